@@ -1,0 +1,1 @@
+"""Simulated autopilots: they live behind the wire protocols of the real ones."""

@@ -1,0 +1,192 @@
+"""The one place where frames are converted.
+
+Names: ``enu`` = east, north, up metres about an origin; ``ned`` = north, east, down about the same origin;
+``flu``/``frd`` = body axes forward, left, up / forward, right, down (REP-103 on the ROS side, MAVLink on the
+other). Yaw: ENU yaw is radians anticlockwise from east, NED heading radians clockwise from north. Quaternions
+are (w, x, y, z) and rotate body into world.
+
+Geodetic to local goes through earth-centred coordinates of the WGS-84 ellipsoid (NIMA TR8350.2) and is exact
+to floating point at any distance. Heights here are one kind throughout: give AMSL and get AMSL (the geoid is
+taken as parallel to the ellipsoid within the local frame; over 10 km that costs at most a few decimetres).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import atan2, cos, degrees, hypot, pi, radians, remainder, sin, sqrt
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+EQUATOR_M = 6_378_137.0
+FLATTENING = 1.0 / 298.257223563
+_E2 = FLATTENING * (2.0 - FLATTENING)
+_HALF = sqrt(0.5)
+
+
+def enu_to_ned(v: Vector) -> Vector:
+    """East, north, up to north, east, down. Its own inverse."""
+    return v[1], v[0], -v[2]
+
+
+ned_to_enu = enu_to_ned
+
+
+def flu_to_frd(v: Vector) -> Vector:
+    """Forward, left, up to forward, right, down. Its own inverse."""
+    return v[0], -v[1], -v[2]
+
+
+frd_to_flu = flu_to_frd
+
+
+def wrap(angle: float) -> float:
+    """The same angle in (-pi, pi], radians."""
+    wrapped = remainder(angle, 2.0 * pi)
+    return pi if wrapped == -pi else wrapped
+
+
+def heading_to_yaw(heading: float) -> float:
+    """NED heading (clockwise from north) to ENU yaw (anticlockwise from east), radians. Its own inverse."""
+    return wrap(pi / 2.0 - heading)
+
+
+yaw_to_heading = heading_to_yaw
+
+
+def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """The Hamilton product p q: rotate by q first, then by p."""
+    pw, px, py, pz = p
+    qw, qx, qy, qz = q
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
+
+
+def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
+    """A FRD-in-NED attitude as the FLU-in-ENU attitude of the same body. Its own inverse."""
+    world: Quaternion = (0.0, _HALF, _HALF, 0.0)
+    body: Quaternion = (0.0, 1.0, 0.0, 0.0)
+    return multiply(multiply(world, q), body)
+
+
+attitude_enu_to_ned = attitude_ned_to_enu
+
+
+def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Intrinsic yaw-pitch-roll (z, y', x'') radians to a quaternion."""
+    cr, sr = cos(roll / 2), sin(roll / 2)
+    cp, sp = cos(pitch / 2), sin(pitch / 2)
+    cy, sy = cos(yaw / 2), sin(yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def quaternion_to_euler(q: Quaternion) -> Vector:
+    """Roll, pitch, yaw in radians. At the poles (pitch = +-90 degrees) roll is zero and yaw takes the rest."""
+    w, x, y, z = q
+    sine = 2.0 * (w * y - z * x)
+    if abs(sine) > 1.0 - 1e-12:
+        return 0.0, (pi / 2.0 if sine > 0 else -pi / 2.0), wrap(-2.0 * atan2(x, w) if sine > 0 else 2.0 * atan2(x, w))
+    cosine = hypot(1.0 - 2.0 * (x * x + y * y), 2.0 * (w * x + y * z))
+    return (
+        atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        atan2(sine, cosine),
+        atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def geodetic_to_ecef(latitude: float, longitude: float, height: float) -> Vector:
+    """WGS-84 degrees and metres to earth-centred, earth-fixed metres."""
+    sin_lat, cos_lat = sin(radians(latitude)), cos(radians(latitude))
+    normal = EQUATOR_M / sqrt(1.0 - _E2 * sin_lat * sin_lat)
+    across = (normal + height) * cos_lat
+    return (
+        across * cos(radians(longitude)),
+        across * sin(radians(longitude)),
+        (normal * (1.0 - _E2) + height) * sin_lat,
+    )
+
+
+def ecef_to_geodetic(ecef: Vector) -> Vector:
+    """Earth-centred metres to WGS-84 latitude, longitude (degrees) and height (metres).
+
+    Bowring's method, iterated on the reduced latitude; below 1e-9 degrees and 1e-6 m for heights from -10 km to 50 km.
+    """
+    x, y, z = ecef
+    across = hypot(x, y)
+    polar = EQUATOR_M * (1.0 - FLATTENING)
+    reduced = atan2(EQUATOR_M * z, polar * across)
+    latitude = reduced
+    for _ in range(3):
+        latitude = atan2(
+            z + _E2 / (1.0 - _E2) * polar * sin(reduced) ** 3, across - _E2 * EQUATOR_M * cos(reduced) ** 3
+        )
+        reduced = atan2((1.0 - FLATTENING) * sin(latitude), cos(latitude))
+    sin_lat = sin(latitude)
+    curvature = sqrt(1.0 - _E2 * sin_lat * sin_lat)
+    height = across * cos(latitude) + z * sin_lat - EQUATOR_M * curvature
+    return degrees(latitude), degrees(atan2(y, x)), height
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """A tangent plane at an origin: converts between WGS-84 degrees/AMSL and local metres.
+
+    ``amsl`` is the origin's altitude in metres above mean sea level.
+    """
+
+    latitude: float
+    longitude: float
+    amsl: float = 0.0
+
+    @cached_property
+    def _origin(self) -> Vector:
+        return geodetic_to_ecef(self.latitude, self.longitude, self.amsl)
+
+    @cached_property
+    def _axes(self) -> tuple[Vector, Vector, Vector]:
+        lat, lon = radians(self.latitude), radians(self.longitude)
+        return (
+            (-sin(lon), cos(lon), 0.0),
+            (-sin(lat) * cos(lon), -sin(lat) * sin(lon), cos(lat)),
+            (cos(lat) * cos(lon), cos(lat) * sin(lon), sin(lat)),
+        )
+
+    def to_enu(self, latitude: float, longitude: float, amsl: float) -> Vector:
+        """Degrees and metres AMSL to east, north, up metres about the origin."""
+        x, y, z = geodetic_to_ecef(latitude, longitude, amsl)
+        dx, dy, dz = x - self._origin[0], y - self._origin[1], z - self._origin[2]
+        east, north, up = self._axes
+        return (
+            east[0] * dx + east[1] * dy + east[2] * dz,
+            north[0] * dx + north[1] * dy + north[2] * dz,
+            up[0] * dx + up[1] * dy + up[2] * dz,
+        )
+
+    def from_enu(self, enu: Vector) -> Vector:
+        """East, north, up metres to latitude, longitude (degrees) and metres AMSL."""
+        east, north, up = self._axes
+        return ecef_to_geodetic(
+            (
+                self._origin[0] + east[0] * enu[0] + north[0] * enu[1] + up[0] * enu[2],
+                self._origin[1] + east[1] * enu[0] + north[1] * enu[1] + up[1] * enu[2],
+                self._origin[2] + east[2] * enu[0] + north[2] * enu[1] + up[2] * enu[2],
+            )
+        )
+
+    def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
+        """Degrees and metres AMSL to north, east, down metres about the origin."""
+        return enu_to_ned(self.to_enu(latitude, longitude, amsl))
+
+    def from_ned(self, ned: Vector) -> Vector:
+        """North, east, down metres to latitude, longitude (degrees) and metres AMSL."""
+        return self.from_enu(ned_to_enu(ned))

@@ -1,0 +1,43 @@
+"""How a lower room reaches a higher one: by name, through entry points. Knows no name itself.
+
+Third parties register with an entry point of their own package; a test or a script with ``add``.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, entry_points
+from typing import Generic, TypeVar
+
+from volery.base.errors import UsageError, choices, did_you_mean
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """Things of one kind, by name: ``drivers.load("ardupilot")``."""
+
+    def __init__(self, group: str, noun: str) -> None:
+        self.group, self.noun = group, noun
+        self._added: dict[str, T] = {}
+
+    def add(self, name: str, thing: T) -> None:
+        """Register *thing* for this process."""
+        self._added[name] = thing
+
+    def _installed(self) -> dict[str, EntryPoint]:
+        return {point.name: point for point in entry_points(group=self.group)}
+
+    def names(self) -> list[str]:
+        """All names, sorted, without importing anything."""
+        return sorted(self._added.keys() | self._installed().keys())
+
+    def load(self, name: str) -> T:
+        """Import and return what goes by *name*; a ``UsageError`` lists the valid names."""
+        if name in self._added:
+            return self._added[name]
+        installed = self._installed()
+        if name not in installed:
+            hint = did_you_mean(name, self.names())
+            raise UsageError(f"no {self.noun} named {name!r}{hint}; there is {choices(self.names())}")
+        loaded: T = installed[name].load()
+        return loaded

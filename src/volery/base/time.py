@@ -1,0 +1,30 @@
+"""Time is an ``int`` of nanoseconds, everywhere inside. Seconds as ``float`` exist at the doors only."""
+
+from __future__ import annotations
+
+Ns = int
+"""A point in time since the start of a run, or a duration, in nanoseconds."""
+
+US: Ns = 1_000
+MS: Ns = 1_000_000
+S: Ns = 1_000_000_000
+MINUTE: Ns = 60 * S
+HOUR: Ns = 60 * MINUTE
+
+
+def from_seconds(seconds: float) -> Ns:
+    """Nearest nanosecond to *seconds* (ties to even)."""
+    return round(seconds * S)
+
+
+def to_seconds(ns: Ns) -> float:
+    """Seconds as a float; exact to a nanosecond for runs of up to 104 days."""
+    return ns / S
+
+
+def clock(ns: Ns) -> str:
+    """``h:mm:ss.mmm`` for people to read, for example ``0:02:07.250``."""
+    sign = "-" if ns < 0 else ""
+    milliseconds = abs(ns) // MS
+    minutes, rest = divmod(milliseconds, 60_000)
+    return f"{sign}{minutes // 60}:{minutes % 60:02d}:{rest // 1000:02d}.{rest % 1000:03d}"

@@ -1,0 +1,1 @@
+"""A vehicle on the ROS graph, under MAVROS's names."""

@@ -1,0 +1,1 @@
+"""The paper's calibration method on the machine at hand. Not there yet."""

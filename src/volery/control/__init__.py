@@ -1,0 +1,1 @@
+"""Controllers, flying code and safety switches. Not there yet."""

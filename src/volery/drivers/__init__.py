@@ -1,0 +1,1 @@
+"""Drivers: how to talk to each autopilot. They know neither world nor autopilots."""

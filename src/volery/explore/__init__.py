@@ -1,0 +1,1 @@
+"""Campaigns and design-space exploration. Not there yet."""

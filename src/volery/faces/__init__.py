@@ -1,0 +1,1 @@
+"""Import faces of client libraries (rospy) over the embedded graph."""

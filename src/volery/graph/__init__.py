@@ -1,0 +1,1 @@
+"""The ROS graph: nodes, topics, services, parameters, and its embedded implementation."""

@@ -1,0 +1,108 @@
+"""A task is a flow of control; a place is where its computing is spent; a scope is who may end it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from volery.base.time import Ns
+
+
+class Cancelled(BaseException):
+    """Ends a task at its next interaction point. No ``Exception``: user code must not catch it by accident."""
+
+
+class Server(Protocol):
+    """A processor, as a task sees it."""
+
+    name: str
+
+    def serve(self, task: Task, amount: Ns) -> None:
+        """Block *task* until *amount* of target time has been executed for it, in contention with others."""
+
+    def load(self, place: Place, amount: Ns) -> None:
+        """Execute *amount* beside whatever the caller does: background threads of a process. Never blocks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where computing is spent: whose it is, on which processor, how urgent, and how it is metered.
+
+    ``processor`` is ``None`` where computing takes no simulated time. ``priority`` ``None`` means the caller's (a
+    passive component). ``deadline`` is relative to the release of an activation. ``meter`` gives the execution time on
+    the target since it was last asked; it is pulled at every interaction point.
+    """
+
+    component: str
+    processor: Server | None = None
+    priority: int | None = 0
+    deadline: Ns | None = None
+    meter: Callable[[], Ns] | None = None
+
+
+class Task:
+    """One flow of control. The kernel that spawned it owns ``flow`` and the fields below it."""
+
+    def __init__(self, name: str, place: Place, scope: Scope) -> None:
+        self.name = name
+        self.places = [place]
+        self.scope = scope
+        self.debt: Ns = 0
+        self.released: Ns | None = None  # of the activation that is under way
+        self.done = False
+        self.flow: Any = None
+        self.waiting_for = ""
+        self.woken = False
+        self.ticket = 0  # the wait it is in; a wake-up meant for another wait is void
+        self.refusals = 0  # how often it has swallowed its end
+        scope.tasks.append(self)
+
+    @property
+    def place(self) -> Place:
+        """Where it computes now: its own place, or that of the component it is visiting through a port."""
+        return self.places[-1]
+
+    @property
+    def priority(self) -> int:
+        """Of the innermost place that states one."""
+        return next((place.priority for place in reversed(self.places) if place.priority is not None), 0)
+
+    def charge(self, amount: Ns) -> None:
+        """Owe *amount* of target time, to be served at the next interaction point."""
+        self.debt += amount
+
+    def take_debt(self) -> Ns:
+        """What is owed, the meter's reading included; zero from now on."""
+        amount, self.debt = self.debt, 0
+        meter = self.places[-1].meter
+        return amount + meter() if meter else amount
+
+
+@dataclass(eq=False)
+class Scope:
+    """A tree of tasks that are ended together."""
+
+    name: str
+    parent: Scope | None = None
+    tasks: list[Task] = field(default_factory=list)
+    children: list[Scope] = field(default_factory=list)
+    cancelled: str = ""  # why; empty while it lives
+
+    def child(self, name: str) -> Scope:
+        """A scope that ends when this one does, or earlier."""
+        scope = Scope(name, self, cancelled=self.cancelled)
+        self.children.append(scope)
+        return scope
+
+    def all_tasks(self) -> Iterator[Task]:
+        """Every task in this scope and below."""
+        yield from self.tasks
+        for child in self.children:
+            yield from child.all_tasks()
+
+    def mark(self, why: str) -> None:
+        """Remember, here and below, that it has ended. Waking the tasks is the kernel's part."""
+        self.cancelled = self.cancelled or why
+        for child in self.children:
+            child.mark(why)

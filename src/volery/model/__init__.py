@@ -1,0 +1,1 @@
+"""The system model as frozen data with source lines."""

@@ -1,0 +1,1 @@
+"""Mapping, marker detection and route planning. Not there yet."""

@@ -1,0 +1,1 @@
+"""Bounds as folds over the event stream: the same code while running and from a trace read back."""

@@ -1,0 +1,1 @@
+"""Joins everything: simulate() and fly(). The only room that sees every other."""

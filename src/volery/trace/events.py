@@ -1,0 +1,207 @@
+"""The one schema of a run: everything that is recorded is one of these.
+
+All times are ``int`` nanoseconds since the start of the run. An event is a fact; what it costs, means or
+violates is worked out by those who read the stream.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from volery.base.time import Ns
+
+NONE: Ns = -1
+"""No deadline, no such time."""
+
+
+class Slice(NamedTuple):
+    """A task ran on a core of a processor from ``start`` to ``end`` without a break."""
+
+    start: Ns
+    end: Ns
+    processor: str
+    core: int
+    task: str
+    component: str
+
+
+class Charge(NamedTuple):
+    """Computing was added to what a component owes its processor.
+
+    ``kind`` is ``code``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is what the calling task
+    pays before it goes on, ``background`` what its process pays beside it, both target time at the processor's
+    frequency; ``energy`` in joules is given only where the model states it for the operation, else 0.0.
+    """
+
+    at: Ns
+    component: str
+    processor: str
+    kind: str
+    caller: Ns
+    background: Ns
+    energy: float
+
+
+class Activation(NamedTuple):
+    """One activation of an active component: from its release to its next blocking wait.
+
+    ``deadline`` is absolute, or ``NONE``.
+    """
+
+    released: Ns
+    finished: Ns
+    component: str
+    deadline: Ns
+
+
+class Call(NamedTuple):
+    """One operation through a port, from the caller's call to the caller's return."""
+
+    start: Ns
+    end: Ns
+    caller: str
+    callee: str
+    operation: str
+    outcome: str  # "ok", or the class name of the error
+
+
+class Message(NamedTuple):
+    """A ROS message reached a subscriber (``received``), or was lost on the way (``received == NONE``)."""
+
+    sent: Ns
+    received: Ns
+    topic: str
+    publisher: str
+    subscriber: str
+    size: int
+
+
+class Published(NamedTuple):
+    """The content of a ROS message as it was published, already in ROS 2 CDR encoding."""
+
+    at: Ns
+    topic: str
+    type: str
+    publisher: str
+    data: bytes
+
+
+class VehicleState(NamedTuple):
+    """A vehicle as it is (truth, ENU metres about the world's origin) and as its autopilot believes.
+
+    Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates are NaN
+    while the autopilot has none.
+    """
+
+    at: Ns
+    vehicle: str
+    x: float
+    y: float
+    z: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    vx: float
+    vy: float
+    vz: float
+    estimated_x: float
+    estimated_y: float
+    estimated_z: float
+    battery: float
+    volts: float
+    amperes: float
+    armed: bool
+    mode: str
+
+
+class Operation(NamedTuple):
+    """A vehicle operation (take-off, goto, ...) from its call to its end, with how far off it ended.
+
+    Errors in metres, horizontal and vertical, by the autopilot's own estimate and by truth; NaN where there is none.
+    """
+
+    start: Ns
+    end: Ns
+    vehicle: str
+    operation: str
+    asked: str
+    outcome: str  # "ok", or the class name of the error
+    said: str  # the error's message
+    estimate_horizontal: float
+    estimate_vertical: float
+    true_horizontal: float
+    true_vertical: float
+
+
+class Milestone(NamedTuple):
+    """Something that the application follows, such as a parcel, entered a state."""
+
+    at: Ns
+    component: str
+    kind: str
+    subject: str
+    state: str
+    detail: str
+
+
+class Text(NamedTuple):
+    """Words: a component's log line or an autopilot's status text. ``severity`` as in syslog: 0 emergency .. 7 debug."""
+
+    at: Ns
+    source: str
+    severity: int
+    text: str
+
+
+class LinkState(NamedTuple):
+    """A link came up, went silent, was lost or came back."""
+
+    at: Ns
+    link: str
+    state: str
+    detail: str
+
+
+class Failure(NamedTuple):
+    """A component or the run itself failed."""
+
+    at: Ns
+    who: str
+    what: str
+
+
+class Verdict(NamedTuple):
+    """A requirement at the end of a run. ``observed`` is NaN when nothing was there to observe (and ``met`` False)."""
+
+    at: Ns
+    requirement: str
+    observable: str
+    relation: str  # "max" or "min"
+    bound: float
+    observed: float
+    met: bool
+
+
+Event = (
+    Slice
+    | Charge
+    | Activation
+    | Call
+    | Message
+    | Published
+    | VehicleState
+    | Operation
+    | Milestone
+    | Text
+    | LinkState
+    | Failure
+    | Verdict
+)
+Record = Callable[[Any], None]
+"""What a room that has something to tell is given: call it with an ``Event``."""
+
+
+def ignore(event: Event) -> None:
+    """A record that keeps nothing."""

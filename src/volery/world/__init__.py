@@ -1,0 +1,1 @@
+"""Laws of bodies: multirotor, rover, wind, battery, terrain, sensors. Imports base only."""
