@@ -1,0 +1,60 @@
+# Everything sets itself up in .venv; nothing outside this folder is touched, except that `make test` asks
+# scripts/debian-packages for programs it drives (it prints what it installs, and why).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check -q
+
+.PHONY: demo test check bench docs clean
+.DEFAULT_GOAL := demo
+
+demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
+	$(BIN)/volery demo
+
+test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
+	$(BIN)/pytest --durations=10 $(TESTS)
+
+check: $(VENV)/dev.stamp ## style, types, and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	PYTHONPATH=src $(BIN)/lint-imports
+
+bench: $(VENV)/bench.stamp ## every figure that the README and the docs claim
+	@set -e; for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script; done
+
+docs: $(VENV)/docs.stamp ## regenerate the generated pages, build the site into site/
+	$(BIN)/python scripts/generate_docs.py
+	$(BIN)/mkdocs build --strict --quiet
+	@echo "docs: site/index.html"
+
+clean: ## remove what was built, not what was recorded
+	rm -rf $(VENV) build dist site .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+
+$(BIN)/python:
+	@$(PYTHON) -m venv $(VENV) 2>/dev/null || { scripts/debian-packages python3-venv && $(PYTHON) -m venv $(VENV); }
+	@$(PIP) install -U 'pip>=25.1'
+
+$(VENV)/volery.stamp: pyproject.toml | $(BIN)/python
+	@echo "setting up $(VENV): volery and what it needs"
+	@$(PIP) install -e .
+	@touch $@
+
+$(VENV)/dev.stamp: $(VENV)/volery.stamp
+	@echo "setting up $(VENV): tests and checks"
+	@$(PIP) install --group dev
+	@touch $@
+
+$(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages
+	@echo "setting up $(VENV): independent MAVLink clients"
+	@$(PIP) install --group clients
+	@scripts/debian-packages chromium
+	@touch $@
+
+$(VENV)/bench.stamp: $(VENV)/dev.stamp
+	@$(PIP) install --group bench
+	@touch $@
+
+$(VENV)/docs.stamp: $(VENV)/dev.stamp
+	@$(PIP) install --group docs
+	@touch $@
