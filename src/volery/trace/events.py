@@ -29,9 +29,10 @@ class Slice(NamedTuple):
 class Charge(NamedTuple):
     """Computing was added to what a component owes its processor.
 
-    ``kind`` is ``code``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is what the calling task
-    pays before it goes on, ``background`` what its process pays beside it, both target time at the processor's
-    frequency; ``energy`` in joules is given only where the model states it for the operation, else 0.0.
+    ``kind`` is ``code``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is what the
+    calling task pays before it goes on, ``background`` what its process pays beside it, both target time at
+    the processor's frequency; ``energy`` in joules is given only where the model states it for the operation,
+    else 0.0.
     """
 
     at: Ns
@@ -90,8 +91,8 @@ class Published(NamedTuple):
 class VehicleState(NamedTuple):
     """A vehicle as it is (truth, ENU metres about the world's origin) and as its autopilot believes.
 
-    Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates are NaN
-    while the autopilot has none.
+    Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates
+    are NaN while the autopilot has none.
     """
 
     at: Ns
@@ -119,7 +120,8 @@ class VehicleState(NamedTuple):
 class Operation(NamedTuple):
     """A vehicle operation (take-off, goto, ...) from its call to its end, with how far off it ended.
 
-    Errors in metres, horizontal and vertical, by the autopilot's own estimate and by truth; NaN where there is none.
+    Errors in metres, horizontal and vertical, by the autopilot's own estimate and by truth; NaN where there
+    is none.
     """
 
     start: Ns
@@ -147,7 +149,10 @@ class Milestone(NamedTuple):
 
 
 class Text(NamedTuple):
-    """Words: a component's log line or an autopilot's status text. ``severity`` as in syslog: 0 emergency .. 7 debug."""
+    """Words: a component's log line or an autopilot's status text.
+
+    ``severity`` is that of syslog: 0 emergency .. 7 debug.
+    """
 
     at: Ns
     source: str
@@ -173,7 +178,10 @@ class Failure(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """A requirement at the end of a run. ``observed`` is NaN when nothing was there to observe (and ``met`` False)."""
+    """A requirement at the end of a run.
+
+    ``observed`` is NaN when nothing was there to observe (and ``met`` False).
+    """
 
     at: Ns
     requirement: str

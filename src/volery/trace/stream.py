@@ -16,5 +16,6 @@ class Stream:
         self._taps.append(listener)
 
     def __call__(self, event: Event) -> None:
+        """Tell everybody."""
         for listener in self._taps:
             listener(event)

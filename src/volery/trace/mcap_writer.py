@@ -1,0 +1,327 @@
+"""Writes the events of a run as an MCAP file with ROS 2 messages: ``trace.mcap``.
+
+The same run gives the same bytes: no wall time, no version, no compression. Chunks end with each simulated
+second and go to the operating system at once, so a killed process loses at most the last simulated second.
+Records other than messages are built by the ``mcap`` library; messages, of which there are millions, by
+precompiled encoders.
+
+Format: https://mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from array import array
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from io import FileIO
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mcap import records
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns, S
+from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
+from volery.trace.events import NONE, Event, Message, Published, VehicleState
+from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_to_json
+
+MAGIC = b"\x89MCAP0\r\n"
+TRACE_SCHEMA = "volery-trace/1"
+MESSAGE_FRAME = "BQHIQQ"
+"""Opcode, length, channel, sequence, log time, publish time: what stands before a message's data."""
+MESSAGE_OVERHEAD = struct.calcsize(f"<{MESSAGE_FRAME}") - 9
+"""What a message record's length counts beside its data: the frame without opcode and length."""
+_ROS2_PROFILE = "ros2"
+_MESSAGE = int(Opcode.MESSAGE)
+
+Definitions = Callable[[str], str]
+"""Gives the complete ``ros2msg`` text of a type such as ``std_msgs/msg/String``, dependencies included."""
+
+
+class Attachment(NamedTuple):
+    """A file that travels within a trace."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+def _no_definition(_: str) -> str:
+    return ""
+
+
+def _times(kind: type[Any]) -> Callable[[Any], tuple[Ns, Ns]]:
+    """When an event was told and when what it tells of began: MCAP's log time and publish time."""
+    if kind is Message:
+        return lambda event: (event.sent if event.received == NONE else event.received, event.sent)
+    fields = kind._fields
+    for log, publish in (("end", "start"), ("finished", "released"), ("at", "at")):
+        if log in fields:
+            return itemgetter(fields.index(log), fields.index(publish))
+    raise TypeError(f"{kind.__name__} says no time")
+
+
+def _record(thing: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    thing.write(builder)
+    return builder.end()  # type: ignore[no-untyped-call, no-any-return]  # the library left it bare
+
+
+def _write_all(file: FileIO, data: bytes) -> None:
+    rest = memoryview(data)
+    while rest:
+        rest = rest[file.write(rest) :]
+
+
+class McapWriter:
+    """A tap of the stream that writes ``trace.mcap``. Call it with events, then ``close`` it.
+
+    Gives every type of published message to *definitions* once. Should the disk fill up or the file become
+    unwritable, the writer cuts the file back to its last whole record, keeps nothing more and says so in
+    ``problem``; a run need not end for it. Raises ``UsageError`` if the file cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        setup: RunSetup,
+        attachments: Iterable[Attachment] = (),
+        definitions: Definitions = _no_definition,
+    ) -> None:
+        self.path = path
+        self.problem = ""
+        try:
+            self._file = path.open("wb", buffering=0)
+        except OSError as error:
+            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        self._definitions = definitions
+        self._summary = _Summary()
+        self._size = 0
+        self._body = bytearray()
+        self._indexes: dict[int, array[int]] = {}
+        self._chunk_ends: Ns = S
+        self._schemas: dict[str, int] = {}
+        self._published: dict[tuple[str, str, str], int] = {}
+        self._writers: dict[type[Any], Callable[[Any], None]] = {kind: self._own(kind) for kind in OWN_EVENTS}
+        self._writers[Published] = self._write_published
+        self._put(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
+        self.metadata("volery", {"schema": TRACE_SCHEMA, "seed": str(setup.seed)})
+        self.attach(Attachment(SETUP_ATTACHMENT, "application/json", setup_to_json(setup)))
+        for attachment in attachments:
+            self.attach(attachment)
+
+    def __call__(self, event: Event) -> None:
+        """Write one event."""
+        self._writers[type(event)](event)
+
+    def attach(self, attachment: Attachment) -> None:
+        """Add a file to the trace; it carries no time."""
+        self.flush()
+        name, media_type, data = attachment
+        record = _record(records.Attachment(0, 0, name, media_type, data))
+        index = records.AttachmentIndex(self._size, len(record), 0, 0, len(data), name, media_type)
+        if self._put(record):
+            self._summary.attachments.append(index)
+
+    def metadata(self, name: str, values: dict[str, str]) -> None:
+        """Add words by name to the trace."""
+        self.flush()
+        record = _record(records.Metadata(name=name, metadata=values))
+        index = records.MetadataIndex(offset=self._size, length=len(record), name=name)
+        if self._put(record):
+            self._summary.metadata.append(index)
+
+    def flush(self) -> None:
+        """End the chunk and hand it to the operating system: it survives the death of this process."""
+        if not self._indexes:
+            return
+        body = bytes(self._body)
+        indexes = self._indexes
+        self._body = bytearray()
+        self._indexes = {}
+        first = min(min(index[::2]) for index in indexes.values())
+        last = max(max(index[::2]) for index in indexes.values())
+        chunk = _record(
+            records.Chunk(
+                compression="",
+                data=body,
+                message_start_time=first,
+                message_end_time=last,
+                uncompressed_crc=zlib.crc32(body),
+                uncompressed_size=len(body),
+            )
+        )
+        listed = b""
+        offsets = {}
+        for channel, index in indexes.items():
+            offsets[channel] = self._size + len(chunk) + len(listed)
+            listed += _index_record(channel, index)
+        entry = records.ChunkIndex(
+            chunk_length=len(chunk),
+            chunk_start_offset=self._size,
+            compression="",
+            compressed_size=len(body),
+            message_end_time=last,
+            message_index_length=len(listed),
+            message_index_offsets=offsets,
+            message_start_time=first,
+            uncompressed_size=len(body),
+        )
+        if self._put(chunk + listed):
+            self._summary.chunk(entry, {channel: len(index) // 2 for channel, index in indexes.items()})
+
+    def close(self) -> None:
+        """Write what is left, the summary and the index. A second call does nothing."""
+        if self._file.closed:
+            return
+        self.flush()
+        self._put(_record(records.DataEnd(0)))
+        self._put(self._summary.bytes(self._size) + MAGIC)
+        self._file.close()
+
+    def _put(self, data: bytes) -> bool:
+        if self.problem or self._file.closed:
+            return False
+        try:
+            _write_all(self._file, data)
+        except OSError as error:
+            self._give_up(error)
+            return False
+        self._size += len(data)
+        return True
+
+    def _give_up(self, error: OSError) -> None:
+        why = error.strerror or error
+        self.problem = f"cannot write {self.path} any more: {why}; the trace ends after {self._size} bytes"
+        with suppress(OSError):  # the reader copes with a file that is cut anywhere
+            self._file.truncate(self._size)
+
+    def _schema(self, name: str, text: str) -> int:
+        known = self._schemas.get(name)
+        if known is None:
+            known = self._schemas[name] = len(self._schemas) + 1
+            record = _record(records.Schema(id=known, data=text.encode(), encoding="ros2msg", name=name))
+            self._summary.schemas.append(record)
+            self._body += record
+        return known
+
+    def _channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
+        channel = len(self._summary.channels) + 1
+        record = _record(records.Channel(channel, topic, "cdr", metadata, schema))
+        self._summary.channels.append(record)
+        self._body += record
+        return channel
+
+    def _own(self, kind: type[Any]) -> Callable[[Any], None]:
+        """A function that writes events of one kind of ours: the hot path."""
+        codec = Codec(kind)
+        pack = struct.Struct(f"<{MESSAGE_FRAME}{codec.codes}").pack
+        overhead = MESSAGE_OVERHEAD + codec.fixed
+        times, numbers, words, tail_of = _times(kind), codec.numbers, codec.words, codec.tail
+        channels: dict[str, int] = {}
+        topic = f"/volery/{kind.__name__.lower()}"
+        of_vehicle = kind is VehicleState
+
+        def write(event: Any) -> None:
+            log, publish = times(event)
+            if publish >= self._chunk_ends:
+                self._end_second(publish)
+            subject = event.vehicle if of_vehicle else ""
+            channel = channels.get(subject)
+            if channel is None:
+                schema = self._schema(type_name(kind), codec.definition)
+                name = f"/volery/{subject}/state" if of_vehicle else topic
+                channel = channels[subject] = self._channel(name, schema, {})
+            tail = tail_of(words(event))
+            body = self._body
+            index = self._indexes.get(channel)
+            if index is None:
+                index = self._indexes[channel] = array("Q")
+            index.append(log)
+            index.append(len(body))
+            length = overhead + len(tail)
+            body += (
+                pack(_MESSAGE, length, channel, 0, log, publish, LITTLE_ENDIAN_CDR, *numbers(event)) + tail
+            )
+
+        return write
+
+    def _write_published(self, event: Published) -> None:
+        if event.at >= self._chunk_ends:
+            self._end_second(event.at)
+        key = (event.topic, event.type, event.publisher)
+        channel = self._published.get(key)
+        if channel is None:
+            schema = self._schema(event.type, self._definitions(event.type))
+            channel = self._channel(event.topic, schema, {"publisher": event.publisher})
+            self._published[key] = channel
+        index = self._indexes.setdefault(channel, array("Q"))
+        index.extend((event.at, len(self._body)))
+        length = MESSAGE_OVERHEAD + len(event.data)
+        self._body += struct.pack(f"<{MESSAGE_FRAME}", _MESSAGE, length, channel, 0, event.at, event.at)
+        self._body += event.data
+
+    def _end_second(self, now: Ns) -> None:
+        self.flush()
+        self._chunk_ends = (now // S + 1) * S
+
+
+def _index_record(channel: int, index: array[int]) -> bytes:
+    pairs = index.tobytes()
+    return struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(pairs), channel, len(pairs)) + pairs
+
+
+class _Summary:
+    """What stands at the end of the file, so that a reader need not read all of it."""
+
+    def __init__(self) -> None:
+        self.schemas: list[bytes] = []
+        self.channels: list[bytes] = []
+        self.chunks: list[records.ChunkIndex] = []
+        self.attachments: list[records.AttachmentIndex] = []
+        self.metadata: list[records.MetadataIndex] = []
+        self._counts: dict[int, int] = {}
+
+    def chunk(self, entry: records.ChunkIndex, counts: dict[int, int]) -> None:
+        """A chunk was written, with so many messages per channel."""
+        self.chunks.append(entry)
+        for channel, count in counts.items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+
+    def _statistics(self) -> records.Statistics:
+        return records.Statistics(
+            attachment_count=len(self.attachments),
+            channel_count=len(self.channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self.chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=max((entry.message_end_time for entry in self.chunks), default=0),
+            message_start_time=min((entry.message_start_time for entry in self.chunks), default=0),
+            metadata_count=len(self.metadata),
+            schema_count=len(self.schemas),
+        )
+
+    def bytes(self, start: int) -> bytes:
+        """The summary section and the footer of a file whose data section ends at *start*."""
+        groups = [
+            (Opcode.SCHEMA, b"".join(self.schemas)),
+            (Opcode.CHANNEL, b"".join(self.channels)),
+            (Opcode.STATISTICS, _record(self._statistics())),
+            (Opcode.CHUNK_INDEX, b"".join(_record(entry) for entry in self.chunks)),
+            (Opcode.ATTACHMENT_INDEX, b"".join(_record(entry) for entry in self.attachments)),
+            (Opcode.METADATA_INDEX, b"".join(_record(entry) for entry in self.metadata)),
+        ]
+        body = b""
+        offsets = b""
+        for opcode, data in groups:
+            if data:
+                offsets += _record(records.SummaryOffset(opcode, start + len(body), len(data)))
+                body += data
+        summary = body + offsets
+        footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, start + len(body))
+        return summary + footer + struct.pack("<I", zlib.crc32(footer, zlib.crc32(summary)))

@@ -1,0 +1,201 @@
+"""The one reader of a trace, whole or cut anywhere.
+
+A trace whose writer was killed has no summary and may end within a chunk. The reader therefore never needs
+the summary: it walks through the records from the start, takes every whole one and says what is missing.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns, clock
+from volery.trace.encoding import OWN_EVENTS, Codec, type_name
+from volery.trace.events import Event, Published
+from volery.trace.mcap_writer import MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
+from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_from_json
+
+_HEAD = struct.Struct("<BQ")
+_FRAME = struct.Struct(f"<{MESSAGE_FRAME[2:]}")
+# start, end, uncompressed size, checksum, length of the name of the compression
+_CHUNK_HEAD = struct.Struct("<QQQII")
+_CHUNK_OVERHEAD = _CHUNK_HEAD.size + 8
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A run, read back: its events in the order in which they were told.
+
+    ``complete`` is False if the writer never finished; ``lost`` then says in words what is missing.
+    """
+
+    setup: RunSetup
+    events: tuple[Event, ...]
+    attachments: dict[str, Attachment] = field(default_factory=dict)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    complete: bool = True
+    lost: str = ""
+
+
+def read(path: Path) -> Trace:
+    """The trace in a file. Raises ``UsageError`` if there is none, or not enough of it to know its set-up."""
+    with Reading(path) as reading:
+        events = tuple(reading.events())
+    return Trace(reading.setup, events, reading.attachments, reading.metadata, reading.complete, reading.lost)
+
+
+class _Record(NamedTuple):
+    opcode: int
+    content: bytes
+    missing: int  # how many bytes of it are not there
+
+
+class Reading:
+    """Reads a trace as far as one asks: iterate over ``events()`` once, then look at ``complete`` and
+    ``lost``.
+
+    The set-up and the attachments made at the start are known from the beginning, later ones when
+    ``events()`` has passed them. A context, since it holds the file open. Raises ``UsageError`` as ``read``
+    does.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.attachments: dict[str, Attachment] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.complete = False
+        self.lost = ""
+        self._codecs = {type_name(kind): Codec(kind) for kind in OWN_EVENTS}
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, tuple[str, str, str]] = {}
+        self._last: Ns = 0
+        try:
+            self._file: BinaryIO = path.open("rb")
+        except OSError as error:
+            raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+        if self._file.read(len(MAGIC)) != MAGIC:
+            self._file.close()
+            raise UsageError(f"{path} is not a trace: it does not begin as an MCAP file does")
+        self._records = self._walk()
+        self._pending: _Record | None = None
+        self.setup = self._read_beginning()
+
+    def __enter__(self) -> Reading:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def events(self) -> Iterator[Event]:
+        """All events, in the order in which they were told."""
+        record = self._pending
+        while record is not None:
+            if record.opcode == Opcode.CHUNK:
+                yield from self._events_of_chunk(record)
+            elif record.opcode == Opcode.DATA_END:
+                self.complete = not record.missing
+            record = self._next()
+        self.complete = self.complete and self._ends_well()
+        if not self.complete:
+            self.lost = self.lost or (
+                f"the writer never finished; everything up to {clock(self._last)} was kept, "
+                "at most the second after it is missing"
+            )
+
+    def _read_beginning(self) -> RunSetup:
+        self._pending = self._next()
+        while self._pending is not None and self._pending.opcode != Opcode.CHUNK:
+            if self._pending.opcode == Opcode.DATA_END:
+                break
+            self._pending = self._next()
+        if self.metadata.get("volery", {}).get("schema", TRACE_SCHEMA) != TRACE_SCHEMA:
+            found = self.metadata["volery"]["schema"]
+            raise UsageError(f"{self.path} has schema {found!r}; this version reads {TRACE_SCHEMA!r}")
+        if SETUP_ATTACHMENT not in self.attachments:
+            what = "does not say how the run was set up: cut too early, or not a trace of volery"
+            raise UsageError(f"{self.path} {what}")
+        return setup_from_json(self.attachments[SETUP_ATTACHMENT].data)
+
+    def _walk(self) -> Iterator[_Record]:
+        while True:
+            head = self._file.read(_HEAD.size)
+            if len(head) < _HEAD.size:
+                return
+            opcode, length = _HEAD.unpack(head)
+            content = self._file.read(min(length, 1 << 40))
+            yield _Record(opcode, content, length - len(content))
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER) or len(content) < length:
+                return
+
+    def _next(self) -> _Record | None:
+        """The next record, after what it says about the file itself has been noted."""
+        record = next(self._records, None)
+        if record is None or record.missing:
+            return record
+        if record.opcode == Opcode.ATTACHMENT:
+            found = records.Attachment.read(_stream(record.content))
+            self.attachments[found.name] = Attachment(found.name, found.media_type, found.data)
+        elif record.opcode == Opcode.METADATA:
+            words = records.Metadata.read(_stream(record.content))
+            self.metadata[words.name] = dict(words.metadata)
+        return record
+
+    def _ends_well(self) -> bool:
+        self._file.seek(0, 2)
+        self._file.seek(max(0, self._file.tell() - len(MAGIC)))
+        return self._file.read() == MAGIC
+
+    def _events_of_chunk(self, record: _Record) -> Iterator[Event]:
+        if len(record.content) < _CHUNK_OVERHEAD:
+            return
+        *_, checksum, name_length = _CHUNK_HEAD.unpack_from(record.content)
+        if name_length:
+            raise UsageError(f"{self.path} is compressed, which no trace of volery is")
+        body = record.content[_CHUNK_OVERHEAD:]
+        if not record.missing and zlib.crc32(body) != checksum:
+            self.lost = f"a part that ends after {clock(self._last)} is damaged: its checksum is wrong"
+            return
+        yield from self._events_of_body(body)
+
+    def _events_of_body(self, body: bytes) -> Iterator[Event]:
+        at = 0
+        while at + _HEAD.size <= len(body):
+            opcode, length = _HEAD.unpack_from(body, at)
+            at += _HEAD.size
+            if at + length > len(body):
+                return
+            if opcode == Opcode.MESSAGE:
+                yield self._event(body, at, at + length)
+            elif opcode == Opcode.SCHEMA:
+                schema = records.Schema.read(_stream(body[at : at + length]))
+                self._schemas[schema.id] = schema.name
+            elif opcode == Opcode.CHANNEL:
+                channel = records.Channel.read(_stream(body[at : at + length]))
+                publisher = channel.metadata.get("publisher", "")
+                self._channels[channel.id] = (self._schemas[channel.schema_id], channel.topic, publisher)
+            at += length
+
+    def _event(self, body: bytes, start: int, end: int) -> Event:
+        channel, _, log, _ = _FRAME.unpack_from(body, start)
+        schema, topic, publisher = self._channels[channel]
+        data = body[start + _FRAME.size : end]
+        self._last = max(self._last, log)
+        codec = self._codecs.get(schema)
+        if codec is None:
+            return Published(log, topic, schema, publisher, data)
+        event: Event = codec.decode(data)
+        return event
+
+
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))
