@@ -1,5 +1,7 @@
-"""What a link is: messages to and from one peer, as values. In one process they travel as they are; on a wire a
-codec turns them into bytes and back."""
+"""What a link is: messages to and from one peer, as values.
+
+In one process they travel as values; on a wire a codec turns them into bytes and back.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 
 class Frame(NamedTuple):
-    """A message: its name and fields as the protocol defines them (MAVLink: ``HEARTBEAT``, ``custom_mode`` ...).
+    """A message: its name and fields as the protocol defines them (``HEARTBEAT``, ``custom_mode`` ...).
 
     ``system`` and ``component`` are the sender's ids. Fields are never changed after sending.
     """
@@ -34,7 +36,7 @@ class Link(Protocol):
         """From now on hand every frame that arrives to *receiver*."""
 
     def problem(self) -> str:
-        """What is wrong with the wire, in words for the user (``only text arrives: ...``); empty if nothing is."""
+        """What is wrong with the wire, in words for the user (``only text arrives: ...``); else empty."""
 
     def close(self) -> None:
         """Let go of sockets and threads."""

@@ -1,0 +1,180 @@
+"""MAVLink 2 as bytes: a ``Frame`` to its wire form and back.
+
+Dialect ``ardupilotmega``, which holds ``common``. The message definitions are pymavlink's; packing uses them
+directly instead of pymavlink's message objects, which cost ten times as much. Arrays are tuples of numbers, ``char[]`` fields are ``str``. A field that is
+not given is zero or empty, as the protocol says of fields that an older sender does not know. Signatures
+are neither written nor checked.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from volery.base.errors import UsageError, did_you_mean
+from volery.links.link import Frame
+
+STX = 0xFD
+STX_V1 = 0xFE
+HEADER = struct.Struct("<BBBBBBBHB")  # STX, length, two flags, sequence, system, component, id low, high
+HEADER_V1 = struct.Struct("<BBBBBB")  # STX, length, sequence, system, component, id
+CHECKSUM = struct.Struct("<H")
+SIGNED = 0x01
+SIGNATURE_LENGTH = 13
+
+
+class _Field(NamedTuple):
+    name: str
+    length: int  # 1 for a single value, else how many
+    text: bool
+
+
+class MessageType:
+    """One message of the dialect: its id and how its fields lie on the wire."""
+
+    def __init__(self, definition: Any) -> None:
+        self.name: str = definition.msgname
+        self.id: int = definition.id
+        self.field_names: tuple[str, ...] = tuple(definition.fieldnames)
+        self._extra = bytes([definition.crc_extra])
+        self._struct: struct.Struct = definition.unpacker
+        self._fields = tuple(self._laid_out(definition))
+        self._names = tuple(field.name for field in self._fields)
+        self._known = frozenset(self._names)
+        self._plain = all(field.length == 1 and not field.text for field in self._fields)
+
+    @staticmethod
+    def _laid_out(definition: Any) -> list[_Field]:
+        texts = {
+            name
+            for name, kind in zip(definition.fieldnames, definition.fieldtypes, strict=True)
+            if kind == "char"
+        }
+        return [
+            _Field(name, length, name in texts)
+            for name, length in zip(definition.ordered_fieldnames, definition.lengths, strict=True)
+        ]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the payload with nothing cut off."""
+        return self._struct.size
+
+    def pack(self, fields: Mapping[str, Any]) -> bytes:
+        """The whole payload. Raises ``UsageError`` naming a field that does not exist or does not fit."""
+        if not self._known.issuperset(fields):
+            raise self._unknown_field(fields)
+        try:
+            if self._plain:
+                return self._struct.pack(*[fields.get(name, 0) for name in self._names])
+            return self._struct.pack(*self._flat(fields))
+        except (struct.error, OverflowError, TypeError, ValueError) as error:
+            raise UsageError(f"{self.name}: a field does not fit ({error}): {dict(fields)}") from None
+
+    def _flat(self, fields: Mapping[str, Any]) -> list[Any]:
+        values: list[Any] = []
+        for field in self._fields:
+            given = fields.get(field.name)
+            if field.text:
+                values.append((given or "").encode()[: field.length])
+            elif field.length == 1:
+                values.append(given or 0)
+            else:
+                given = tuple(given or ())
+                if len(given) > field.length:
+                    raise ValueError(f"{field.name} has room for {field.length} values")
+                values += given + (0,) * (field.length - len(given))
+        return values
+
+    def _unknown_field(self, fields: Mapping[str, Any]) -> UsageError:
+        wrong = next(name for name in fields if name not in self._known)
+        hint = did_you_mean(wrong, self.field_names)
+        return UsageError(f"{self.name} has no field {wrong!r}{hint}; it has {', '.join(self.field_names)}")
+
+    def unpack(self, payload: bytes) -> dict[str, Any]:
+        """The fields of a payload, which may be shorter (zeros were cut off) or longer (a newer sender)."""
+        size = self._struct.size
+        values = self._struct.unpack(payload[:size].ljust(size, b"\0"))
+        if self._plain:
+            return dict(zip(self._names, values, strict=True))
+        fields: dict[str, Any] = {}
+        place = 0
+        for field in self._fields:
+            if field.text:
+                fields[field.name] = values[place].split(b"\0", 1)[0].decode(errors="replace")
+                place += 1
+            elif field.length == 1:
+                fields[field.name] = values[place]
+                place += 1
+            else:
+                fields[field.name] = values[place : place + field.length]
+                place += field.length
+        return fields
+
+    def checksum(self, covered: bytes) -> int:
+        """X.25 (CRC-16/MCRF4XX) over everything after STX and the message's own extra byte."""
+        return int(mcrf4xx(covered + self._extra))
+
+
+_TYPES = {number: MessageType(definition) for number, definition in dialect.mavlink_map.items()}
+_BY_NAME = {kind.name: kind for kind in _TYPES.values()}
+
+
+def message_type(name: str) -> MessageType:
+    """The definition of the message called *name*; ``UsageError`` if the dialect has none."""
+    kind = _BY_NAME.get(name)
+    if kind is None:
+        raise UsageError(f"MAVLink has no message {name!r}{did_you_mean(name, _BY_NAME)}")
+    return kind
+
+
+def message_type_of(number: int) -> MessageType | None:
+    """The definition of message *number*; ``None`` if the dialect has none."""
+    return _TYPES.get(number)
+
+
+@cache
+def constant(name: str) -> int:
+    """The value of an enumeration entry, such as ``MAV_CMD_NAV_TAKEOFF``."""
+    value = getattr(dialect, name, None)
+    if not isinstance(value, int):
+        raise UsageError(f"MAVLink has no constant {name!r}")
+    return value
+
+
+@cache
+def entry_name(enumeration: str, value: int) -> str:
+    """The name of *value* in an enumeration without the enumeration's own: ``("MAV_RESULT", 4)`` is
+    ``FAILED``.
+    """
+    entries = dialect.enums.get(enumeration)
+    if entries is None:
+        hint = did_you_mean(enumeration, dialect.enums)
+        raise UsageError(f"MAVLink has no enumeration {enumeration!r}{hint}")
+    entry = entries.get(value)
+    if entry is None:
+        return str(value)
+    return str(entry.name).removeprefix(f"{enumeration}_")
+
+
+def quantised(frame: Frame) -> Frame:
+    """The frame as it arrives after a trip over the wire: 32-bit floats, strings cut to length, all fields
+    present.
+    """
+    kind = message_type(frame.name)
+    return Frame(frame.name, kind.unpack(kind.pack(frame.fields)), frame.system, frame.component)
+
+
+def encode(frame: Frame, sequence: int) -> bytes:
+    """The frame in MAVLink 2 wire form; *sequence* counts the frames of one sender (taken modulo 256)."""
+    kind = message_type(frame.name)
+    payload = kind.pack(frame.fields).rstrip(b"\0") or b"\0"
+    low, high = kind.id & 0xFFFF, kind.id >> 16
+    sender = frame.system, frame.component
+    header = HEADER.pack(STX, len(payload), 0, 0, sequence % 256, *sender, low, high)
+    return header + payload + CHECKSUM.pack(kind.checksum(header[1:] + payload))

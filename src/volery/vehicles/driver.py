@@ -1,0 +1,159 @@
+"""What a driver is: facts that it keeps, and for each operation the steps that its autopilot wants.
+
+A driver answers with data and never waits; ``perform`` runs the steps of every driver for every vehicle. So
+time-outs, refusals, starting over, takeover and fences exist once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, NamedTuple, Protocol
+
+from volery.base.position import Position
+from volery.base.registry import Registry
+from volery.base.time import Ns, S
+from volery.kernel.api import Action, Kernel
+from volery.vehicles.mission import MissionItem
+from volery.vehicles.telemetry import Telemetry
+
+
+class Capability(Enum):
+    """What a vehicle may be asked for. A driver states which of these its autopilot can do."""
+
+    TAKEOFF = "take off"
+    GOTO = "go to a position"
+    SPEED = "go at a stated speed"
+    VELOCITY = "follow a velocity"
+    HEADING = "turn to a heading"
+    RETURN_HOME = "return home"
+    LAND = "land"
+    HOLD = "hold its place"
+    STICKS = "be flown by sticks"
+    STABILIZE = "fly stabilized"
+    ALTITUDE_HOLD = "hold its altitude"
+    MISSION = "fly an uploaded mission"
+    TERRAIN = "keep an altitude above ground"
+
+
+class Repeat(NamedTuple):
+    """Something that is done each ``period``."""
+
+    period: Ns
+    action: Action
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One thing asked of an autopilot, and how one sees that it is done.
+
+    ``send`` asks; it and every other function here is house code that never blocks, ``cycle`` excepted.
+    ``done`` looks at the telemetry. ``answer`` is the key of the acknowledgement that counts
+    (``Telemetry.answers``). ``again`` asks once more at this period: until the answer, or where the
+    autopilot gives none, until it is done. ``enters`` is the mode that this step commands. ``mode`` is the
+    mode in which it must stay while it goes on, ``armed`` whether it must stay armed. ``keep`` is sent all
+    the while. ``cycle`` is for carriers that are nodes of a graph: it runs in the caller's own task each
+    period and may block, so that its computing is charged to the caller. ``advice`` says what the user can
+    do if it is refused.
+    """
+
+    ask: str
+    send: Action
+    done: Callable[[Telemetry], bool]
+    within: Ns
+    answer: str = ""
+    again: Ns | None = S
+    enters: str = ""
+    mode: str = ""
+    armed: bool = False
+    keep: Repeat | None = None
+    cycle: Repeat | None = None
+    advice: str = ""
+
+
+class Sticks(NamedTuple):
+    """The four sticks: pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1.
+
+    In altitude hold a throttle of 0.5 keeps the altitude. A rover takes roll for steering.
+    """
+
+    pitch: float = 0.0
+    roll: float = 0.0
+    throttle: float = 0.5
+    yaw: float = 0.0
+
+
+class Driver(Protocol):
+    """Talks to one autopilot. Each operation answers with the steps to perform, in order."""
+
+    name: str
+    telemetry: Telemetry
+    capabilities: frozenset[Capability]
+    handover: str
+    """The mode in which the autopilot obeys a computer: a pilot hands over by choosing it."""
+
+    def ready(self, within: Ns) -> Sequence[Step]:
+        """Until it could arm and fly by position."""
+
+    def arm(self) -> Sequence[Step]:
+        """In the mode it is in."""
+
+    def disarm(self, force: bool) -> Sequence[Step]:
+        """*force* stops the motors in the air, too."""
+
+    def takeoff(self, height: float) -> Sequence[Step]:
+        """To *height* metres above home, sequence from the ground and disarmed included."""
+
+    def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
+        """To *goal* (AMSL, above home or, with ``Capability.TERRAIN``, above ground) at *speed* m/s."""
+
+    def hold(self) -> Sequence[Step]:
+        """Stop and stay."""
+
+    def velocity(self, north: float, east: float, up: float, yaw_rate: float) -> Sequence[Step]:
+        """Follow m/s and degrees per second clockwise; it stands until the next step of any operation."""
+
+    def heading(self, degrees: float) -> Sequence[Step]:
+        """Turn to *degrees* clockwise from north."""
+
+    def return_home(self, within: Ns) -> Sequence[Step]:
+        """And land there; a rover stops there."""
+
+    def land(self, within: Ns) -> Sequence[Step]:
+        """Here, until disarmed."""
+
+    def stabilize(self) -> Sequence[Step]:
+        """The sticks command attitude and throttle."""
+
+    def altitude_hold(self) -> Sequence[Step]:
+        """The sticks command attitude and climb rate."""
+
+    def manual(self) -> Sequence[Step]:
+        """The sticks command the vehicle directly (rovers)."""
+
+    def sticks(self, sticks: Sticks | None) -> None:
+        """Keep sending these; ``None`` lets go of them."""
+
+    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
+        """Replace the mission on board."""
+
+    def start_mission(self, within: Ns) -> Sequence[Step]:
+        """From its first item to its end; take-off included."""
+
+    def stop(self) -> None:
+        """Let go of set-points that are being repeated. The vehicle holds or follows its own mode."""
+
+    def problem(self) -> str:
+        """What is wrong with the way to the autopilot, in words; empty if nothing is."""
+
+    def close(self) -> None:
+        """Stop talking and let go of the link."""
+
+
+Opener = Callable[[Kernel, Any, str, Mapping[str, str]], Driver]
+"""``open_driver(kernel, channel, name, options)``: *channel* is a link, or the node for a driver that rides
+on a graph; *options* are those of the address. Raises ``UsageError`` for options it does not know.
+"""
+
+drivers: Registry[Opener] = Registry("volery.drivers", "driver")
