@@ -1,1 +1,42 @@
-"""ROS message types: definitions, values and their ROS 1 and ROS 2 bytes."""
+"""ROS message types: definitions, values, and their bytes. The only room that imports rosbags.
+
+Within one process a message is a value of the class that this room makes for its type, in the definitions of
+ROS 2 Humble; the few packages that the stores lack are written out in ``definitions/``. Knows nobody but
+``base``: it must not know what a graph is, nor who sends what.
+"""
+
+from volery.messages.cdr import cdr_size, from_cdr, to_cdr
+from volery.messages.message import Message
+from volery.messages.packages import modules
+from volery.messages.store import (
+    ServiceType,
+    define,
+    definition,
+    message_class,
+    message_name,
+    new,
+    request,
+    service,
+    service_name,
+    service_types,
+    types,
+)
+
+__all__ = [
+    "Message",
+    "ServiceType",
+    "cdr_size",
+    "define",
+    "definition",
+    "from_cdr",
+    "message_class",
+    "message_name",
+    "modules",
+    "new",
+    "request",
+    "service",
+    "service_name",
+    "service_types",
+    "to_cdr",
+    "types",
+]
