@@ -1,0 +1,258 @@
+"""What a run comes to: one fold over its events, the same while it runs and from a trace read back.
+
+Memory does not grow with time, only with what the run is made of and with what the application follows
+(parcels, vehicle operations, failures). It prices nothing: the energy law of processors is handed in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import fsum
+from typing import Any, NamedTuple
+
+from volery.base.time import Ns, to_seconds
+from volery.requirements.ledgers import ComponentLedger, EnergyLaw, VehicleLedger, known, linear_energy
+from volery.requirements.record import (
+    FailureRecord,
+    LawRecord,
+    OutcomeRecord,
+    ParcelRecord,
+    ProcessorRecord,
+    RequirementRecord,
+    RunRecord,
+    Status,
+    StepRecord,
+)
+from volery.trace.events import (
+    Activation,
+    Call,
+    Charge,
+    Event,
+    Failure,
+    Milestone,
+    Operation,
+    Slice,
+    VehicleState,
+    Verdict,
+)
+from volery.trace.setup import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
+
+PARCEL = "parcel"
+"""The kind of milestone that tells of parcels."""
+
+
+class Circumstances(NamedTuple):
+    """What stands in ``run.json`` alone, since it differs from one execution of a run to the next."""
+
+    wall_s: float | None = None
+    versions: Mapping[str, str] = {}
+
+
+UNKNOWN_CIRCUMSTANCES = Circumstances()
+
+
+class Accounts:
+    """A tap of the stream that keeps the accounts of a run. Ask for its ``record`` at any time."""
+
+    def __init__(self, setup: RunSetup, energy: EnergyLaw = linear_energy) -> None:
+        self.setup = setup
+        self._energy = energy
+        self._components = {one.name: ComponentLedger(one, one.processor) for one in setup.components}
+        self._processors = {one.name: one for one in setup.processors}
+        self._busy: dict[str, Ns] = dict.fromkeys(self._processors, 0)
+        self._vehicles = {one.name: VehicleLedger(one) for one in setup.vehicles}
+        self._parcels: dict[str, list[Milestone]] = {}
+        self._verdicts: dict[str, Verdict] = {}
+        self._failures: list[Failure] = []
+        self._last: Ns = 0
+        self._folds: dict[type[Any], Callable[[Any], Ns]] = {
+            Slice: self._slice,
+            Charge: self._charge,
+            Activation: self._activation,
+            Call: self._call,
+            VehicleState: self._vehicle_state,
+            Operation: self._operation,
+            Milestone: self._milestone,
+            Failure: self._failure,
+            Verdict: self._verdict,
+        }
+
+    def __call__(self, event: Event) -> None:
+        """Take one event into account."""
+        fold = self._folds.get(type(event))
+        at: Ns = event[0] if fold is None else fold(event)  # of all others only their time counts
+        self._last = max(self._last, at)
+
+    def _component(self, name: str, processor: str) -> ComponentLedger:
+        ledger = self._components.get(name)
+        if ledger is None:
+            ledger = self._components[name] = ComponentLedger(ComponentSetup(name), processor)
+        return ledger
+
+    def _slice(self, event: Slice) -> Ns:
+        ran = event.end - event.start
+        self._component(event.component, event.processor).executed += ran
+        if event.processor not in self._busy:
+            self._processors[event.processor] = ProcessorSetup(event.processor)
+            self._busy[event.processor] = 0
+        self._busy[event.processor] += ran
+        return event.end
+
+    def _charge(self, event: Charge) -> Ns:
+        self._component(event.component, event.processor).charge(event)
+        return event.at
+
+    def _activation(self, event: Activation) -> Ns:
+        self._component(event.component, "").activation(event)
+        return event.finished
+
+    def _call(self, event: Call) -> Ns:
+        self._component(event.callee, "").call(event)
+        return event.end
+
+    def _vehicle(self, name: str) -> VehicleLedger:
+        ledger = self._vehicles.get(name)
+        if ledger is None:
+            ledger = self._vehicles[name] = VehicleLedger(VehicleSetup(name))
+        return ledger
+
+    def _vehicle_state(self, event: VehicleState) -> Ns:
+        self._vehicle(event.vehicle).state(event)
+        return event.at
+
+    def _operation(self, event: Operation) -> Ns:
+        self._vehicle(event.vehicle).operations.append(event)
+        return event.end
+
+    def _milestone(self, event: Milestone) -> Ns:
+        if event.kind == PARCEL:
+            self._parcels.setdefault(event.subject, []).append(event)
+        return event.at
+
+    def _failure(self, event: Failure) -> Ns:
+        self._failures.append(event)
+        return event.at
+
+    def _verdict(self, event: Verdict) -> Ns:
+        self._verdicts[event.requirement] = event
+        return event.at
+
+    def record(
+        self,
+        status: Status,
+        reason: str = "",
+        ended: Ns | None = None,
+        circumstances: Circumstances = UNKNOWN_CIRCUMSTANCES,
+    ) -> RunRecord:
+        """The contents of ``run.json`` for a run that ended at *ended*; without it, at its last event."""
+        setup = self.setup
+        elapsed = to_seconds(self._last if ended is None else ended)
+        wall = circumstances.wall_s
+        return RunRecord(
+            system=setup.system,
+            fidelity=setup.fidelity,
+            allocation=setup.allocation,
+            scenario=setup.scenario,
+            seed=setup.seed,
+            outcome=OutcomeRecord(status=status, reason=reason, requirements_met=self._all_met()),
+            components={
+                name: ledger.record(self._above_idle(ledger.processor))
+                for name, ledger in self._components.items()
+            },
+            processors={name: self._processor_record(name, elapsed) for name in self._processors},
+            vehicles={name: ledger.record() for name, ledger in self._vehicles.items()},
+            parcels={subject: _parcel(steps) for subject, steps in self._parcels.items()},
+            requirements=self._requirements(),
+            failures=[
+                FailureRecord(at_s=to_seconds(one.at), who=one.who, what=one.what) for one in self._failures
+            ],
+            laws=[
+                LawRecord(
+                    name=one.name,
+                    source=one.source,
+                    provenance=one.provenance,
+                    validity=one.validity,
+                    warning=one.warning,
+                )
+                for one in setup.laws
+            ],
+            not_counted=[*setup.not_counted, *self._not_counted()],
+            warnings=list(setup.warnings),
+            versions=dict(sorted(circumstances.versions.items())),
+            sim_s=elapsed,
+            wall_s=wall,
+            real_time_factor=elapsed / wall if wall else None,
+        )
+
+    def _above_idle(self, processor: str) -> Callable[[float], float | None]:
+        setup = self._processors.get(processor)
+        return lambda busy_s: None if setup is None else self._energy(setup, busy_s, 0.0)
+
+    def _processor_record(self, name: str, elapsed: float) -> ProcessorRecord:
+        setup = self._processors[name]
+        mine = [ledger for ledger in self._components.values() if ledger.processor == name]
+        by_law = self._energy(setup, fsum(ledger.unpriced_s() for ledger in mine), elapsed)
+        stated = fsum(ledger.stated_j for ledger in mine)
+        busy = to_seconds(self._busy[name])
+        return ProcessorRecord(
+            kind=setup.kind,
+            frequency_mhz=setup.frequency_mhz,
+            scheduler=setup.scheduler,
+            cores=setup.cores,
+            utilisation=busy / (elapsed * setup.cores) if elapsed else 0.0,
+            energy_j=None if by_law is None else by_law + stated,
+        )
+
+    def _requirements(self) -> dict[str, RequirementRecord]:
+        units = {one.name: one.unit for one in self.setup.requirements}
+        found = {
+            one.name: RequirementRecord(
+                observable=one.observable,
+                relation=one.relation,
+                bound=one.bound,
+                unit=one.unit,
+                observed=None,
+                met=None,
+            )
+            for one in self.setup.requirements
+        }
+        for name, verdict in self._verdicts.items():
+            found[name] = RequirementRecord(
+                observable=verdict.observable,
+                relation=verdict.relation,
+                bound=verdict.bound,
+                unit=units.get(name, ""),
+                observed=known(verdict.observed),
+                met=verdict.met,
+            )
+        return found
+
+    def _all_met(self) -> bool | None:
+        if not self._verdicts:
+            return None
+        return all(verdict.met for verdict in self._verdicts.values())
+
+    def _not_counted(self) -> list[str]:
+        """What the accounts themselves can see is missing."""
+        missing = []
+        for name, ledger in self._components.items():
+            if not ledger.processor:
+                missing.append(
+                    f"{name}: allocated to no processor, so its computing took no time and no energy"
+                )
+            elif ledger.uncounted():
+                missing.append(f"{name}: no cost of its own code was counted, only its ROS calls")
+        for name, setup in self._processors.items():
+            if self._energy(setup, 1.0, 1.0) is None:
+                missing.append(f"{name}: no power figures for {setup.kind or 'this processor'}, so no energy")
+        return missing
+
+
+def _parcel(steps: list[Milestone]) -> ParcelRecord:
+    return ParcelRecord(
+        state=steps[-1].state,
+        history=[
+            StepRecord(at_s=to_seconds(one.at), state=one.state, component=one.component, detail=one.detail)
+            for one in steps
+        ],
+    )

@@ -1,0 +1,212 @@
+"""The ledgers of a run's accounts: one per component, one per vehicle, each closing to a record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import hypot, isnan, sqrt
+
+from volery.base.time import Ns, to_seconds
+from volery.requirements.distribution import Distribution
+from volery.requirements.record import (
+    ComponentRecord,
+    OffsetRecord,
+    OperationRecord,
+    ResponseRecord,
+    VehicleRecord,
+)
+from volery.trace.events import NONE, Activation, Call, Charge, Operation, VehicleState
+from volery.trace.setup import ComponentSetup, ProcessorSetup, VehicleSetup
+
+ROS_PREFIX = "ros:"
+STILL_M_S = 0.3
+AIRBORNE_M = 0.3
+
+EnergyLaw = Callable[[ProcessorSetup, float, float], float | None]
+"""Joules that a processor takes for so many busy core-seconds within so many seconds, ``None`` without
+figures.
+
+With zero elapsed seconds it must give what the busy core-seconds take above idle.
+"""
+
+
+def linear_energy(processor: ProcessorSetup, busy_core_s: float, elapsed_s: float) -> float | None:
+    """Idle power all the time, plus the step from idle to busy in proportion to the busy cores.
+
+    E = idle_w * elapsed + (busy_w - idle_w) * busy / cores: the linear model of Fan, Weber and Barroso,
+    *Power Provisioning for a Warehouse-sized Computer*, ISCA 2007, section 3.
+    """
+    if processor.idle_w is None or processor.busy_w is None:
+        return None
+    step = processor.busy_w - processor.idle_w
+    return processor.idle_w * elapsed_s + step * busy_core_s / processor.cores
+
+
+@dataclass
+class ComponentLedger:
+    """What one component was charged, executed and answered."""
+
+    setup: ComponentSetup
+    processor: str
+    executed: Ns = 0
+    ros: Ns = 0
+    priced: Ns = 0  # charged time whose energy the model states
+    stated_j: float = 0.0
+    charges: int = 0  # other than ROS calls
+    ros_calls: dict[str, int] = field(default_factory=dict)
+    misses: int = 0
+    activations: Distribution = field(default_factory=Distribution)
+    calls: Distribution = field(default_factory=Distribution)
+
+    def charge(self, event: Charge) -> None:
+        """Computing was owed."""
+        owed = event.caller + event.background
+        if event.kind.startswith(ROS_PREFIX):
+            self.ros += owed
+            call = event.kind[len(ROS_PREFIX) :]
+            self.ros_calls[call] = self.ros_calls.get(call, 0) + 1
+        else:
+            self.charges += 1
+        if event.energy:
+            self.stated_j += event.energy
+            self.priced += owed
+
+    def activation(self, event: Activation) -> None:
+        """An activation ended."""
+        self.activations.add(event.finished - event.released)
+        if event.deadline != NONE and event.finished > event.deadline:
+            self.misses += 1
+
+    def call(self, event: Call) -> None:
+        """It served a call."""
+        self.calls.add(event.end - event.start)
+
+    def unpriced_s(self) -> float:
+        """Executed seconds whose energy the law of the processor must give."""
+        return to_seconds(max(0, self.executed - self.priced))
+
+    def uncounted(self) -> bool:
+        """It worked, but no computing of its own was ever charged."""
+        return not self.charges and bool(self.activations.count or self.calls.count)
+
+    def record(self, energy: Callable[[float], float | None]) -> ComponentRecord:
+        """Its row; *energy* gives joules above idle for busy core-seconds of its processor."""
+        unpriced = self.unpriced_s()
+        by_law = energy(unpriced) if unpriced else 0.0
+        return ComponentRecord(
+            processor=self.processor,
+            language=self.setup.language,
+            cpu_s=to_seconds(self.executed),
+            ros_cpu_s=to_seconds(self.ros),
+            ros_calls=dict(sorted(self.ros_calls.items())),
+            energy_j=None if by_law is None else self.stated_j + by_law,
+            activations=self.activations.count,
+            deadline_misses=self.misses,
+            calls=self.calls.count,
+            response_s=self._response(),
+        )
+
+    def _response(self) -> ResponseRecord:
+        spread = self.activations if self.activations.count else self.calls
+        mean, p95 = spread.mean(), spread.quantile(0.95)
+        if mean is None or p95 is None:
+            return ResponseRecord()
+        return ResponseRecord(
+            of="activations" if self.activations.count else "calls",
+            count=spread.count,
+            mean=mean * 1e-9,
+            p95=to_seconds(p95),
+            max=to_seconds(spread.largest),
+        )
+
+
+@dataclass
+class VehicleLedger:
+    """Where one vehicle went and what it took."""
+
+    setup: VehicleSetup
+    last: VehicleState | None = None
+    ground: float = 0.0
+    distance: float = 0.0
+    armed: Ns = 0
+    airborne: Ns = 0
+    joules: float = 0.0
+    metered: bool = False
+    operations: list[Operation] = field(default_factory=list)
+
+    def state(self, event: VehicleState) -> None:
+        """It was seen; states come in the order of time."""
+        if not event.armed:
+            self.ground = event.z
+        if self.last is not None:
+            self._between(self.last, event)
+        self.last = event
+
+    def _between(self, before: VehicleState, after: VehicleState) -> None:
+        elapsed = after.at - before.at
+        dx, dy, dz = after.x - before.x, after.y - before.y, after.z - before.z
+        self.distance += sqrt(dx * dx + dy * dy + dz * dz)
+        if before.armed:
+            self.armed += elapsed
+            if self.setup.kind != "rover" and before.z - self.ground > AIRBORNE_M:
+                self.airborne += elapsed
+        watts = (before.volts * before.amperes + after.volts * after.amperes) / 2.0
+        if not isnan(watts):
+            self.metered = True
+            self.joules += watts * to_seconds(elapsed)
+
+    def record(self) -> VehicleRecord:
+        """Its row."""
+        done = [one for one in self.operations if one.outcome == "ok"]
+        last = self.last
+        return VehicleRecord(
+            autopilot=self.setup.autopilot,
+            kind=self.setup.kind,
+            distance_m=self.distance,
+            armed_s=to_seconds(self.armed),
+            airborne_s=to_seconds(self.airborne),
+            energy_j=self.joules if self.metered else None,
+            battery=None if last is None else known(last.battery),
+            landed=None if last is None else _stands(last),
+            error_by_estimate_m=OffsetRecord(
+                horizontal=largest([one.estimate_horizontal for one in done]),
+                vertical=largest([one.estimate_vertical for one in done]),
+            ),
+            error_by_truth_m=OffsetRecord(
+                horizontal=largest([one.true_horizontal for one in done]),
+                vertical=largest([one.true_vertical for one in done]),
+            ),
+            operations=[_operation(one) for one in self.operations],
+        )
+
+
+def _stands(state: VehicleState) -> bool:
+    return not state.armed and hypot(state.vx, state.vy, state.vz) < STILL_M_S
+
+
+def _operation(event: Operation) -> OperationRecord:
+    return OperationRecord(
+        operation=event.operation,
+        asked=event.asked,
+        start_s=to_seconds(event.start),
+        end_s=to_seconds(event.end),
+        outcome=event.outcome,
+        said=event.said,
+        error_by_estimate_m=OffsetRecord(
+            horizontal=known(event.estimate_horizontal), vertical=known(event.estimate_vertical)
+        ),
+        error_by_truth_m=OffsetRecord(
+            horizontal=known(event.true_horizontal), vertical=known(event.true_vertical)
+        ),
+    )
+
+
+def known(value: float) -> float | None:
+    """The value, or ``None`` where an event says NaN."""
+    return None if isnan(value) else value
+
+
+def largest(values: list[float]) -> float | None:
+    """The value farthest from zero, its sign dropped; ``None`` if all are NaN or there are none."""
+    sizes = [abs(value) for value in values if not isnan(value)]
+    return max(sizes, default=None)

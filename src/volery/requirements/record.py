@@ -1,0 +1,204 @@
+"""``run.json``: what one run came to, as documented in ``docs/run-folder.md``.
+
+Seconds, metres, joules, megahertz. A value that nobody observed is ``null``, never zero. Wall time and
+versions stand here and nowhere else in a run folder.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from volery.base.errors import UsageError
+
+RUN_SCHEMA: Final = "volery-run/1"
+RUN_FILE = "run.json"
+
+Status = Literal["completed", "interrupted", "failed", "unfinished"]
+"""``interrupted``: by the user. ``failed``: something raised. ``unfinished``: killed, its trace is all there is."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class OutcomeRecord(_Part):
+    """How the run ended. ``requirements_met`` is ``null`` where there were no verdicts."""
+
+    status: Status
+    reason: str = ""
+    requirements_met: bool | None = None
+
+
+class ResponseRecord(_Part):
+    """Response times in seconds: of activations from release to end, else of calls as callers saw them."""
+
+    of: Literal["activations", "calls"] | None = None
+    count: int = 0
+    mean: float | None = None
+    p95: float | None = None
+    max: float | None = None
+
+
+class ComponentRecord(_Part):
+    """What a component cost. ``cpu_s`` was executed on its processor; ``ros_cpu_s`` is the part owed to ROS
+    calls.
+
+    ``energy_j`` is what the model states for its operations, else by the energy law of its processor above
+    idle.
+    """
+
+    processor: str
+    language: str
+    cpu_s: float
+    ros_cpu_s: float
+    ros_calls: dict[str, int]
+    energy_j: float | None
+    activations: int
+    deadline_misses: int
+    calls: int
+    response_s: ResponseRecord
+
+
+class ProcessorRecord(_Part):
+    """A processor; ``utilisation`` is the busy share of all its cores over the run, 0..1."""
+
+    kind: str
+    frequency_mhz: float
+    scheduler: str
+    cores: int
+    utilisation: float
+    energy_j: float | None
+
+
+class OffsetRecord(_Part):
+    """How far from what was asked, in metres."""
+
+    horizontal: float | None
+    vertical: float | None
+
+
+class OperationRecord(_Part):
+    """One vehicle operation and how far off it ended."""
+
+    operation: str
+    asked: str
+    start_s: float
+    end_s: float
+    outcome: str
+    said: str
+    error_by_estimate_m: OffsetRecord
+    error_by_truth_m: OffsetRecord
+
+
+class VehicleRecord(_Part):
+    """What a vehicle did; the errors are the largest of all operations that succeeded.
+
+    ``airborne_s`` is the time armed and more than 0.3 m above where it last stood disarmed. ``landed`` is
+    true if it stands still, disarmed, at the end.
+    """
+
+    autopilot: str
+    kind: str
+    distance_m: float
+    armed_s: float
+    airborne_s: float
+    energy_j: float | None
+    battery: float | None
+    landed: bool | None
+    error_by_estimate_m: OffsetRecord
+    error_by_truth_m: OffsetRecord
+    operations: list[OperationRecord]
+
+
+class StepRecord(_Part):
+    """A state that a parcel entered."""
+
+    at_s: float
+    state: str
+    component: str
+    detail: str
+
+
+class ParcelRecord(_Part):
+    """A parcel: its state at the end and how it came there. It is in exactly one state at any time."""
+
+    state: str
+    history: list[StepRecord]
+
+
+class RequirementRecord(_Part):
+    """A bound, what was observed (``null``: nothing) and whether it was met."""
+
+    observable: str
+    relation: str
+    bound: float
+    unit: str
+    observed: float | None
+    met: bool | None
+
+
+class FailureRecord(_Part):
+    """What failed when."""
+
+    at_s: float
+    who: str
+    what: str
+
+
+class LawRecord(_Part):
+    """A law that priced the run."""
+
+    name: str
+    source: str
+    provenance: str
+    validity: str
+    warning: str
+
+
+class RunRecord(_Part):
+    """The whole of ``run.json``."""
+
+    schema_: Literal["volery-run/1"] = Field(default=RUN_SCHEMA, alias="schema")
+    system: str
+    fidelity: str
+    allocation: str
+    scenario: str
+    seed: int
+    outcome: OutcomeRecord
+    components: dict[str, ComponentRecord]
+    processors: dict[str, ProcessorRecord]
+    vehicles: dict[str, VehicleRecord]
+    parcels: dict[str, ParcelRecord]
+    requirements: dict[str, RequirementRecord]
+    failures: list[FailureRecord]
+    laws: list[LawRecord]
+    not_counted: list[str]
+    warnings: list[str]
+    versions: dict[str, str]
+    sim_s: float
+    wall_s: float | None
+    real_time_factor: float | None
+
+
+def write_record(record: RunRecord, folder: Path) -> Path:
+    """Write ``run.json`` into *folder*; ``UsageError`` if that cannot be done."""
+    path = folder / RUN_FILE
+    try:
+        path.write_text(record.model_dump_json(by_alias=True, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+    return path
+
+
+def read_record(folder: Path) -> RunRecord:
+    """The ``run.json`` of *folder*; ``UsageError`` if there is none or it is of another version."""
+    path = folder / RUN_FILE
+    try:
+        return RunRecord.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+    except ValidationError as error:
+        raise UsageError(f"{path} is not a {RUN_SCHEMA} document: {error}") from error
