@@ -6,7 +6,7 @@ In one process they travel as values; on a wire a codec turns them into bytes an
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 
 class Frame(NamedTuple):
@@ -40,3 +40,11 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Let go of sockets and threads."""
+
+
+@runtime_checkable
+class ByteLink(Protocol):
+    """A link that is bytes on a wire, and so can carry some that are no frame: a boot loader's greeting, noise."""
+
+    def send_bytes(self, data: bytes) -> None:
+        """Put *data* on the wire as it is."""
