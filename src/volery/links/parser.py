@@ -96,20 +96,28 @@ class Parser:
         return min(starts, default=len(self._buffer))
 
     def _frame_length(self) -> int:
-        """Bytes of the frame that seems to start here; 0 if none does. More than there are if that is not
-        known yet.
-        """
+        """Bytes of the frame that seems to start here; 0 if none does; more than there are if unknown yet."""
         buffer = self._buffer
         if buffer[0] == STX_V1:
-            return HEADER_V1.size + buffer[1] + CHECKSUM.size if len(buffer) > 1 else len(buffer) + 1
+            return self._frame_length_v1()
         if len(buffer) < HEADER.size:
             return len(buffer) + 1
-        _, payload, incompatible, *_, low, high = HEADER.unpack_from(buffer)
-        kind = message_type_of(low | high << 16)
+        payload, incompatible = buffer[1], buffer[2]
+        kind = message_type_of(_sender(buffer, old=False)[2])
         if incompatible & ~SIGNED or (kind is not None and payload > kind.size):
             return 0
         signature = SIGNATURE_LENGTH if incompatible & SIGNED else 0
-        return HEADER.size + int(payload) + CHECKSUM.size + signature
+        return HEADER.size + payload + CHECKSUM.size + signature
+
+    def _frame_length_v1(self) -> int:
+        """As above. Of the old protocol only known messages count: noise looks like the others."""
+        buffer = self._buffer
+        if len(buffer) < HEADER_V1.size:
+            return len(buffer) + 1
+        kind = message_type_of(_sender(buffer, old=True)[2])
+        if kind is None or buffer[1] > kind.size:
+            return 0
+        return HEADER_V1.size + buffer[1] + CHECKSUM.size
 
     def _take(self, length: int, frames: list[Frame]) -> None:
         raw = bytes(self._buffer[:length])
@@ -161,7 +169,7 @@ class Parser:
             self._line.append(octet)
 
 
-def _sender(raw: bytes, old: bool) -> tuple[int, int, int]:
+def _sender(raw: bytes | bytearray, old: bool) -> tuple[int, int, int]:
     """System, component and message number."""
     if old:
         *_, system, component, number = HEADER_V1.unpack_from(raw)
