@@ -1,1 +1,27 @@
-"""Laws of computing: what ROS calls, code and energy take on a processor. Imports base only."""
+"""Laws of computing: what ROS calls, code and energy take on a processor of the catalogue.
+
+Imports ``base`` only. It must not know who calls, when, or what else runs: it turns a kind, an amount and a
+frequency into nanoseconds, joules or watts, and says where its figures come from and how far they reach. A
+missing figure is an ``EstimateError``, never zero.
+"""
+
+from volery.cost.catalogue import Catalogue, Figure, ProcessorEntry, catalogue
+from volery.cost.code import CodeLaw
+from volery.cost.energy import PowerLaw
+from volery.cost.operation import scale_energy, scale_time
+from volery.cost.ros import NOT_COUNTED, Price, RosLaw, Tariff
+
+__all__ = [
+    "NOT_COUNTED",
+    "Catalogue",
+    "CodeLaw",
+    "Figure",
+    "PowerLaw",
+    "Price",
+    "ProcessorEntry",
+    "RosLaw",
+    "Tariff",
+    "catalogue",
+    "scale_energy",
+    "scale_time",
+]

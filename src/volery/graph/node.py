@@ -71,8 +71,8 @@ class Cost(Protocol):
 
 Price = Callable[[NodeId, str, float], Cost]
 """``price(node, call, x)``. The calls are ``init``, ``node_handle``, ``advertise``, ``subscribe``,
-``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the topic), ``sleep`` (x = microseconds
-slept) and ``spin_once`` (x = 1 for the first of this node, 0 after it)."""
+``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the topic), ``sleep`` (x =
+microseconds slept) and ``spin_once`` (x = 1 for the first of this node, 0 after it)."""
 
 Carry = Callable[[NodeId, NodeId, int, bool, Callable[[], None], Callable[[], None]], None]
 """``carry(sender, receiver, size, reliable, deliver, lost)``: bring *size* bytes from node to node, then call

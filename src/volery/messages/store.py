@@ -66,7 +66,7 @@ def _register(into: Typestore, texts: dict[str, str]) -> None:
 def define(name: str, text: str) -> None:
     """Add a type of your own from the text of its ``.msg`` or ``.srv`` file.
 
-    *name* is ``package/msg/Name`` or ``package/srv/Name``. Raises ``UsageError`` if the text is no definition or
+    *name* is ``package/msg/Name`` or ``package/srv/Name``. ``UsageError`` if the text is no definition or
     the name is taken by another one.
     """
     if len(name.split("/")) != 3 or name.split("/")[1] not in ("msg", "srv"):
