@@ -92,7 +92,7 @@ class ComponentLedger:
     def record(self, energy: Callable[[float], float | None]) -> ComponentRecord:
         """Its row; *energy* gives joules above idle for busy core-seconds of its processor."""
         unpriced = self.unpriced_s()
-        by_law = energy(unpriced) if unpriced else 0.0
+        by_law = energy(unpriced)
         return ComponentRecord(
             processor=self.processor,
             language=self.setup.language,

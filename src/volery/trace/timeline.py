@@ -1,0 +1,190 @@
+"""Writes ``timeline.json``: who ran on which core when, for https://ui.perfetto.dev and chrome://tracing.
+
+The trace-event format (*Trace Event Format*, Google, 2016) as its JSON array, which by its definition may
+lack the closing bracket: a file whose writer was killed opens as far as it goes. A process of the timeline is
+a processor of the run and a thread one of its cores; activations, calls, vehicle operations and what the
+application follows have tracks of their own. The format's time is microseconds; three decimals keep the
+nanoseconds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.trace.events import (
+    Activation,
+    Call,
+    Event,
+    Failure,
+    LinkState,
+    Milestone,
+    Operation,
+    Slice,
+    Verdict,
+)
+
+_quote = json.JSONEncoder(ensure_ascii=False).encode
+
+_ACTIVATIONS = "activations"
+_CALLS = "calls"
+_OPERATIONS = "vehicle operations"
+_FOLLOWED = "followed"
+_RUN = "the run"
+
+
+class TimelineWriter:
+    """A tap of the stream that writes ``timeline.json``. Call it with events, then ``close`` it.
+
+    Raises ``UsageError`` if the file cannot be made; should it become unwritable later, ``problem`` says so.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.problem = ""
+        try:
+            self._file = path.open("w", encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        self._lines: list[str] = []
+        self._first = True
+        self._processes: dict[str, int] = {}
+        self._threads: dict[tuple[str, str], str] = {}
+        self._spans = 0
+        self._states: dict[tuple[str, str], Milestone] = {}
+        self._last: Ns = 0
+        self._writers: dict[type[Any], Callable[[Any], None]] = {
+            Slice: self._slice,
+            Activation: self._activation,
+            Call: self._call,
+            Operation: self._operation,
+            Milestone: self._milestone,
+            LinkState: self._link_state,
+            Failure: self._failure,
+            Verdict: self._verdict,
+        }
+
+    def __call__(self, event: Event) -> None:
+        """Write one event, if the timeline shows its kind."""
+        writer = self._writers.get(type(event))
+        if writer is not None:
+            writer(event)
+
+    def close(self) -> None:
+        """Let what is still under way end with the run, and close the file. A second call does nothing."""
+        if self._file.closed:
+            return
+        for state in self._states.values():
+            self._state_until(state, max(self._last, state.at))
+        self._write_out()
+        if not self.problem:
+            self._write("\n]\n" if not self._first else "[]\n")
+        with suppress(OSError):  # what could not be written was reported when it happened
+            self._file.close()
+
+    def _slice(self, event: Slice) -> None:
+        where = self._threads.get((event.processor, str(event.core)))
+        if where is None:
+            where = self._thread(event.processor, str(event.core), f"core {event.core}")
+        name = event.component if event.task == event.component else f"{event.component}/{event.task}"
+        self._complete(name, event.start, event.end, where)
+
+    def _activation(self, event: Activation) -> None:
+        self._span(
+            _ACTIVATIONS, event.component, event.released, event.finished, {"deadline": event.deadline}
+        )
+
+    def _call(self, event: Call) -> None:
+        name = f"{event.callee}.{event.operation}"
+        self._span(_CALLS, name, event.start, event.end, {"caller": event.caller, "outcome": event.outcome})
+
+    def _operation(self, event: Operation) -> None:
+        details = {"asked": event.asked, "outcome": event.outcome, "said": event.said}
+        self._span(_OPERATIONS, f"{event.vehicle}.{event.operation}", event.start, event.end, details)
+
+    def _milestone(self, event: Milestone) -> None:
+        key = (event.kind, event.subject)
+        before = self._states.get(key)
+        if before is not None:
+            self._state_until(before, event.at)
+        self._states[key] = event
+        self._last = max(self._last, event.at)
+
+    def _state_until(self, state: Milestone, end: Ns) -> None:
+        track = f"{state.kind} {state.subject}"
+        self._complete(state.state, state.at, end, self._thread(_FOLLOWED, track, track))
+
+    def _link_state(self, event: LinkState) -> None:
+        self._instant(event.at, f"{event.link}: {event.state}", event.detail)
+
+    def _failure(self, event: Failure) -> None:
+        self._instant(event.at, f"failure of {event.who}", event.what)
+
+    def _verdict(self, event: Verdict) -> None:
+        self._instant(event.at, f"{event.requirement} {'met' if event.met else 'NOT met'}", event.observable)
+
+    def _complete(self, name: str, start: Ns, end: Ns, where: str) -> None:
+        self._last = max(self._last, end)
+        times = f'"ts":{_microseconds(start)},"dur":{_microseconds(end - start)}'
+        self._line(f'{{"name":{_quote(name)},"ph":"X",{times},{where}}}')
+
+    def _span(self, process: str, name: str, start: Ns, end: Ns, details: dict[str, Any]) -> None:
+        """Something that may overlap with its like: a pair of asynchronous events of its own."""
+        self._last = max(self._last, end)
+        self._spans += 1
+        common = f'"cat":{_quote(process)},"id":{self._spans},{self._thread(process, "", process)}'
+        named = f'"name":{_quote(name)}'
+        arguments = _quote(details)
+        self._line(f'{{{named},"ph":"b","ts":{_microseconds(start)},{common},"args":{arguments}}}')
+        self._line(f'{{{named},"ph":"e","ts":{_microseconds(end)},{common}}}')
+
+    def _instant(self, at: Ns, name: str, detail: str) -> None:
+        self._last = max(self._last, at)
+        where = self._thread(_RUN, "", _RUN)
+        arguments = _quote({"detail": detail})
+        time = _microseconds(at)
+        self._line(f'{{"name":{_quote(name)},"ph":"i","s":"g","ts":{time},{where},"args":{arguments}}}')
+
+    def _thread(self, process: str, thread: str, name: str) -> str:
+        """The ``pid`` and ``tid`` of a track, which is introduced when it first occurs."""
+        known = self._threads.get((process, thread))
+        if known is not None:
+            return known
+        if process not in self._processes:
+            pid = self._processes[process] = len(self._processes) + 1
+            self._line(_introduction("process_name", f'"pid":{pid}', process))
+        where = f'"pid":{self._processes[process]},"tid":{len(self._threads) + 1}'
+        self._threads[process, thread] = where
+        self._line(_introduction("thread_name", where, name))
+        return where
+
+    def _line(self, line: str) -> None:
+        self._lines.append(line)
+        if len(self._lines) >= 1000:
+            self._write_out()
+
+    def _write_out(self) -> None:
+        if self._lines and not self.problem:
+            self._write(("[\n" if self._first else ",\n") + ",\n".join(self._lines))
+            self._first = False
+        self._lines.clear()
+
+    def _write(self, text: str) -> None:
+        try:
+            self._file.write(text)
+            self._file.flush()
+        except OSError as error:
+            self.problem = f"cannot write {self.path} any more: {error.strerror or error}"
+
+
+def _introduction(what: str, where: str, name: str) -> str:
+    return f'{{"name":"{what}","ph":"M",{where},"args":{{"name":{_quote(name)}}}}}'
+
+
+def _microseconds(ns: Ns) -> str:
+    return f"{ns // 1000}.{ns % 1000:03d}"
