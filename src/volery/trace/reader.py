@@ -105,12 +105,16 @@ class Reading:
             elif record.opcode == Opcode.DATA_END:
                 self.complete = not record.missing
             record = self._next()
-        self.complete = self.complete and self._ends_well()
-        if not self.complete:
-            self.lost = self.lost or (
+        if not (self.complete and self._ends_well()):
+            self._lose(
                 f"the writer never finished; everything up to {clock(self._last)} was kept, "
                 "at most the second after it is missing"
             )
+        self.complete = not self.lost
+
+    def _lose(self, what: str) -> None:
+        if what not in self.lost:
+            self.lost = f"{self.lost}; {what}" if self.lost else what
 
     def _read_beginning(self) -> RunSetup:
         self._pending = self._next()
@@ -163,7 +167,7 @@ class Reading:
             raise UsageError(f"{self.path} is compressed, which no trace of volery is")
         body = record.content[_CHUNK_OVERHEAD:]
         if not record.missing and zlib.crc32(body) != checksum:
-            self.lost = f"a part that ends after {clock(self._last)} is damaged: its checksum is wrong"
+            self._lose(f"a part that follows {clock(self._last)} is damaged: its checksum is wrong")
             return
         yield from self._events_of_body(body)
 
@@ -175,7 +179,9 @@ class Reading:
             if at + length > len(body):
                 return
             if opcode == Opcode.MESSAGE:
-                yield self._event(body, at, at + length)
+                event = self._event(body, at, at + length)
+                if event is not None:
+                    yield event
             elif opcode == Opcode.SCHEMA:
                 schema = records.Schema.read(_stream(body[at : at + length]))
                 self._schemas[schema.id] = schema.name
@@ -185,15 +191,24 @@ class Reading:
                 self._channels[channel.id] = (self._schemas[channel.schema_id], channel.topic, publisher)
             at += length
 
-    def _event(self, body: bytes, start: int, end: int) -> Event:
+    def _event(self, body: bytes, start: int, end: int) -> Event | None:
         channel, _, log, _ = _FRAME.unpack_from(body, start)
-        schema, topic, publisher = self._channels[channel]
+        described = self._channels.get(channel)
+        if described is None:
+            self._lose("what a channel carries stood in a damaged part: its events are missing")
+            return None
+        schema, topic, publisher = described
         data = body[start + _FRAME.size : end]
         self._last = max(self._last, log)
         codec = self._codecs.get(schema)
         if codec is None:
             return Published(log, topic, schema, publisher, data)
-        event: Event = codec.decode(data)
+        try:
+            event: Event = codec.decode(data)
+        except (ValueError, struct.error) as error:
+            raise UsageError(
+                f"{self.path} holds a {schema} that this version cannot read: {error}"
+            ) from error
         return event
 
 

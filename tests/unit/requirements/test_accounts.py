@@ -1,0 +1,235 @@
+"""Accounts: what a stream of events comes to."""
+
+from math import nan
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.requirements.accounts import Accounts, Circumstances
+from volery.requirements.ledgers import linear_energy
+from volery.requirements.record import RunRecord, read_record, write_record
+from volery.testing.sample_run import sample_events, sample_setup
+from volery.trace.events import (
+    NONE,
+    Activation,
+    Call,
+    Charge,
+    Event,
+    Failure,
+    Milestone,
+    Operation,
+    Slice,
+    Text,
+    VehicleState,
+    Verdict,
+)
+from volery.trace.mcap_writer import McapWriter
+from volery.trace.reader import read
+from volery.trace.setup import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
+
+SETUP = RunSetup(
+    components=(ComponentSetup("control", "Control", "rospy", "onboard", active=True),),
+    processors=(ProcessorSetup("onboard", "rpi4", 1500.0, "fixed-priority", 2, 2.0, 6.0),),
+    vehicles=(VehicleSetup("d", "ardupilot", "multirotor"), VehicleSetup("r", "ardupilot", "rover")),
+    requirements=(
+        RequirementSetup("soon", "x.y", "max", 1.0, "s"),
+        RequirementSetup("later", "x.z", "min", 2.0),
+    ),
+)
+
+
+def books(*events: Event, setup: RunSetup = SETUP) -> RunRecord:
+    accounts = Accounts(setup)
+    for event in events:
+        accounts(event)
+    return accounts.record("completed")
+
+
+def state(at: int, **changes: object) -> VehicleState:
+    still = VehicleState(
+        at, "d", *[0.0] * 3, 1.0, *[0.0] * 6, nan, nan, nan, 0.9, 12.0, 2.0, False, "STABILIZE"
+    )
+    return still._replace(**changes)
+
+
+def test_executed_charged_and_stated() -> None:
+    control = books(
+        Slice(0, 30 * MS, "onboard", 0, "control", "control"),
+        Charge(0, "control", "onboard", "code", 20 * MS, 0, 0.0),
+        Charge(0, "control", "onboard", "ros:publish", 6 * MS, 4 * MS, 0.0),
+        Charge(1 * S, "control", "onboard", "ros:publish", 1 * MS, 0, 0.0),
+    ).components["control"]
+    assert control.cpu_s == 0.03
+    assert control.ros_cpu_s == 0.011
+    assert control.ros_calls == {"publish": 2}
+    assert control.energy_j == pytest.approx(0.03 * 2.0)  # (6 - 2) W over two cores
+    assert (control.processor, control.language) == ("onboard", "rospy")
+
+
+def test_stated_energy_replaces_the_law_for_the_time_it_covers() -> None:
+    found = books(
+        Slice(0, 30 * MS, "onboard", 0, "control", "control"),
+        Charge(0, "control", "onboard", "operation:order", 10 * MS, 0, 0.5),
+        Text(1 * S, "x", 6, "the end"),
+    )
+    assert found.components["control"].energy_j == pytest.approx(0.5 + 0.02 * 2.0)
+    assert found.processors["onboard"].energy_j == pytest.approx(2.0 * 1.0 + 0.5 + 0.02 * 2.0)
+
+
+def test_utilisation_is_of_all_cores_over_the_whole_run() -> None:
+    accounts = Accounts(SETUP)
+    accounts(Slice(0, 500 * MS, "onboard", 0, "t", "control"))
+    accounts(Slice(0, 500 * MS, "onboard", 1, "t", "control"))
+    assert accounts.record("completed", ended=1 * S).processors["onboard"].utilisation == 0.5
+    assert accounts.record("completed", ended=2 * S).processors["onboard"].utilisation == 0.25
+
+
+def test_no_power_figures_no_energy() -> None:
+    setup = RunSetup(
+        components=(ComponentSetup("c", processor="p"),), processors=(ProcessorSetup("p", "z80"),)
+    )
+    found = books(Slice(0, S, "p", 0, "t", "c"), setup=setup)
+    assert found.components["c"].energy_j is None
+    assert found.processors["p"].energy_j is None
+    assert any("z80" in line for line in found.not_counted)
+
+
+def test_an_energy_law_can_be_handed_in() -> None:
+    accounts = Accounts(SETUP, lambda processor, busy, elapsed: 100.0 * busy + elapsed)
+    accounts(Slice(0, S, "onboard", 0, "t", "control"))
+    found = accounts.record("completed")
+    assert found.components["control"].energy_j == 100.0
+    assert found.processors["onboard"].energy_j == 101.0
+    assert linear_energy(SETUP.processors[0], 1.0, 10.0) == 22.0
+
+
+def test_deadlines_and_responses_of_activations() -> None:
+    control = books(
+        *[Activation(n * S, n * S + (n + 1) * MS, "control", n * S + 10 * MS) for n in range(20)],
+        Activation(30 * S, 31 * S, "control", NONE),
+        Call(0, 5 * S, "x", "control", "ask", "ok"),
+    ).components["control"]
+    assert (control.activations, control.calls, control.deadline_misses) == (21, 1, 10)
+    assert control.response_s.of == "activations"
+    assert control.response_s.mean == pytest.approx((sum(range(1, 21)) * 1e-3 + 1.0) / 21)
+    assert control.response_s.p95 == pytest.approx(0.020, rel=2e-3)
+    assert control.response_s.max == 1.0
+
+
+def test_a_passive_component_answers_calls() -> None:
+    found = books(
+        Call(0, 3 * MS, "a", "planner", "path", "ok"), Call(0, 5 * MS, "a", "planner", "path", "ok")
+    )
+    response = found.components["planner"].response_s
+    assert (response.of, response.count, response.mean, response.max) == ("calls", 2, 0.004, 0.005)
+
+
+def test_what_the_accounts_see_is_missing() -> None:
+    found = books(
+        Activation(0, 1, "control", NONE),
+        Charge(0, "control", "onboard", "ros:publish", 1, 0, 0.0),
+        Call(0, 1, "a", "nowhere", "ask", "ok"),
+    )
+    assert any(line.startswith("control: no cost of its own code") for line in found.not_counted)
+    assert any(line.startswith("nowhere: allocated to no processor") for line in found.not_counted)
+    assert found.components["nowhere"].energy_j is None
+
+
+def test_a_vehicle_flies_and_lands() -> None:
+    flight = books(
+        state(0, z=3.0),
+        state(1 * S, z=3.0, armed=True),
+        state(2 * S, z=13.0, armed=True),
+        state(3 * S, z=13.0, x=4.0, y=3.0, armed=True),
+        state(4 * S, z=3.0, x=4.0, y=3.0, armed=True, vz=-0.1, volts=10.0),
+        state(5 * S, z=3.0, x=4.0, y=3.0),
+    ).vehicles["d"]
+    assert flight.distance_m == 25.0
+    assert flight.armed_s == 4.0
+    assert flight.airborne_s == 2.0
+    assert flight.energy_j == pytest.approx(24.0 * 3 + 22.0 * 2)
+    assert flight.landed is True
+    assert books(state(0, armed=True)).vehicles["d"].landed is False
+    assert books(state(0, vz=-8.0)).vehicles["d"].landed is False
+    assert books().vehicles["d"].landed is None
+
+
+def test_a_rover_is_never_airborne() -> None:
+    on_a_hill = books(
+        state(0, vehicle="r"), *[state(n * S, vehicle="r", z=50.0, armed=True) for n in (1, 2, 3)]
+    )
+    assert on_a_hill.vehicles["r"].airborne_s == 0.0
+
+
+def test_errors_are_the_largest_of_what_succeeded() -> None:
+    found = books(
+        Operation(0, 1, "d", "goto", "there", "ok", "", 0.2, -0.4, nan, 0.1),
+        Operation(1, 2, "d", "goto", "back", "ok", "", 0.3, 0.1, nan, -0.2),
+        Operation(2, 3, "d", "land", "", "Refused", "no", 9.0, 9.0, 9.0, 9.0),
+    ).vehicles["d"]
+    assert (found.error_by_estimate_m.horizontal, found.error_by_estimate_m.vertical) == (0.3, 0.4)
+    assert (found.error_by_truth_m.horizontal, found.error_by_truth_m.vertical) == (None, 0.2)
+    assert [one.outcome for one in found.operations] == ["ok", "ok", "Refused"]
+
+
+def test_a_parcel_is_where_it_was_last_seen() -> None:
+    found = books(
+        Milestone(0, "central", "parcel", "p1", "ordered", "blood"),
+        Milestone(S, "central", "order", "o1", "accepted", ""),
+        Milestone(2 * S, "drone", "parcel", "p1", "delivered", ""),
+    ).parcels
+    assert list(found) == ["p1"]
+    assert found["p1"].state == "delivered"
+    assert [(step.at_s, step.state) for step in found["p1"].history] == [(0.0, "ordered"), (2.0, "delivered")]
+
+
+def test_verdicts_and_what_has_none() -> None:
+    found = books(Verdict(S, "soon", "x.y", "max", 1.0, nan, False))
+    assert found.requirements["soon"].observed is None
+    assert found.requirements["soon"].met is False
+    assert found.requirements["soon"].unit == "s"
+    assert found.requirements["later"].met is None
+    assert found.outcome.requirements_met is False
+    assert books().outcome.requirements_met is None
+
+
+def test_failures_are_kept() -> None:
+    assert books(Failure(3 * S, "control", "ValueError: no")).failures[0].who == "control"
+
+
+def test_the_same_from_the_run_and_from_its_trace(tmp_path: Path) -> None:
+    setup = sample_setup(onboard_mhz=600.0)
+    accounts = Accounts(setup)
+    writer = McapWriter(tmp_path / "trace.mcap", setup)
+    for event in sample_events(seconds=60.0, onboard_mhz=600.0):
+        accounts(event)
+        writer(event)
+    writer.close()
+    trace = read(tmp_path / "trace.mcap")
+    again = Accounts(trace.setup)
+    for event in trace.events:
+        again(event)
+    assert again.record("completed") == accounts.record("completed")
+    assert accounts.record("completed").components["drone_control"].deadline_misses > 0
+
+
+def test_run_json_says_wall_time_and_comes_back(tmp_path: Path) -> None:
+    accounts = Accounts(SETUP)
+    accounts(Text(10 * S, "x", 6, ""))
+    record = accounts.record("interrupted", "Ctrl-C", circumstances=Circumstances(2.0, {"volery": "1"}))
+    assert record.real_time_factor == 5.0
+    path = write_record(record, tmp_path)
+    assert '"schema": "volery-run/1"' in path.read_text()
+    assert read_record(tmp_path) == record
+
+
+def test_a_run_json_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="cannot read"):
+        read_record(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(UsageError, match=r"volery-run/1"):
+        read_record(tmp_path)
+    with pytest.raises(UsageError, match="cannot write"):
+        write_record(books(), tmp_path / "none")

@@ -1,0 +1,229 @@
+"""What is written is what is read, byte for byte the same each time, and whatever happens to the file."""
+
+import hashlib
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.events import Event, Failure, Published, Slice, Text
+from volery.trace.mcap_writer import Attachment, McapWriter
+from volery.trace.reader import Reading, read
+from volery.trace.scenery import scenery_from_json, scenery_to_json
+from volery.trace.setup import RunSetup, setup_from_json, setup_to_json
+
+_MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
+
+
+def write_sample(path: Path, seconds: float = 20.0, seed: int = 7) -> list[Event]:
+    writer = McapWriter(path, sample_setup(seed), [_MAP], lambda name: "string data\n")
+    events = list(sample_events(seed, seconds))
+    for event in events:
+        writer(event)
+    writer.close()
+    return events
+
+
+def test_reads_back_what_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path)
+    trace = read(path)
+    assert [repr(event) for event in trace.events] == [repr(event) for event in events]
+    assert trace.complete
+    assert trace.lost == ""
+    assert trace.setup == sample_setup()
+    assert scenery_from_json(trace.attachments["world.json"].data) == sample_scenery()
+    assert trace.metadata["volery"] == {"schema": "volery-trace/1", "seed": "7"}
+
+
+def test_same_run_same_bytes_other_seed_other_bytes(tmp_path: Path) -> None:
+    digests = []
+    for name, seed in (("a", 7), ("b", 7), ("c", 8)):
+        write_sample(tmp_path / name, 5.0, seed)
+        digests.append(hashlib.sha256((tmp_path / name).read_bytes()).hexdigest())
+    assert digests[0] == digests[1]
+    assert digests[0] != digests[2]
+
+
+def test_the_mcap_library_reads_it_through_its_index(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path)
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == len(events)
+        assert summary.statistics.message_start_time == 0
+        assert reader.get_header().profile == "ros2"
+        assert reader.get_header().library == "volery"
+        strings = list(
+            reader.iter_messages(topics=["/drone_1/state"], starting_at=5 * S, ending_before=8 * S)
+        )
+        assert [message.log_time for _, _, message in strings] == [5 * S, 6 * S, 7 * S]
+        assert {schema.name for schema, _, _ in strings if schema} == {"std_msgs/msg/String"}
+        assert sum(1 for _ in reader.iter_messages()) == len(events)
+        assert [found.name for found in reader.iter_attachments()] == ["run-setup.json", "world.json"]
+
+
+def test_chunks_end_with_each_simulated_second_and_are_in_the_file_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    writer = McapWriter(path, RunSetup())
+    for tick in range(35):
+        writer(Text(tick * 100 * MS, "x", 6, str(tick)))
+    trace = read(path)  # the writer lives on, as if it had been killed now
+    assert [event.text for event in trace.events if isinstance(event, Text)] == [str(i) for i in range(30)]
+    assert not trace.complete
+    assert "0:00:02.900" in trace.lost
+    writer.flush()
+    assert len(read(path).events) == 35
+    writer.close()
+    writer.close()
+    assert read(path).complete
+
+
+def test_an_attachment_may_come_late(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    writer = McapWriter(path, RunSetup())
+    writer(Text(1, "x", 6, "before"))
+    writer.attach(Attachment("notes.txt", "text/plain", b"late"))
+    writer(Text(2, "x", 6, "after"))
+    writer.close()
+    trace = read(path)
+    assert trace.attachments["notes.txt"].data == b"late"
+    assert len(trace.events) == 2
+
+
+def test_two_publishers_of_one_topic_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    writer = McapWriter(path, RunSetup())
+    events = tuple(
+        Published(at, "/a", "std_msgs/msg/Empty", name, b"\0\1\0\0") for at, name in ((1, "p"), (2, "q"))
+    )
+    for event in events:
+        writer(event)
+    writer.close()
+    assert read(path).events == events
+
+
+def test_a_damaged_chunk_is_left_out_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path, 5.0)
+    data = bytearray(path.read_bytes())
+    middle = data.index(b"drone_control", len(data) // 2)
+    data[middle] ^= 1
+    path.write_bytes(data)
+    trace = read(path)
+    assert 0 < len(trace.events) < len(events)
+    assert "damaged" in trace.lost
+    assert not trace.complete
+
+
+def test_events_of_a_channel_that_was_introduced_in_a_damaged_part_are_missing(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path, 5.0)
+    data = bytearray(path.read_bytes())
+    data[data.index(b"int64 released")] ^= 1  # the definition of activations, in the first chunk
+    path.write_bytes(data)
+    trace = read(path)
+    assert 0 < len(trace.events) < len(events)
+    assert "channel" in trace.lost
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "not a trace"),
+        (b"hello, I am a text", "not a trace"),
+        (b"\x89MCAP0\r\n", "how the run was set up"),
+    ],
+)
+def test_what_is_no_trace_is_refused(tmp_path: Path, content: bytes, says: str) -> None:
+    path = tmp_path / "trace.mcap"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=says):
+        read(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none\.mcap"):
+        read(tmp_path / "none.mcap")
+
+
+def test_a_folder_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="cannot write"):
+        McapWriter(tmp_path / "none" / "trace.mcap", RunSetup())
+
+
+class _FullDisk:
+    """A file that takes so many bytes and no more."""
+
+    def __init__(self, room: int) -> None:
+        self.content = BytesIO()
+        self.room = room
+        self.closed = False
+
+    def write(self, data: memoryview) -> int:
+        if self.content.tell() >= self.room:
+            raise OSError(28, "No space left on device")
+        return self.content.write(data[: self.room - self.content.tell()])
+
+    def truncate(self, size: int) -> None:
+        self.content.truncate(size)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_a_full_disk_leaves_a_readable_trace_and_a_problem(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    writer = McapWriter(path, sample_setup())
+    begun = path.stat().st_size
+    disk = _FullDisk(100_000)
+    writer._file.close()
+    writer._file = disk  # type: ignore[assignment]
+    disk.content.write(path.read_bytes())
+    for event in sample_events(seconds=20.0):
+        writer(event)
+    writer.close()
+    assert "No space left on device" in writer.problem
+    assert str(path) in writer.problem
+    assert disk.closed
+    path.write_bytes(disk.content.getvalue())
+    assert begun < path.stat().st_size <= 100_000
+    trace = read(path)
+    assert trace.events
+    assert not trace.complete
+    with Reading(path) as reading:
+        assert reading.setup == sample_setup()
+
+
+def test_set_ups_survive_and_others_are_refused() -> None:
+    assert setup_from_json(setup_to_json(sample_setup())) == sample_setup()
+    for wrong in (b"{", b"[]", b'{"schema":"volery-setup/9"}', b'{"schema":"volery-setup/1","seed":"x"}'):
+        with pytest.raises(UsageError, match=r"run-setup\.json"):
+            setup_from_json(wrong)
+    with pytest.raises(UsageError, match="map"):
+        scenery_from_json(b"{}")
+
+
+def test_a_trace_of_another_version_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    write_sample(path, 1.0)
+    path.write_bytes(path.read_bytes().replace(b"volery-trace/1", b"volery-trace/9"))
+    with pytest.raises(UsageError, match="volery-trace/9"):
+        read(path)
+
+
+def test_slices_and_failures_keep_their_order_of_telling(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = (Slice(5, 9, "p", 0, "t", "c"), Failure(2 * S, "c", "late"), Slice(1, 2, "p", 0, "t", "c"))
+    writer = McapWriter(path, RunSetup())
+    for event in events:
+        writer(event)
+    writer.close()
+    assert read(path).events == events
