@@ -1,8 +1,9 @@
-"""What every room above may ask of time. Implemented twice: virtual time on greenlets, the wall clock on threads.
+"""What every room above may ask of time: once on greenlets, once on threads.
 
-*House code* (actions of ``call_at``, ``every`` and ``post``) never blocks. *User code* (the body of a task) blocks
-wherever it likes. ``with kernel:`` marks an interaction point: user code enters the house. There virtual time first
-serves what the task owes its processor, and the wall clock takes the one monitor that guards all house data.
+*House code* (actions of ``call_at``, ``every`` and ``post``) never blocks. *User code* (the body of a task)
+blocks wherever it likes. ``with kernel:`` marks an interaction point: user code enters the house. There
+virtual time first serves what the task owes its processor, and the wall clock takes the one monitor that
+guards all house data.
 """
 
 from __future__ import annotations
@@ -31,12 +32,15 @@ class Kernel(Protocol):
 
     root: Scope
     record: Record
+    guard: AbstractContextManager[object]
+    """Holds house data together without being an interaction point: for what must not fail or block, such as
+    a release in ``finally``. Virtual time needs none, the wall clock takes its monitor."""
 
     def now(self) -> Ns:
         """Nanoseconds since the start of the run."""
 
     def call_at(self, when: Ns, action: Action) -> Handle:
-        """Run house code at *when* (not before now). Actions of one instant run in the order of their calls."""
+        """Run house code at *when*, not before now. Actions of one instant run in the order of the calls."""
 
     def every(self, period: Ns, action: Action) -> Handle:
         """Run house code now and then each *period*."""
@@ -45,7 +49,7 @@ class Kernel(Protocol):
         """Run house code as soon as possible. The only call that a foreign thread may make."""
 
     def spawn(self, body: Action, name: str, place: Place, scope: Scope | None = None) -> Task:
-        """Start a flow of control. An exception that leaves *body* is a fault of the house: catch it inside."""
+        """Start a flow of control. An exception that leaves *body* is a fault of the house."""
 
     def adopt(self, name: str) -> AbstractContextManager[Task]:
         """Make the flow that calls this (a script, a REPL) a task for as long as the context lasts.
@@ -57,7 +61,7 @@ class Kernel(Protocol):
         """The task that runs now; ``None`` in house code."""
 
     def __enter__(self) -> Self:
-        """An interaction point: see the module's docstring. Raises ``Cancelled`` if the task's scope has ended."""
+        """An interaction point: see above. Raises ``Cancelled`` if the task's scope has ended."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None

@@ -7,10 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from volery.base.time import Ns
+from volery.trace.events import NONE, Activation
+
+STUBBORN = 10
+"""How often a task may swallow its end before it is left where it is and never runs again."""
 
 
 class Cancelled(BaseException):
-    """Ends a task at its next interaction point. No ``Exception``: user code must not catch it by accident."""
+    """Ends a task at its next interaction point. No ``Exception``, lest user code catch it by accident."""
 
 
 class Server(Protocol):
@@ -29,9 +33,10 @@ class Server(Protocol):
 class Place:
     """Where computing is spent: whose it is, on which processor, how urgent, and how it is metered.
 
-    ``processor`` is ``None`` where computing takes no simulated time. ``priority`` ``None`` means the caller's (a
-    passive component). ``deadline`` is relative to the release of an activation. ``meter`` gives the execution time on
-    the target since it was last asked; it is pulled at every interaction point.
+    ``processor`` is ``None`` where computing takes no simulated time. ``priority`` ``None`` means the
+    caller's (a passive component). ``deadline`` is relative to the release of an activation. ``meter`` gives
+    the execution time on the target since it was last asked; it is pulled at every interaction point.
+    ``on_release`` is told each release of an activation before the task goes on, and may charge it.
     """
 
     component: str
@@ -39,10 +44,15 @@ class Place:
     priority: int | None = 0
     deadline: Ns | None = None
     meter: Callable[[], Ns] | None = None
+    on_release: Callable[[Task], None] | None = None
 
 
 class Task:
-    """One flow of control. The kernel that spawned it owns ``flow`` and the fields below it."""
+    """One flow of control. The kernel that spawned it owns ``flow`` and the fields below it.
+
+    An *activation* runs from a release (its start, a timer, a message, the return of a sleep) to the next
+    blocking wait of the user's. Waits inside the house (for a processor, a network, a lock) do not end it.
+    """
 
     def __init__(self, name: str, place: Place, scope: Scope) -> None:
         self.name = name
@@ -51,12 +61,30 @@ class Task:
         self.debt: Ns = 0
         self.released: Ns | None = None  # of the activation that is under way
         self.done = False
+        self.adopted = False  # the flow of a script: the kernel has not made it and cannot end it
         self.flow: Any = None
         self.waiting_for = ""
         self.woken = False
-        self.ticket = 0  # the wait it is in; a wake-up meant for another wait is void
+        self.ticket = 0  # of its next resumption; what was scheduled under another ticket is void
         self.refusals = 0  # how often it has swallowed its end
         scope.tasks.append(self)
+
+    def release(self, due: Ns) -> None:
+        """An activation begins; it was due at *due*, which is in the past for a task that is late."""
+        self.released = due
+        hook = self.places[0].on_release
+        if hook is not None:
+            hook(self)
+
+    def finish(self, now: Ns) -> Activation | None:
+        """The activation that is under way ends; ``None`` if there is none, as in the flow of a script."""
+        if self.released is None:
+            return None
+        home = self.places[0]
+        deadline = NONE if home.deadline is None else self.released + home.deadline
+        activation = Activation(self.released, now, home.component, deadline)
+        self.released = None
+        return activation
 
     @property
     def place(self) -> Place:

@@ -1,0 +1,114 @@
+"""A network joins processors: one sender at a time, then latency; what is sent may be lost.
+
+The law, for *size* bytes:
+
+* serialisation time = size * 8 / bandwidth, rounded up to a nanosecond; who wants to send meanwhile waits;
+* arrival = end of serialisation + latency;
+* each sending is lost with probability *loss*: one draw from the network's own stream per sending, in turn;
+* what must arrive is sent again 2 * latency + serialisation time after the start of a sending that was lost.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from volery.base.errors import LinkLost, UsageError
+from volery.base.time import Ns, S, to_seconds
+from volery.kernel.waiting import current_task
+
+if TYPE_CHECKING:
+    from random import Random
+
+    from volery.kernel.api import Action, Handle, Kernel
+
+
+@dataclass(eq=False, slots=True)
+class Transfer:
+    """Something that must arrive."""
+
+    size: int
+    deliver: Action
+    queue: deque[Transfer]  # of those that must arrive in order
+    next: Handle | None = None
+    arrived: bool = False
+
+
+class Network:
+    """Serves both clocks. Sizes are in bytes on the wire, headers included."""
+
+    def __init__(
+        self, kernel: Kernel, name: str, *, bandwidth_bit_s: int, latency: Ns, loss: float, stream: Random
+    ) -> None:
+        if bandwidth_bit_s <= 0 or latency < 0 or not 0.0 <= loss <= 1.0:
+            raise UsageError(
+                f"{name}: bandwidth {bandwidth_bit_s} bit/s must be above 0, "
+                f"latency {latency} ns at least 0, loss {loss} between 0 and 1"
+            )
+        self._kernel, self.name = kernel, name
+        self._bandwidth, self._latency, self._loss, self._stream = bandwidth_bit_s, latency, loss, stream
+        self._free: Ns = 0  # when the medium is free
+        self._queues: dict[str, deque[Transfer]] = {}
+
+    def serialisation(self, size: int) -> Ns:
+        """How long the medium is taken by *size* bytes."""
+        return -(-size * 8 * S // self._bandwidth)
+
+    def _transmit(self, size: int) -> tuple[Ns, Ns, bool]:
+        """Take the medium in turn: when it starts to send, when that arrives, and whether it is lost."""
+        start = max(self._free, self._kernel.now())
+        self._free = start + self.serialisation(size)
+        return start, self._free + self._latency, self._stream.random() < self._loss
+
+    def send(self, size: int, deliver: Action, lost: Action | None = None) -> None:
+        """Best effort: *deliver* is called when it arrives, else *lost* when it would have. Never blocks."""
+        _, arrival, is_lost = self._transmit(size)
+        if not is_lost:
+            self._kernel.call_at(arrival, deliver)
+        elif lost is not None:
+            self._kernel.call_at(arrival, lost)
+
+    def send_reliable(self, size: int, deliver: Action, stream: str = "") -> None:
+        """Sent again until it arrives. What bears one *stream* name is delivered in the order of sending."""
+        queue = self._queues.setdefault(stream, deque()) if stream else deque()
+        self._begin(Transfer(size, deliver, queue))
+
+    def carry(self, size: int, deadline: Ns | None = None) -> None:
+        """Block the current task until *size* bytes have arrived, sent again as often as that takes.
+
+        Raises:
+            LinkLost: they have not by *deadline*.
+        """
+        with self._kernel as kernel:
+            task = current_task(kernel)
+            start = kernel.now()
+            transfer = Transfer(size, lambda: kernel.wake(task), deque())
+            self._begin(transfer)
+            try:
+                while not transfer.arrived:
+                    if not kernel.park(deadline, self.name) and not transfer.arrived:
+                        waited = to_seconds(kernel.now() - start)
+                        raise LinkLost(f"{self.name}: {size} bytes did not get through within {waited:g} s")
+            finally:
+                if not transfer.arrived and transfer.next is not None:
+                    transfer.next.cancel()
+
+    def _begin(self, transfer: Transfer) -> None:
+        transfer.queue.append(transfer)
+        self._try(transfer)
+
+    def _try(self, transfer: Transfer) -> None:
+        start, arrival, is_lost = self._transmit(transfer.size)
+        if is_lost:
+            again = start + 2 * self._latency + self.serialisation(transfer.size)
+            transfer.next = self._kernel.call_at(again, partial(self._try, transfer))
+        else:
+            transfer.next = self._kernel.call_at(arrival, partial(self._arrive, transfer))
+
+    def _arrive(self, transfer: Transfer) -> None:
+        transfer.arrived = True
+        queue = transfer.queue
+        while queue and queue[0].arrived:
+            queue.popleft().deliver()

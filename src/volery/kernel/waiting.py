@@ -1,0 +1,263 @@
+"""Everything that waits, once for both clocks: built on ``park`` and ``wake`` only.
+
+The user's own waits end an activation when they block: ``sleep``, ``Rate.sleep``, ``Event.wait``,
+``Queue.get``, and ``Signal.wait_for`` where asked. Waits inside the house, such as a ``Lock``'s, do not.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Generic, Self, TypeVar, overload
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place, Task
+
+T = TypeVar("T")
+Predicate = Callable[[], object]
+
+MOST_PERIODS_LATE = 2
+"""A ``Rate`` that is later than this gives up catching up, as rospy's does."""
+
+
+def current_task(kernel: Kernel) -> Task:
+    """The task that runs now; a ``UsageError`` in house code, which must not wait."""
+    task = kernel.current()
+    if task is None:
+        raise UsageError("only a task can wait: call this from a component, or from a script within adopt()")
+    return task
+
+
+def end_activation(kernel: Kernel) -> None:
+    """Record the end of the current task's activation. Call it within ``with kernel``, where it is paid."""
+    activation = current_task(kernel).finish(kernel.now())
+    if activation is not None:
+        kernel.record(activation)
+
+
+def sleep(kernel: Kernel, duration: Ns) -> None:
+    """Block the current task for *duration*, counted from when its computing so far has been served."""
+    with kernel:
+        due = kernel.now() + duration
+        if duration > 0:
+            end_activation(kernel)
+            kernel.sleep_until(due)
+            current_task(kernel).release(due)
+
+
+class Rate:
+    """Sleeps to the next multiple of *period*, counted from its making.
+
+    A loop that is late catches up: ``sleep`` returns at once, the next activation was released when it was
+    due. One that is more than two periods late starts counting anew from now, as rospy's Rate does.
+    """
+
+    def __init__(self, kernel: Kernel, period: Ns) -> None:
+        if period <= 0:
+            raise UsageError(f"a period of {period} ns; it must be above 0")
+        self._kernel, self.period = kernel, period
+        with kernel:
+            self._last = kernel.now()
+
+    def sleep(self) -> None:
+        """End the activation; block the current task until the next one is due."""
+        with self._kernel as kernel:
+            end_activation(kernel)
+            now = kernel.now()
+            due = self._last + self.period
+            if now - due > MOST_PERIODS_LATE * self.period:
+                due = now
+            self._last = due
+            kernel.sleep_until(due)
+            current_task(kernel).release(due)
+
+
+class Signal:
+    """``wait_for`` a predicate, which is looked at again each time somebody says ``notify``."""
+
+    def __init__(self, kernel: Kernel, name: str) -> None:
+        self._kernel, self.name = kernel, name
+        self._waiters: list[tuple[Task, Predicate]] = []
+
+    def notify(self) -> None:
+        """What predicates look at has changed. Never blocks; not an interaction point."""
+        with self._kernel.guard:
+            for task, predicate in self._waiters:
+                if _may_hold(predicate):
+                    self._kernel.wake(task)  # a task that would only look again is not woken
+
+    def wait_for(
+        self, predicate: Predicate, within: Ns | None = None, *, ends_activation: bool = False
+    ) -> bool:
+        """Block the current task until *predicate* holds (True), at most for *within* (False)."""
+        with self._kernel as kernel:
+            if predicate():
+                return True
+            task = current_task(kernel)
+            if ends_activation:
+                end_activation(kernel)
+            held = self._wait(task, predicate, None if within is None else kernel.now() + within)
+            if ends_activation:
+                task.release(kernel.now())
+            return held
+
+    def _wait(self, task: Task, predicate: Predicate, deadline: Ns | None) -> bool:
+        waiter = (task, predicate)
+        self._waiters.append(waiter)
+        try:
+            while True:
+                in_time = self._kernel.park(deadline, self.name)
+                if predicate():
+                    return True
+                if not in_time:
+                    return False
+        finally:
+            self._waiters.remove(waiter)
+
+
+def _may_hold(predicate: Predicate) -> bool:
+    try:
+        return bool(predicate())
+    except Exception:  # the fault of whoever waits: woken, it looks itself and gets it
+        return True
+
+
+class Event:
+    """A flag that tasks wait for."""
+
+    def __init__(self, kernel: Kernel, name: str) -> None:
+        self._kernel = kernel
+        self._changed = Signal(kernel, name)
+        self._set = False
+
+    def is_set(self) -> bool:
+        """Whether it is raised."""
+        with self._kernel:
+            return self._set
+
+    def set(self) -> None:
+        """Raise it: everybody who waits goes on."""
+        with self._kernel:
+            self._set = True
+            self._changed.notify()
+
+    def clear(self) -> None:
+        """Lower it."""
+        with self._kernel:
+            self._set = False
+
+    def wait(self, within: Ns | None = None) -> bool:
+        """Block the current task until it is raised (True), at most for *within* (False)."""
+        return self._changed.wait_for(lambda: self._set, within, ends_activation=True)
+
+
+class Queue(Generic[T]):
+    """First in, first out. With a *depth*, the oldest item makes room for a new one, as ROS has it."""
+
+    def __init__(self, kernel: Kernel, name: str, depth: int | None = None) -> None:
+        if depth is not None and depth <= 0:
+            raise UsageError(f"{name}: a depth of {depth}; give at least 1, or None for no bound")
+        self._kernel = kernel
+        self._items: deque[T] = deque(maxlen=depth)
+        self._filled = Signal(kernel, name)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def put(self, item: T) -> bool:
+        """Append *item*; False if the oldest one had to go. Blocks only to pay what the task owes."""
+        with self._kernel:
+            fits = len(self._items) != self._items.maxlen
+            self._items.append(item)
+            self._filled.notify()
+            return fits
+
+    @overload
+    def get(self) -> T: ...
+    @overload
+    def get(self, within: Ns | None) -> T | None: ...
+    def get(self, within: Ns | None = None) -> T | None:
+        """Block the current task until there is an item and take it; ``None`` if there is none *within*."""
+        with self._kernel:
+            if self._filled.wait_for(lambda: self._items, within, ends_activation=True):
+                return self._items.popleft()
+            return None
+
+
+class Lock:
+    """One task at a time, as often as that task likes. ``with lock:`` blocks until it is free.
+
+    The next owner is the most urgent of those who wait, and among equals the first (a futex's order under
+    real-time scheduling). Priority is not inherited by the owner.
+    """
+
+    def __init__(self, kernel: Kernel, name: str) -> None:
+        self._kernel, self.name = kernel, name
+        self._waiters: list[Task] = []
+        self.owner: Task | None = None
+        self._depth = 0
+
+    def __enter__(self) -> Self:
+        with self._kernel as kernel:
+            task = current_task(kernel)
+            if self.owner is None:
+                self.owner = task
+            elif self.owner is not task:
+                self._wait(task)
+            self._depth += 1
+        return self
+
+    def _wait(self, task: Task) -> None:
+        self._waiters.append(task)
+        try:
+            while self.owner is not task:
+                self._kernel.park(None, self.name)
+        except BaseException:
+            if self.owner is task:
+                self._hand_over()
+            else:
+                self._waiters.remove(task)
+            raise
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Release it. Never blocks and is no interaction point, so that a task that is ended can do it."""
+        with self._kernel.guard:
+            self._depth -= 1
+            if self._depth == 0:
+                self._hand_over()
+
+    def _hand_over(self) -> None:
+        # ``max`` takes the first of the greatest
+        self.owner = max(self._waiters, key=lambda task: task.priority, default=None)
+        if self.owner is not None:
+            self._waiters.remove(self.owner)
+            self._kernel.wake(self.owner)
+
+
+@contextmanager
+def at(kernel: Kernel, place: Place) -> Iterator[None]:
+    """The current task computes at *place*: it pays before it goes there, and before it leaves.
+
+    That holds for an error that leaves, too; a task that is ended owes nothing.
+    """
+    with kernel:
+        task = current_task(kernel)
+        task.places.append(place)
+    try:
+        try:
+            yield
+        except Exception:
+            with kernel:
+                pass
+            raise
+        with kernel:
+            pass
+    finally:
+        task.take_debt()
+        task.places.pop()
