@@ -26,13 +26,13 @@ class VoleryError(Exception):
 
 
 class Location(NamedTuple):
-    """Where in a file something stands. Lines count from 1."""
+    """Where in a file something stands. Lines count from 1; 0 stands for no line (an option, a missing file)."""
 
     file: str
     line: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}"
+        return f"{self.file}:{self.line}" if self.line else self.file
 
 
 class ModelError(VoleryError):

@@ -1,8 +1,8 @@
 """Quantities as people write them: ``2 ms``, ``57600 bit/s``, ``5 Ah``, ``0.5 %``, ``6 / h``, ``30 deg``.
 
-An own table rather than a library of units: the few units that a model needs, so that a slip is refused and not
-read as one of hundreds, and exact rational arithmetic, so that a time is the nanosecond that was written. Angles
-are a dimension of their own.
+An own table rather than a library of units: the few units that a model needs, so that a slip is refused and
+not read as one of hundreds, and exact rational arithmetic, so that a time is the nanosecond that was written.
+Angles are a dimension of their own.
 """
 
 from __future__ import annotations

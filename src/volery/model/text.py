@@ -1,0 +1,196 @@
+"""YAML text to a tree that remembers where everything stands.
+
+A ``Node`` is a scalar, a mapping or a list; what is merged into a tree later (a world file, a scenario, an
+option) brings its own places along. YAML 1.2, so ``on`` and ``yes`` are text. Keys are text, and stand once.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+
+from volery.base.errors import Location, ModelError
+from volery.model.problems import Path
+
+MOST_NODES = 100_000
+"""More than any model needs: a file of nested aliases would otherwise fill the memory."""
+
+Scalar = str | int | float | bool | None
+
+
+@dataclass
+class Node:
+    """A piece of a model and where it stands: for the value of a mapping, the line of its key.
+
+    ``quoted`` is true for a text in quotation marks: it is meant as text even if it looks like a quantity.
+    """
+
+    value: Scalar | dict[str, Node] | list[Node]
+    where: Location
+    quoted: bool = False
+
+    @property
+    def items(self) -> dict[str, Node]:
+        """The entries of a mapping; empty for anything else."""
+        return self.value if isinstance(self.value, dict) else {}
+
+    def child(self, step: str | int) -> Node | None:
+        """The entry or the list item, ``None`` where there is none."""
+        if isinstance(self.value, list) and str(step).isdigit() and int(step) < len(self.value):
+            return self.value[int(step)]
+        return self.items.get(str(step))
+
+    def at(self, path: Path) -> Node | None:
+        """The piece at *path*, ``None`` if there is none."""
+        node: Node | None = self
+        for step in path:
+            node = node.child(step) if node else None
+        return node
+
+    def locate(self, path: Path) -> Location | None:
+        """Where *path* stands, or the deepest part of it that there is."""
+        node: Node = self
+        for step in path:
+            below = node.child(step)
+            if below is None:
+                break
+            node = below
+        return node.where
+
+    def plain(self) -> Any:
+        """The same as plain values. A text in quotation marks stays a ``Quoted``."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        if isinstance(self.value, list):
+            return [node.plain() for node in self.value]
+        return Quoted(self.value) if self.quoted else self.value
+
+    def copy(self) -> Node:
+        """A tree of its own."""
+        if isinstance(self.value, dict):
+            return Node({key: node.copy() for key, node in self.value.items()}, self.where)
+        if isinstance(self.value, list):
+            return Node([node.copy() for node in self.value], self.where)
+        return Node(self.value, self.where, self.quoted)
+
+    def moved(self, where: Location) -> Node:
+        """The same, as if all of it stood at *where*."""
+        if isinstance(self.value, dict):
+            return Node({key: node.moved(where) for key, node in self.value.items()}, where)
+        if isinstance(self.value, list):
+            return Node([node.moved(where) for node in self.value], where)
+        return Node(self.value, where, self.quoted)
+
+
+class Quoted(str):
+    """A text that stood in quotation marks."""
+
+    __slots__ = ()
+
+
+def parse(text: str, name: str) -> Node:
+    """The tree of a YAML text. *name* is what messages call the file."""
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        with warnings.catch_warnings(action="ignore", category=ReusedAnchorWarning):
+            root = yaml.compose(text)
+    except MarkedYAMLError as error:
+        raise ModelError(_complaint(error), "", _mark(error, name)) from None
+    except RecursionError:
+        raise ModelError("nested too deeply to be a model", "", Location(name, 1)) from None
+    except (YAMLError, ValueError) as error:
+        raise ModelError(f"this is not YAML: {_first_line(error)}", "", Location(name, 1)) from None
+    if root is None:
+        raise ModelError(
+            "the file is empty; `volery new DIR` writes a model to start from", "", Location(name, 1)
+        )
+    return _Reading(name, yaml).node(root, ())
+
+
+def parse_value(text: str, where: Location) -> Node:
+    """The tree of an option's value, all of it standing at *where*."""
+    if not text.strip():
+        return Node(None, where)
+    try:
+        return parse(text, where.file).moved(where)
+    except ModelError as error:
+        raise ModelError(f"{text!r}: {error.what}", error.path, where) from None
+
+
+@dataclass
+class _Reading:
+    """One pass over the composed nodes of a file."""
+
+    name: str
+    yaml: YAML
+    count: int = 0
+    open: list[int] = field(default_factory=list)
+
+    def node(self, raw: Any, path: Path) -> Node:
+        """The tree below *raw*."""
+        where = Location(self.name, raw.start_mark.line + 1)
+        self.count += 1
+        if self.count > MOST_NODES:
+            raise ModelError(f"more than {MOST_NODES} values; is it a model?", _dotted(path), where)
+        if isinstance(raw, ScalarNode):
+            return Node(self._scalar(raw, path, where), where, quoted=raw.style in ("'", '"'))
+        if id(raw) in self.open:
+            raise ModelError("an alias that contains itself", _dotted(path), where)
+        self.open.append(id(raw))
+        value: dict[str, Node] | list[Node]
+        if isinstance(raw, SequenceNode):
+            value = [self.node(item, (*path, position)) for position, item in enumerate(raw.value)]
+        else:
+            value = dict(self._entries(raw, path))
+        self.open.pop()
+        return Node(value, where)
+
+    def _entries(self, raw: MappingNode, path: Path) -> Iterator[tuple[str, Node]]:
+        lines: dict[str, int] = {}
+        for key, value in raw.value:
+            where = Location(self.name, key.start_mark.line + 1)
+            if not isinstance(key, ScalarNode):
+                raise ModelError("a key must be a word", _dotted(path), where)
+            name = str(key.value)
+            if name == "<<":
+                raise ModelError("merge keys (<<) are not read; repeat the entries", _dotted(path), where)
+            if name in lines:
+                here = _dotted((*path, name))
+                raise ModelError(f"this key is here twice; first in line {lines[name]}", here, where)
+            lines[name] = where.line
+            node = self.node(value, (*path, name))
+            yield name, Node(node.value, where, node.quoted)
+
+    def _scalar(self, raw: ScalarNode, path: Path, where: Location) -> Scalar:
+        kind = str(raw.tag or "").rpartition(":")[2]
+        if kind not in ("int", "float", "bool", "null"):
+            return str(raw.value)
+        try:
+            value: Scalar = getattr(self.yaml.constructor, f"construct_yaml_{kind}")(raw)
+        except ValueError:
+            raise ModelError(f"{raw.value!r} is no number", _dotted(path), where) from None
+        return value
+
+
+def _dotted(path: Path) -> str:
+    return ".".join(str(step) for step in path)
+
+
+def _mark(error: MarkedYAMLError, name: str) -> Location:
+    mark = error.problem_mark or error.context_mark
+    return Location(name, mark.line + 1 if mark else 1)
+
+
+def _complaint(error: MarkedYAMLError) -> str:
+    parts = [part for part in (error.context, error.problem) if part]
+    return f"this is not YAML: {', '.join(parts)}"
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
