@@ -32,6 +32,7 @@ from volery.trace.events import (
     Milestone,
     Operation,
     Slice,
+    Text,
     VehicleState,
     Verdict,
 )
@@ -39,6 +40,10 @@ from volery.trace.setup import ComponentSetup, ProcessorSetup, RunSetup, Vehicle
 
 PARCEL = "parcel"
 """The kind of milestone that tells of parcels."""
+HOUSE = "volery"
+"""The source of words that come from the house itself: its warnings become warnings of the record."""
+WARNING = 4
+"""Syslog's severity of a warning."""
 
 
 class Circumstances(NamedTuple):
@@ -64,6 +69,7 @@ class Accounts:
         self._parcels: dict[str, list[Milestone]] = {}
         self._verdicts: dict[str, Verdict] = {}
         self._failures: list[Failure] = []
+        self._warnings = dict.fromkeys(setup.warnings)
         self._last: Ns = 0
         self._folds: dict[type[Any], Callable[[Any], Ns]] = {
             Slice: self._slice,
@@ -75,6 +81,7 @@ class Accounts:
             Milestone: self._milestone,
             Failure: self._failure,
             Verdict: self._verdict,
+            Text: self._text,
         }
 
     def __call__(self, event: Event) -> None:
@@ -137,6 +144,11 @@ class Accounts:
         self._verdicts[event.requirement] = event
         return event.at
 
+    def _text(self, event: Text) -> Ns:
+        if event.source == HOUSE and event.severity <= WARNING:
+            self._warnings[event.text] = None
+        return event.at
+
     def record(
         self,
         status: Status,
@@ -177,7 +189,7 @@ class Accounts:
                 for one in setup.laws
             ],
             not_counted=[*setup.not_counted, *self._not_counted()],
-            warnings=list(setup.warnings),
+            warnings=list(self._warnings),
             versions=dict(sorted(circumstances.versions.items())),
             sim_s=elapsed,
             wall_s=wall,

@@ -17,7 +17,7 @@ RUN_SCHEMA: Final = "volery-run/1"
 RUN_FILE = "run.json"
 
 Status = Literal["completed", "interrupted", "failed", "unfinished"]
-"""``interrupted``: by the user; ``failed``: something raised; ``unfinished``: killed, known from its trace."""
+"""``interrupted`` by the user; ``failed``: something raised; ``unfinished``: killed, known from its trace."""
 
 
 class _Part(BaseModel):
