@@ -1,0 +1,28 @@
+"""Stand-ins for modules of Python whose meaning depends on the run: time, chance, threads and queues.
+
+They are imported in place of the real ones by the files of components, and by nothing else. With them plain
+Python that sleeps, waits and draws runs in virtual time and repeats itself with the seed. What they do not
+offer says so.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from volery.base.time import Ns, S
+from volery.components.stand_ins import chance, clock, flows, queues
+from volery.kernel.api import Kernel
+
+EPOCH: Ns = 1_700_000_000 * S
+"""What ``time.time()`` says at the start of a run in virtual time: 2023-11-14 22:13:20 UTC."""
+
+
+def stand_ins(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, ModuleType]:
+    """By name, for ``Loader``. *epoch*: ``time.time_ns()`` at the start of the run."""
+    return {
+        "time": clock.time_module(kernel, epoch),
+        "datetime": clock.datetime_module(kernel, epoch),
+        "random": chance.random_module(kernel, seed),
+        "queue": queues.queue_module(kernel),
+        "threading": flows.threading_module(kernel),
+    }

@@ -1,0 +1,332 @@
+"""A user's file becomes a running component: classes, scripts, what they import, and their mistakes."""
+
+from __future__ import annotations
+
+import random
+import textwrap
+from types import ModuleType
+
+import pytest
+
+from volery.base.errors import ComponentError, Location, ModelError, UsageError
+from volery.base.time import MS, S
+from volery.components import services
+from volery.components.counting import Steps
+from volery.components.instance import Instance, Seat
+from volery.components.loading import Loader
+from volery.components.pricing import Counted
+from volery.components.python import load_class, load_function, load_program, start
+from volery.components.stand_ins import stand_ins
+from volery.components.stub import StubProgram, neutral
+from volery.kernel.processor import Processor
+from volery.kernel.virtual import VirtualKernel
+from volery.trace.events import Activation, Charge, Failure, Milestone, Slice, Text
+
+
+class Desk:
+    """A folder of user's files and a kernel to run them on."""
+
+    def __init__(self, folder, seed=1):
+        self.folder = folder
+        self.events = []
+        self.kernel = VirtualKernel(self.events.append)
+        self.processor = Processor(self.kernel, "onboard")
+        self.seat = Seat(self.processor, frequency_mhz=600.0, priority=1)
+        self.log = []
+        log = ModuleType("log")
+        log.tell = self.log.append
+        self.loader = Loader({**stand_ins(self.kernel, seed), "log": log})
+        self.failures = []
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(textwrap.dedent(text))
+        return path
+
+    def start(self, path, class_name="", name="user", **given):
+        operations = given.pop("operations", ())
+        instance = Instance(self.kernel, name, given.pop("seat", self.seat), operations=operations)
+        program = load_program(self.loader, name, path, class_name)
+        start(instance, program, given, self.kernel.root, lambda *told: self.failures.append(told))
+        return instance
+
+    def of(self, kind):
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+@pytest.fixture
+def desk(tmp_path):
+    return Desk(tmp_path)
+
+
+def test_a_class_is_constructed_by_parameter_name_and_run(desk):
+    path = desk.write(
+        "greeter.py",
+        """
+        import time
+        from log import tell
+
+        class Greeter:
+            def __init__(self, who, times=2):
+                self.who, self.times = who, times
+
+            def run(self):
+                for _ in range(self.times):
+                    time.sleep(0.5)
+                    tell((self.who, time.monotonic()))
+        """,
+    )
+    desk.start(path, "Greeter", who="world")
+    desk.kernel.run(5 * S)
+    assert desk.log == [("world", 0.5), ("world", 1.0)]
+    assert len(desk.of(Activation)) == 3
+
+
+def test_a_script_runs_as_main(desk):
+    path = desk.write(
+        "node.py",
+        """
+        import time
+        from log import tell
+
+        def main():
+            time.sleep(1)
+            tell(__name__)
+
+        if __name__ == "__main__":
+            main()
+        """,
+    )
+    desk.start(path, seat=Seat(priority=0))
+    desk.kernel.run(5 * S)
+    assert desk.log == ["__main__"]
+
+
+def test_a_file_is_executed_once_an_instance_and_what_it_imports_once_a_run(desk):
+    desk.write("pkg/__init__.py", "from .inner import Kind\n")
+    desk.write("pkg/inner.py", "class Kind: pass\n")
+    desk.write("shared.py", "from pkg import Kind\nseen = []\n")
+    path = desk.write(
+        "part.py",
+        """
+        from log import tell
+        import pkg.inner
+        import shared
+        COUNT = 0
+
+        class Part:
+            def run(self):
+                global COUNT
+                COUNT += 1
+                shared.seen.append(COUNT)
+                tell((COUNT, len(shared.seen), shared.Kind is pkg.inner.Kind))
+        """,
+    )
+    desk.start(path, "Part", "one")
+    desk.start(path, "Part", "two")
+    desk.kernel.run(S)
+    assert desk.log == [(1, 1, True), (1, 2, True)]
+
+
+def test_nothing_global_is_changed(desk):
+    path = desk.write("part.py", "import random, time\nclass Part:\n    def run(self): random.seed(3)\n")
+    random.seed(5)
+    before = random.getstate()
+    desk.start(path, "Part")
+    desk.kernel.run(S)
+    assert random.getstate() == before
+
+
+GOOD = """
+class Central:
+    def __init__(self, routes, drones, limit=3):
+        pass
+
+    def order(self, good):
+        pass
+"""
+
+
+def check(desk, text, given, operations=(), active=False):
+    program = load_program(desk.loader, "central", desk.write("central.py", text), "Central")
+    program.check(given, operations, active)
+
+
+@pytest.mark.parametrize(
+    ("given", "operations", "active", "line", "message"),
+    [
+        (
+            ["route", "drones"],
+            (),
+            False,
+            3,
+            "Central: its constructor asks for 'routes' (did you mean 'route'?), "
+            "but the model gives drones or route",
+        ),
+        (
+            ["routes", "drones", "limits"],
+            (),
+            False,
+            3,
+            "Central: the model gives 'limits' (did you mean 'limit'?), "
+            "but its constructor takes drones, limit or routes",
+        ),
+        (
+            ["routes", "drones"],
+            ("orders",),
+            False,
+            2,
+            "Central: has no method 'orders', an operation that it provides (did you mean 'order'?)",
+        ),
+        (["routes", "drones"], ("order",), True, 2, "Central: has no method 'run', but is active"),
+    ],
+)
+def test_a_class_that_does_not_fit_is_refused_before_it_starts(
+    desk, given, operations, active, line, message
+):
+    with pytest.raises(ModelError) as caught:
+        check(desk, GOOD, given, operations, active)
+    assert caught.value.where == Location(str(desk.folder / "central.py"), line)
+    assert caught.value.what == message
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "operations"),
+    [
+        (GOOD, ["routes", "drones"], ("order",)),
+        (GOOD, ["routes", "drones", "limit"], ("order",)),
+        ("class Central:\n    def __init__(self, **ports): pass\n", ["anything"], ()),
+    ],
+)
+def test_a_class_that_fits_is_accepted(desk, text, given, operations):
+    check(desk, text, given, operations)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        (
+            "class Centrale:\n    pass\n",
+            1,
+            "no class 'Central' (did you mean 'Centrale'?); there is Centrale",
+        ),
+        ("x = 1\n\ndef f(:\n", 3, "not Python: invalid syntax"),
+        ("Central = 3\nfrom os import path as Central\n", 1, "'Central' is not a class"),
+    ],
+)
+def test_files_that_cannot_be_used(desk, text, line, message):
+    with pytest.raises(ModelError) as caught:
+        check(desk, text, [])
+    assert caught.value.where == Location(str(desk.folder / "central.py"), line)
+    assert caught.value.what == message
+
+
+def test_a_missing_file_is_named_at_the_line_of_the_model(desk):
+    with pytest.raises(ModelError, match=r"model.yaml:12: no file .*nowhere.py"):
+        load_program(desk.loader, "x", desk.folder / "nowhere.py", "X", Location("model.yaml", 12))
+
+
+def test_a_file_that_raises_on_loading_names_the_component(desk):
+    with pytest.raises(ComponentError, match=r"central: .*central\.py cannot be loaded: ZeroDivisionError"):
+        check(desk, "1 / 0\nclass Central: pass\n", [])
+
+
+def test_a_script_has_no_ports(desk):
+    program = load_program(desk.loader, "x", desk.write("x.py", "pass\n"), "")
+    for given, operations, active in ((["drone"], (), True), ((), ("order",), True), ((), (), False)):
+        with pytest.raises(ModelError, match="script"):
+            program.check(given, operations, active)
+
+
+def test_what_a_component_raises_is_reported_with_its_place(desk):
+    path = desk.write("bad.py", "class Bad:\n    def run(self):\n        raise KeyError('parcel')\n")
+    desk.start(path, "Bad", "bad")
+    desk.kernel.run(S)
+    [(who, error)] = desk.failures
+    assert who == "bad"
+    assert str(error) == "bad: run raised KeyError: 'parcel' (bad.py:3)"
+    assert [failure.who for failure in desk.of(Failure)] == ["bad"]
+
+
+def test_services_find_the_run_and_the_component(desk):
+    path = desk.write(
+        "user.py",
+        """
+        from volery.components.services import add_time, log, note, now, sleep
+
+        class User:
+            def run(self):
+                sleep(0.25)
+                add_time(0.03, at_mhz=1500)
+                note("parcel", "p-1", "ordered", f"at {now():g}")
+                add_time(0.01, energy=0.5)
+                log("done", "warning")
+        """,
+    )
+    desk.start(path, "User")
+    desk.kernel.run(S)
+    assert desk.of(Milestone) == [Milestone(325 * MS, "user", "parcel", "p-1", "ordered", "at 0.325")]
+    assert desk.of(Text) == [Text(335 * MS, "user", 4, "done")]
+    charges = [(charge.kind, charge.caller / MS, charge.energy) for charge in desk.of(Charge)]
+    assert charges == [("stated", 75, 0.0), ("stated", 10, 0.5)]
+
+
+def test_services_outside_of_a_run_say_so():
+    with pytest.raises(UsageError, match="works in a component or a mission of a run only"):
+        services.note("parcel", "p-1", "ordered")
+
+
+def test_counted_code_is_charged_and_takes_its_time(tmp_path):
+    desk = Desk(tmp_path)
+    steps = Steps()
+    loader = Loader(stand_ins(desk.kernel, 1), steps)
+    path = desk.write(
+        "loop.py",
+        """
+        import time
+
+        class Loop:
+            def run(self):
+                for _ in range(2):
+                    total = 0
+                    for number in range(100):
+                        total += number
+                    time.sleep(1)
+        """,
+    )
+    instance = Instance(desk.kernel, "loop", desk.seat, Counted(1000.0), counter=steps.take)
+    program = load_program(loader, "loop", path, "Loop")
+    start(instance, program, {}, desk.kernel.root, lambda *told: desk.failures.append(told))
+    desk.kernel.run(10 * S)
+    instance.flush()
+    slices = desk.of(Slice)
+    assert desk.failures == []
+    assert sum(ran.end - ran.start for ran in slices) == sum(charge.caller for charge in desk.of(Charge))
+    assert slices[0].end - slices[0].start == slices[1].end - slices[1].start + 1000 * 5  # the first: range()
+    assert {charge.kind for charge in desk.of(Charge)} == {"code"}
+
+
+def test_a_stub_returns_neutral_values():
+    kernel = VirtualKernel()
+    stub = StubProgram(
+        kernel, {"route": "Position[]", "name": "str", "ready": "bool", "order": "Receipt"}
+    ).make({})
+    assert (stub.route(1, 2), stub.name(), stub.ready(), stub.order(good="x")) == ([], "", False, None)
+    assert (neutral("int"), neutral(""), neutral("float")) == (0, None, 0.0)
+
+
+def test_an_active_stub_is_released_each_period(desk):
+    instance = Instance(desk.kernel, "stub", desk.seat)
+    program = StubProgram(desk.kernel, {}, 100 * MS)
+    start(instance, program, {}, desk.kernel.root, print)
+    desk.kernel.run(250 * MS)
+    assert [activation.released / MS for activation in desk.of(Activation)] == [0, 100, 200]
+
+
+def test_functions_and_classes_of_a_file(desk):
+    path = desk.write("mission.py", "def mission(drone):\n    return drone\n\nclass Kind: pass\n")
+    assert load_function(desk.loader, path, "mission")(7) == 7
+    assert load_class(path, "Kind").__name__ == "Kind"
+    with pytest.raises(ModelError, match="no function 'missions'; there is mission"):
+        load_function(desk.loader, path, "missions")

@@ -1,0 +1,428 @@
+"""Calls through ports, worked out by hand on two processors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from volery.base.errors import ComponentError, EstimateError, UsageError
+from volery.base.time import MS, Ns, S
+from volery.components.instance import Instance, Seat
+from volery.components.ports import HEADER_BYTES, Port, PortList, size_of
+from volery.components.pricing import FREE, Cost, Stated
+from volery.components.python import start
+from volery.kernel import waiting
+from volery.kernel.processor import Processor
+from volery.kernel.task import Cancelled, Place
+from volery.kernel.virtual import VirtualKernel
+from volery.trace.events import Call, Charge, Failure, Slice
+
+
+class Given:
+    """A program that becomes an object made by the test."""
+
+    def __init__(self, thing):
+        self.thing = thing
+
+    def check(self, given, operations, active):
+        pass
+
+    def make(self, given):
+        return self.thing
+
+    def run(self, thing):
+        thing.run()
+
+
+class House:
+    """A kernel with two processors, and what it recorded."""
+
+    def __init__(self):
+        self.events = []
+        self.kernel = VirtualKernel(self.events.append)
+        self.onboard = Processor(self.kernel, "onboard")
+        self.ground = Processor(self.kernel, "ground")
+        self.failures = []
+
+    def instance(self, name, thing, seat, pricing=None, operations=()):
+        instance = Instance(self.kernel, name, seat, pricing or FREE, operations)
+        self.things = {**getattr(self, "things", {}), name: (instance, thing)}
+        return instance
+
+    def run(self, until=S):
+        for instance, thing in self.things.values():
+            start(instance, Given(thing), {}, self.kernel.root, lambda *told: self.failures.append(told))
+        self.kernel.run(until)
+
+    def of(self, kind):
+        return [event for event in self.events if isinstance(event, kind)]
+
+    def busy(self, processor):
+        return [
+            (ran.start / MS, ran.end / MS, ran.component)
+            for ran in self.of(Slice)
+            if ran.processor == processor
+        ]
+
+    def travel(self, takes: Ns):
+        return lambda size: self.kernel.park(self.kernel.now() + takes, "network")
+
+
+@dataclass
+class Doing:
+    """A component that does what a list says, in milliseconds of computing and calls."""
+
+    kernel: object
+    steps: list
+    log: list = field(default_factory=list)
+
+    def work(self):
+        for step in self.steps:
+            if callable(step):
+                step()
+            else:
+                self.kernel.current().charge(int(step * MS))
+        return "done"
+
+    run = work
+
+
+def free(**operations):
+    return Stated({name: Cost(int(time * MS)) for name, time in operations.items()}, Cost(0))
+
+
+def test_nested_calls_over_two_processors_under_preemption():
+    """a (onboard) computes 4, calls b (ground): 3, which calls c (onboard): 2; b 1 more, a 1 more.
+
+    A trip takes 3 ms. On board somebody urgent takes 2..5, on the ground somebody urgent takes 11..13.
+    """
+    house = House()
+    kernel = house.kernel
+    c = house.instance("c", Doing(kernel, []), Seat(house.onboard), free(work=2), ("work",))
+    to_c = Port(kernel, "b", c, house.travel(3 * MS), house.travel(3 * MS))
+    b = house.instance("b", Doing(kernel, [to_c.work, 1]), Seat(house.ground), free(work=3), ("work",))
+    to_b = Port(kernel, "a", b, house.travel(3 * MS), house.travel(3 * MS))
+    house.instance("a", Doing(kernel, [4, to_b.work, 1]), Seat(house.onboard, priority=1), free())
+
+    def urgent(processor, at, amount):
+        def body():
+            kernel.sleep_until(int(at * MS))
+            kernel.pay(int(amount * MS))
+
+        kernel.spawn(body, "urgent", Place("urgent", processor, 9))
+
+    urgent(house.onboard, 2, 3)
+    urgent(house.ground, 11, 2)
+    house.run()
+    # a computes 0..2, is preempted 2..5, computes 5..7; trip 7..10; b computes 10..11, 13..15; trip 15..18;
+    # c computes 18..20; trip 20..23; b computes 23..24; trip 24..27; a computes 27..28
+    assert house.busy("onboard") == [(0, 2, "a"), (2, 5, "urgent"), (5, 7, "a"), (18, 20, "c"), (27, 28, "a")]
+    assert house.busy("ground") == [(10, 11, "b"), (11, 13, "urgent"), (13, 15, "b"), (23, 24, "b")]
+    calls = [
+        (call.start / MS, call.end / MS, call.caller, call.callee, call.outcome) for call in house.of(Call)
+    ]
+    assert calls == [(15, 23, "b", "c", "ok"), (7, 27, "a", "b", "ok")]
+    charges = [(charge.component, charge.kind, charge.caller / MS) for charge in house.of(Charge)]
+    assert charges == [("b", "operation:work", 3), ("c", "operation:work", 2)]
+
+
+def test_one_visitor_at_a_time_the_urgent_first():
+    house = House()
+    kernel = house.kernel
+    shared = house.instance("shared", Doing(kernel, []), Seat(house.ground), free(work=10), ("work",))
+    ends = []
+
+    def caller(name, priority, at):
+        port = Port(kernel, name, shared, None, None)
+        doing = Doing(
+            kernel,
+            [
+                lambda: waiting.sleep(kernel, at * MS),
+                port.work,
+                lambda: ends.append((name, kernel.now() / MS)),
+            ],
+        )
+        house.instance(name, doing, Seat(None, priority=priority), free())
+
+    caller("first", 1, 1)
+    caller("second", 1, 2)
+    caller("urgent", 5, 3)
+    house.run()
+    assert ends == [("first", 11), ("urgent", 21), ("second", 31)]
+
+
+def test_a_visitor_has_the_callers_priority_unless_the_callee_states_its_own():
+    house = House()
+    kernel = house.kernel
+    seen = {}
+
+    class Looking:
+        def __init__(self, name):
+            self.name = name
+
+        def look(self):
+            seen[self.name] = kernel.current().priority
+
+        def run(self):
+            pass
+
+    passive = house.instance("passive", Looking("passive"), Seat(house.ground), free(look=0), ("look",))
+    active = house.instance(
+        "active", Looking("active"), Seat(house.ground, priority=3), free(look=0), ("look",)
+    )
+    ports = [Port(kernel, "caller", callee, None, None) for callee in (passive, active)]
+    house.instance(
+        "caller", Doing(kernel, [port.look for port in ports]), Seat(house.ground, priority=8), free()
+    )
+    house.run()
+    assert seen == {"passive": 8, "active": 3}
+
+
+class Keeper:
+    """Keeps what it is given and gives back what it keeps."""
+
+    def __init__(self):
+        self.kept = None
+
+    def keep(self, thing):
+        self.kept = thing
+        return thing
+
+
+@pytest.mark.parametrize("far", [True, False])
+def test_arguments_and_results_are_copied_between_processors_only(far):
+    house = House()
+    keeper = Keeper()
+    kept = house.instance("keeper", keeper, Seat(house.ground), free(keep=0), ("keep",))
+    port = Port(house.kernel, "caller", kept, None, None)
+    mine = {"list": [1]}
+    returned = []
+    place = house.onboard if far else house.ground
+    house.instance(
+        "caller",
+        Doing(house.kernel, [lambda: returned.append(port.keep(mine))]),
+        Seat(place, priority=0),
+        free(),
+    )
+    house.run()
+    assert keeper.kept == mine == returned[0]
+    assert (keeper.kept is mine) is not far
+    assert (returned[0] is keeper.kept) is not far
+
+
+class Faulty:
+    """Raises in every way."""
+
+    def __init__(self, kernel, other=None):
+        self.kernel, self.other = kernel, other
+
+    def boom(self):
+        self.kernel.current().charge(2 * MS)
+        raise ValueError("no such parcel")
+
+    def pass_on(self):
+        return self.other.boom()
+
+    def wait(self):
+        self.kernel.park(None, "for ever")
+
+
+def test_what_a_callee_raises_names_it_and_leaves_it_usable():
+    house = House()
+    kernel = house.kernel
+    faulty = house.instance("faulty", Faulty(kernel), Seat(house.ground), free(boom=0), ("boom",))
+    middle_port = Port(kernel, "middle", faulty, None, None)
+    middle = house.instance(
+        "middle", Faulty(kernel, middle_port), Seat(house.ground), free(pass_on=0), ("pass_on",)
+    )
+    port = Port(kernel, "caller", middle, None, None)
+    caught = []
+
+    def attempt():
+        try:
+            port.pass_on()
+        except Exception as error:
+            caught.append(error)
+
+    house.instance("caller", Doing(kernel, [attempt, attempt]), Seat(house.onboard, priority=0), free())
+    house.run()
+    assert [type(error) for error in caught] == [ComponentError, ComponentError]
+    assert caught[0].component == "faulty"
+    assert "boom raised ValueError: no such parcel (test_ports.py:" in str(caught[0])
+    assert isinstance(caught[0].__cause__, ValueError)
+    assert [failure.who for failure in house.of(Failure)] == ["faulty", "faulty"]
+    assert house.failures == []
+    assert house.busy("ground") == [(0, 2, "faulty"), (2, 4, "faulty")]  # what it computed before is paid
+    assert {call.outcome for call in house.of(Call)} == {"ComponentError"}
+
+
+def test_an_error_nobody_catches_ends_the_caller_and_is_reported():
+    house = House()
+    faulty = house.instance("faulty", Faulty(house.kernel), Seat(house.ground), free(boom=0), ("boom",))
+    port = Port(house.kernel, "caller", faulty, None, None)
+    house.instance("caller", Doing(house.kernel, [port.boom]), Seat(house.onboard, priority=0), free())
+    house.run()
+    [(who, error)] = house.failures
+    assert who == "caller"
+    assert error.component == "faulty"
+    assert [failure.who for failure in house.of(Failure)] == ["faulty", "caller"]
+
+
+def test_cancellation_passes_through_except_exception_and_frees_the_callee():
+    house = House()
+    kernel = house.kernel
+    seen = []
+    faulty = Faulty(kernel)
+    callee = house.instance("callee", faulty, Seat(house.ground), free(wait=0), ("wait",))
+    port = Port(kernel, "caller", callee, None, None)
+
+    def body():
+        try:
+            try:
+                port.wait()
+            except Exception:
+                seen.append("caught by the user")
+        except Cancelled:
+            seen.append("cancelled")
+            raise
+
+    house.instance("caller", Doing(kernel, [body]), Seat(house.onboard, priority=0), free())
+    kernel.call_at(5 * MS, lambda: kernel.cancel(kernel.root, "enough"))
+    house.run()
+    assert kernel.close() == []
+    assert seen == ["cancelled"]
+    assert callee._lock.owner is None
+
+
+def test_a_missing_figure_is_an_error_before_anything_starts():
+    house = House()
+    instance = house.instance("planner", Keeper(), Seat(house.ground), Stated({}), ("keep",))
+    with pytest.raises(EstimateError, match="planner: no time is stated for its operation 'keep'"):
+        start(instance, Given(Keeper()), {}, house.kernel.root, print)
+    active = house.instance("loop", Keeper(), Seat(house.ground, priority=1), Stated({}))
+    with pytest.raises(EstimateError, match="loop: it is active, but no time is stated for an activation"):
+        start(active, Given(Keeper()), {}, house.kernel.root, print)
+
+
+def test_an_activation_is_charged_at_each_release():
+    house = House()
+    kernel = house.kernel
+
+    class Loop:
+        def run(self):
+            rate = waiting.Rate(kernel, 100 * MS)
+            while True:
+                rate.sleep()
+
+    pricing = Stated({}, Cost(7 * MS, 0.002))
+    house.instance("loop", Loop(), Seat(house.onboard, priority=1), pricing)
+    house.run(250 * MS)
+    assert house.busy("onboard") == [(0, 7, "loop"), (107, 114, "loop"), (207, 214, "loop")]
+    assert [(charge.kind, charge.energy) for charge in house.of(Charge)] == [("activation", 0.002)] * 3
+
+
+def test_calls_wait_for_the_constructor():
+    house = House()
+    kernel = house.kernel
+    log = []
+
+    class Slow(Given):
+        def make(self, given):
+            waiting.sleep(kernel, 50 * MS)
+            return Keeper()
+
+    slow = Instance(kernel, "slow", Seat(house.ground), free(keep=0), ("keep",))
+    port = Port(kernel, "caller", slow, None, None)
+    house.instance(
+        "caller",
+        Doing(kernel, [lambda: log.append((port.keep(1), kernel.now() / MS))]),
+        Seat(None, priority=0),
+    )
+    house.things["slow"] = (slow, None)
+    start(slow, Slow(None), {}, kernel.root, print)
+    del house.things["slow"]
+    house.run()
+    assert log == [(1, 50)]
+
+
+def test_calling_what_could_not_be_constructed_names_it():
+    house = House()
+    kernel = house.kernel
+
+    class Broken(Given):
+        def make(self, given):
+            raise RuntimeError("no camera")
+
+    told = []
+    broken = Instance(kernel, "broken", Seat(house.ground), free(keep=0), ("keep",))
+    start(broken, Broken(None), {}, kernel.root, lambda *args: told.append(args))
+    port = Port(kernel, "caller", broken, None, None)
+    house.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Seat(None, priority=0))
+    house.run()
+    assert "its constructor raised RuntimeError: no camera" in str(told[0][1])
+    assert str(house.failures[0][1]) == "broken: cannot be called: its constructor has failed"
+
+
+def test_an_unknown_operation_lists_the_valid_ones():
+    house = House()
+    keeper = house.instance("keeper", Keeper(), Seat(), free(keep=0), ("keep",))
+    port = Port(house.kernel, "caller", keeper, None, None)
+    with pytest.raises(
+        AttributeError, match="keeper provides no operation 'kepp' \\(did you mean 'keep'\\?\\): keep"
+    ):
+        port.kepp  # noqa: B018 (looking is the test)
+    with pytest.raises(UsageError, match="by a component or a mission only"):
+        port.keep(1)
+
+
+def test_a_port_list_is_read_by_index_and_by_name():
+    house = House()
+    ports = PortList(
+        [
+            Port(house.kernel, "caller", house.instance(name, Keeper(), Seat(), None, ("keep",)), None, None)
+            for name in ("one", "two")
+        ]
+    )
+    assert len(ports) == 2
+    assert ports[1] is ports["two"]
+    assert [port.component for port in ports] == ["one", "two"] == list(ports.names)
+    with pytest.raises(KeyError, match="did you mean 'two'"):
+        ports["twoo"]
+
+
+def test_the_network_is_given_the_size_of_what_travels():
+    house = House()
+    sizes = []
+    keeper = house.instance("keeper", Keeper(), Seat(house.ground), free(keep=0), ("keep",))
+    port = Port(house.kernel, "caller", keeper, sizes.append, sizes.append)
+    house.instance(
+        "caller", Doing(house.kernel, [lambda: port.keep("äb")]), Seat(house.onboard, priority=0), free()
+    )
+    house.run()
+    text = 4 + 3
+    assert sizes == [HEADER_BYTES + 4 + (4 + text) + 4, HEADER_BYTES + text]
+
+
+@dataclass
+class Pair:
+    left: float
+    right: list
+
+
+@pytest.mark.parametrize(
+    ("value", "size"),
+    [
+        (None, 1),
+        (True, 1),
+        (3, 8),
+        (2.5, 8),
+        ("abc", 7),
+        (b"12", 6),
+        ([1, 2], 20),
+        ({"a": 1}, 17),
+        (Pair(1.0, [2]), 20),
+    ],
+)
+def test_sizes(value, size):
+    assert size_of(value) == size
