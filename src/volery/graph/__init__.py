@@ -3,3 +3,59 @@
 Knows the kernel (waiting) and messages. It must not know what a call costs nor how a message travels: both
 are asked of two functions that are given from above.
 """
+
+from volery.graph.embedded import EmbeddedNode
+from volery.graph.graph import Graph, ServiceState, TopicState
+from volery.graph.node import (
+    BEST_AVAILABLE,
+    BEST_EFFORT,
+    DEFAULT,
+    LATCHED,
+    RELIABLE,
+    SENSOR_DATA,
+    TRANSIENT_LOCAL,
+    VOLATILE,
+    Carry,
+    Client,
+    Cost,
+    Group,
+    Node,
+    NodeId,
+    Price,
+    Publisher,
+    QoS,
+    Rate,
+    Service,
+    Subscription,
+    Timer,
+)
+from volery.graph.services import ServiceError
+
+__all__ = [
+    "BEST_AVAILABLE",
+    "BEST_EFFORT",
+    "DEFAULT",
+    "LATCHED",
+    "RELIABLE",
+    "SENSOR_DATA",
+    "TRANSIENT_LOCAL",
+    "VOLATILE",
+    "Carry",
+    "Client",
+    "Cost",
+    "EmbeddedNode",
+    "Graph",
+    "Group",
+    "Node",
+    "NodeId",
+    "Price",
+    "Publisher",
+    "QoS",
+    "Rate",
+    "Service",
+    "ServiceError",
+    "ServiceState",
+    "Subscription",
+    "Timer",
+    "TopicState",
+]

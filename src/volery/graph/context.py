@@ -1,0 +1,90 @@
+"""What all parts of one embedded graph share: the kernel, the two functions from above, and who is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.graph.node import Carry, NodeId, Price
+from volery.graph.parameters import Parameters
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place
+from volery.kernel.waiting import Signal
+from volery.trace.events import Charge, Record
+
+if TYPE_CHECKING:
+    from volery.graph.services import EmbeddedService
+    from volery.graph.topics import Topic
+
+Records = Callable[[str], bool]
+"""Whether the content of a topic's messages is recorded, by the topic's name."""
+
+
+@dataclass(eq=False)
+class Context:
+    """One graph, seen by its members. ``changed`` is notified whenever somebody comes or goes."""
+
+    kernel: Kernel
+    price: Price
+    carry: Carry
+    records: Records
+    epoch: Ns
+    changed: Signal
+    listen_to_clock: Callable[[], None] = lambda: None
+    parameters: Parameters = field(default_factory=Parameters)
+    topics: dict[str, Topic] = field(default_factory=dict)
+    services: dict[str, EmbeddedService] = field(default_factory=dict)
+
+    @property
+    def record(self) -> Record:
+        """The stream that events go to."""
+        return self.kernel.record
+
+    def stamp(self) -> Ns:
+        """ROS time, without being an interaction point."""
+        return self.epoch + self.kernel.now()
+
+
+class Member:
+    """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
+
+    __slots__ = ("closed", "context", "id", "place")
+
+    def __init__(self, context: Context, name: str, place: Place) -> None:
+        processor = place.processor.name if place.processor else ""
+        self.context = context
+        self.id = NodeId(name, place.component, processor)
+        self.place = place
+        self.closed = False
+
+    @property
+    def name(self) -> str:
+        """The node's full name."""
+        return self.id.name
+
+    def pay(self, call: str, x: float = 0.0) -> None:
+        """Price a call and have it executed: the caller's part before this returns, the rest beside it.
+
+        House code cannot wait: there all of it goes to the background.
+        """
+        context = self.context
+        kernel = context.kernel
+        who = self.id
+        cost = context.price(who, call, x)
+        caller, background = cost.caller, cost.background
+        kind = f"ros:{call}"
+        kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
+        if kernel.current() is None:
+            background += caller
+        else:
+            kernel.pay(caller)
+        if background and self.place.processor is not None:
+            self.place.processor.load(self.place, background)
+
+    def check_open(self) -> None:
+        """``UsageError`` if the node has left the graph."""
+        if self.closed:
+            raise UsageError(f"node {self.name} has left the graph")

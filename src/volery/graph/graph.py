@@ -1,0 +1,127 @@
+"""The embedded ROS graph: nothing to install, one kernel's time, every call priced and every message carried.
+
+What a call costs and how a message travels are asked of two functions that are given from above; the graph
+knows neither laws nor networks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.graph.clock import Clock
+from volery.graph.context import Context, Records
+from volery.graph.embedded import EmbeddedNode
+from volery.graph.node import Carry, Price
+from volery.graph.parameters import Parameters
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place
+from volery.kernel.waiting import Signal
+
+
+class TopicState(NamedTuple):
+    """A topic as it is: who publishes and who subscribes, by the nodes' names."""
+
+    name: str
+    type: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+
+
+class ServiceState(NamedTuple):
+    """A service as it is: its type, and who serves it by the node's name."""
+
+    name: str
+    type: str
+    server: str
+
+
+def everything(topic_name: str) -> bool:
+    """Record the content of all topics."""
+    return True
+
+
+class Graph:
+    """One ROS graph.
+
+    *records* says for which topics the content of messages is recorded. *epoch* is what ROS time is at the
+    kernel's zero: 0 in virtual time, the Unix time in ns on the wall clock. ``/clock`` ticks each 10 ms of
+    the kernel's time while somebody subscribes to it.
+    """
+
+    def __init__(
+        self, kernel: Kernel, price: Price, carry: Carry, *, records: Records = everything, epoch: Ns = 0
+    ) -> None:
+        self.kernel = kernel
+        self._context = Context(kernel, price, carry, records, epoch, Signal(kernel, "the ROS graph"))
+        self._context.listen_to_clock = Clock(self._context).listen
+        self._nodes: dict[str, EmbeddedNode] = {}
+
+    @property
+    def parameters(self) -> Parameters:
+        """All parameters, by absolute name."""
+        return self._context.parameters
+
+    def node(
+        self,
+        name: str,
+        namespace: str = "/",
+        *,
+        remaps: Mapping[str, str] | None = None,
+        anonymous: bool = False,
+        place: Place | None = None,
+    ) -> EmbeddedNode:
+        """Join the graph as *name*; priced as ``init`` and ``node_handle``.
+
+        *place* is where the node's computing is spent, that of the current task if it is not given.
+        *anonymous* adds a number to the name. Raises ``UsageError`` for an invalid name or one that is
+        taken.
+        """
+        with self.kernel:
+            if anonymous:
+                name = self._numbered(name, namespace)
+            made = EmbeddedNode(self._context, name, namespace, remaps or {}, place or self._here(name))
+            other = self._nodes.get(made.name)
+            if other is not None:
+                raise UsageError(
+                    f"a node named {made.name} is there already (of component {other.place.component}); "
+                    f"give this one of component {made.place.component} another name or namespace"
+                )
+            self._nodes[made.name] = made
+            made.on_close = lambda: self._forget(made)
+            made.join()
+            return made
+
+    def _here(self, name: str) -> Place:
+        task = self.kernel.current()
+        return task.place if task is not None else Place(name)
+
+    def _numbered(self, name: str, namespace: str) -> str:
+        number = 1
+        while f"{namespace.rstrip('/')}/{name}_{number}" in self._nodes:
+            number += 1
+        return f"{name}_{number}"
+
+    def _forget(self, node: EmbeddedNode) -> None:
+        del self._nodes[node.name]
+
+    def node_names(self) -> list[str]:
+        """Who is there, sorted."""
+        return sorted(self._nodes)
+
+    def topics(self) -> list[TopicState]:
+        """The topics that somebody publishes or subscribes to, by name."""
+        states = []
+        for name, at in sorted(self._context.topics.items()):
+            publishers = tuple(one.member.name for one in at.publishers)
+            subscribers = tuple(one.member.name for one in at.subscriptions)
+            if publishers or subscribers:
+                states.append(TopicState(name, at.type, publishers, subscribers))
+        return states
+
+    def services(self) -> list[ServiceState]:
+        """The services that somebody serves, by name."""
+        served = sorted(self._context.services.items())
+        return [ServiceState(name, one.type, one.member.name) for name, one in served]

@@ -1,0 +1,86 @@
+"""Callback groups: what is ready waits here in the order of its arrival until somebody spins."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from volery.base.time import Ns
+from volery.graph.context import Member
+from volery.kernel.waiting import Signal, current_task, end_activation
+
+FIRST, NEXT = 1.0, 0.0
+
+
+class Work(NamedTuple):
+    """A callback that is ready: since when, and what runs it (as user code)."""
+
+    arrived: Ns
+    run: Callable[[], None]
+
+
+class CallbackGroup:
+    """See ``volery.graph.node.Group``.
+
+    A wait in ``spin_once`` ends the caller's activation; the callback that ends the wait is a new one,
+    released when its message (request, timer) arrived. Polling (``within=0``) belongs to the activation that
+    is under way.
+    """
+
+    def __init__(self, member: Member, label: str) -> None:
+        self._member = member
+        self._ready: deque[Work] = deque()
+        self._filled = Signal(member.context.kernel, f"{member.name} ({label})")
+        self._spun = False
+
+    def __len__(self) -> int:
+        return len(self._ready)
+
+    def add(self, work: Work) -> None:
+        """A callback has become ready. House code."""
+        self._ready.append(work)
+        self._filled.notify()
+
+    def discard(self, run: Callable[[], None]) -> None:
+        """Forget the oldest work that would run *run*."""
+        for work in self._ready:
+            if work.run == run:
+                self._ready.remove(work)
+                return
+
+    def wake(self) -> None:
+        """Let those who wait look again: the node has been closed."""
+        self._filled.notify()
+
+    def spin_once(self, within: Ns | None = None) -> bool:
+        """Run the next callback; see ``Group``."""
+        member = self._member
+        with member.context.kernel:
+            if within == 0:
+                self._pay()
+                work = self._ready.popleft() if self._ready else None
+            else:
+                work = self._wait(within)
+                self._pay()
+        if work is None:
+            return False
+        work.run()
+        return True
+
+    def spin(self) -> None:
+        """Run callbacks as they come until the node is closed."""
+        while not self._member.closed:
+            self.spin_once()
+
+    def _pay(self) -> None:
+        self._member.pay("spin_once", NEXT if self._spun else FIRST)
+        self._spun = True
+
+    def _wait(self, within: Ns | None) -> Work | None:
+        kernel = self._member.context.kernel
+        end_activation(kernel)
+        self._filled.wait_for(lambda: self._ready or self._member.closed, within)
+        work = self._ready.popleft() if self._ready else None
+        current_task(kernel).release(work.arrived if work else kernel.now())
+        return work
