@@ -82,8 +82,7 @@ class Interface:
 class Figure:
     """What an operation or an activation takes, stated at a processor of the catalogue and a frequency.
 
-    ``energy_j`` is ``None`` where the model states none. See ``volery.model.figures`` for the law that scales
-    it.
+    ``energy_j`` is ``None`` where the model states none. What it is at another frequency is a law's to say.
     """
 
     time_ns: Ns
