@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import field, make_dataclass
 from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Message:
     __match_args__: ClassVar[tuple[str, ...]] = ()
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
-    __hash__ = None  # type: ignore[assignment]  # messages are mutable values
+    __hash__: ClassVar[Any] = None  # messages are mutable values
 
     def copy(self) -> Any:
         """The message as it is now, lists made arrays.
@@ -60,47 +60,8 @@ def _same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-class _Stamp(Message):
-    """ROS 1's spelling of a time or a duration, for code that reads ``stamp.secs`` or ``stamp.to_sec()``."""
-
-    __slots__ = ()
-    if TYPE_CHECKING:  # the fields of the types that are made of this
-        sec: Any
-        nanosec: Any
-
-    @property
-    def secs(self) -> int:
-        """``sec`` in ROS 1's spelling."""
-        return int(self.sec)
-
-    @secs.setter
-    def secs(self, value: int) -> None:
-        self.sec = value
-
-    @property
-    def nsecs(self) -> int:
-        """``nanosec`` in ROS 1's spelling."""
-        return int(self.nanosec)
-
-    @nsecs.setter
-    def nsecs(self, value: int) -> None:
-        self.nanosec = value
-
-    def to_nsec(self) -> int:
-        """Nanoseconds."""
-        return int(self.sec * 1_000_000_000 + self.nanosec)
-
-    def to_sec(self) -> float:
-        """Seconds."""
-        return self.to_nsec() / 1e9
-
-    def is_zero(self) -> bool:
-        """Whether nothing was ever set."""
-        return self.to_nsec() == 0
-
-
-class _Header(Message):
-    """ROS 1's ``seq`` may be written; ROS 2 does not carry it, so it reads as 0."""
+class Header(Message):
+    """A header. ROS 1's ``seq`` may be written; ROS 2 does not carry it, so it reads as 0."""
 
     __slots__ = ()
 
@@ -114,7 +75,7 @@ class _Header(Message):
         """Accepted and forgotten."""
 
 
-class _Nothing(Message):
+class Nothing(Message):
     """A type without fields; its encoding has one byte that says nothing."""
 
     __slots__ = ()
@@ -123,11 +84,6 @@ class _Nothing(Message):
     def __init__(self, structure_needs_at_least_one_member: int = 0) -> None: ...
 
 
-_BASES: dict[str, type[Message]] = {
-    "builtin_interfaces/msg/Time": _Stamp,
-    "builtin_interfaces/msg/Duration": _Stamp,
-    "std_msgs/msg/Header": _Header,
-}
 _ROS2_DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
 """Defaults that the ROS 2 definitions state; all others are zero, false or empty."""
 
@@ -144,10 +100,11 @@ class Field(NamedTuple):
     length: int | None
 
 
-def make_class(name: str, constants: dict[str, Any], fields: list[Field]) -> type[Message]:
-    """The class of the values of type *name* (``package/msg/Name``)."""
+def make_class(
+    name: str, base: type[Message], constants: dict[str, Any], fields: list[Field]
+) -> type[Message]:
+    """The class of the values of type *name* (``package/msg/Name``), made of *base*."""
     package, kind, label = name.split("/")
-    base = _BASES.get(name, Message) if fields else _Nothing
     members = []
     copiers = []
     for index, one in enumerate(fields):

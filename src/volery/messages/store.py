@@ -12,7 +12,8 @@ from rosbags.typesys.base import TypesysError, normalize_fieldname
 from rosbags.typesys.store import Typestore
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.messages.message import Field, Message, make_class
+from volery.messages.message import Field, Header, Message, Nothing, make_class
+from volery.messages.stamp import DurationValue, TimeValue
 
 _classes: dict[str, type[Message]] = {}
 _services: dict[str, ServiceType] = {}
@@ -132,14 +133,32 @@ def message_class(name: str) -> type[Message]:
         constants, fields = store().fielddefs[full]
         described = [_describe(normalize_fieldname(key), what) for key, what in fields if key != _FILLER]
         named = {normalize_fieldname(label): value for label, _, value in constants}
-        made = make_class(full, named, described)
+        made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
         _classes[full] = made
         store().types[full] = made  # what bytes are decoded to
+        if issubclass(made, (TimeValue, DurationValue)):
+            _introduce(made)
     _classes[name] = _classes[full]
     return _classes[full]
 
 
+_TIME, _DURATION = "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"
+_BASES: dict[str, type[Message]] = {
+    _TIME: TimeValue,
+    _DURATION: DurationValue,
+    "std_msgs/msg/Header": Header,
+}
 _FILLER = "structure_needs_at_least_one_member"
+
+
+def _introduce(made: Any) -> None:
+    """Tell times and durations of each other: the difference of two times is a duration."""
+    if issubclass(made, TimeValue):
+        TimeValue.kind = made
+        message_class(_DURATION)
+    else:
+        DurationValue.kind = made
+        message_class(_TIME)
 
 
 def _describe(name: str, what: Any) -> Field:
