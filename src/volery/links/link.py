@@ -44,7 +44,7 @@ class Link(Protocol):
 
 @runtime_checkable
 class ByteLink(Protocol):
-    """A link that is bytes on a wire, and so can carry some that are no frame: a boot loader's greeting, noise."""
+    """A link that is bytes on a wire, and so can carry some that are no frame: a greeting, noise."""
 
     def send_bytes(self, data: bytes) -> None:
         """Put *data* on the wire as it is."""

@@ -30,7 +30,7 @@ SIGNATURE_LENGTH = 13
 
 class _Field(NamedTuple):
     name: str
-    length: int  # 1 for a single value, else how many
+    length: int  # 0 for a single value, else how many
     text: bool
 
 
@@ -46,7 +46,7 @@ class MessageType:
         self._fields = tuple(self._laid_out(definition))
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)
-        self._plain = all(field.length == 1 and not field.text for field in self._fields)
+        self._plain = all(field.length == 0 for field in self._fields)
 
     @staticmethod
     def _laid_out(definition: Any) -> list[_Field]:
@@ -57,7 +57,7 @@ class MessageType:
         }
         return [
             _Field(name, length, name in texts)
-            for name, length in zip(definition.ordered_fieldnames, definition.lengths, strict=True)
+            for name, length in zip(definition.ordered_fieldnames, definition.array_lengths, strict=True)
         ]
 
     @property
@@ -82,7 +82,7 @@ class MessageType:
             given = fields.get(field.name)
             if field.text:
                 values.append((given or "").encode()[: field.length])
-            elif field.length == 1:
+            elif field.length == 0:
                 values.append(given or 0)
             else:
                 given = tuple(given or ())
@@ -108,7 +108,7 @@ class MessageType:
             if field.text:
                 fields[field.name] = values[place].split(b"\0", 1)[0].decode(errors="replace")
                 place += 1
-            elif field.length == 1:
+            elif field.length == 0:
                 fields[field.name] = values[place]
                 place += 1
             else:

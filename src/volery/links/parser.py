@@ -1,8 +1,7 @@
-"""A stream of bytes taken apart into frames. Tolerant: real links carry boot texts, noise and other
-protocols.
+"""A stream of bytes taken apart into frames. Tolerant: real links carry boot texts, noise, other protocols.
 
-What is not MAVLink 2 is skipped, counted and kept as evidence, so that ``problem`` can say in words what
-does arrive.
+What is not MAVLink 2 is skipped, counted and kept as evidence, so that ``problem`` can say in words what does
+arrive.
 """
 
 from __future__ import annotations
@@ -19,12 +18,16 @@ from volery.links.mavlink import (
     SIGNED,
     STX,
     STX_V1,
+    MessageType,
     message_type_of,
 )
 
+_STARTS = frozenset((STX, STX_V1))
 _PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
 _KEPT_LINES = 20
 _LONGEST_LINE = 120
+
+Octets = bytes | bytearray
 
 
 @dataclass
@@ -41,6 +44,59 @@ class Heard:
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_KEPT_LINES))
 
 
+class _Head:
+    """What seems to be the header of a frame at *start*. ``length`` is that of the whole; 0: it is none."""
+
+    __slots__ = ("component", "kind", "length", "old", "payload", "start", "system", "trailer")
+
+    def __init__(self, buffer: Octets, start: int) -> None:
+        self.start = start
+        self.old = buffer[start] == STX_V1
+        self.trailer = CHECKSUM.size
+        incompatible = 0
+        if self.old:
+            _, size, _, self.system, self.component, number = HEADER_V1.unpack_from(buffer, start)
+            self.payload = start + HEADER_V1.size
+        else:
+            _, size, incompatible, _, _, self.system, self.component, low, high = HEADER.unpack_from(
+                buffer, start
+            )
+            number = low | high << 16
+            self.payload = start + HEADER.size
+            self.trailer += SIGNATURE_LENGTH if incompatible & SIGNED else 0
+        self.kind: MessageType | None = message_type_of(number)
+        self.length: int = self.payload - start + size + self.trailer
+        if incompatible & ~SIGNED or (self.kind is not None and size > self.kind.size):
+            self.length = 0
+        elif self.old and self.kind is None:
+            self.length = 0  # of the old protocol only known messages count: noise looks like the others
+
+    def whole(self, buffer: Octets) -> bool:
+        """The checksum is right. An unknown message's cannot be told: believe it if a frame follows."""
+        end = self.start + self.length
+        if self.kind is None:
+            return len(buffer) <= end or buffer[end] in _STARTS
+        body = end - self.trailer
+        checksum: int = CHECKSUM.unpack_from(buffer, body)[0]
+        return self.kind.checksum(bytes(buffer[self.start + 1 : body])) == checksum
+
+
+def _head(buffer: Octets, start: int) -> _Head | None:
+    """``None`` while the header is not complete."""
+    size = HEADER_V1.size if buffer[start] == STX_V1 else HEADER.size
+    return _Head(buffer, start) if len(buffer) - start >= size else None
+
+
+def whole_frame(data: Octets, start: int) -> int:
+    """The length of the whole frame that lies at *start*; 0 if none does."""
+    if start >= len(data) or data[start] not in _STARTS:
+        return 0
+    head = _head(data, start)
+    if head is None or not head.length or start + head.length > len(data):
+        return 0
+    return head.length if head.whole(data) else 0
+
+
 class Parser:
     """Feed it bytes in any portions; it returns the frames that they complete."""
 
@@ -50,21 +106,22 @@ class Parser:
         self._line = bytearray()
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames completed by *data*, in order; MAVLink 1 frames among them. Never raises."""
+        """The frames completed by *data*, in order, MAVLink 1 frames among them. Never raises."""
         self.heard.octets += len(data)
         self._buffer += data
+        buffer = self._buffer
         frames: list[Frame] = []
-        while self._buffer:
-            self._skip(self._before_start())
-            if not self._buffer:
+        place = 0
+        while place < len(buffer):
+            if buffer[place] not in _STARTS:
+                self._classify(buffer[place])
+                place += 1
+                continue
+            head = _head(buffer, place)
+            if head is None or place + head.length > len(buffer):
                 break
-            length = self._frame_length()
-            if length == 0:
-                self._skip(1)
-            elif length > len(self._buffer):
-                break
-            else:
-                self._take(length, frames)
+            place += self._take(head, frames)
+        del buffer[:place]
         return frames
 
     def reset(self) -> None:
@@ -78,101 +135,45 @@ class Parser:
             return ""
         if heard.frames_v1:
             return "MAVLink 1 only: set SERIALx_PROTOCOL=2 (ArduPilot) or MAV_PROTO_VER=2 (PX4) for this port"
-        if heard.unknown or heard.corrupt:
-            return (
-                f"MAVLink-like frames arrive, but none is whole or known ({heard.corrupt} corrupt, "
-                f"{heard.unknown} of unknown kind): noise, or another dialect"
-            )
         if heard.text > 4 * heard.garbage:
             return f"only text arrives: {self._sample()!r}"
+        if heard.corrupt > 2 or heard.unknown > 2:
+            return (
+                f"{heard.octets} bytes arrive but no whole MAVLink frame ({heard.corrupt} corrupt, "
+                f"{heard.unknown} of unknown kind): noise, or another dialect"
+            )
         return f"{heard.octets} bytes arrive but no MAVLink: another protocol, or the wrong baud rate"
 
     def _sample(self) -> str:
         lines = [line for line in self.heard.lines if line.strip()]
-        return lines[0] if lines else self._line.decode("ascii", errors="replace")[:_LONGEST_LINE]
+        return lines[0] if lines else self._line.decode("ascii")
 
-    def _before_start(self) -> int:
-        starts = [at for at in (self._buffer.find(STX), self._buffer.find(STX_V1)) if at >= 0]
-        return min(starts, default=len(self._buffer))
-
-    def _frame_length(self) -> int:
-        """Bytes of the frame that seems to start here; 0 if none does; more than there are if unknown yet."""
-        buffer = self._buffer
-        if buffer[0] == STX_V1:
-            return self._frame_length_v1()
-        if len(buffer) < HEADER.size:
-            return len(buffer) + 1
-        payload, incompatible = buffer[1], buffer[2]
-        kind = message_type_of(_sender(buffer, old=False)[2])
-        if incompatible & ~SIGNED or (kind is not None and payload > kind.size):
-            return 0
-        signature = SIGNATURE_LENGTH if incompatible & SIGNED else 0
-        return HEADER.size + payload + CHECKSUM.size + signature
-
-    def _frame_length_v1(self) -> int:
-        """As above. Of the old protocol only known messages count: noise looks like the others."""
-        buffer = self._buffer
-        if len(buffer) < HEADER_V1.size:
-            return len(buffer) + 1
-        kind = message_type_of(_sender(buffer, old=True)[2])
-        if kind is None or buffer[1] > kind.size:
-            return 0
-        return HEADER_V1.size + buffer[1] + CHECKSUM.size
-
-    def _take(self, length: int, frames: list[Frame]) -> None:
-        raw = bytes(self._buffer[:length])
-        old = raw[0] == STX_V1
-        signature = 0 if old or not raw[2] & SIGNED else SIGNATURE_LENGTH
-        header = HEADER_V1.size if old else HEADER.size
-        system, component, number = _sender(raw, old)
-        kind = message_type_of(number)
-        end = length - CHECKSUM.size - signature
-        if kind is None:
-            self._unknown(length)
-            return
-        if kind.checksum(raw[1:end]) != CHECKSUM.unpack_from(raw, end)[0]:
-            self.heard.corrupt += 1
-            self._skip(1)
-            return
-        if old:
+    def _take(self, head: _Head, frames: list[Frame]) -> int:
+        """How many bytes are dealt with."""
+        if not head.length or not head.whole(self._buffer):
+            if head.length and head.kind is not None:
+                self.heard.corrupt += 1
+            self._classify(self._buffer[head.start])
+            return 1
+        if head.kind is None:
+            self.heard.unknown += 1
+            return head.length
+        if head.old:
             self.heard.frames_v1 += 1
         else:
             self.heard.frames += 1
-        frames.append(Frame(kind.name, kind.unpack(raw[header:end]), system, component))
-        del self._buffer[:length]
-
-    def _unknown(self, length: int) -> None:
-        """Of a message that the dialect lacks the checksum is unknown, too: believe it if a frame follows."""
-        if len(self._buffer) > length and self._buffer[length] not in {STX, STX_V1}:
-            self._skip(1)
-            return
-        self.heard.unknown += 1
-        del self._buffer[:length]
-
-    def _skip(self, count: int) -> None:
-        if not count:
-            return
-        for octet in self._buffer[:count]:
-            self._classify(octet)
-        del self._buffer[:count]
+        payload = bytes(self._buffer[head.payload : head.start + head.length - head.trailer])
+        frames.append(Frame(head.kind.name, head.kind.unpack(payload), head.system, head.component))
+        return head.length
 
     def _classify(self, octet: int) -> None:
         if octet not in _PRINTABLE:
             self.heard.garbage += 1
             return
         self.heard.text += 1
-        if octet in b"\r\n" or len(self._line) >= _LONGEST_LINE:
-            if self._line:
-                self.heard.lines.append(self._line.decode("ascii"))
+        ends = octet in b"\r\n"
+        if self._line and (ends or len(self._line) >= _LONGEST_LINE):
+            self.heard.lines.append(self._line.decode("ascii"))
             self._line.clear()
-        if octet not in b"\r\n":
+        if not ends:
             self._line.append(octet)
-
-
-def _sender(raw: bytes | bytearray, old: bool) -> tuple[int, int, int]:
-    """System, component and message number."""
-    if old:
-        *_, system, component, number = HEADER_V1.unpack_from(raw)
-        return system, component, number
-    *_, system, component, low, high = HEADER.unpack_from(raw)
-    return system, component, low | high << 16

@@ -1,0 +1,127 @@
+"""A link within one process that goes through real bytes, and the faults that a wire or a radio adds to them.
+
+Every fault is drawn from one seeded stream in the order of sending, so a run with faults repeats exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from random import Random
+
+from volery.base.errors import UsageError, choices, did_you_mean
+from volery.base.time import MS, Ns, from_seconds
+from volery.kernel.api import Kernel
+from volery.links.coded import CodedLink
+
+BURST_LENGTH = 40
+"""Bytes that a burst of noise overwrites, from where it begins."""
+
+
+@dataclass(frozen=True)
+class WireFaults:
+    """What happens to bytes on their way. Probabilities are 0..1.
+
+    ``drop``: that a frame vanishes. ``flip``: that a bit of a byte is turned, for each byte. ``burst``: that
+    noise begins with a frame and overwrites ``BURST_LENGTH`` bytes. ``jitter``: up to so much later, in
+    order. ``cuts``: from, to; in between nothing passes in either direction.
+    """
+
+    drop: float = 0.0
+    flip: float = 0.0
+    burst: float = 0.0
+    jitter: Ns = 0
+    cuts: tuple[tuple[Ns, Ns], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in (("drop", self.drop), ("flip", self.flip), ("burst", self.burst)):
+            if not 0.0 <= value <= 1.0:
+                raise UsageError(f"wire faults: {name}={value} is no probability; 0 to 1")
+
+    def cut_at(self, now: Ns) -> bool:
+        """Nothing passes at this time."""
+        return any(start <= now < end for start, end in self.cuts)
+
+
+FAULT_OPTIONS = ("burst", "cut", "drop", "flip", "jitter")
+
+
+def faults_of(options: Mapping[str, str]) -> WireFaults:
+    """Faults as an address states them: ``drop=0.01&flip=1e-5&burst=0.001&jitter=0.05&cut=20-25,60-70``.
+
+    ``jitter`` and ``cut`` (from-to) in seconds. Raises ``UsageError`` for anything else.
+    """
+    numbers: dict[str, float] = {}
+    cuts: tuple[tuple[Ns, Ns], ...] = ()
+    for name, given in options.items():
+        if name == "cut":
+            cuts = tuple(_span(part) for part in given.split(","))
+        elif name in FAULT_OPTIONS:
+            numbers[name] = _number(name, given)
+        else:
+            hint = did_you_mean(name, FAULT_OPTIONS)
+            raise UsageError(f"no wire fault {name!r}{hint}; there is {choices(FAULT_OPTIONS)}")
+    jitter = from_seconds(numbers.pop("jitter", 0.0))
+    return WireFaults(jitter=jitter, cuts=cuts, **numbers)
+
+
+def _number(name: str, given: str) -> float:
+    try:
+        return float(given)
+    except ValueError:
+        raise UsageError(f"wire faults: {name}={given!r} is not a number") from None
+
+
+def _span(text: str) -> tuple[Ns, Ns]:
+    start, dash, end = text.partition("-")
+    if not dash:
+        raise UsageError(f"wire faults: cut={text!r} should be FROM-TO in seconds, as in cut=20-25")
+    return from_seconds(_number("cut", start)), from_seconds(_number("cut", end))
+
+
+class Wire(CodedLink):
+    """One end. What it sends arrives as bytes at the peer, or does not."""
+
+    def __init__(self, kernel: Kernel, name: str, delay: Ns, faults: WireFaults, random: Random) -> None:
+        super().__init__(kernel, name)
+        self.peer: Wire = self
+        self._delay = delay
+        self._faults = faults
+        self._random = random
+        self._noise = 0  # bytes that the burst under way will still overwrite
+        self._latest: Ns = 0  # nothing overtakes
+
+    def _transmit(self, data: bytes) -> None:
+        now = self._kernel.now()
+        faults, random = self._faults, self._random
+        if faults.drop and random.random() < faults.drop:
+            return
+        if faults.burst and random.random() < faults.burst:
+            self._noise = BURST_LENGTH
+        if faults.flip or self._noise:
+            data = self._garbled(data)
+        if faults.cut_at(now):
+            return
+        late = int(random.random() * faults.jitter) if faults.jitter else 0
+        self._latest = max(self._latest, now + self._delay + late)
+        self._kernel.call_at(self._latest, lambda: self.peer.arrived(data))
+
+    def _garbled(self, data: bytes) -> bytes:
+        garbled = bytearray(data)
+        for place in range(len(garbled)):
+            if self._noise:
+                self._noise -= 1
+                garbled[place] = self._random.randrange(256)
+            elif self._random.random() < self._faults.flip:
+                garbled[place] ^= 1 << self._random.randrange(8)
+        return bytes(garbled)
+
+
+def wire(
+    kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns = MS
+) -> tuple[Wire, Wire]:
+    """The vehicle's and the autopilot's side of a link through bytes; *random* is a named, seeded stream."""
+    ours = Wire(kernel, name, delay, faults, random)
+    theirs = Wire(kernel, f"{name} (autopilot)", delay, faults, random)
+    ours.peer, theirs.peer = theirs, ours
+    return ours, theirs

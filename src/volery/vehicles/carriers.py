@@ -1,0 +1,53 @@
+"""From an address to an open link. ``sim`` and ``graph`` are not carriers of bytes: ``run`` supplies them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from volery.base.errors import UsageError
+from volery.kernel.api import Kernel
+from volery.links.coded import CodedLink
+from volery.links.serial_line import SerialLine
+from volery.links.tcp import TcpClient, TcpServer
+from volery.links.udp import UdpLink
+from volery.vehicles.address import Address
+
+DEFAULT_BAUD = 57_600
+ANYWHERE = "0.0.0.0"
+"""``udp://:PORT`` means just this: whoever speaks first."""
+
+
+def open_link(kernel: Kernel, address: Address) -> CodedLink:
+    """The link to an autopilot at *address* (tcp, udp, serial). It connects by itself, again after a break.
+
+    Raises ``UsageError`` for another carrier, a baud rate that is none, or a port that is taken.
+    """
+    if address.carrier == "tcp":
+        return TcpClient(kernel, address.host, _port(address), address.text)
+    if address.carrier == "udp":
+        return _udp(kernel, address)
+    if address.carrier == "serial":
+        baud = address.number("baud", DEFAULT_BAUD)
+        if baud <= 0 or baud != int(baud):
+            raise UsageError(f"{address}: baud={baud:g} is no baud rate; usual are 57600, 115200 and 921600")
+        return SerialLine(kernel, address.path, int(baud), address.text)
+    raise UsageError(f"{address}: {address.carrier} is not a carrier of bytes; tcp, udp and serial are")
+
+
+def listen(kernel: Kernel, address: Address, *, joined: Callable[[], None] | None = None) -> CodedLink:
+    """Where an autopilot serves: tcp clients connect; udp sends to a host or answers the first speaker."""
+    if address.carrier == "tcp":
+        return TcpServer(kernel, address.host, _port(address), address.text, joined=joined)
+    return _udp(kernel, address)
+
+
+def _udp(kernel: Kernel, address: Address) -> UdpLink:
+    if address.host:
+        return UdpLink(kernel, ANYWHERE, 0, (address.host, _port(address)), address.text)
+    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text)
+
+
+def _port(address: Address) -> int:
+    if address.port is None:
+        raise UsageError(f"{address} lacks the port")
+    return address.port

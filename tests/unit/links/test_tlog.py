@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from pymavlink import mavutil
+
+from volery.base.time import MS, S
+from volery.kernel.virtual import VirtualKernel
+from volery.links.in_process import in_process
+from volery.links.link import Frame
+from volery.links.mavlink import encode
+from volery.links.tlog import TlogTap, read_tlog
+
+BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
+ARM = Frame("COMMAND_LONG", {"target_system": 1, "command": 400, "param1": 1.0}, 255, 190)
+
+
+def record(path: Path) -> None:
+    kernel = VirtualKernel()
+    ours, theirs = in_process(kernel, "radio", 5 * MS)
+    tap = TlogTap(kernel, ours, path, epoch_us=1_700_000_000_000_000)
+    tap.receive(lambda frame: None)
+    theirs.send(BEAT)
+    kernel.call_at(S, lambda: tap.send(ARM))
+    kernel.run(2 * S)
+    tap.close()
+
+
+def test_both_directions_are_read_back(tmp_path: Path) -> None:
+    record(tmp_path / "flight.tlog")
+    entries = list(read_tlog(tmp_path / "flight.tlog"))
+    assert [
+        (entry.at_us - 1_700_000_000_000_000, entry.frame.name, entry.frame.system) for entry in entries
+    ] == [
+        (5_000, "HEARTBEAT", 1),
+        (1_000_000, "COMMAND_LONG", 255),
+    ]
+
+
+def test_other_programs_read_it(tmp_path: Path) -> None:
+    record(tmp_path / "flight.tlog")
+    log = mavutil.mavlink_connection(str(tmp_path / "flight.tlog"), dialect="ardupilotmega")
+    assert [log.recv_msg().get_type() for _ in range(2)] == ["HEARTBEAT", "COMMAND_LONG"]
+    log.close()
+
+
+def test_damage_and_a_cut_end_are_passed_over(tmp_path: Path) -> None:
+    good = struct.pack(">Q", 7) + encode(BEAT, 0)
+    path = tmp_path / "damaged.tlog"
+    path.write_bytes(good + b"\xfd\x09 noise \xfe" + good + good[:-4])
+    assert [entry.at_us for entry in read_tlog(path)] == [7, 7]

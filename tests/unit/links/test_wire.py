@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.seeds import stream
+from volery.base.time import MS, S
+from volery.kernel.virtual import VirtualKernel
+from volery.links.link import Frame
+from volery.links.wire import WireFaults, faults_of, wire
+
+COUNT = 400
+
+
+def arrivals(faults: WireFaults, seed: int = 1) -> tuple[list[tuple[int, int]], object]:
+    """(when, which) of those of 400 numbered frames, one each 10 ms, that came; what the end has heard."""
+    kernel = VirtualKernel()
+    ours, theirs = wire(kernel, "radio", faults, stream(seed, "radio"))
+    seen: list[tuple[int, int]] = []
+    ours.receive(lambda frame: seen.append((kernel.now(), frame.fields["seq"])))
+    for number in range(COUNT):
+        frame = Frame("MISSION_CURRENT", {"seq": number}, 1, 1)
+        kernel.call_at(number * 10 * MS, lambda frame=frame: theirs.send(frame))
+    kernel.run(10 * S)
+    return seen, ours.heard
+
+
+def test_without_faults_all_arrive_after_the_delay() -> None:
+    seen, _ = arrivals(WireFaults())
+    assert seen == [(number * 10 * MS + MS, number) for number in range(COUNT)]
+
+
+def test_frames_are_dropped_as_often_as_stated_and_the_same_ones_for_the_same_seed() -> None:
+    seen, _ = arrivals(WireFaults(drop=0.25))
+    assert 0.65 * COUNT < len(seen) < 0.85 * COUNT
+    assert seen == arrivals(WireFaults(drop=0.25))[0]
+    assert seen != arrivals(WireFaults(drop=0.25), seed=2)[0]
+
+
+def test_turned_bits_are_caught_by_the_checksum() -> None:
+    seen, heard = arrivals(WireFaults(flip=0.01))
+    assert len(seen) < COUNT
+    assert heard.corrupt > 0  # type: ignore[attr-defined]
+    assert [number for _, number in seen] == sorted(number for _, number in seen)
+
+
+def test_a_burst_garbles_frames_in_a_row() -> None:
+    seen, _ = arrivals(WireFaults(burst=0.02))
+    numbers = [number for _, number in seen]
+    gaps = [later - earlier - 1 for earlier, later in pairwise(numbers)]
+    assert max(gaps) >= 2
+
+
+def test_jitter_delays_and_nothing_overtakes() -> None:
+    seen, _ = arrivals(WireFaults(jitter=50 * MS))
+    assert [number for _, number in seen] == list(range(COUNT))
+    assert max(when - number * 10 * MS for when, number in seen) > 20 * MS
+
+
+def test_nothing_passes_while_the_wire_is_cut() -> None:
+    seen, _ = arrivals(WireFaults(cuts=((S, 2 * S),)))
+    assert [number for _, number in seen] == [*range(100), *range(200, COUNT)]
+
+
+def test_faults_as_an_address_states_them() -> None:
+    stated = {"drop": "0.01", "flip": "1e-5", "burst": "0.001", "jitter": "0.05", "cut": "20-25,60-70"}
+    assert faults_of(stated) == WireFaults(
+        drop=0.01, flip=1e-5, burst=0.001, jitter=50 * MS, cuts=((20 * S, 25 * S), (60 * S, 70 * S))
+    )
+
+
+@pytest.mark.parametrize(
+    ("stated", "says"),
+    [
+        ({"drop": "2"}, "no probability"),
+        ({"drop": "much"}, "not a number"),
+        ({"cut": "20"}, "FROM-TO"),
+        ({"drp": "0"}, "did you mean 'drop'"),
+    ],
+)
+def test_faults_that_make_no_sense(stated: dict[str, str], says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        faults_of(stated)
