@@ -1,0 +1,1 @@
+"""The simulated flight stack: estimator, cascaded control, modes, and what all dialects of it share."""
