@@ -1,0 +1,223 @@
+"""Runs side by side: one table per question, one column per run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+from volery.report.grids import (
+    NOTHING,
+    Cell,
+    Column,
+    Grid,
+    bound,
+    count,
+    energy,
+    figure,
+    milliseconds,
+    number,
+    verdict,
+)
+from volery.requirements.record import ComponentRecord, RunRecord
+
+
+def _names(dictionaries: Iterable[Iterable[str]]) -> list[str]:
+    """All keys, in the order in which they first occur."""
+    return list(dict.fromkeys(name for names in dictionaries for name in names))
+
+
+def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """How each run ended and what it came to as a whole."""
+    rows = [
+        ("outcome", [_outcome(record) for record in records]),
+        ("requirements met", [_met(record) for record in records]),
+        ("fidelity", [Cell(record.fidelity or NOTHING) for record in records]),
+        ("scenario", [Cell(record.scenario or NOTHING) for record in records]),
+        ("seed", [Cell(str(record.seed)) for record in records]),
+        ("simulated s", [Cell(number(record.sim_s, 1)) for record in records]),
+        ("faster than real time", [Cell(number(record.real_time_factor, 0, "×")) for record in records]),
+        ("parcels", [Cell(_parcels(record)) for record in records]),
+        ("energy of computers", [Cell(energy(_sum(_computers(record)))) for record in records]),
+        ("energy of vehicles", [Cell(energy(_sum(_vehicles(record)))) for record in records]),
+    ]
+    columns = (Column(""), *(Column(label, True) for label in labels))
+    return Grid("The runs", columns, tuple((Cell(name), *cells) for name, cells in rows))
+
+
+def _outcome(record: RunRecord) -> Cell:
+    good = record.outcome.status == "completed"
+    return Cell(record.outcome.status, status="good" if good else "bad")
+
+
+def _met(record: RunRecord) -> Cell:
+    judged = [one for one in record.requirements.values() if one.met is not None]
+    met = sum(1 for one in judged if one.met)
+    return Cell(
+        f"{met} of {len(record.requirements)}", status="good" if met == len(record.requirements) else "bad"
+    )
+
+
+def _parcels(record: RunRecord) -> str:
+    states = Counter(parcel.state for parcel in record.parcels.values())
+    return ", ".join(f"{amount} {state}" for state, amount in states.most_common()) or NOTHING
+
+
+def _computers(record: RunRecord) -> list[float | None]:
+    return [one.energy_j for one in record.processors.values()]
+
+
+def _vehicles(record: RunRecord) -> list[float | None]:
+    return [one.energy_j for one in record.vehicles.values()]
+
+
+def _sum(values: list[float | None]) -> float | None:
+    """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
+    known = [value for value in values if value is not None]
+    return sum(known) if values and len(known) == len(values) else None
+
+
+def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each requirement: what every run observed, and whether it met the bound."""
+    rows = []
+    for name in _names(record.requirements for record in records):
+        first = next(record.requirements[name] for record in records if name in record.requirements)
+        cells = [Cell(name), Cell(bound(first), status="quiet")]
+        for record in records:
+            one = record.requirements.get(name)
+            if one is None:
+                cells.append(Cell("not required", status="quiet"))
+            else:
+                judged = verdict(one)
+                cells.append(Cell(f"{figure(one.observed, one.unit)}  {judged.text}", status=judged.status))
+        rows.append(tuple(cells))
+    columns = (Column("requirement"), Column("bound", True), *(Column(label, True) for label in labels))
+    return Grid("Requirements", columns, tuple(rows))
+
+
+Take = Callable[[ComponentRecord], Cell]
+_QUESTIONS: tuple[tuple[str, Take], ...] = (
+    ("execution s", lambda one: Cell(number(one.cpu_s, 3), share=one.cpu_s)),
+    ("of it ROS s", lambda one: Cell(number(one.ros_cpu_s, 3), share=one.ros_cpu_s)),
+    ("response p95 ms", lambda one: Cell(milliseconds(one.response_s.p95), share=one.response_s.p95)),
+    ("response max ms", lambda one: Cell(milliseconds(one.response_s.max), share=one.response_s.max)),
+    (
+        "deadline misses",
+        lambda one: (
+            Cell(count(one.deadline_misses), status="bad" if one.deadline_misses else "")
+            if one.activations
+            else Cell(NOTHING)
+        ),
+    ),
+    ("energy", lambda one: Cell(energy(one.energy_j), share=one.energy_j)),
+)
+_IN_SHORT = {
+    "execution s": "exec s",
+    "response p95 ms": "p95 ms",
+    "deadline misses": "misses",
+    "energy": "energy",
+}
+
+
+def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each component: where it ran and what it cost there, run beside run."""
+    rows = []
+    for name in _names(record.components for record in records):
+        found = [record.components.get(name) for record in records]
+        places = [Cell(one.processor or "none", status="quiet") if one else Cell(NOTHING) for one in found]
+        rows.append((Cell(name), Cell("processor", status="quiet"), *places))
+        for question, take in _QUESTIONS:
+            cells = [take(one) if one else Cell(NOTHING) for one in found]
+            if any(cell.text != NOTHING for cell in cells):
+                rows.append((Cell(""), Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("component"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("What each component costs", columns, tuple(rows))
+
+
+def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """The same in short: one row per component, the runs beside each other for each question."""
+    asked = [(_IN_SHORT[question], take) for question, take in _QUESTIONS if question in _IN_SHORT]
+    rows = []
+    for name in _names(record.components for record in records):
+        cells = [Cell(name)]
+        for _, take in asked:
+            found = [record.components.get(name) for record in records]
+            cells += _relative([take(one) if one else Cell(NOTHING) for one in found])
+        rows.append(tuple(cells))
+    columns = [Column(f"{question}\n{label}", True) for question, _ in asked for label in labels]
+    return Grid("What each component costs", (Column("component"), *columns), tuple(rows))
+
+
+def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each processor: what it was and how busy, run beside run."""
+    rows = []
+    for name in _names(record.processors for record in records):
+        found = [record.processors.get(name) for record in records]
+        kinds = [
+            Cell(f"{one.kind} at {number(one.frequency_mhz, 0, 'MHz')}", status="quiet")
+            if one
+            else Cell(NOTHING)
+            for one in found
+        ]
+        loads = [
+            Cell(number(100.0 * one.utilisation, 2, "%"), share=one.utilisation) if one else Cell(NOTHING)
+            for one in found
+        ]
+        taken = [Cell(energy(one.energy_j), share=one.energy_j) if one else Cell(NOTHING) for one in found]
+        rows.append((Cell(name), Cell("kind", status="quiet"), *kinds))
+        rows.append((Cell(""), Cell("utilisation", status="quiet"), *loads))
+        rows.append((Cell(""), Cell("energy", status="quiet"), *_relative(taken)))
+    columns = (Column("processor"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Processors", columns, tuple(rows))
+
+
+def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each vehicle: how far, how long, with what energy, run beside run."""
+    rows = []
+    for name in _names(record.vehicles for record in records):
+        found = [record.vehicles.get(name) for record in records]
+        for question, cells in (
+            (
+                "distance m",
+                [
+                    Cell(number(one.distance_m), share=one.distance_m) if one else Cell(NOTHING)
+                    for one in found
+                ],
+            ),
+            (
+                "airborne s",
+                [
+                    Cell(number(one.airborne_s), share=one.airborne_s) if one else Cell(NOTHING)
+                    for one in found
+                ],
+            ),
+            (
+                "energy",
+                [Cell(energy(one.energy_j), share=one.energy_j) if one else Cell(NOTHING) for one in found],
+            ),
+        ):
+            first = Cell(name if question == "distance m" else "")
+            rows.append((first, Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("vehicle"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Vehicles", columns, tuple(rows))
+
+
+def _relative(cells: list[Cell]) -> list[Cell]:
+    """Shares become fractions of the largest among the runs."""
+    largest = max((cell.share for cell in cells if cell.share is not None), default=0.0)
+    if largest <= 0.0:
+        return [Cell(cell.text, None, cell.status) for cell in cells]
+    return [
+        Cell(cell.text, None if cell.share is None else cell.share / largest, cell.status) for cell in cells
+    ]
+
+
+def all_comparisons(labels: Sequence[str], records: Sequence[RunRecord]) -> list[Grid]:
+    """All tables that have rows, in reading order."""
+    made = (
+        outcome_comparison(labels, records),
+        requirements_comparison(labels, records),
+        cost_comparison(labels, records),
+        processor_comparison(labels, records),
+        vehicle_comparison(labels, records),
+    )
+    return [grid for grid in made if grid]

@@ -1,0 +1,257 @@
+"""What a report draws, folded from the events of a run: tracks, curves, processor load, parcels, remarkable
+moments.
+
+A tap of the stream, as the accounts are; its result is plain lists and numbers that become JSON within the
+document.
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from volery.base.time import MS, Ns, S, to_seconds
+from volery.report.thinning import Floats, thin_curve, thin_track
+from volery.requirements.accounts import PARCEL
+from volery.trace.events import (
+    NONE,
+    Activation,
+    Event,
+    Failure,
+    LinkState,
+    Message,
+    Milestone,
+    Operation,
+    Slice,
+    Text,
+    VehicleState,
+)
+from volery.trace.scenery import Scenery
+from volery.trace.setup import RunSetup
+
+_BIN: Ns = 250 * MS
+_MOST_BINS = 300
+_TRACK_TOLERANCE_M = 0.15
+_CURVE_STRETCHES = 350
+_MOST_REMARKS = 400
+_REMARKABLE = 4  # syslog's severity of a warning
+
+Json = dict[str, Any]
+
+
+@dataclass
+class _Track:
+    """All states of one vehicle, column by column."""
+
+    kind: str
+    columns: dict[str, array[float]] = field(
+        default_factory=lambda: {name: array("d") for name in ("t", "x", "y", "z", "v", "battery")}
+    )
+    modes: list[tuple[float, str, bool]] = field(default_factory=list)
+
+    def add(self, event: VehicleState) -> None:
+        at = to_seconds(event.at)
+        columns = self.columns
+        columns["t"].append(at)
+        columns["x"].append(event.x)
+        columns["y"].append(event.y)
+        columns["z"].append(event.z)
+        columns["v"].append(hypot(event.vx, event.vy, event.vz))
+        columns["battery"].append(event.battery)
+        if not self.modes or self.modes[-1][1:] != (event.mode, event.armed):
+            self.modes.append((at, event.mode, event.armed))
+
+    def column(self, name: str) -> Floats:
+        return np.frombuffer(self.columns[name], dtype=np.float64)
+
+
+class Digest:
+    """Call it with every event of a run, then ask for its ``data``."""
+
+    def __init__(self, setup: RunSetup, scenery: Scenery | None) -> None:
+        self._setup = setup
+        self._scenery = scenery
+        self._tracks = {one.name: _Track(one.kind) for one in setup.vehicles}
+        self._load: dict[str, dict[str, list[Ns]]] = {one.name: {} for one in setup.processors}
+        self._misses: dict[str, list[int]] = {}
+        self._processor_of = {one.name: one.processor for one in setup.components}
+        self._parcels: dict[str, list[Milestone]] = {}
+        self._remarks: list[Json] = []
+        self._lost: dict[str, list[int]] = {}
+        self._last: Ns = 0
+
+    def __call__(self, event: Event) -> None:
+        """Take one event in."""
+        match event:
+            case VehicleState():
+                self._tracks.setdefault(event.vehicle, _Track("")).add(event)
+                self._last = max(self._last, event.at)
+            case Slice():
+                self._slice(event)
+            case Activation():
+                self._activation(event)
+            case Milestone():
+                self._milestone(event)
+            case Message():
+                self._message(event)
+            case _:
+                self._remark(event)
+
+    def _slice(self, event: Slice) -> None:
+        self._last = max(self._last, event.end)
+        bins = self._load.setdefault(event.processor, {}).setdefault(event.component, [])
+        first, last = event.start // _BIN, max(event.start, event.end - 1) // _BIN
+        bins.extend([0] * (last + 1 - len(bins)))
+        for index in range(first, last + 1):
+            bins[index] += min(event.end, (index + 1) * _BIN) - max(event.start, index * _BIN)
+
+    def _activation(self, event: Activation) -> None:
+        self._last = max(self._last, event.finished)
+        if event.deadline != NONE and event.finished > event.deadline:
+            counts = self._misses.setdefault(self._processor_of.get(event.component, ""), [])
+            index = event.finished // _BIN
+            counts.extend([0] * (index + 1 - len(counts)))
+            counts[index] += 1
+
+    def _milestone(self, event: Milestone) -> None:
+        self._last = max(self._last, event.at)
+        if event.kind == PARCEL:
+            self._parcels.setdefault(event.subject, []).append(event)
+
+    def _message(self, event: Message) -> None:
+        counts = self._lost.setdefault(event.topic, [0, 0])
+        counts[0] += 1
+        counts[1] += event.received == NONE
+
+    def _remark(self, event: Event) -> None:
+        match event:
+            case Failure():
+                self._note(event.at, "failure", event.who, event.what)
+            case Operation() if event.outcome != "ok":
+                what = f"{event.operation} {event.asked}: {event.outcome}: {event.said}"
+                self._note(event.end, "refused", event.vehicle, what)
+            case LinkState():
+                self._note(event.at, "link", event.link, f"{event.state} {event.detail}".strip())
+            case Text():
+                kind = "warning" if event.severity <= _REMARKABLE else "words"
+                self._note(event.at, kind, event.source, event.text)
+            case _:
+                pass
+
+    def _note(self, at: Ns, kind: str, who: str, what: str) -> None:
+        self._last = max(self._last, at)
+        if len(self._remarks) < _MOST_REMARKS or kind in ("failure", "refused"):
+            self._remarks.append({"t": _seconds(at), "kind": kind, "who": who, "what": what})
+
+    def data(self, ended: float | None = None) -> Json:
+        """Everything to draw, as JSON values, of a run that ended after so many seconds (else: its last event)."""
+        end = to_seconds(self._last) if ended is None else ended
+        return {
+            "end": round(end, 3),
+            "scenery": _scenery(self._scenery),
+            "vehicles": [_vehicle(name, track) for name, track in self._tracks.items()],
+            "processors": [self._processor(name) for name in self._load],
+            "parcels": [{"name": name, "steps": self._steps(steps)} for name, steps in self._parcels.items()],
+            "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
+            "messages": [
+                {"topic": topic, "sent": sent, "lost": lost}
+                for topic, (sent, lost) in sorted(self._lost.items())
+            ],
+        }
+
+    def _steps(self, steps: list[Milestone]) -> list[Json]:
+        vehicles = list(self._tracks)
+        places = [place.name for place in self._scenery.places] if self._scenery else []
+        return [
+            {
+                "t": _seconds(step.at),
+                "state": step.state,
+                "by": step.component,
+                "detail": step.detail,
+                "vehicle": _mentioned(step, vehicles),
+                "place": _mentioned(step, places),
+            }
+            for step in steps
+        ]
+
+    def _processor(self, name: str) -> Json:
+        cores = next((one.cores for one in self._setup.processors if one.name == name), 1)
+        count = max((len(bins) for bins in self._load[name].values()), default=0)
+        count = max(count, -(-self._last // _BIN))
+        together = max(1, -(-count // _MOST_BINS))
+        whole = together * _BIN * cores
+        return {
+            "name": name,
+            "cores": cores,
+            "step": to_seconds(together * _BIN),
+            "components": [
+                {
+                    "name": component,
+                    "share": [round(100.0 * ns / whole, 2) for ns in _merge(bins, together, count)],
+                }
+                for component, bins in self._load[name].items()
+            ],
+            "misses": _merge(self._misses.get(name, []), together, count),
+        }
+
+
+def _merge(bins: list[int], together: int, count: int) -> list[int]:
+    filled = bins + [0] * (count - len(bins))
+    return [sum(filled[at : at + together]) for at in range(0, count, together)]
+
+
+def _mentioned(step: Milestone, names: list[str]) -> str:
+    """Which of *names* the state, else the detail, speaks of; the longest: drone_11 contains drone_1."""
+    for words in (step.state, step.detail):
+        found = [name for name in names if name in words]
+        if found:
+            return max(found, key=len)
+    return ""
+
+
+def _seconds(at: Ns) -> float:
+    return round(at / S, 3)
+
+
+def _rounded(values: Floats, digits: int) -> list[float]:
+    found: list[float] = np.round(values, digits).tolist()
+    return found
+
+
+def _vehicle(name: str, track: _Track) -> Json:
+    times = track.column("t")
+    points = np.column_stack([track.column("x"), track.column("y"), track.column("z")])
+    kept = thin_track(times, points, _TRACK_TOLERANCE_M)
+    return {
+        "name": name,
+        "kind": track.kind,
+        "t": _rounded(times[kept], 2),
+        "x": _rounded(points[kept, 0], 2),
+        "y": _rounded(points[kept, 1], 2),
+        "z": _rounded(points[kept, 2], 2),
+        "modes": [[round(at, 2), mode, armed] for at, mode, armed in track.modes],
+        "height": _curve(times, track.column("z")),
+        "speed": _curve(times, track.column("v")),
+        "battery": _curve(times, 100.0 * track.column("battery")),
+    }
+
+
+def _curve(times: Floats, values: Floats) -> Json:
+    kept = thin_curve(values, _CURVE_STRETCHES)
+    return {"t": _rounded(times[kept], 2), "v": _rounded(values[kept], 2)}
+
+
+def _scenery(scenery: Scenery | None) -> Json | None:
+    if scenery is None:
+        return None
+    return {
+        "origin": [scenery.origin.latitude, scenery.origin.longitude, scenery.origin.amsl],
+        "places": [[place.name, place.x, place.y, place.kind] for place in scenery.places],
+        "roads": scenery.roads,
+        "corridors": scenery.corridors,
+        "areas": [[area.name, area.kind, area.outline] for area in scenery.areas],
+    }

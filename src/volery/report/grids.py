@@ -1,0 +1,341 @@
+"""The tables of a report as plain data, so that the terminal and the HTML document say the same.
+
+A cell is what is to be read; its ``share`` (0..1) may be drawn as a bar behind it, its ``status`` as a colour
+beside the words, never instead of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from volery.base.time import clock, from_seconds
+from volery.requirements.record import (
+    ComponentRecord,
+    OffsetRecord,
+    ParcelRecord,
+    RequirementRecord,
+    RunRecord,
+    VehicleRecord,
+)
+
+CellStatus = Literal["", "good", "bad", "warn", "quiet"]
+NOTHING = "–"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of a table."""
+
+    text: str
+    share: float | None = None
+    status: CellStatus = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A heading; numbers stand to the right.
+
+    ``hint`` explains it in a sentence. Where there is no room for all, what is not ``essential`` goes first.
+    """
+
+    title: str
+    numeric: bool = False
+    hint: str = ""
+    essential: bool = True
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table: every row has a cell for every column."""
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.rows)
+
+
+def number(value: float | None, digits: int = 1, unit: str = "") -> str:
+    """A number to be read; a dash if there is none."""
+    if value is None:
+        return NOTHING
+    text = f"{value:,.{digits}f}".replace(",", "\N{NO-BREAK SPACE}")
+    return f"{text}\N{NO-BREAK SPACE}{unit}" if unit else text
+
+
+def figure(value: float | None, unit: str = "") -> str:
+    """A number of any size, to four significant digits."""
+    if value is None:
+        return NOTHING
+    text = f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+    return f"{text}\N{NO-BREAK SPACE}{unit}" if unit else text
+
+
+def energy(joules: float | None) -> str:
+    """Joules, as kilojoules from ten thousand on."""
+    if joules is None:
+        return NOTHING
+    return number(joules / 1e3, 1, "kJ") if abs(joules) >= 1e4 else figure(joules, "J")
+
+
+def milliseconds(seconds: float | None) -> str:
+    """A response time."""
+    return number(None if seconds is None else 1e3 * seconds, 2)
+
+
+def moment(seconds: float) -> str:
+    """A point in time of a run, ``h:mm:ss.mmm``."""
+    return clock(from_seconds(seconds))
+
+
+def count(value: int) -> str:
+    """A whole number."""
+    return f"{value:,}".replace(",", "\N{NO-BREAK SPACE}")
+
+
+def _offset(offset: OffsetRecord) -> str:
+    return f"{number(offset.horizontal, 2)} / {number(offset.vertical, 2)}"
+
+
+def verdict(requirement: RequirementRecord) -> Cell:
+    """Whether a requirement was met."""
+    if requirement.met is None:
+        return Cell("not judged", status="warn")
+    return Cell("✓ met", status="good") if requirement.met else Cell("✗ not met", status="bad")
+
+
+def bound(requirement: RequirementRecord) -> str:
+    """``≤ 0.3 m``."""
+    sign = {"max": "≤", "min": "≥"}.get(requirement.relation, requirement.relation)
+    return f"{sign} {figure(requirement.bound, requirement.unit)}"
+
+
+def requirements_grid(record: RunRecord) -> Grid:
+    """Verdicts."""
+    rows = tuple(
+        (
+            Cell(name),
+            Cell(one.observable, status="quiet"),
+            Cell(bound(one)),
+            Cell(figure(one.observed, one.unit)),
+            verdict(one),
+        )
+        for name, one in record.requirements.items()
+    )
+    columns = (
+        Column("requirement"),
+        Column("observable", essential=False),
+        Column("bound", True),
+        Column("observed", True),
+        Column("verdict"),
+    )
+    return Grid("Requirements", columns, rows)
+
+
+def cost_grid(record: RunRecord) -> Grid:
+    """What each component cost its processor."""
+    longest = max((one.cpu_s for one in record.components.values()), default=0.0)
+    rows = tuple(_cost_row(name, one, longest) for name, one in record.components.items())
+    columns = (
+        Column("component"),
+        Column("processor"),
+        Column("language", essential=False),
+        Column("execution s", True, "time executed on the processor"),
+        Column("of it ROS", True, "share of the execution time that was owed to ROS calls"),
+        Column("ROS calls", True, essential=False),
+        Column("activations", True, essential=False),
+        Column("misses", True, "activations that ended after their deadline"),
+        Column("mean ms", True, "response time of activations, else of calls served", False),
+        Column("p95 ms", True, "95 % of all responses took no longer"),
+        Column("max ms", True, "", False),
+        Column("energy", True, "stated for its operations, else what its execution takes above idle"),
+    )
+    return Grid("What each component costs", columns, rows)
+
+
+def _cost_row(name: str, one: ComponentRecord, longest: float) -> tuple[Cell, ...]:
+    ros_share = one.ros_cpu_s / one.cpu_s if one.cpu_s else None
+    response = one.response_s
+    late = Cell(count(one.deadline_misses), status="bad" if one.deadline_misses else "")
+    return (
+        Cell(name),
+        Cell(one.processor or "none", status="" if one.processor else "warn"),
+        Cell(one.language or NOTHING, status="quiet"),
+        Cell(number(one.cpu_s, 3), share=one.cpu_s / longest if longest else None),
+        Cell(NOTHING if ros_share is None else number(100.0 * ros_share, 1, "%")),
+        Cell(count(sum(one.ros_calls.values()))),
+        Cell(count(one.activations)),
+        late if one.activations else Cell(NOTHING),
+        Cell(milliseconds(response.mean)),
+        Cell(milliseconds(response.p95)),
+        Cell(milliseconds(response.max)),
+        Cell(energy(one.energy_j)),
+    )
+
+
+def ros_calls_grid(record: RunRecord) -> Grid:
+    """How often each component called ROS, by kind of call."""
+    kinds = sorted({kind for one in record.components.values() for kind in one.ros_calls})
+    rows = tuple(
+        (
+            Cell(name),
+            *(Cell(count(one.ros_calls[kind]) if kind in one.ros_calls else NOTHING) for kind in kinds),
+        )
+        for name, one in record.components.items()
+        if one.ros_calls
+    )
+    return Grid("ROS calls by kind", (Column("component"), *(Column(kind, True) for kind in kinds)), rows)
+
+
+def processors_grid(record: RunRecord) -> Grid:
+    """Processors: what they are, how busy they were, what they took."""
+    rows = tuple(
+        (
+            Cell(name),
+            Cell(one.kind, status="quiet"),
+            Cell(number(one.frequency_mhz, 0, "MHz")),
+            Cell(str(one.cores)),
+            Cell(one.scheduler, status="quiet"),
+            Cell(number(100.0 * one.utilisation, 2, "%"), share=min(1.0, one.utilisation)),
+            Cell(energy(one.energy_j)),
+        )
+        for name, one in record.processors.items()
+    )
+    columns = (
+        Column("processor"),
+        Column("kind"),
+        Column("frequency", True),
+        Column("cores", True, essential=False),
+        Column("scheduler", essential=False),
+        Column("utilisation", True, "busy share of all cores over the whole run"),
+        Column("energy", True, "idle power included"),
+    )
+    return Grid("Processors", columns, rows)
+
+
+def vehicles_grid(record: RunRecord) -> Grid:
+    """Vehicles: how far, how long, with what energy, and how precisely."""
+    rows = tuple(_vehicle_row(name, one) for name, one in record.vehicles.items())
+    columns = (
+        Column("vehicle"),
+        Column("kind", essential=False),
+        Column("autopilot", essential=False),
+        Column("distance m", True),
+        Column("armed s", True, essential=False),
+        Column("airborne s", True),
+        Column("energy", True),
+        Column("battery left", True, essential=False),
+        Column("at the end"),
+        Column(
+            "error by estimate m", True, "largest of all operations that succeeded: horizontal / vertical"
+        ),
+        Column("error by truth m", True, "the same, by where the vehicle really was"),
+    )
+    return Grid("Vehicles", columns, rows)
+
+
+def _vehicle_row(name: str, one: VehicleRecord) -> tuple[Cell, ...]:
+    end = {None: Cell("never seen", status="warn"), True: Cell("at rest", status="good")}
+    return (
+        Cell(name),
+        Cell(one.kind, status="quiet"),
+        Cell(one.autopilot, status="quiet"),
+        Cell(number(one.distance_m)),
+        Cell(number(one.armed_s)),
+        Cell(number(one.airborne_s)),
+        Cell(energy(one.energy_j)),
+        Cell(NOTHING if one.battery is None else number(100.0 * one.battery, 0, "%"), share=one.battery),
+        end.get(one.landed, Cell("not at rest", status="bad")),
+        Cell(_offset(one.error_by_estimate_m)),
+        Cell(_offset(one.error_by_truth_m)),
+    )
+
+
+def operations_grid(record: RunRecord) -> Grid:
+    """What vehicles were asked, and how it ended."""
+    operations = [(name, each) for name, one in record.vehicles.items() for each in one.operations]
+    operations.sort(key=lambda pair: pair[1].start_s)
+    rows = tuple(
+        (
+            Cell(moment(one.start_s)),
+            Cell(name),
+            Cell(one.operation),
+            Cell(one.asked, status="quiet"),
+            Cell(number(one.end_s - one.start_s)),
+            Cell("✓ ok", status="good")
+            if one.outcome == "ok"
+            else Cell(f"✗ {one.outcome}: {one.said}", status="bad"),
+            Cell(_offset(one.error_by_estimate_m)),
+            Cell(_offset(one.error_by_truth_m)),
+        )
+        for name, one in operations
+    )
+    columns = (
+        Column("at"),
+        Column("vehicle"),
+        Column("operation"),
+        Column("asked"),
+        Column("took s", True),
+        Column("outcome"),
+        Column("error by estimate m", True, "horizontal / vertical"),
+        Column("error by truth m", True, "horizontal / vertical"),
+    )
+    return Grid("Vehicle operations", columns, rows)
+
+
+def parcels_grid(record: RunRecord) -> Grid:
+    """Parcels and their last state."""
+    rows = tuple(
+        (Cell(name), Cell(one.state), Cell(moment(one.history[-1].at_s)), Cell(_story(one), status="quiet"))
+        for name, one in record.parcels.items()
+    )
+    return Grid(
+        "Parcels",
+        (Column("parcel"), Column("state"), Column("since"), Column("history", essential=False)),
+        rows,
+    )
+
+
+def _story(parcel: ParcelRecord) -> str:
+    return " → ".join(step.state for step in parcel.history)
+
+
+def laws_grid(record: RunRecord) -> Grid:
+    """The laws that priced the run, with where they come from and what is to be warned of."""
+    rows = tuple(
+        (
+            Cell(law.name),
+            Cell(law.source, status="quiet"),
+            Cell(law.provenance),
+            Cell(law.validity, status="quiet"),
+            Cell(f"⚠ {law.warning}", status="warn")
+            if law.warning
+            else Cell("used within its range", status="quiet"),
+        )
+        for law in record.laws
+    )
+    columns = (Column("law"), Column("source"), Column("provenance"), Column("valid for"), Column("this run"))
+    return Grid("Laws behind the figures", columns, rows)
+
+
+def all_grids(record: RunRecord) -> list[Grid]:
+    """All tables that have rows, in reading order."""
+    made = (
+        requirements_grid(record),
+        cost_grid(record),
+        processors_grid(record),
+        vehicles_grid(record),
+        parcels_grid(record),
+    )
+    return [grid for grid in made if grid]
+
+
+def labels(records: Sequence[RunRecord], names: Iterable[str]) -> list[str]:
+    """What to call runs beside each other: their allocations if these differ, else *names* (of folders)."""
+    allocations = [record.allocation for record in records]
+    if all(allocations) and len(set(allocations)) == len(allocations):
+        return allocations
+    return list(names)

@@ -1,0 +1,100 @@
+"""Tables for the terminal, from records alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich import box
+from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType, RenderResult
+from rich.measure import Measurement
+from rich.table import Table
+from rich.text import Text
+
+from volery.report.comparing import (
+    all_comparisons,
+    cost_matrix,
+    outcome_comparison,
+    requirements_comparison,
+)
+from volery.report.grids import Cell, Grid, all_grids, cost_grid, labels
+from volery.requirements.record import RunRecord
+
+_UNLIMITED = 10_000
+_STYLES = {"": "", "good": "green", "bad": "bold red", "warn": "yellow", "quiet": "dim"}
+
+
+class GridTable:
+    """A grid that leaves out what is not essential where the terminal is narrow."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Give it all columns if they fit without folding."""
+        whole = _table(self.grid, essential=False)
+        unlimited = options.update(max_width=_UNLIMITED)
+        fits = Measurement.get(console, unlimited, whole).maximum <= options.max_width
+        yield whole if fits else _table(self.grid, essential=True)
+
+
+def _table(grid: Grid, essential: bool) -> Table:
+    made = Table(
+        title=grid.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    shown = [index for index, column in enumerate(grid.columns) if column.essential or not essential]
+    for index in shown:
+        column = grid.columns[index]
+        made.add_column(
+            column.title,
+            justify="right" if column.numeric else "left",
+            no_wrap=column.numeric,
+            overflow="fold",
+        )
+    for row in grid.rows:
+        made.add_row(*(_text(row[index]) for index in shown))
+    return made
+
+
+def _text(cell: Cell) -> Text:
+    return Text(cell.text, style=_STYLES[cell.status])
+
+
+def headline(record: RunRecord) -> Text:
+    """One line: what was run, how it ended, how fast it was."""
+    name = " · ".join(part for part in (record.system, record.allocation, record.fidelity) if part)
+    good = record.outcome.status == "completed" and record.outcome.requirements_met is not False
+    line = Text(name, style="bold")
+    line.append(f"  {record.outcome.status}", style="green" if good else "bold red")
+    if record.outcome.reason:
+        line.append(f" ({record.outcome.reason})")
+    line.append(f"  {record.sim_s:.1f} s simulated", style="dim")
+    if record.wall_s is not None and record.real_time_factor is not None:
+        line.append(f" in {record.wall_s:.1f} s, {record.real_time_factor:.0f}× real time", style="dim")
+    return line
+
+
+def summary_table(record: RunRecord) -> RenderableType:
+    """Everything about one run that fits a terminal."""
+    parts: list[RenderableType] = [headline(record)]
+    parts += [GridTable(grid) for grid in all_grids(record)]
+    parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
+    parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]
+    return Group(*parts)
+
+
+def cost_table(record: RunRecord) -> RenderableType:
+    """The cost table alone."""
+    return GridTable(cost_grid(record))
+
+
+def comparison_table(records: Sequence[RunRecord], names: Sequence[str] = ()) -> RenderableType:
+    """Runs side by side; *names* is what to call them where their allocations are the same."""
+    called = labels(records, names or [f"run {index}" for index in range(1, len(records) + 1)])
+    return Group(*(GridTable(grid) for grid in all_comparisons(called, records)))
+
+
+def short_comparison(records: Sequence[RunRecord], names: Sequence[str] = ()) -> RenderableType:
+    """How the runs ended, their requirements and their costs; no more."""
+    called = labels(records, names or [f"run {index}" for index in range(1, len(records) + 1)])
+    grids = (make(called, records) for make in (outcome_comparison, requirements_comparison, cost_matrix))
+    return Group(*(GridTable(grid) for grid in grids if grid))
