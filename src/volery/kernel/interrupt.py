@@ -1,42 +1,68 @@
-"""Ctrl-C, taken where nothing of the house is half done.
+"""What reaches the house from outside of virtual time: Ctrl-C, and the watchdog's accusations.
 
-While the house runs in the main thread it owns SIGINT. An interrupt is posted to the hub, which raises it
-between two events; if user code is running it is also raised there at once, so that an endless loop ends. A
-second Ctrl-C before the first was delivered is raised on the spot. A handler that somebody else has installed
-is called instead.
+While the house runs in the main thread it owns SIGINT, and takes it where nothing of its own is half done.
+Ctrl-C is posted to the hub, which raises it between two events; if user code is running it is also raised
+there at once, so that an endless loop ends. A second Ctrl-C before the first was delivered is raised on the
+spot. A handler that somebody else has installed is called instead.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sysconfig
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from volery.base.errors import ComponentError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import FrameType
 
+    from volery.base.time import Ns
     from volery.kernel.api import Kernel
+    from volery.kernel.task import Task
 
-_HOUSE = str(Path(__file__).parents[1])
-_EXAMPLES = str(Path(_HOUSE, "examples"))
-_LIBRARIES = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
+_HOUSE = f"{Path(__file__).parents[1]}{os.sep}"
+_EXAMPLES = f"{_HOUSE}examples{os.sep}"
+_LIBRARIES = (
+    "<frozen",
+    *{sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")},
+)
 
 
-def users_frame(frame: FrameType | None) -> FrameType | None:
-    """The innermost frame, from *frame* outwards, of code that is neither the house's nor a library's.
+def _is_house(frame: FrameType) -> bool:
+    file = frame.f_code.co_filename
+    return file.startswith(_HOUSE) and not file.startswith(_EXAMPLES)
 
-    ``None`` if the house stands nearer than any such frame: then it is the house that is at work.
-    """
+
+def _outwards(frame: FrameType | None) -> Iterator[FrameType]:
+    """*frame* and its callers, libraries left out."""
     while frame is not None:
-        file = frame.f_code.co_filename
-        if file.startswith(_HOUSE) and not file.startswith(_EXAMPLES):
-            return None
-        if not file.startswith((*_LIBRARIES, "<frozen")):
-            return frame
+        if _is_house(frame) or not frame.f_code.co_filename.startswith(_LIBRARIES):
+            yield frame
         frame = frame.f_back
-    return None
+
+
+def is_users(frame: FrameType | None) -> bool:
+    """Whether it is user code that is at work, and not the house on its behalf."""
+    return not _is_house(next(_outwards(frame), frame)) if frame is not None else False
+
+
+def users_line(frame: FrameType | None) -> str:
+    """``file:line`` of the innermost line of user code; of a house that is all alone, its own."""
+    found = next((each for each in _outwards(frame) if not _is_house(each)), frame)
+    return f"{found.f_code.co_filename}:{found.f_lineno}" if found is not None else "an unknown line"
+
+
+class Accusation(NamedTuple):
+    """It was this task, at this virtual time, that would not let go."""
+
+    task: Task
+    now: Ns
+    what: str
 
 
 class Interrupts:
@@ -45,6 +71,8 @@ class Interrupts:
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
         self._before: Any = None
+        self._lock = threading.Lock()  # an accusation is made while the handler is in place, or not at all
+        self._accusation: Accusation | None = None
         self.pending = False
 
     def __enter__(self) -> Self:
@@ -54,19 +82,44 @@ class Interrupts:
 
     def __exit__(self, *_: object) -> None:
         if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
-            self._before = None
+            with self._lock:
+                signal.signal(signal.SIGINT, self._before)
+                self._before = None
         self._deliver()
 
+    def accuse(self, task: Task, now: Ns, what: str) -> None:
+        """Raise a ``ComponentError`` in *task* if it is still at work at *now*. From any thread."""
+        main = threading.main_thread().ident
+        with self._lock:
+            if self._before is not None and main is not None:
+                self._accusation = Accusation(task, now, what)
+                signal.pthread_kill(main, signal.SIGINT)  # ends blocking calls too, such as time.sleep
+
     def _taken(self, number: int, frame: FrameType | None) -> None:
-        if self._before is not signal.default_int_handler:
-            if callable(self._before):
-                self._before(number, frame)
+        accusation, self._accusation = self._accusation, None
+        if accusation is not None:
+            self._confront(accusation, frame)
+        elif self._before is signal.default_int_handler:
+            self._interrupt(frame)
+        elif callable(self._before):
+            self._before(number, frame)
+
+    def _confront(self, accusation: Accusation, frame: FrameType | None) -> None:
+        task, now, what = accusation
+        if self._kernel.current() is not task or self._kernel.now() != now:
             return
+        error = ComponentError(
+            task.place.component, f"virtual time is frozen: {what}, in {users_line(frame)}"
+        )
+        if is_users(frame):
+            raise error
+        task.summons = task.summons or error
+
+    def _interrupt(self, frame: FrameType | None) -> None:
         if self.pending:
             raise KeyboardInterrupt
         task = self._kernel.current()
-        in_user_code = task is not None and users_frame(frame) is not None
+        in_user_code = task is not None and is_users(frame)
         if not (in_user_code and task is not None and task.adopted):
             self.pending = True
             self._kernel.post(self._deliver)

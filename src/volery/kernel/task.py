@@ -67,7 +67,20 @@ class Task:
         self.woken = False
         self.ticket = 0  # of its next resumption; what was scheduled under another ticket is void
         self.refusals = 0  # how often it has swallowed its end
+        self.summons: BaseException | None = Cancelled(scope.cancelled) if scope.cancelled else None
         scope.tasks.append(self)
+
+    def answer(self) -> None:
+        """Raise what it is summoned for. Returns only if it has swallowed its end too often."""
+        error, self.summons = self.summons, None
+        if self.scope.cancelled:
+            self.summons = Cancelled(self.scope.cancelled)  # an end is delivered again and again
+        if isinstance(error, Cancelled):
+            self.refusals += 1
+            if self.refusals > STUBBORN and not self.adopted:
+                return
+        if error is not None:
+            raise error
 
     def release(self, due: Ns) -> None:
         """An activation begins; it was due at *due*, which is in the past for a task that is late."""
@@ -132,5 +145,7 @@ class Scope:
     def mark(self, why: str) -> None:
         """Remember, here and below, that it has ended. Waking the tasks is the kernel's part."""
         self.cancelled = self.cancelled or why
+        for task in self.tasks:
+            task.summons = Cancelled(self.cancelled)
         for child in self.children:
             child.mark(why)

@@ -1,28 +1,28 @@
 """Virtual time: a task is a greenlet, and what is to happen lies in one heap ordered by (time, ticket).
 
 The *hub* is a greenlet of its own that takes from the heap: house code runs there, and from there tasks are
-started. A task that blocks hands over to the next task directly where it can (``_yield``), and where nobody
-else would notice it does not even hand over (``leap``). A ticket is drawn for every entry; an entry is void
-as soon as its target bears another ticket.
+started. A task that blocks hands over directly to a task that is next (``_yield``), and does not even do that
+where nobody would notice (``leap``). A ticket is drawn for every entry; an entry is void once its target
+bears another.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from contextlib import contextmanager, nullcontext, suppress
-from heapq import heappop, heappush
+from contextlib import contextmanager, nullcontext
+from heapq import heappop, heappush, heapreplace
 from itertools import count
-from queue import Empty, SimpleQueue
-from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Self
 
 from greenlet import GreenletExit, getcurrent, greenlet
 
 from volery.base.errors import Deadlock, UsageError
-from volery.base.time import Ns, to_seconds
+from volery.base.time import Ns
 from volery.kernel.interrupt import Interrupts
-from volery.kernel.task import STUBBORN, Cancelled, Place, Scope, Task
+from volery.kernel.pacing import Pacer
+from volery.kernel.task import Cancelled, Place, Scope, Task
 from volery.kernel.timer import Every
+from volery.kernel.watchdog import Watchdog
 from volery.trace.events import Record, ignore
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 FOREVER: Ns = 2**63 - 1
 NEVER: Ns = -1
 VOID = 0
-LONGEST_WAIT_S = 3600.0
 
 
 class Entry:
@@ -51,15 +50,23 @@ class Entry:
         self.ticket = VOID
 
 
-class VirtualKernel:
-    """Time that passes as fast as there is nothing to do, or *pace* times as fast as the clock on the wall.
+def _nothing() -> None:
+    """What happens at the end of time."""
 
-    With a *pace* the kernel waits for what other threads ``post`` even when nothing else is left to happen.
+
+class VirtualKernel:
+    """Time that passes as fast as there is nothing to do; with a *pace*, at most that many seconds a second.
+
+    A kernel with a pace also serves other threads: it waits for what they ``post`` when nothing else is left
+    to happen. With *watchdog_s*, a task that runs that long on the wall while virtual time stands gets a
+    ``ComponentError`` that names its component and line; this needs the main thread.
+
+    A kernel belongs to the thread that first runs it.
     """
 
-    def __init__(self, record: Record = ignore, pace: float | None = None) -> None:
-        if pace is not None and pace <= 0.0:
-            raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
+    def __init__(
+        self, record: Record = ignore, pace: float | None = None, watchdog_s: float | None = None
+    ) -> None:
         self.record = record
         self.root = Scope("run")
         self.guard: AbstractContextManager[object] = nullcontext()
@@ -67,17 +74,16 @@ class VirtualKernel:
         self._now: Ns = 0
         self._until: Ns = 0
         self._horizon: Ns = NEVER  # up to here tasks may hand over without the hub
-        self._heap: list[tuple[Ns, int, Any]] = []
+        self._heap: list[tuple[Ns, int, Any]] = [(FOREVER + 1, VOID, Entry(_nothing, VOID))]  # never empty
         self._tickets = count(1)
         self._current: Task | None = None
         self._adopted: Task | None = None
         self._inbox: deque[Action] = deque()
-        self._bell: SimpleQueue[None] = SimpleQueue()
-        self._pace = pace
-        self._anchor: tuple[int, Ns] | None = None  # (on the wall, in virtual time): where pacing began
+        self._pacer = None if pace is None else Pacer(pace)
         self._hub: Any = None
         self._owner: Any = None  # the flow that is told how the hub ended
         self._interrupts = Interrupts(self)
+        self._watchdog = None if watchdog_s is None else Watchdog(self, self._interrupts, watchdog_s)
 
     # -- what is asked without blocking
 
@@ -104,8 +110,8 @@ class VirtualKernel:
         """Run house code as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
         self._horizon = NEVER
-        if self._pace:
-            self._bell.put(None)
+        if self._pacer is not None:
+            self._pacer.ring()
 
     def spawn(self, body: Action, name: str, place: Place, scope: Scope | None = None) -> Task:
         """Start a flow of control; it begins at this instant, after what is already due."""
@@ -122,7 +128,7 @@ class VirtualKernel:
 
     def _live(self, task: Task, body: Action) -> None:
         try:
-            if not task.scope.cancelled:
+            if task.summons is None:
                 task.release(self._now)
                 body()
                 with self:  # the last computing is paid as well
@@ -147,8 +153,8 @@ class VirtualKernel:
     def __enter__(self) -> Self:
         task = self._current
         if task is not None:
-            if task.scope.cancelled:
-                self._end(task)
+            if task.summons is not None:
+                self._answer(task)
             amount = task.take_debt()
             if amount:
                 processor = task.places[-1].processor
@@ -161,37 +167,51 @@ class VirtualKernel:
     ) -> None:
         pass
 
+    def _answer(self, task: Task) -> None:
+        task.answer()
+        while True:  # it swallows its end: this interaction point never returns
+            task.ticket = VOID
+            self._hub_runs()
+
     def pay(self, amount: Ns) -> None:
         """Block the current task until its processor has served *amount*."""
         task = self._current
-        if task is None or not amount:
-            return
-        if task.scope.cancelled:
-            self._end(task)
-        processor = task.places[-1].processor
-        if processor is not None:
-            processor.serve(task, amount)
+        if task is not None:
+            task.debt += amount
+            self.__enter__()
 
     def sleep_until(self, when: Ns) -> None:
-        """Pay, then block the current task until *when*."""
+        """Pay, then block the current task until *when*. The hot path: leap, park and yield, written out."""
         task = self._current
         if task is None:
-            raise _house_blocks("sleep")
-        if task.debt or task.places[-1].meter is not None or task.scope.cancelled:
+            raise _house_blocks("a time")
+        if task.debt or task.summons is not None or task.places[-1].meter is not None:
             self.__enter__()
-        if when <= self._now or self.leap(when):
+        if when <= self._now:
+            return
+        due, due_ticket, target = self._heap[0]
+        if when < due and when <= self._horizon:
+            self._now = when
+            self.events += 1
             return
         task.woken = False
-        task.waiting_for = "time"
-        task.ticket = next(self._tickets)
-        heappush(self._heap, (when, task.ticket, task))
-        self._yield(task)
-        if task.scope.cancelled:
-            self._end(task)
+        task.waiting_for = "a time"
+        task.ticket = ticket = next(self._tickets)
+        if due <= self._horizon and target.ticket == due_ticket and type(target) is Task:
+            heapreplace(self._heap, (when, ticket, task))
+            self._now = due
+            self.events += 1
+            self._current = target
+            target.flow.switch()
+        else:
+            heappush(self._heap, (when, ticket, task))
+            self._hub_runs()
+        if task.summons is not None:
+            self._answer(task)
 
     def leap(self, to: Ns) -> bool:
         """Advance to *to* without blocking anybody, if nothing else is to happen until then."""
-        if to > self._horizon or (self._heap and self._heap[0][0] <= to):
+        if to > self._horizon or self._heap[0][0] <= to:
             return False
         self._now = to
         self.events += 1
@@ -202,16 +222,16 @@ class VirtualKernel:
         task = self._current
         if task is None:
             raise _house_blocks(waiting_for)
-        if task.scope.cancelled:
-            self._end(task)
+        if task.summons is not None:
+            self._answer(task)
         task.woken = False
         task.waiting_for = waiting_for
         task.ticket = next(self._tickets)
         if deadline is not None:
             heappush(self._heap, (max(deadline, self._now), task.ticket, task))
         self._yield(task)
-        if task.scope.cancelled:
-            self._end(task)
+        if task.summons is not None:
+            self._answer(task)
         return task.woken
 
     def wake(self, task: Task) -> None:
@@ -228,30 +248,20 @@ class VirtualKernel:
         for task in scope.all_tasks():
             self.wake(task)
 
-    def _end(self, task: Task) -> None:
-        task.refusals += 1
-        if task.refusals <= STUBBORN or task.adopted:
-            raise Cancelled(task.scope.cancelled)
-        while True:  # it swallows its end: this interaction point never returns
-            task.ticket = VOID
-            self._hub_runs()
-
     # -- handing over
 
     def _yield(self, task: Task) -> None:
         """To whoever is next: directly if that is a task, through the hub if it is house code."""
-        heap = self._heap
-        if heap and heap[0][0] <= self._horizon:
-            when, ticket, target = heap[0]
-            if type(target) is Task and target.ticket == ticket:
-                heappop(heap)
-                self._now = when
-                self.events += 1
-                if target is not task:
-                    self._current = target
-                    target.flow.switch()
-                return
-        self._hub_runs()
+        due, ticket, target = self._heap[0]
+        if due <= self._horizon and target.ticket == ticket and type(target) is Task:
+            heappop(self._heap)
+            self._now = due
+            self.events += 1
+            if target is not task:
+                self._current = target
+                target.flow.switch()
+        else:
+            self._hub_runs()
 
     def _hub_runs(self) -> None:
         if self._hub is None:
@@ -261,6 +271,8 @@ class VirtualKernel:
     def _resume(self, task: Task) -> None:
         self._current = task
         task.flow.switch()
+        if self._pacer is not None and task.adopted:
+            self._pacer.rest()  # time stood still while the script ran
 
     # -- the hub
 
@@ -274,25 +286,33 @@ class VirtualKernel:
         Raises:
             Deadlock: nothing is left to happen while tasks still wait.
         """
-        if self._current is not None or self._adopted is not None:
-            raise UsageError("run() from inside a task: time runs by itself while the task blocks")
+        if self._current is not None or (self._hub is not None and self._hub is getcurrent()):
+            raise UsageError("run() from inside the run: time passes while a task blocks")
         self._until = until
         self._owner = getcurrent()
-        with self._interrupts:
+        with self._watched():
             self._hub_runs()
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        if self._watchdog is not None:
+            self._watchdog.start()
+        with self._interrupts:
+            yield
 
     def _serve(self) -> None:
         while True:
-            error = self._loop_until_error()
+            error = self._error_of_loop()
             self._horizon = NEVER
-            self._anchor = None
             self._current = self._adopted
+            if self._pacer is not None:
+                self._pacer.rest()
             if error is None:
                 self._owner.switch()
             else:
                 self._owner.throw(type(error), error, error.__traceback__)
 
-    def _loop_until_error(self) -> BaseException | None:
+    def _error_of_loop(self) -> BaseException | None:
         try:
             self._loop()
         except GreenletExit:
@@ -302,23 +322,26 @@ class VirtualKernel:
         return None
 
     def _loop(self) -> None:
-        heap, inbox = self._heap, self._inbox
+        heap, inbox, pacer = self._heap, self._inbox, self._pacer
         while True:
             self._current = None
-            self._horizon = NEVER if self._pace else self._until
+            self._horizon = self._until if pacer is None else NEVER
             while inbox:
                 inbox.popleft()()
             if self.root.cancelled and self._adopted is None:
                 return
-            when = heap[0][0] if heap else FOREVER
-            if self._pace and self._waits_for(min(when, self._until)):
-                continue
-            if not heap or when > self._until:
+            due = heap[0][0]
+            if pacer is not None:
+                now = pacer.wait(self._now, min(due, self._until))
+                if now is not None:
+                    self._now = now
+                    continue
+            if due > self._until:
                 self._come_to_rest()
                 return
             _, ticket, target = heappop(heap)
             if target.ticket == ticket:
-                self._now = when
+                self._now = due
                 self.events += 1
                 if type(target) is Task:
                     self._resume(target)
@@ -327,29 +350,14 @@ class VirtualKernel:
 
     def _come_to_rest(self) -> None:
         heap = self._heap
-        while heap and heap[0][2].ticket != heap[0][1]:
+        while heap[0][2].ticket != heap[0][1]:
             heappop(heap)
-        if heap or self._pace:
+        if len(heap) > 1 or self._pacer is not None:
             self._now = max(self._now, self._until)
             return
         waiting = [f"{task.name} for {task.waiting_for}" for task in self.root.all_tasks()]
         if waiting:
             raise Deadlock("nothing can happen any more; waiting: " + "; ".join(waiting))
-
-    def _waits_for(self, when: Ns) -> bool:
-        """False if *when* has come on the wall; else True after a wait, in which things may have changed."""
-        assert self._pace is not None
-        if self._anchor is None:
-            self._anchor = (monotonic_ns(), self._now)
-        wall, virtual = self._anchor
-        ahead = to_seconds(when - virtual) / self._pace - to_seconds(monotonic_ns() - wall)
-        if ahead <= 0.0:
-            return False
-        with suppress(Empty):
-            self._bell.get(timeout=min(ahead, LONGEST_WAIT_S))
-        passed = int((monotonic_ns() - wall) * self._pace)
-        self._now = max(self._now, min(virtual + passed, when))
-        return True
 
     # -- scripts
 
@@ -367,7 +375,7 @@ class VirtualKernel:
         self._until = FOREVER
         self._adopted = self._current = task
         try:
-            with self._interrupts:
+            with self._watched():
                 yield task
         except Cancelled:
             pass
@@ -383,6 +391,8 @@ class VirtualKernel:
         if self._current is not None:
             raise UsageError("close() from inside a task: leave it first")
         self.cancel(self.root, why)
+        if self._watchdog is not None:
+            self._watchdog.stop()
         hub, self._hub = self._hub, getcurrent()
         for task in list(self.root.all_tasks()):
             if task.flow is None:
@@ -392,7 +402,7 @@ class VirtualKernel:
                 self._resume(task)
         self._current = None
         if hub is not None:
-            hub.parent = getcurrent()
+            hub.parent = self._hub
             hub.throw()
         return [task.name for task in self.root.all_tasks()]
 

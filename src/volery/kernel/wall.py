@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Self
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.interrupt import Interrupts
-from volery.kernel.task import STUBBORN, Cancelled, Place, Scope, Task
+from volery.kernel.task import Cancelled, Place, Scope, Task
 from volery.kernel.timer import Every
 from volery.trace.events import Record, ignore
 
@@ -149,15 +149,12 @@ class WallKernel:
     def _fail(self, error: BaseException) -> None:
         """Remember what run(), or the script that is adopted, is to be told."""
         with self._monitor:
-            self._fault = self._fault or error
-            self._bell.put(None)
             if self._adopted is not None:
+                self._adopted.summons = self._adopted.summons or error
                 self.wake(self._adopted)
-
-    def _raise_fault(self) -> None:
-        fault, self._fault = self._fault, None
-        if fault is not None:
-            raise fault
+            else:
+                self._fault = self._fault or error
+                self._bell.put(None)
 
     # -- interaction points
 
@@ -166,9 +163,9 @@ class WallKernel:
         task = self.current()
         if task is not None:
             task.take_debt()
-            if task.scope.cancelled:
+            if task.summons is not None:
                 try:
-                    self._end(task)
+                    self._answer(task)
                 finally:
                     self._monitor.release()
         return self
@@ -202,10 +199,8 @@ class WallKernel:
                 if left is not None and left <= 0.0:
                     break
                 task.flow.woken.wait(left)
-            if task.adopted:
-                self._raise_fault()
-            if task.scope.cancelled:
-                self._end(task)
+            if task.summons is not None:
+                self._answer(task)
             return task.woken
 
     def _wall_seconds(self, until: Ns) -> float:
@@ -225,10 +220,8 @@ class WallKernel:
                 self.wake(task)
             self._bell.put(None)
 
-    def _end(self, task: Task) -> None:
-        task.refusals += 1
-        if task.refusals <= STUBBORN or task.adopted:
-            raise Cancelled(task.scope.cancelled)
+    def _answer(self, task: Task) -> None:
+        task.answer()
         while True:  # it swallows its end: this interaction point never returns
             task.flow.woken.wait()
 
@@ -251,7 +244,9 @@ class WallKernel:
     def _goes_on(self, until: Ns) -> bool:
         """Do one thing that is due, or wait for it; False if there will be none."""
         with self._monitor:
-            self._raise_fault()
+            fault, self._fault = self._fault, None
+            if fault is not None:
+                raise fault
             if self.root.cancelled:
                 return False
             if self._do_next(until):
