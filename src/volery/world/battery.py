@@ -18,7 +18,7 @@ from numba import njit
 CELL_FULL_VOLTS = 4.2
 
 
-@njit(cache=True)
+@njit(cache=False)
 def cell_voltage(left: float) -> float:
     """Open-circuit volts of one cell with the fraction *left* of its charge; 3.0 V when none is left."""
     if left >= 0.9:
@@ -32,7 +32,7 @@ def cell_voltage(left: float) -> float:
     return 3.0 + max(left, 0.0) * 6.1
 
 
-@njit(cache=True)
+@njit(cache=False)
 def current(open_volts: float, resistance: float, power: float) -> float:
     """Amperes at which the terminals give *power* watts."""
     room = open_volts * open_volts - 4.0 * resistance * power

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from volery.world.columns import (
     INTEGRATED,
+    MULTIROTOR,
     P_FEET,
     P_GRAVITY,
     P_IDLE_POWER,
@@ -17,6 +18,7 @@ from volery.world.columns import (
     P_MASS,
     S_AMPS,
     S_ATTITUDE,
+    S_AWAKE,
     S_CONTACT_SPEED,
     S_CONTACTS,
     S_DISTANCE,
@@ -33,10 +35,12 @@ from volery.world.columns import (
     U_PAYLOAD,
     U_THROTTLE,
     U_WIND,
+    Advance,
     Array,
     Bodies,
     Work,
 )
+from volery.world.compiled import digest_of, world_sources
 from volery.world.multirotor import (
     electrical_power,
     lift,
@@ -55,7 +59,7 @@ _STILL_RATE = 0.05  # [rad/s]
 _LIGHT = 0.7  # of its weight: a body whose rotors lift less than this stays where it landed
 
 
-@njit(cache=True)
+@njit(cache=False)
 def new_work() -> Work:
     """Scratch for one compiled call."""
     return Work(
@@ -72,7 +76,7 @@ def new_work() -> Work:
     )
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _slope(flying: bool, inputs: Array, parameters: Array, work: Work, resting: bool) -> None:
     if flying:
         multirotor_slope(work.y, inputs, parameters, work, resting)
@@ -80,7 +84,7 @@ def _slope(flying: bool, inputs: Array, parameters: Array, work: Work, resting: 
         rover_slope(work.y, inputs, parameters, work, resting)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _integrate(flying: bool, state: Array, inputs: Array, parameters: Array, work: Work) -> None:
     """The classical fourth-order Runge-Kutta step (Kutta 1901) of the integrated columns."""
     resting = state[S_RESTING] > 0.5
@@ -104,7 +108,7 @@ def _integrate(flying: bool, state: Array, inputs: Array, parameters: Array, wor
         state[i] += STEP_S / 6.0 * (total[i] + slope[i])
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _normalise(state: Array) -> None:
     square = 0.0
     for i in range(4):
@@ -114,7 +118,7 @@ def _normalise(state: Array) -> None:
         state[S_ATTITUDE + i] /= norm
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _touches(state: Array, parameters: Array, rotation: Array) -> bool:
     lowest = (
         parameters[P_FEET] * abs(rotation[2, 0])
@@ -125,7 +129,7 @@ def _touches(state: Array, parameters: Array, rotation: Array) -> bool:
     return touching
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _settle_flyer(state: Array, parameters: Array, work: Work) -> None:
     """Contact, rest and power at the end of a multirotor's step."""
     touching = _touches(state, parameters, work.rotation)
@@ -148,7 +152,7 @@ def _settle_flyer(state: Array, parameters: Array, work: Work) -> None:
             state[S_RATES + axis] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _settle_rover(state: Array, parameters: Array, work: Work, height_before: float) -> None:
     """Height, velocity and rest at the end of a rover's step."""
     climb = (state[S_GROUND] - height_before) / STEP_S
@@ -161,7 +165,7 @@ def _settle_rover(state: Array, parameters: Array, work: Work, height_before: fl
     follow_ground(state, parameters, state[S_GROUND], climb)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _felt(state: Array, parameters: Array, work: Work) -> None:
     """The step's mean specific force in body axes, and the way gone."""
     rotation, before = work.rotation, work.before
@@ -176,7 +180,7 @@ def _felt(state: Array, parameters: Array, work: Work) -> None:
     state[S_DISTANCE] += sqrt(square) * STEP_S
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _power(flying: bool, state: Array, inputs: Array, parameters: Array, work: Work) -> None:
     if flying:
         power = electrical_power(state, inputs, parameters)
@@ -188,7 +192,7 @@ def _power(flying: bool, state: Array, inputs: Array, parameters: Array, work: W
     state[S_PAYLOAD_ENERGY] += inputs[U_PAYLOAD] * STEP_S
 
 
-@njit(cache=True)
+@njit(cache=False)
 def electrical_rover(state: Array, inputs: Array, parameters: Array, work: Work) -> float:
     """Watts drawn at a rover's battery."""
     drive = drive_power(state[S_SPEED], work.slope[S_SPEED], parameters)
@@ -196,13 +200,13 @@ def electrical_rover(state: Array, inputs: Array, parameters: Array, work: Work)
     return power
 
 
-@njit(cache=True)
+@njit(cache=False)
 def step_body(bodies: Bodies, body: int, work: Work) -> None:
     """Advance one body from its grid step to the next under ``work.throttle``, and take the samples due
     there.
     """
     state, inputs, parameters = bodies.state[body], bodies.inputs[body], bodies.parameters[body]
-    flying = parameters[P_KIND] == 0.0
+    flying = parameters[P_KIND] == MULTIROTOR
     for axis in range(3):
         work.before[axis] = state[S_VELOCITY + axis]
         work.air[axis] = inputs[U_WIND + axis] + state[S_GUST + axis]
@@ -226,27 +230,35 @@ def step_body(bodies: Bodies, body: int, work: Work) -> None:
     sense(bodies, body, work.rotation, k)
 
 
-@njit(cache=True)
-def first_samples(bodies: Bodies) -> None:
+@njit(cache=False)
+def wake_body(bodies: Bodies, body: int, work: Work) -> None:
     """What the instruments show at grid step 0, before anything moved."""
-    work = new_work()
-    for body in range(bodies.state.shape[0]):
-        state = bodies.state[body]
-        rotation_matrix(state, work.rotation)
-        for axis in range(3):
-            state[S_FORCE + axis] = work.rotation[2, axis] * bodies.parameters[body, P_GRAVITY]
-        _power(
-            bodies.parameters[body, P_KIND] == 0.0, state, bodies.inputs[body], bodies.parameters[body], work
-        )
-        sense(bodies, body, work.rotation, 0)
+    state, parameters = bodies.state[body], bodies.parameters[body]
+    rotation_matrix(state, work.rotation)
+    for axis in range(3):
+        state[S_FORCE + axis] = work.rotation[2, axis] * parameters[P_GRAVITY]
+    _power(parameters[P_KIND] == MULTIROTOR, state, bodies.inputs[body], parameters, work)
+    sense(bodies, body, work.rotation, 0)
+    state[S_AWAKE] = 1.0
 
 
-@njit(cache=True)
-def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
-    """Advance each body to its goal step with the motor commands in its inputs: no autopilot at all."""
-    work = new_work()
-    for body in range(goals.shape[0]):
-        for i in range(4):
-            work.throttle[i] = bodies.inputs[body, U_THROTTLE + i]
-        while bodies.reached[body] < goals[body]:
-            step_body(bodies, body, work)
+def _compose(sources: str) -> Advance:
+    @njit(cache=True)
+    def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
+        if not sources:  # never so: its being named here makes the digest part of the cache's key
+            return
+        work = new_work()
+        for body in range(goals.shape[0]):
+            if bodies.state[body, S_AWAKE] == 0.0:
+                wake_body(bodies, body, work)
+            while bodies.reached[body] < goals[body]:
+                for i in range(4):
+                    work.throttle[i] = bodies.inputs[body, U_THROTTLE + i]
+                step_body(bodies, body, work)
+
+    compiled: Advance = advance_bodies
+    return compiled
+
+
+advance_bodies = _compose(digest_of(world_sources()))
+"""Advance each body to its goal step with the motor commands in its inputs: no autopilot at all."""

@@ -8,6 +8,7 @@ measurements. A composer (an autopilot's flight loops) may add columns of its ow
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,8 @@ S_GUST = 28  # east, north, up [m/s]
 S_GROUND = 31  # height of the ground straight below [m up]
 S_PAYLOAD_ENERGY = 32  # of the energy, that of the on-board computers [J]
 S_DISTANCE = 33  # path length flown or driven [m]
-STATE = 34
+S_AWAKE = 34  # 1 once the first samples are taken
+STATE = 35
 
 # --- inputs -------------------------------------------------------------------------------------------------
 U_THROTTLE = 0  # four motor commands 0..1; rover: steering -1..1, throttle -1..1 (used by `bodies` alone)
@@ -142,6 +144,10 @@ class Bodies(NamedTuple):
     reached: NDArray[np.int64]
     heights: Array
     grid: Array
+
+
+Advance = Callable[[Bodies, NDArray[np.int64]], None]
+"""The compiled step: brings every body to its goal step. Composed by import, not by passing functions."""
 
 
 class Work(NamedTuple):

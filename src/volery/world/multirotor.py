@@ -57,7 +57,7 @@ from volery.world.columns import (
 _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
 
-@njit(cache=True)
+@njit(cache=False)
 def electrical_power(state: Array, inputs: Array, parameters: Array) -> float:
     """Watts drawn at the battery's terminals: rotors, autopilot and payload."""
     cubes = 0.0
@@ -69,7 +69,7 @@ def electrical_power(state: Array, inputs: Array, parameters: Array) -> float:
     return power
 
 
-@njit(cache=True)
+@njit(cache=False)
 def volts_amps(state: Array, parameters: Array, power: float) -> tuple[float, float]:
     """Terminal volts and amperes at a state of charge and a power."""
     left = 1.0 - state[S_CHARGE] / parameters[P_CAPACITY]
@@ -78,7 +78,7 @@ def volts_amps(state: Array, parameters: Array, power: float) -> tuple[float, fl
     return open_volts - parameters[P_RESISTANCE] * amps, amps
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _feet(y: Array, parameters: Array, work: Work, ground: float) -> None:
     """Add what the ground does to four feet to work's force (east, north, up) and torque (body)."""
     rotation, force, torque = work.rotation, work.force, work.torque
@@ -110,7 +110,7 @@ def _feet(y: Array, parameters: Array, work: Work, ground: float) -> None:
         torque[2] += x * by - left * bx
 
 
-@njit(cache=True)
+@njit(cache=False)
 def rotation_matrix(state: Array, rotation: Array) -> None:
     """The attitude quaternion in *state* as a matrix that takes body axes to east, north, up."""
     w, x, y, z = state[S_ATTITUDE], state[S_ATTITUDE + 1], state[S_ATTITUDE + 2], state[S_ATTITUDE + 3]
@@ -125,7 +125,7 @@ def rotation_matrix(state: Array, rotation: Array) -> None:
     rotation[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _spin_up(y: Array, throttle: Array, inputs: Array, parameters: Array, out: Array) -> None:
     """Rotor speeds, charge and energy: what changes even in a body at rest."""
     power = electrical_power(y, inputs, parameters)
@@ -137,7 +137,7 @@ def _spin_up(y: Array, throttle: Array, inputs: Array, parameters: Array, out: A
     out[S_ENERGY] = volts * amps
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _loads(y: Array, inputs: Array, parameters: Array, work: Work) -> None:
     """Rotor and air loads into work: force east, north, up without gravity; torque forward, left, up."""
     rotation, force, torque, air = work.rotation, work.force, work.torque, work.air
@@ -161,7 +161,7 @@ def _loads(y: Array, inputs: Array, parameters: Array, work: Work) -> None:
         torque[axis] -= parameters[P_SPIN_DAMPING] * y[S_RATES + axis]
 
 
-@njit(cache=True)
+@njit(cache=False)
 def multirotor_slope(y: Array, inputs: Array, parameters: Array, work: Work, resting: bool) -> None:
     """The state's rate of change into ``work.slope``. A resting body keeps its place; its rotors may spin."""
     slope, rotation, force, torque = work.slope, work.rotation, work.force, work.torque
@@ -192,7 +192,7 @@ def multirotor_slope(y: Array, inputs: Array, parameters: Array, work: Work, res
     slope[S_RATES + 2] = (torque[2] + (ix - iy) * p * q) / iz
 
 
-@njit(cache=True)
+@njit(cache=False)
 def lift(state: Array, parameters: Array) -> float:
     """The rotors' thrust together [N]."""
     squares = 0.0

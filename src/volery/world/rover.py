@@ -49,7 +49,7 @@ S_SPEED = S_ROTORS + 1
 _STANDING = 0.001  # [m/s] below which rolling resistance has no sign
 
 
-@njit(cache=True)
+@njit(cache=False)
 def drive_power(speed: float, acceleration: float, parameters: Array) -> float:
     """Watts at the battery for the wheels at a speed [m/s] and an acceleration [m/s^2]."""
     pace = abs(speed)
@@ -63,7 +63,7 @@ def drive_power(speed: float, acceleration: float, parameters: Array) -> float:
     return power
 
 
-@njit(cache=True)
+@njit(cache=False)
 def turn_rate(speed: float, steer: float, parameters: Array) -> float:
     """Heading's rate of change [rad/s, anticlockwise] at a speed and a steering angle (skid: a turn rate)."""
     if parameters[P_SKID] > 0.5:
@@ -76,7 +76,7 @@ def turn_rate(speed: float, steer: float, parameters: Array) -> float:
     return held
 
 
-@njit(cache=True)
+@njit(cache=False)
 def rover_slope(y: Array, inputs: Array, parameters: Array, work: Work, resting: bool) -> None:
     """The state's rate of change into ``work.slope``; commands: steering (left positive), throttle."""
     slope = work.slope
@@ -101,7 +101,7 @@ def rover_slope(y: Array, inputs: Array, parameters: Array, work: Work, resting:
     slope[S_ENERGY] = volts * amps
 
 
-@njit(cache=True)
+@njit(cache=False)
 def follow_ground(state: Array, parameters: Array, ground: float, climb: float) -> None:
     """What the wheels dictate after a step: height, velocity and turn rate."""
     speed = state[S_SPEED]

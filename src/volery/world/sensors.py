@@ -159,7 +159,7 @@ def declared_sigma(name: str) -> Sigma:
     return Sigma(horizontal=(2.0 * level) ** 0.5, vertical=(height + air) ** 0.5)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _drift(measured: Array, parameters: Array, key: np.uint64, k: int) -> None:
     """Move every slow error by one period."""
     stream = _SLOW
@@ -179,7 +179,7 @@ def _drift(measured: Array, parameters: Array, key: np.uint64, k: int) -> None:
             stream += 1
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _inertial(bodies: Bodies, body: int, k: int) -> None:
     state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
     key = bodies.keys[body]
@@ -194,7 +194,7 @@ def _inertial(bodies: Bodies, body: int, k: int) -> None:
             measured[M_ACCEL + axis] += accel * gaussian(key, _ACCEL + axis, k)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _barometer(bodies: Bodies, body: int, k: int) -> None:
     measured = bodies.measured[body]
     if bodies.inputs[body, U_BARO_BLOCKED] != 0.0:
@@ -206,7 +206,7 @@ def _barometer(bodies: Bodies, body: int, k: int) -> None:
     measured[M_BARO_COUNT] += 1.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _compass(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
     measured, parameters = bodies.measured[body], bodies.parameters[body]
     if bodies.inputs[body, U_MAG_BLOCKED] != 0.0:
@@ -221,7 +221,7 @@ def _compass(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
     measured[M_MAG_COUNT] += 1.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _range_finder(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
     state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
     slant = (state[S_POSITION + 2] - state[S_GROUND]) / max(rotation[2, 2], 0.1)
@@ -230,7 +230,7 @@ def _range_finder(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
     measured[M_RANGE] = max(slant, 0.0) if seen else -1.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _satellites(bodies: Bodies, body: int, k: int) -> None:
     state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
     if bodies.inputs[body, U_GPS_BLOCKED] != 0.0:
@@ -252,7 +252,7 @@ def _satellites(bodies: Bodies, body: int, k: int) -> None:
     measured[M_GPS_COUNT] += 1.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def sense(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
     """Take the samples that fall due at step *k*. *rotation* is the body's at that step."""
     if k % SLOW_EVERY == 0:

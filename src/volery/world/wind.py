@@ -46,7 +46,7 @@ class Wind:
         return self.gust_length / max(speed, 2.0)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def blow(state: Array, inputs: Array, parameters: Array, key: np.uint64, k: int) -> None:
     """Advance one body's gust by one gust period (call when k is a multiple of GUST_EVERY)."""
     deviation = inputs[U_GUST]

@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Quaternion, Vector
 from volery.base.seeds import key
 from volery.base.time import MS, Ns
-from volery.world.bodies import advance_bodies, first_samples
+from volery.world.bodies import advance_bodies
 from volery.world.columns import (
     INPUTS,
     MEASUREMENTS,
@@ -42,6 +41,7 @@ from volery.world.columns import (
     U_MOTOR_HEALTH,
     U_PAYLOAD,
     U_WIND,
+    Advance,
     Bodies,
 )
 from volery.world.specs import BodySpec, first_state, parameters_of
@@ -53,10 +53,6 @@ STEP: Ns = 2 * MS
 
 _WATCHED = 500
 """A body looked at within this many steps is advanced along with the others, in one compiled call."""
-
-Advance = Callable[[Bodies, NDArray[np.int64]], None]
-"""The compiled step: brings every body to its goal step. Composed by import, never passed into compiled code.
-"""
 
 
 class Truth(NamedTuple):
@@ -135,10 +131,10 @@ class World:
         self.arrays.inputs[:, U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
         self.arrays.inputs[:, U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
         self.arrays.inputs[:, U_GUST] = wind.gust
-        first_samples(self.arrays)
         self._dated: list[deque[_Dated]] = [deque() for _ in self.specs]
         self._looked = [-_WATCHED] * count
         self._goals = np.zeros(count, dtype=np.int64)
+        self._advance(self.arrays, self._goals)
         self.advances = 0
 
     def look(self, body: int) -> int:

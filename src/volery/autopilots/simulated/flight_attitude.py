@@ -51,7 +51,7 @@ _SPOOL_TIME = 0.5  # [s]
 _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _rate_targets(memory: Array) -> tuple[float, float, float]:
     """Rates that turn the attitude into the demanded one, forward, right, down [rad/s]."""
     w, x, y, z = memory[K_ATTITUDE], memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2], memory[K_ATTITUDE + 3]
@@ -68,7 +68,7 @@ def _rate_targets(memory: Array) -> tuple[float, float, float]:
     )
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _torque(memory: Array, axis: int, wanted: float) -> float:
     """One rate's PID: a share of full thrust by which motors are to differ."""
     rate = memory[K_RATES + axis]
@@ -85,7 +85,7 @@ def _torque(memory: Array, axis: int, wanted: float) -> float:
     return torque
 
 
-@njit(cache=True)
+@njit(cache=False)
 def motor_output(thrust: float) -> float:
     """Motor command 0..1 for a share of full thrust."""
     linear = 1.0 - _EXPO
@@ -93,7 +93,7 @@ def motor_output(thrust: float) -> float:
     return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * curve
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _mix(memory: Array, parameters: Array, roll: float, pitch: float, yaw: float) -> None:
     """Motor commands from three torques and the collective."""
     reach = 1e-9
@@ -116,7 +116,7 @@ def _mix(memory: Array, parameters: Array, roll: float, pitch: float, yaw: float
         memory[K_MOTORS + i] = motor_output(thrust)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def fly_attitude(memory: Array, parameters: Array, control: int) -> None:
     """One grid step of the inner loops: from the demanded attitude and collective to four motor commands."""
     if control in (OFF, IDLE):

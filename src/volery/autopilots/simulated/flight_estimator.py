@@ -25,7 +25,7 @@ from volery.world.columns import P_GRAVITY, S_ATTITUDE, S_FORCE, S_POSITION, S_R
 _HALF = 0.7071067811865476
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _euler(memory: Array) -> None:
     """Roll, pitch and yaw of the estimated quaternion."""
     w, x, y, z = memory[K_ATTITUDE], memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2], memory[K_ATTITUDE + 3]
@@ -35,7 +35,7 @@ def _euler(memory: Array) -> None:
     memory[K_EULER + 2] = arc_tangent2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@njit(cache=True)
+@njit(cache=False)
 def know(memory: Array, state: Array, command: Array, parameters: Array, rotation: Array) -> None:
     """The estimate of a vehicle with perfect instruments: the truth, in the autopilot's axes."""
     memory[K_POSITION] = state[S_POSITION + 1]

@@ -79,18 +79,18 @@ _LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
 _MOST_LIFT = 2.2  # of gravity
 
 
-@njit(cache=True)
+@njit(cache=False)
 def in_plane(control: int) -> bool:
     """Does this control hold anything in the plane?"""
     return control in (VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _vertical(control: int) -> bool:
     return in_plane(control) or control == CLIMB
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _enter(memory: Array, control: int, before: int) -> None:
     """A new control takes over where the vehicle is and as fast as it is."""
     for axis in range(3):
@@ -107,7 +107,7 @@ def _enter(memory: Array, control: int, before: int) -> None:
         memory[K_TARGET_EULER + 1] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _stay(memory: Array) -> None:
     """On the ground: the target is where the vehicle stands, nothing is wound up."""
     for axis in range(3):
@@ -117,7 +117,7 @@ def _stay(memory: Array) -> None:
         memory[K_VELOCITY_INTEGRAL + axis] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _move_target(memory: Array, axis: int, speed: float, accel: float) -> None:
     """Integrate one axis of the target towards a speed; *accel* is what the limits allow now."""
     target_accel = ramp(memory[K_TARGET_ACCEL + axis], accel, _JERK * GUIDE_S)
@@ -127,7 +127,7 @@ def _move_target(memory: Array, axis: int, speed: float, accel: float) -> None:
     memory[K_TARGET + axis] += (before + 0.5 * target_accel * GUIDE_S) * GUIDE_S
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _shape_plane(memory: Array, command: Array, control: int) -> None:
     limit = command[C_ACCEL]
     if control in (POSITION, POSITION_CLIMB):
@@ -148,7 +148,7 @@ def _shape_plane(memory: Array, command: Array, control: int) -> None:
     _move_target(memory, 1, east, de * scale)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _shape_height(memory: Array, command: Array, control: int) -> None:
     limit = command[C_ACCEL_Z]
     if control in (POSITION, VELOCITY_HEIGHT):
@@ -164,7 +164,7 @@ def _shape_height(memory: Array, command: Array, control: int) -> None:
     _move_target(memory, 2, down, clip(push, -limit, limit))
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _leash(memory: Array) -> None:
     """A target that ran ahead (wind, a blocked motor) waits."""
     dn = memory[K_TARGET] - memory[K_POSITION]
@@ -176,7 +176,7 @@ def _leash(memory: Array) -> None:
     memory[K_TARGET + 2] = memory[K_POSITION + 2] + dd
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _wanted_accel(memory: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
     """Position and velocity loop of one axis [m/s^2]."""
     error = memory[K_TARGET + axis] - memory[K_POSITION + axis]
@@ -189,7 +189,7 @@ def _wanted_accel(memory: Array, axis: int, gain: float, integral: float, hold: 
     return accel
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _turn(memory: Array, command: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
     kind = int(command[C_YAW_IS])
@@ -207,7 +207,7 @@ def _turn(memory: Array, command: Array) -> None:
     memory[K_YAW_TARGET] = wrap_angle(memory[K_YAW_TARGET] + memory[K_YAW_SPEED] * GUIDE_S)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _demand_angles(memory: Array, roll: float, pitch: float) -> None:
     """Demand a roll, a pitch and the yaw target."""
     yaw = memory[K_YAW_TARGET]
@@ -223,7 +223,7 @@ def _demand_angles(memory: Array, roll: float, pitch: float) -> None:
     memory[K_DEMAND + 3] = cr * cp * sy - sr * sp * cy
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _lean(memory: Array, command: Array, north: float, east: float, lift: float) -> None:
     """Demand the attitude whose thrust gives an acceleration in the plane at a *lift* [m/s^2 up, with
     gravity].
@@ -240,7 +240,7 @@ def _lean(memory: Array, command: Array, north: float, east: float, lift: float)
     _demand_angles(memory, clip(roll, -most, most), clip(pitch, -most, most))
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _collective(memory: Array, lift: float) -> None:
     """Collective for a vertical acceleration *lift* [m/s^2 up, gravity included] at the present tilt."""
     x, y = memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2]
@@ -248,7 +248,7 @@ def _collective(memory: Array, lift: float) -> None:
     memory[K_THROTTLE] = clip(memory[K_HOVER] * lift / _GRAVITY / clip(upright, 0.5, 1.0), 0.0, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _learn_hover(memory: Array) -> None:
     """Learn the collective that carries the weight, while the vehicle hardly accelerates."""
     steady = memory[K_LANDED] < 0.5 and memory[K_SPOOL] >= 1.0 and abs(memory[K_VELOCITY + 2]) < 0.6
@@ -260,7 +260,7 @@ def _learn_hover(memory: Array) -> None:
         memory[K_HOVER] = learnt
 
 
-@njit(cache=True)
+@njit(cache=False)
 def guide(memory: Array, command: Array) -> None:
     """One guidance period."""
     control = int(command[C_CONTROL])

@@ -28,7 +28,7 @@ _PERIOD = 0.01  # [s]
 _SURE = 1.0  # [s]
 
 
-@njit(cache=True)
+@njit(cache=False)
 def detect_landing(memory: Array, control: int) -> None:
     """One guidance period of the detector."""
     motion = 0.0

@@ -43,14 +43,14 @@ _SPEED_INTEGRAL = 0.2  # ATC_SPEED_I
 _CLOSE = 0.3  # [m]: where a rover stops chasing the point
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _forward_speed(memory: Array) -> float:
     s, c = sine_cosine(memory[K_EULER + 2])
     speed: float = memory[K_VELOCITY] * c + memory[K_VELOCITY + 1] * s
     return speed
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _steer_for(parameters: Array, rate: float, speed: float) -> float:
     """Steering -1..1, right positive, that turns at *rate* clockwise [rad/s] at a *speed*."""
     if parameters[P_SKID] > 0.5:
@@ -60,7 +60,7 @@ def _steer_for(parameters: Array, rate: float, speed: float) -> float:
     return clip(angle / parameters[P_STEER_TOP], -1.0, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _throttle_for(memory: Array, parameters: Array, wanted: float) -> float:
     """A speed controller: feed-forward and PI."""
     miss = wanted - _forward_speed(memory)
@@ -72,7 +72,7 @@ def _throttle_for(memory: Array, parameters: Array, wanted: float) -> float:
     return clip(wanted / parameters[P_SPEED_TOP] + _SPEED_GAIN * miss + memory[K_SPEED_INTEGRAL], -1.0, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _to_point(memory: Array, command: Array) -> tuple[float, float]:
     """Speed and turn rate on the way to a point."""
     north = command[C_POSITION] + memory[K_ORIGIN] - memory[K_POSITION]
@@ -88,7 +88,7 @@ def _to_point(memory: Array, command: Array) -> tuple[float, float]:
     return speed * clip(ahead, 0.2, 1.0), clip(_TURN_GAIN * error, -1.5, 1.5)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def _along(memory: Array, command: Array) -> tuple[float, float]:
     """Speed and turn rate as told."""
     kind = int(command[C_YAW_IS])
@@ -100,7 +100,7 @@ def _along(memory: Array, command: Array) -> tuple[float, float]:
     return clip(command[C_VELOCITY], -command[C_SPEED], command[C_SPEED]), rate
 
 
-@njit(cache=True)
+@njit(cache=False)
 def guide_rover(memory: Array, command: Array, parameters: Array) -> None:
     """One guidance period."""
     control = int(command[C_CONTROL])

@@ -9,7 +9,7 @@ from numba import njit
 from volery.world.arithmetic import clip
 
 
-@njit(cache=True)
+@njit(cache=False)
 def approach(error: float, gain: float, brake: float) -> float:
     """The rate at which to close *error* so that *brake* suffices to stop at zero.
 
@@ -26,13 +26,13 @@ def approach(error: float, gain: float, brake: float) -> float:
     return error * gain
 
 
-@njit(cache=True)
+@njit(cache=False)
 def ramp(value: float, goal: float, most: float) -> float:
     """*value* moved towards *goal* by at most *most*."""
     return value + clip(goal - value, -most, most)
 
 
-@njit(cache=True)
+@njit(cache=False)
 def shorten(x: float, y: float, most: float) -> tuple[float, float]:
     """The vector (x, y), scaled down where it is longer than *most*."""
     length = sqrt(x * x + y * y)
