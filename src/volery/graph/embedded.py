@@ -10,7 +10,7 @@ from volery.base.time import Ns
 from volery.graph import names
 from volery.graph.clock import CLOCK
 from volery.graph.context import Context, Member
-from volery.graph.group import CallbackGroup
+from volery.graph.group import CallbackGroup, Work
 from volery.graph.node import DEFAULT, Callback, Group, Handler, QoS
 from volery.graph.services import EmbeddedClient, EmbeddedService
 from volery.graph.timing import NodeRate, NodeTimer, sleep
@@ -62,14 +62,14 @@ class EmbeddedNode:
         absolute = names.absolute(name, self.namespace, self.name)
         return self._remaps.get(absolute, absolute)
 
-    def _new_group(self, label: str) -> CallbackGroup:
-        made = CallbackGroup(self._member, label)
+    def _new_group(self, label: str, start: Callable[[Work], None] | None = None) -> CallbackGroup:
+        made = CallbackGroup(self._member, label, start)
         self._groups.append(made)
         return made
 
-    def group(self) -> CallbackGroup:
-        """A new group."""
-        return self._new_group(f"callbacks of group {len(self._groups)}")
+    def group(self, start: Callable[[Work], None] | None = None) -> CallbackGroup:
+        """A new group. With *start* its work waits for no spin: *start* is given it, as house code."""
+        return self._new_group(f"callbacks of group {len(self._groups)}", start)
 
     def _group_of(self, group: Group | None) -> CallbackGroup:
         if group is None:
@@ -125,6 +125,11 @@ class EmbeddedNode:
             self._member.check_open()
             self._member.pay("service_client")
             return EmbeddedClient(self._member, self.resolve(name), service_type)
+
+    def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
+        """Block until somebody serves *name*; False if *within* has passed first."""
+        full = self.resolve(name)
+        return self._context.changed.wait_for(lambda: full in self._context.services, within)
 
     def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> NodeTimer:
         """Call back each *period*."""

@@ -25,11 +25,12 @@ class CallbackGroup:
 
     A wait in ``spin_once`` ends the caller's activation; the callback that ends the wait is a new one,
     released when its message (request, timer) arrived. Polling (``within=0``) belongs to the activation that
-    is under way.
+    is under way. With *start* nothing waits: it is given the work at once, as house code.
     """
 
-    def __init__(self, member: Member, label: str) -> None:
+    def __init__(self, member: Member, label: str, start: Callable[[Work], None] | None = None) -> None:
         self._member = member
+        self._start = start
         self._ready: deque[Work] = deque()
         self._filled = Signal(member.context.kernel, f"{member.name} ({label})")
         self._spun = False
@@ -39,15 +40,11 @@ class CallbackGroup:
 
     def add(self, work: Work) -> None:
         """A callback has become ready. House code."""
+        if self._start is not None:
+            self._start(work)
+            return
         self._ready.append(work)
         self._filled.notify()
-
-    def discard(self, run: Callable[[], None]) -> None:
-        """Forget the oldest work that would run *run*."""
-        for work in self._ready:
-            if work.run == run:
-                self._ready.remove(work)
-                return
 
     def wake(self) -> None:
         """Let those who wait look again: the node has been closed."""

@@ -1,0 +1,199 @@
+"""The ``rospy`` module of one run, and the message packages beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import ModuleType
+from typing import Any, NoReturn
+
+from volery import messages
+from volery.base.errors import UsageError, choices, did_you_mean
+from volery.base.time import S
+from volery.faces.rospy import services, time, topics
+from volery.faces.rospy.errors import EXCEPTIONS
+from volery.faces.rospy.logging import LEVELS, loggers
+from volery.faces.rospy.session import Launch, Sessions
+from volery.graph import Graph
+
+_BOUND = (
+    topics.Publisher,
+    topics.Subscriber,
+    services.Service,
+    services.ServiceProxy,
+    time.Rate,
+    time.Timer,
+    time.Time,
+)
+
+
+def modules(graph: Graph, launched: Mapping[str, Launch] | None = None) -> dict[str, ModuleType]:
+    """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
+
+    *launched* says for each component what a launch file would (by the component's name, which names its
+    node then).
+    """
+    sessions = Sessions(graph, launched or {})
+    names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
+    for kind in _BOUND:
+        names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})
+    names["Duration"] = time.Duration
+    names["TimerEvent"] = time.TimerEvent
+    names["Header"] = messages.message_class("std_msgs/msg/Header")
+    names["Message"] = messages.Message
+    rospy = _module("rospy", names)
+    exceptions = _module("rospy.exceptions", EXCEPTIONS)
+    vars(rospy)["exceptions"] = exceptions
+    return {**messages.modules(), "rospy": rospy, "rospy.exceptions": exceptions}
+
+
+def _module(name: str, names: Mapping[str, Any]) -> ModuleType:
+    module = ModuleType(name, "rospy on the embedded graph.")
+    module.__path__ = []
+    vars(module).update(names)
+
+    def missing(attribute: str) -> NoReturn:
+        if attribute.startswith("__"):
+            raise AttributeError(attribute)
+        hint = did_you_mean(attribute, names)
+        raise AttributeError(
+            f"{name}.{attribute} is not there on the embedded graph{hint}; there is {choices(names)}"
+        )
+
+    vars(module)["__getattr__"] = missing
+    return module
+
+
+def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
+    """The functions of rospy, bound to the sessions of one run."""
+    found: tuple[Any, ...] = (
+        init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
+        get_param, set_param, has_param, delete_param, get_param_names, get_name, get_namespace,
+        get_time, get_rostime, resolve_name, get_published_topics,
+    )  # fmt: skip
+    bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
+    return {**bound, "get_caller_id": bound["get_name"], "myargv": myargv}
+
+
+def init_node(
+    sessions: Sessions, name: str, argv: Any = None, anonymous: bool = False, **options: Any
+) -> None:
+    """Join the graph. Options about signals, logging and ports are accepted and mean nothing here."""
+    sessions.join(name, anonymous)
+
+
+def is_shutdown(sessions: Sessions) -> bool:
+    """Whether this node is shutting down. An interaction point, as every call is."""
+    with sessions.kernel:
+        session = sessions.find()
+        return session is not None and bool(session.shutdown)
+
+
+def signal_shutdown(sessions: Sessions, reason: str = "") -> None:
+    """Shut this node down."""
+    sessions.here().end(reason)
+
+
+def on_shutdown(sessions: Sessions, h: Callable[[], Any]) -> None:
+    """Call *h* when this node shuts down."""
+    sessions.here().hooks.append(h)
+
+
+def spin(sessions: Sessions) -> None:
+    """Block until this node shuts down."""
+    services.spin(sessions.here())
+
+
+def sleep(sessions: Sessions, duration: Any) -> None:
+    """Block for a number of seconds or a ``Duration``."""
+    time.sleep(sessions.here(), duration)
+
+
+def _within(timeout: Any) -> int | None:
+    return None if timeout is None else time.as_ns(timeout)
+
+
+def wait_for_message(sessions: Sessions, topic: str, topic_type: Any, timeout: Any = None) -> Any:
+    """The next message of a topic."""
+    return topics.wait_for_message(sessions.here(), topic, topic_type, _within(timeout))
+
+
+def wait_for_service(sessions: Sessions, service: str, timeout: Any = None) -> None:
+    """Block until somebody serves it."""
+    services.wait_for_service(sessions.here(), service, _within(timeout))
+
+
+_NO_DEFAULT = object()
+
+
+def get_param(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
+    """A parameter; ``KeyError`` if there is none and no default."""
+    node = sessions.here().node
+    if default is not _NO_DEFAULT:
+        return node.get_parameter(param_name, default)
+    try:
+        return node.get_parameter(param_name)
+    except UsageError as error:
+        raise KeyError(str(error)) from error
+
+
+def set_param(sessions: Sessions, param_name: str, param_value: Any) -> None:
+    """Set a parameter."""
+    sessions.here().node.set_parameter(param_name, param_value)
+
+
+def has_param(sessions: Sessions, param_name: str) -> bool:
+    """Whether there is such a parameter."""
+    return sessions.here().node.has_parameter(param_name)
+
+
+def delete_param(sessions: Sessions, param_name: str) -> None:
+    """Remove a parameter; ``KeyError`` if there is none."""
+    try:
+        sessions.here().node.delete_parameter(param_name)
+    except UsageError as error:
+        raise KeyError(str(error)) from error
+
+
+def get_param_names(sessions: Sessions) -> list[str]:
+    """All parameters."""
+    with sessions.kernel:
+        return sessions.graph.parameters.names()
+
+
+def get_name(sessions: Sessions) -> str:
+    """The full name of this node."""
+    return sessions.here().node.name
+
+
+def get_namespace(sessions: Sessions) -> str:
+    """This node's namespace, with a slash at its end."""
+    return f"{sessions.here().node.namespace.rstrip('/')}/"
+
+
+def get_time(sessions: Sessions) -> float:
+    """ROS time in seconds."""
+    return sessions.now() / S
+
+
+def get_rostime(sessions: Sessions) -> time.Time:
+    """ROS time."""
+    return time.Time(0, sessions.now())
+
+
+def resolve_name(sessions: Sessions, name: str) -> str:
+    """The absolute name, remappings applied."""
+    return sessions.here().node.resolve(name)
+
+
+def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:
+    """Topics that somebody publishes below *namespace*, with their types in ROS 1's spelling."""
+    with sessions.kernel:
+        states = [one for one in sessions.graph.topics() if one.publishers]
+    below = namespace.rstrip("/") + "/"
+    return [[one.name, one.type.replace("/msg/", "/")] for one in states if one.name.startswith(below)]
+
+
+def myargv(argv: list[str] | None = None) -> list[str]:
+    """The command line without ROS's own arguments; components have none."""
+    return [one for one in argv or [] if ":=" not in one]

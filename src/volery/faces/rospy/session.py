@@ -1,0 +1,157 @@
+"""What one component is to rospy: its node, its helping tasks, whether it is shutting down."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+from volery.base.errors import VoleryError
+from volery.base.time import Ns
+from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
+from volery.graph import EmbeddedNode, Graph
+from volery.graph.group import CallbackGroup, Work
+from volery.kernel.api import Kernel
+from volery.kernel.task import Scope
+from volery.kernel.waiting import Signal, current_task
+from volery.trace.events import Failure, Text
+
+ERROR = 3
+"""Severity, as in syslog."""
+
+
+class Launch(NamedTuple):
+    """What a launch file says about a node: its namespace, its remappings and its private parameters."""
+
+    namespace: str = "/"
+    remaps: Mapping[str, str] = {}
+    parameters: Mapping[str, Any] = {}
+
+
+@dataclass(eq=False)
+class Session:
+    """One component's node."""
+
+    node: EmbeddedNode
+    scope: Scope
+    kernel: Kernel
+    ended: Signal
+    shutdown: str = ""
+    hooks: list[Callable[[], Any]] = field(default_factory=list)
+    failures: set[str] = field(default_factory=set)
+
+    def say(self, severity: int, text: str) -> None:
+        """Record a log line of this node. An interaction point."""
+        with self.kernel as kernel:
+            kernel.record(Text(kernel.now(), self.node.place.component, severity, text))
+
+    def check(self) -> None:
+        """``ROSInterruptException`` if it is shutting down."""
+        if self.shutdown:
+            raise ROSInterruptException(f"rospy shutdown: {self.shutdown}")
+
+    def end(self, why: str) -> None:
+        """Shut down: hooks first, then leave the graph."""
+        if not self.shutdown:
+            self.shutdown = why or "signal_shutdown"
+            for hook in self.hooks:
+                hook()
+            self.node.close()
+            self.ended.notify()
+
+    def spin_beside(self, label: str, what: str) -> CallbackGroup:
+        """A new group that a task of its own spins, as a thread of rospy would."""
+        group = self.node.group()
+
+        def body() -> None:
+            while not self.node.closed:
+                self._guarded(group.spin_once, what)
+
+        self._start(body, label)
+        return group
+
+    def spawn_each(self, label: str, what: str) -> CallbackGroup:
+        """A new group of which each piece of work gets a task of its own."""
+
+        def start(work: Work) -> None:
+            self._start(lambda: self._guarded(work.run, what), label)
+
+        return self.node.group(start)
+
+    def _start(self, body: Callable[[], None], label: str) -> None:
+        place = replace(self.node.place, deadline=None, on_release=None)
+        self.kernel.spawn(body, f"{place.component} ({label})", place, self.scope)
+
+    def _guarded(self, run: Callable[[], object], what: str) -> None:
+        """rospy's threads log what a callback raises and go on.
+
+        Here it is a failure of the component, too.
+        """
+        try:
+            run()
+        except ROSInterruptException:
+            pass
+        except Exception as error:
+            text = f"{what} raised {_in_words(error)}"
+            self.say(ERROR, f"bad callback: {text}")
+            if text not in self.failures:
+                self.failures.add(text)
+                self.kernel.record(Failure(self.kernel.now(), self.node.place.component, text))
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, VoleryError):
+        return str(error)
+    traceback = error.__traceback__
+    while traceback is not None and traceback.tb_next is not None:
+        traceback = traceback.tb_next
+    where = f" (line {traceback.tb_lineno})" if traceback is not None else ""
+    return f"{type(error).__name__}: {error}{where}"
+
+
+class Sessions:
+    """All components of one run that are nodes."""
+
+    def __init__(self, graph: Graph, launched: Mapping[str, Launch]) -> None:
+        self.graph = graph
+        self.kernel = graph.kernel
+        self._launched = launched
+        self._open: dict[str, Session] = {}
+
+    def _component(self) -> str:
+        return current_task(self.kernel).place.component
+
+    def join(self, name: str, anonymous: bool) -> None:
+        """``init_node``: a second call of the same component changes nothing."""
+        component = self._component()
+        if component in self._open:
+            return
+        task = current_task(self.kernel)
+        launch = self._launched.get(component, Launch())
+        label = re.sub(r"\W", "_", component if component in self._launched else name)
+        node = self.graph.node(
+            label,
+            launch.namespace,
+            remaps=launch.remaps,
+            anonymous=anonymous and component not in self._launched,
+        )
+        for key, value in launch.parameters.items():
+            node.set_parameter(f"~{key}", value)
+        ended = Signal(self.kernel, f"{component} (rospy.spin)")
+        self._open[component] = Session(node, task.scope, self.kernel, ended)
+
+    def here(self) -> Session:
+        """The session of the component that the current task computes for."""
+        session = self._open.get(self._component())
+        if session is None:
+            raise ROSInitException(f"{self._component()}: call rospy.init_node() first")
+        return session
+
+    def find(self) -> Session | None:
+        """``here``, or ``None`` before ``init_node``."""
+        return self._open.get(self._component())
+
+    def now(self) -> Ns:
+        """ROS time; an interaction point."""
+        return self.here().node.now()
