@@ -18,7 +18,7 @@ from volery.model.resolve_application import Surroundings, instances
 from volery.model.resolve_environment import environment
 from volery.model.resolve_library import components, interfaces
 from volery.model.resolve_platform import (
-    check_all_allocations,
+    check_all_variants,
     check_names,
     check_reach,
     networks,
@@ -86,7 +86,7 @@ def _file(path: Path) -> Path:
 def _resolve(context: Context, made: Assembly, options: tuple[str, ...]) -> System:
     problems: Problems = context.problems
     check_names(context)
-    check_all_allocations(context)
+    check_all_variants(context)
     where = places(context, made.allocation, made.places)
     known = interfaces(context)
     library = components(context, known)

@@ -146,19 +146,19 @@ def _figure(context: Context, path: Path, form: FigureForm, at: ReferenceForm | 
         what = "a time means nothing without where it was taken: add `at: {processor: ..., frequency: ...}`"
         context.problems.add(path, what)
         return None
-    check_processor(context, (*path, "at"), at.processor, at.frequency)
+    check_processor(context, (*path, "at"), "processor", at.processor, at.frequency)
     return Figure(form.time, form.energy, at.processor, at.frequency, form.provenance, context.where(path))
 
 
-def check_processor(context: Context, path: Path, kind: str, frequency_hz: float) -> None:
-    """Note it if the catalogue has no such processor, or none at that frequency."""
+def check_processor(context: Context, path: Path, key: str, kind: str, frequency_hz: float) -> None:
+    """Note it if the catalogue has no such processor (named by *key*), or none at that frequency."""
     catalogue = context.vocabulary.processors
-    if not context.known(path, kind, "processor in the catalogue", catalogue):
+    if not context.known((*path, key), kind, "processor in the catalogue", catalogue):
         return
     least, greatest = catalogue[kind].least_hz, catalogue[kind].greatest_hz
     if not least <= frequency_hz <= greatest:
         context.problems.add(
-            path,
+            (*path, "frequency"),
             f"{frequency_hz / 1e6:g} MHz is outside what is known of {kind}: "
             f"{least / 1e6:g} to {greatest / 1e6:g} MHz",
         )

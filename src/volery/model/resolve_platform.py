@@ -18,7 +18,7 @@ def processors(context: Context) -> tuple[Processor, ...]:
 
 def _processor(context: Context, name: str, form: ProcessorForm) -> Processor:
     path: Path = ("platform", "processors", name)
-    check_processor(context, path, form.kind, form.frequency)
+    check_processor(context, path, "is", form.kind, form.frequency)
     kind = context.vocabulary.processors.get(form.kind)
     vehicles = context.form.environment.vehicles
     for key, vehicle in (("carried_by", form.carried_by), ("powered_by", form.powered_by)):
@@ -74,9 +74,17 @@ def check_names(context: Context) -> None:
             taken.setdefault(name, what)
 
 
-def check_all_allocations(context: Context) -> None:
-    """Every allocation of the model, chosen or not, speaks of things that exist."""
-    for name, form in context.form.allocations.items():
+def check_all_variants(context: Context) -> None:
+    """Every allocation and scenario of the model, chosen or not, speaks of things that exist."""
+    allocations, scenarios = context.form.allocations, context.form.scenarios
+    for name, scenario in scenarios.items():
+        if scenario.extends is not None:
+            context.known(("scenarios", name, "extends"), scenario.extends, "scenario", scenarios)
+        if scenario.allocation is not None:
+            context.known(("scenarios", name, "allocation"), scenario.allocation, "allocation", allocations)
+    for name, form in allocations.items():
+        if form.extends is not None:
+            context.known(("allocations", name, "extends"), form.extends, "allocation", allocations)
         for who, processor in form.places.items():
             _check_place(context, ("allocations", name, who), who, processor)
 

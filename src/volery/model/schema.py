@@ -31,7 +31,7 @@ def keys_at(path: Path) -> list[str] | None:
 
 def names_are_free(path: Path) -> bool:
     """True if the entries of the mapping at *path* are named by the model: components, processors, ports."""
-    return any(isinstance(found.get("additionalProperties"), dict) for found in _variants_at(path))
+    return any(_free(found) for found in _variants_at(path))
 
 
 def short_key(path: Path) -> str | None:
@@ -69,11 +69,17 @@ def _options_at(path: Path) -> list[Schema]:
 def _below(place: Schema, step: str | int) -> list[Schema]:
     if step in place.get("properties", {}):
         return [place["properties"][step]]
-    if isinstance(place.get("additionalProperties"), dict):
-        return [place["additionalProperties"]]
+    if _free(place):
+        return _free(place)
     if "items" in place and str(step).isdigit():
         return [place["items"]]
     return []
+
+
+def _free(place: Schema) -> list[Schema]:
+    """What entries with names of the model's own are."""
+    others = place.get("additionalProperties")
+    return [*place.get("patternProperties", {}).values(), *([others] if isinstance(others, dict) else [])]
 
 
 def _resolved(place: Schema) -> list[Schema]:

@@ -210,13 +210,13 @@ def _vehicle(reading: Callable[[VehicleLedger], float]) -> Make:
 
 
 def _least_battery(vehicle: str, setup: RunSetup) -> Observer:
-    most_used = [nan]
+    least = [nan]  # negated, as _larger wants it
 
     def take(event: VehicleState) -> None:
         if event.vehicle == vehicle:
-            most_used[0] = _larger(most_used[0], 1.0 - event.battery)
+            least[0] = _larger(least[0], -event.battery)
 
-    return Observer((VehicleState,), take, lambda at: 1.0 - most_used[0])
+    return Observer((VehicleState,), take, lambda at: -least[0])
 
 
 def _failed_operations(vehicle: str, setup: RunSetup) -> Observer:

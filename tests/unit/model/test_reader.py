@@ -1,0 +1,220 @@
+"""A right model arrives as frozen data in SI units, with everything inherited and overridden settled."""
+
+from math import hypot, isclose
+
+import pytest
+
+from volery.base.errors import ModelError, UsageError
+from volery.base.time import MS, S
+from volery.model.reader import check, load
+from volery.model.system import Activity, Connection, Figure, Target, TargetKind
+
+
+def test_units_are_si_and_times_nanoseconds(workshop):
+    system = workshop.load()
+    network = system.network_between("onboard", "ground")
+    assert (network.bandwidth_bit_s, network.latency_ns, network.loss) == (57600.0, 20 * MS, 0.005)
+    assert system.processor("ground").frequency_hz == 3e9
+    assert system.processor("ground").frequency_mhz == 3000
+    assert system.vehicle("drone_1").battery.capacity_coulomb == 18000.0
+    assert system.environment.workload.rate_hz == pytest.approx(6 / 3600)
+    assert system.requirements[0].bound == 0.3
+    assert system.limits.duration_ns == 900 * S
+
+
+def test_cores_come_from_the_catalogue_unless_stated(workshop):
+    assert workshop.load().processor("ground").cores == 4
+    assert workshop.load(None, None, "platform.processors.ground.cores=2").processor("ground").cores == 2
+
+
+def test_ports_are_connected(workshop):
+    system = workshop.load()
+    drones = system.instance("central").connections["drones"]
+    assert drones == Connection(
+        "drones", "DroneService", (Target(TargetKind.INSTANCE, "control", "service"),), many=True
+    )
+    assert system.instance("control").connections["drone"].targets == (Target(TargetKind.VEHICLE, "drone_1"),)
+    assert str(system.instance("planner").connections["map"].targets[0]) == "environment"
+    assert "progress" not in system.instance("control").connections
+
+
+def test_an_instance_overrides_its_component(workshop):
+    control = workshop.load().instance("control")
+    assert control.activity == Activity(100 * MS, 80 * MS, 12, 0)
+    assert control.parameters["steps"] == 4
+
+
+def test_parameters_with_a_unit_become_numbers_unless_quoted(workshop):
+    parameters = workshop.load().instance("control").parameters
+    assert parameters["rate"] == pytest.approx(6 / 3600)
+    assert parameters["label"] == "10 m"
+    assert parameters["points"] == (1000.0, "x")
+
+
+def test_a_period_is_the_deadline_where_none_is_stated(workshop):
+    workshop.change(", deadline: 80 ms", "")
+    assert workshop.load().instance("control").activity.deadline_ns == 100 * MS
+
+
+def test_figures_stand_at_a_processor(workshop):
+    operations = workshop.load().components["RouteGenerator"].operations
+    assert [(figure.time_ns, figure.processor) for figure in operations["get_path"]] == [
+        (5 * MS, "rpi4-cortex-a72"),
+        (1 * MS, "intel-i5-3470"),
+    ]
+    order = workshop.load().components["DeliveryCentral"].operations["order"][0]
+    assert order == Figure(2 * MS, 0.003, "intel-i5-3470", 3e9, "estimated")
+
+
+def test_the_class_is_the_components_name_in_camel_case(workshop):
+    components = workshop.load().components
+    assert components["drone_control"].class_name == "DroneControl"
+    assert components["DeliveryCentral"].class_name == "DeliveryCentral"
+
+
+def test_environment_components_run_nowhere(workshop):
+    system = workshop.load()
+    assert system.instance("requester").is_environment
+    assert [instance.name for instance in system.instances] == ["central", "planner", "control", "requester"]
+
+
+def test_every_point_is_in_degrees_and_metres(workshop):
+    environment = workshop.load().environment
+    hospital, port = environment.places["hospital"], environment.places["port_north"]
+    assert environment.origin.from_enu((hospital.east_m, hospital.north_m, 0.0))[0] == pytest.approx(43.471)
+    assert environment.origin.to_enu(port.latitude, port.longitude, 20.0)[1] == pytest.approx(100.0)
+    assert port.position.altitude.metres == 20.0
+    assert [place.name for place in environment.places_with("port")] == ["port_north"]
+
+
+def test_ways_are_edges_with_lengths(workshop):
+    environment = workshop.load().environment
+    assert environment.roads.edges[0] == ("store", "bend", hypot(5, 5))
+    assert list(environment.roads.nodes) == ["store", "port_north", "bend"]
+    assert environment.corridors.height_m == 40.0
+
+
+def test_a_circle_becomes_a_polygon_around_it(workshop):
+    prison = workshop.load().environment.no_fly_zones[0]
+    distances = [hypot(east - 50, north - 50) for east, north in prison.corners]
+    middles = [
+        hypot((a[0] + b[0]) / 2 - 50, (a[1] + b[1]) / 2 - 50)
+        for a, b in zip(prison.corners, prison.corners[1:], strict=False)
+    ]
+    assert min(distances) > 20.0
+    assert all(isclose(middle, 20.0, rel_tol=1e-9) for middle in middles)
+
+
+def test_a_carried_computer_drains_its_carrier_and_serves_it(workshop):
+    system = workshop.load()
+    assert system.processor("onboard").powered_by == "drone_1"
+    assert system.vehicle("drone_1").processor == "onboard"
+    assert system.vehicle("rover_1").processor is None
+    mains = workshop.load(None, None, "platform.processors.onboard.powered_by=mains")
+    assert mains.processor("onboard").powered_by is None
+
+
+def test_an_allocation_says_where_a_vehicles_node_runs(workshop):
+    workshop.change("control: onboard}", "control: onboard, rover_1: ground}")
+    assert workshop.load().vehicle("rover_1").processor == "ground"
+
+
+def test_the_first_allocation_is_the_default(workshop):
+    assert workshop.load().allocation == "fast"
+    slow = workshop.load(None, "slow")
+    assert slow.processor("onboard").frequency_mhz == 600
+    assert (slow.instance("planner").processor, slow.instance("central").processor) == ("onboard", "ground")
+    assert slow.allocations == ("fast", "slow")
+
+
+def test_a_scenario_changes_the_model_and_chooses_an_allocation(workshop):
+    system = workshop.load("pocket")
+    assert (system.scenario, system.allocation) == ("pocket", "slow")
+    wind = system.environment.wind
+    assert (wind.speed_m_s, wind.gusts_m_s) == (0.0, 1.0)
+    assert system.limits.duration_ns == 60 * S
+    assert (system.limits.until.observe, system.limits.until.relation) == ("application.delivered", "min")
+
+
+def test_options_win_over_scenario_and_allocation(workshop):
+    system = workshop.load(
+        "pocket",
+        "fast",
+        "environment.wind.speed=7 m/s",
+        "platform.processors.onboard.frequency=1 GHz",
+        "allocations.fast.planner=onboard",
+        "run.duration=5 s",
+    )
+    assert system.environment.wind.speed_m_s == 7.0
+    assert system.processor("onboard").frequency_mhz == 1000
+    assert system.instance("planner").processor == "onboard"
+    assert system.limits.duration_ns == 5 * S
+    assert system.overrides[0] == "environment.wind.speed=7 m/s"
+
+
+def test_an_option_may_take_an_entry_away(workshop):
+    system = workshop.load(None, None, "environment.vehicles.rover_1=")
+    assert [vehicle.name for vehicle in system.vehicles] == ["drone_1"]
+
+
+def test_the_world_file_may_be_chosen_by_an_option(workshop):
+    (workshop.folder / "flat.yaml").write_text(
+        "places: {port_north: {east: 1 m, north: 2 m}, store: {east: 0 m}}\n"
+    )
+    system = workshop.load(None, None, "environment.world=flat.yaml")
+    assert system.environment.places["port_north"].east_m == 1.0
+    assert [source.name for source in system.sources] == ["model.yaml", "flat.yaml"]
+
+
+def test_the_models_own_places_win_over_the_world_files(workshop):
+    workshop.change("  wind: 3 m/s\n", "  places: {store: {east: 7 m}}\n")
+    places = workshop.load().environment.places
+    assert places["store"].east_m == 7.0
+    assert places["port_north"].north_m == 100.0
+
+
+def test_the_sources_are_kept(workshop):
+    sources = workshop.load().sources
+    assert [source.name for source in sources] == ["model.yaml", "city.yaml"]
+    assert sources[0].text == workshop.file.read_text()
+
+
+def test_a_folder_stands_for_its_model(workshop):
+    assert load(workshop.folder, workshop.vocabulary).name == "hospital-delivery"
+
+
+def test_where_things_stand(workshop):
+    control = workshop.load().instance("control")
+    assert control.where == (str(workshop.file), workshop.line_of("control: {is: drone_control"))
+
+
+def test_same_text_same_system(workshop):
+    assert workshop.load() == workshop.load()
+
+
+def test_ros_is_needed_by_a_language_or_a_topic_port(workshop):
+    assert workshop.load().needs_ros
+    workshop.change("language: rospy", "language: python").change(", progress: Progress", "")
+    assert not workshop.load().needs_ros
+
+
+def test_looking_up_what_is_not_there(workshop):
+    with pytest.raises(UsageError, match=r"no vehicle named 'drone_2' \(did you mean 'drone_1'\?\)"):
+        workshop.load().vehicle("drone_2")
+
+
+def test_check_tries_every_allocation_and_scenario(workshop):
+    assert check(workshop.file, workshop.vocabulary).allocation == "fast"
+    workshop.change("600 MHz", "60 MHz").change("environment.wind: 0 m/s", "environment.wind: 0 kg")
+    assert workshop.load().allocation == "fast"
+    with pytest.raises(ModelError) as caught:
+        check(workshop.file, workshop.vocabulary)
+    assert "60 MHz is outside what is known of rpi4-cortex-a72" in str(caught.value)
+    assert "environment.wind.speed" in str(caught.value)
+
+
+def test_unknown_scenario_and_allocation_are_the_callers_fault(workshop):
+    with pytest.raises(UsageError, match=r"no scenario named 'poket' \(did you mean 'pocket'\?\)"):
+        workshop.load("poket")
+    with pytest.raises(UsageError, match="no allocation named 'x'; there is fast or slow"):
+        workshop.load(None, "x")
