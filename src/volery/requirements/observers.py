@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
 
-from volery.base.time import Ns, to_seconds
+from volery.base.time import Ns, S, to_seconds
 from volery.requirements.distribution import Distribution
 from volery.requirements.ledgers import ComponentLedger, VehicleLedger
 from volery.trace.events import (
@@ -85,7 +85,7 @@ def _response(reading: Callable[[Distribution], float | None]) -> Make:
 
 
 def _seconds(nanoseconds: float | None) -> float:
-    return nan if nanoseconds is None else nanoseconds * 1e-9
+    return nan if nanoseconds is None else nanoseconds / S
 
 
 def _largest(spread: Distribution) -> float | None:

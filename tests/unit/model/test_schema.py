@@ -1,0 +1,42 @@
+"""The JSON Schema is published: a change of it is meant. Set VOLERY_UPDATE_GOLDEN=1 to take the new one."""
+
+import json
+import os
+from pathlib import Path
+
+from volery.model.schema import keys_at, names_are_free, schema, short_key
+
+GOLDEN = Path(__file__).parents[2] / "golden" / "model-schema.json"
+
+
+def test_the_schema_is_the_published_one():
+    text = json.dumps(schema(), indent=1) + "\n"
+    if os.environ.get("VOLERY_UPDATE_GOLDEN"):
+        GOLDEN.write_text(text)
+    assert text == GOLDEN.read_text()
+
+
+def test_every_reference_in_it_leads_somewhere():
+    known = schema()["$defs"]
+
+    def references(place):
+        if isinstance(place, dict):
+            if "$ref" in place:
+                yield place["$ref"].removeprefix("#/$defs/")
+            for below in place.values():
+                yield from references(below)
+        elif isinstance(place, list):
+            for below in place:
+                yield from references(below)
+
+    assert set(references(schema())) <= set(known)
+
+
+def test_it_knows_paths():
+    assert "carried_by" in keys_at(("platform", "processors", "any"))
+    assert keys_at(("platform", "processors")) is None
+    assert names_are_free(("platform", "processors"))
+    assert not names_are_free(("platform",))
+    assert keys_at(("nowhere", "at", "all")) is None
+    assert short_key(("environment", "vehicles", "d", "battery")) == "capacity"
+    assert short_key(("environment", "workload")) is None

@@ -1,0 +1,201 @@
+"""Observables: what each comes to, and the verdicts on bounds."""
+
+from math import isnan, nan
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.base.units import unit
+from volery.model.system import Bound
+from volery.requirements.observables import OBSERVABLES, Observers, bounds_of, judge, observer
+from volery.trace.events import (
+    NONE,
+    Activation,
+    Call,
+    Failure,
+    Message,
+    Milestone,
+    Operation,
+    Slice,
+    VehicleState,
+)
+from volery.trace.setup import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
+
+SETUP = RunSetup(
+    components=(ComponentSetup("loop", period=100 * MS), ComponentSetup("server")),
+    processors=(ProcessorSetup("onboard", cores=4),),
+    vehicles=(VehicleSetup("drone_1", kind="multirotor"),),
+    requirements=(RequirementSetup("r", "loop.deadline_misses", "max", 0.0),),
+)
+
+
+def observed(expression, events, at=10 * S):
+    watching = observer(expression, SETUP)
+    for event in events:
+        watching(event)
+    return watching.value(at)
+
+
+def activations(*spans, deadline=NONE):
+    return [
+        Activation(start * MS, end * MS, "loop", NONE if deadline == NONE else (start + deadline) * MS)
+        for start, end in spans
+    ]
+
+
+def operation(name, outcome="ok", horizontal=0.1, vertical=-0.2, vehicle="drone_1"):
+    return Operation(0, 1, vehicle, name, "", outcome, "", horizontal / 2, nan, horizontal, vertical)
+
+
+def state(at, z=0.0, x=0.0, armed=True, battery=1.0):
+    return VehicleState(
+        at * S,
+        "drone_1",
+        x,
+        0.0,
+        z,
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        nan,
+        nan,
+        nan,
+        battery,
+        10.0,
+        2.0,
+        armed,
+        "",
+    )
+
+
+def test_response_times_are_of_activations():
+    events = [*activations((0, 10), (100, 130)), Call(0, 5 * S, "x", "loop", "op", "ok")]
+    assert observed("loop.response_time", events) == pytest.approx(0.030)
+    assert observed("loop.response_time_mean", events) == pytest.approx(0.020)
+    assert observed("loop.response_time_p95", events) == pytest.approx(0.030, rel=2e-3)
+
+
+def test_response_times_are_of_calls_where_there_are_no_activations():
+    events = [Call(1 * S, 3 * S, "x", "server", "op", "ok"), Call(0, 9 * S, "server", "x", "op", "ok")]
+    assert observed("server.response_time", events) == 2.0
+
+
+def test_deadline_misses_count_activations_that_end_late():
+    late, in_time = activations((0, 60), (100, 150), deadline=50)
+    assert observed("loop.deadline_misses", [late, in_time]) == 1.0
+    assert isnan(observed("loop.deadline_misses", activations((0, 60))))
+
+
+def test_a_late_release_violates_the_period_and_one_in_between_does_not():
+    regular = [(at, at + 1) for at in (0, 100, 150, 200, 310)]
+    assert observed("loop.period_violations", activations(*regular)) == 0.0
+    assert observed("loop.period_violations", activations(*regular, (421, 422))) == 1.0
+    assert isnan(observed("server.period_violations", activations((0, 1))))
+
+
+def test_utilisation_is_a_share_of_cores_and_of_time():
+    events = [Slice(0, 4 * S, "onboard", 0, "t", "loop"), Slice(0, 1 * S, "other", 0, "t", "loop")]
+    assert observed("onboard.utilisation", events) == pytest.approx(0.1)
+    assert observed("loop.utilisation", events) == pytest.approx(0.5)
+    assert observed("loop.cpu_time", events) == 5.0
+
+
+def test_landing_offset_is_the_worst_by_truth_of_landings_that_succeeded():
+    events = [
+        operation("land", horizontal=0.2),
+        operation("return_home", horizontal=-0.4),
+        operation("land", horizontal=nan),
+        operation("land", outcome="NotArrived", horizontal=9.0),
+        operation("goto", horizontal=5.0),
+        operation("land", horizontal=7.0, vehicle="drone_2"),
+    ]
+    assert observed("drone_1.landing_offset", events) == 0.4
+    assert observed("drone_1.goto_error", events) == 5.0
+    assert observed("drone_1.goto_error_by_estimate", events) == 2.5
+    assert observed("drone_1.goto_error_vertical", events) == 0.2
+    assert observed("drone_1.failures", events) == 1.0
+    assert isnan(observed("drone_1.landing_offset", [operation("goto")]))
+
+
+def test_vehicles_move_fly_and_drain():
+    events = [
+        state(0, armed=False),
+        state(1, z=3.0),
+        state(3, z=3.0, x=4.0, battery=0.2),
+        state(4, armed=False),
+    ]
+    assert observed("drone_1.distance", events) == pytest.approx(3 + 4 + 5)
+    assert observed("drone_1.airborne_time", events) == 3.0
+    assert observed("drone_1.battery_min", events) == 0.2
+    assert observed("drone_1.energy", events) == pytest.approx(80.0)
+    assert isnan(observed("drone_1.battery_min", [state(0, battery=nan)]))
+
+
+def parcel(at, subject, name):
+    return Milestone(at * S, "central", "parcel", subject, name, "")
+
+
+def test_parcels_are_counted_once_and_timed_from_their_first_state():
+    events = [
+        parcel(1, "a", "ordered"),
+        parcel(2, "b", "ordered"),
+        parcel(9, "a", "delivered"),
+        parcel(10, "a", "delivered"),
+        parcel(11, "b", "failed"),
+        Milestone(3 * S, "central", "truck", "t", "delivered", ""),
+    ]
+    assert observed("application.ordered", events) == 2.0
+    assert observed("application.delivered", events) == 1.0
+    assert observed("application.undelivered", events) == 1.0
+    assert observed("application.delivery_time_max", events) == 8.0
+    assert isnan(observed("application.delivery_time_mean", events[:2]))
+
+
+def test_failures_and_lost_messages():
+    events = [Failure(0, "loop", "x"), Failure(0, "run", "y"), Message(0, NONE, "/t", "a", "b", 1)]
+    assert observed("application.failures", events) == 2.0
+    assert observed("loop.failures", events) == 1.0
+    assert observed("application.messages_lost", events) == 1.0
+
+
+@pytest.mark.parametrize("published", OBSERVABLES, ids=lambda one: f"{one.subject}.{one.quantity}")
+def test_everything_published_can_be_observed(published):
+    subject = {"component": "loop", "processor": "onboard", "vehicle": "drone_1"}.get(
+        published.subject, "application"
+    )
+    watching = observer(f"{subject}.{published.quantity}", SETUP)
+    assert isinstance(watching.value(1 * S), float)
+    assert published.description
+    unit(published.unit)
+
+
+def test_an_unknown_quantity_is_refused_with_the_choices():
+    with pytest.raises(UsageError, match=r"a vehicle has no quantity 'speed'.*airborne_time, battery_min"):
+        observer("drone_1.speed", SETUP)
+
+
+def test_verdicts():
+    bounds = (
+        *bounds_of(SETUP),
+        Bound("fast", "loop.response_time", "max", 0.02),
+        Bound("many", "loop.activations", "min", 2),
+    )
+    watching = Observers(bounds, SETUP)
+    for event in activations((0, 10), (100, 130), deadline=50):
+        watching(event)
+    verdicts = watching.verdicts(5 * S)
+    assert [(one.requirement, one.met) for one in verdicts] == [("r", True), ("fast", False), ("many", True)]
+    assert verdicts[1].observed == 0.03
+    assert not watching.all_hold(5 * S)
+    assert watching.listens_to(activations((0, 1))[0])
+    assert not watching.listens_to(Failure(0, "loop", "x"))
+
+
+def test_what_could_not_be_observed_is_not_met():
+    assert not judge(Bound("r", "x.y", "max", 1.0), nan, 0).met
+    assert not judge(Bound("r", "x.y", "min", 1.0), nan, 0).met
