@@ -73,6 +73,8 @@ def new_work() -> Work:
         np.zeros(1),
         np.zeros(4),
         np.zeros(3),
+        np.zeros((3, 3)),
+        np.zeros(3),
     )
 
 

@@ -163,3 +163,5 @@ class Work(NamedTuple):
     ground: Array
     throttle: Array
     before: Array
+    belief: Array
+    turn: Array

@@ -1,7 +1,7 @@
 """The law of a rover: a bicycle on the ground.
 
-* Speed: v' = (u v_top - v) / T_v; steering angle d' = (s d_top - d) / T_d; heading' = v tan(d) / L, held
-  to the tyres' grip a_max by limiting the turn rate to a_max / v (Rajamani, Vehicle Dynamics and Control,
+* Speed: v' = (u v_top - v) / T_v, at most the tyres' grip a_max; steering angle d' = (s d_top - d) / T_d; heading' = v tan(d) / L, held
+  to the grip by limiting the turn rate to a_max / v (Rajamani, Vehicle Dynamics and Control,
   2.2: the kinematic bicycle). A skid-steered one turns at s r_top with the lag T_d and needs no speed for it.
 * Power: rolling resistance, drag and acceleration against the drive's efficiency; braking returns nothing.
 * Valid: firm ground, slopes below about 15 degrees, no slip angle; the body follows the ground, level in
@@ -88,7 +88,8 @@ def rover_slope(y: Array, inputs: Array, parameters: Array, work: Work, resting:
     if not resting:
         slope[S_STEER] = (work.throttle[0] * top - y[S_STEER]) / parameters[P_STEER_LAG]
         wanted = work.throttle[1] * parameters[P_SPEED_TOP]
-        slope[S_SPEED] = (wanted - speed) / parameters[P_SPEED_LAG]
+        push = (wanted - speed) / parameters[P_SPEED_LAG]
+        slope[S_SPEED] = min(max(push, -parameters[P_GRIP]), parameters[P_GRIP])
         rate = turn_rate(speed, y[S_STEER], parameters)
         w, z = y[S_ATTITUDE], y[S_ATTITUDE + 3]
         slope[S_ATTITUDE] = -0.5 * z * rate

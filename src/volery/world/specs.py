@@ -133,7 +133,7 @@ class Multirotor:
     propeller_diameter: float = 0.3048
     figure_of_merit: float = 0.6
     efficiency: float = 0.8
-    top_speed: float = 727.0
+    top_speed: float = 760.0
     rotor_lag: float = 0.04
     drag_linear: float = 0.25
     drag_quadratic: float = 0.03
@@ -171,8 +171,8 @@ class Rover:
     wheelbase: float = 0.4
     steer_top_deg: float = 30.0
     steer_lag: float = 0.12
-    speed_top: float = 6.0
-    speed_lag: float = 0.6
+    speed_top: float = 20.0
+    speed_lag: float = 1.7
     rolling: float = 0.03
     efficiency: float = 0.6
     drag_linear: float = 0.0

@@ -71,6 +71,8 @@ _CLIMB_GAIN = 5.0  # PSC_VELZ_P
 _CLIMB_INTEGRAL = 1.5
 _JERK = 5.0  # PSC_JERK_XY, PSC_JERK_Z [m/s^3]
 _SHAPING_GAIN = 2.5  # [1/s] of target speed
+_BRAKE_SHARE = 0.5  # of the acceleration limit: how a height is approached
+_PLANE_SHARE = 0.39  # the same for a point in the plane
 _LEASH = 4.0  # [m] that the target may be ahead
 _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
@@ -134,7 +136,7 @@ def _shape_plane(memory: Array, command: Array, control: int) -> None:
         north = command[C_POSITION] + memory[K_ORIGIN] - memory[K_TARGET]
         east = command[C_POSITION + 1] + memory[K_ORIGIN + 1] - memory[K_TARGET + 1]
         distance = sqrt(north * north + east * east)
-        speed = min(approach(distance, _POSITION_GAIN, limit), command[C_SPEED])
+        speed = min(approach(distance, _POSITION_GAIN, _PLANE_SHARE * limit), command[C_SPEED])
         scale = speed / distance if distance > 1e-9 else 0.0
         north, east = north * scale, east * scale
     else:
@@ -152,9 +154,8 @@ def _shape_plane(memory: Array, command: Array, control: int) -> None:
 def _shape_height(memory: Array, command: Array, control: int) -> None:
     limit = command[C_ACCEL_Z]
     if control in (POSITION, VELOCITY_HEIGHT):
-        down = approach(
-            command[C_POSITION + 2] + memory[K_ORIGIN + 2] - memory[K_TARGET + 2], _POSITION_GAIN, limit
-        )
+        left = command[C_POSITION + 2] + memory[K_ORIGIN + 2] - memory[K_TARGET + 2]
+        down = approach(left, _POSITION_GAIN, _BRAKE_SHARE * limit)
     elif control == VELOCITY:
         down = command[C_VELOCITY + 2]
     else:

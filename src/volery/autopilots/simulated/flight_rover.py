@@ -40,6 +40,8 @@ _PERIOD = 0.01  # [s]
 _TURN_GAIN = 1.5  # [1/s]
 _SPEED_GAIN = 0.2  # ATC_SPEED_P [1/(m/s)]
 _SPEED_INTEGRAL = 0.2  # ATC_SPEED_I
+_POINT_GAIN = 0.7  # [1/s] of speed on the last metre
+_BRAKE_SHARE = 0.6  # of the acceleration limit: how a point is approached
 _CLOSE = 0.3  # [m]: where a rover stops chasing the point
 
 
@@ -84,7 +86,7 @@ def _to_point(memory: Array, command: Array) -> tuple[float, float]:
         return 0.0, 0.0
     error = wrap_angle(arc_tangent2(east, north) - memory[K_EULER + 2])
     _, ahead = sine_cosine(error)
-    speed = min(approach(distance, 0.8, command[C_ACCEL]), command[C_SPEED])
+    speed = min(approach(distance, _POINT_GAIN, _BRAKE_SHARE * command[C_ACCEL]), command[C_SPEED])
     return speed * clip(ahead, 0.2, 1.0), clip(_TURN_GAIN * error, -1.5, 1.5)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from volery.autopilots.simulated.flight_attitude import fly_attitude
 from volery.autopilots.simulated.flight_columns import C_CONTROL, K_HOVER, K_LANDED, K_MOTORS
-from volery.autopilots.simulated.flight_estimator import know
+from volery.autopilots.simulated.flight_estimator import believe, first_belief
 from volery.autopilots.simulated.flight_guidance import GUIDE_EVERY, guide
 from volery.autopilots.simulated.flight_landed import detect_landing
 from volery.autopilots.simulated.flight_rover import guide_rover
@@ -31,7 +31,7 @@ def _boot(bodies: Bodies, body: int, work: Work) -> None:
     memory = bodies.memory[body]
     memory[K_HOVER] = _FIRST_HOVER
     memory[K_LANDED] = 1.0
-    know(memory, bodies.state[body], bodies.inputs[body], bodies.parameters[body], work.rotation)
+    first_belief(bodies, body, work)
 
 
 @njit(cache=False)
@@ -66,13 +66,7 @@ def _compose(sources: str) -> Advance:
             while bodies.reached[body] < goals[body]:
                 _control(bodies, body, work)
                 step_body(bodies, body, work)
-                know(
-                    bodies.memory[body],
-                    bodies.state[body],
-                    bodies.inputs[body],
-                    bodies.parameters[body],
-                    work.rotation,
-                )
+                believe(bodies, body, work)
 
     compiled: Advance = advance_flights
     return compiled
