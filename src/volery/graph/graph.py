@@ -60,6 +60,11 @@ class Graph:
         self._nodes: dict[str, EmbeddedNode] = {}
 
     @property
+    def epoch(self) -> Ns:
+        """What ROS time is at the kernel's zero."""
+        return self._context.epoch
+
+    @property
     def parameters(self) -> Parameters:
         """All parameters, by absolute name."""
         return self._context.parameters

@@ -99,6 +99,8 @@ class EmbeddedPublisher:
             if not isinstance(message, self._class):
                 raise UsageError(f"topic {self.topic} carries {self.type}, not {_type_of(message)}")
             self.member.pay("publish", float(len(self._targets)))
+            if not (self._targets or self._recorded or self._keeps):
+                return
             content = message.copy()
             sent = kernel.now()
             size = self._record(content, sent)

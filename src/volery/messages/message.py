@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import field, make_dataclass
 from functools import partial
 from operator import attrgetter
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,10 @@ class Message:
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
     __hash__: ClassVar[Any] = None  # messages are mutable values
+
+    if TYPE_CHECKING:  # each class has the fields of its type
+
+        def __init__(self, *values: Any, **fields: Any) -> None: ...
 
     def copy(self) -> Any:
         """The message as it is now, lists made arrays.

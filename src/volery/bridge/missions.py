@@ -1,0 +1,135 @@
+"""Services that read and write the autopilot's mission: MAVLink's mission protocol.
+
+Waypoints go through as they are; ArduPilot keeps its home as the first one. ``mission/push`` replaces the
+whole mission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from volery.base.time import MS, Ns
+from volery.bridge.wire import Ear, Wire
+from volery.graph import Handler
+from volery.links.link import Frame
+from volery.messages import new, service
+
+ANSWER_WITHIN: Ns = 1500 * MS
+TRIES = 3
+ACCEPTED = 0
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
+_PARAMETERS = ("param1", "param2", "param3", "param4")
+
+
+def _scale(frame: int) -> float:
+    """Units of x and y in a MISSION_ITEM_INT per degree or metre."""
+    return 1e7 if frame in GLOBAL_FRAMES else 1e4
+
+
+def to_item(waypoint: Any, sequence: int) -> dict[str, Any]:
+    """A waypoint as the fields of a MISSION_ITEM_INT."""
+    scale = _scale(waypoint.frame)
+    return {
+        "seq": sequence,
+        "frame": waypoint.frame,
+        "command": waypoint.command,
+        "current": int(waypoint.is_current),
+        "autocontinue": int(waypoint.autocontinue),
+        **{name: getattr(waypoint, name) for name in _PARAMETERS},
+        "x": round(waypoint.x_lat * scale),
+        "y": round(waypoint.y_long * scale),
+        "z": waypoint.z_alt,
+    }
+
+
+def to_waypoint(item: dict[str, Any]) -> Any:
+    """The fields of a MISSION_ITEM_INT as a waypoint."""
+    scale = _scale(item["frame"])
+    return new(
+        "mavros_msgs/msg/Waypoint",
+        frame=item["frame"],
+        command=item["command"],
+        is_current=bool(item["current"]),
+        autocontinue=bool(item["autocontinue"]),
+        **{name: item[name] for name in _PARAMETERS},
+        x_lat=item["x"] / scale,
+        y_long=item["y"] / scale,
+        z_alt=item["z"],
+    )
+
+
+class Missions:
+    """The handlers. *publish* is told the mission after each ``mission/pull`` and ``mission/push``."""
+
+    def __init__(self, wire: Wire, publish: Callable[[Any], None]) -> None:
+        self._wire, self._publish = wire, publish
+
+    def services(self) -> dict[str, tuple[str, Handler]]:
+        """Handlers by the service's name, with its type."""
+        return {
+            "mission/push": ("mavros_msgs/srv/WaypointPush", self.push),
+            "mission/pull": ("mavros_msgs/srv/WaypointPull", self.pull),
+            "mission/clear": ("mavros_msgs/srv/WaypointClear", self.clear),
+            "mission/set_current": ("mavros_msgs/srv/WaypointSetCurrent", self.set_current),
+        }
+
+    def _ask(self, ear: Ear, message: str, fields: dict[str, Any]) -> Frame | None:
+        for _ in range(TRIES):
+            self._wire.send_to(message, fields)
+            answer = ear.next(ANSWER_WITHIN)
+            if answer is not None:
+                return answer
+        return None
+
+    def push(self, request: Any) -> Any:
+        """``mission/push``."""
+        response = service("mavros_msgs/srv/WaypointPush").response
+        waypoints = request.waypoints
+        if request.start_index != 0 or not waypoints:
+            return response(False, 0)
+        sent = 0
+        with self._wire.listen("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as ear:
+            said = self._ask(ear, "MISSION_COUNT", {"count": len(waypoints)})
+            while said is not None and said.name != "MISSION_ACK":
+                sequence = said.fields["seq"]
+                if sequence >= len(waypoints):
+                    return response(False, sent)
+                sent = max(sent, sequence + 1)
+                self._wire.send_to("MISSION_ITEM_INT", to_item(waypoints[sequence], sequence))
+                said = ear.next(TRIES * ANSWER_WITHIN)
+        accepted = said is not None and said.fields["type"] == ACCEPTED
+        if accepted:
+            self._publish(new("mavros_msgs/msg/WaypointList", waypoints=waypoints))
+        return response(accepted, sent if accepted else 0)
+
+    def pull(self, request: Any) -> Any:
+        """``mission/pull``."""
+        response = service("mavros_msgs/srv/WaypointPull").response
+        with self._wire.listen("MISSION_COUNT", "MISSION_ITEM_INT") as ear:
+            counted = self._ask(ear, "MISSION_REQUEST_LIST", {})
+            if counted is None or counted.name != "MISSION_COUNT":
+                return response(False, 0)
+            waypoints: list[Any] = []
+            for sequence in range(counted.fields["count"]):
+                item = self._ask(ear, "MISSION_REQUEST_INT", {"seq": sequence})
+                if item is None or item.fields.get("seq") != sequence:
+                    return response(False, len(waypoints))
+                waypoints.append(to_waypoint(item.fields))
+        self._wire.send_to("MISSION_ACK", {"type": ACCEPTED})
+        self._publish(new("mavros_msgs/msg/WaypointList", waypoints=waypoints))
+        return response(True, len(waypoints))
+
+    def clear(self, request: Any) -> Any:
+        """``mission/clear``."""
+        with self._wire.listen("MISSION_ACK") as ear:
+            said = self._ask(ear, "MISSION_CLEAR_ALL", {})
+        accepted = said is not None and said.fields["type"] == ACCEPTED
+        return service("mavros_msgs/srv/WaypointClear").response(accepted)
+
+    def set_current(self, request: Any) -> Any:
+        """``mission/set_current``."""
+        with self._wire.listen("MISSION_CURRENT") as ear:
+            said = self._ask(ear, "MISSION_SET_CURRENT", {"seq": request.wp_seq})
+        succeeded = said is not None and said.fields["seq"] == request.wp_seq
+        return service("mavros_msgs/srv/WaypointSetCurrent").response(succeeded)

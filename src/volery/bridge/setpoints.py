@@ -1,0 +1,159 @@
+"""Set-points: ROS messages as the frames that command the autopilot. ENU and FLU to NED and FRD.
+
+In the body frames (8, 9) vectors are forward, left, up on the ROS side; elsewhere east, north, up. Yaw is
+anticlockwise from east there and clockwise from north here. Altitudes of ``setpoint_raw/global`` go through
+as they are, in the frame that the message names (AMSL, above home or above terrain); that of
+``setpoint_position/global`` is above the ellipsoid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from volery.base import frames
+from volery.base.geoid import Geoid
+from volery.base.time import MS, Ns
+
+Asked = tuple[str, dict[str, Any]]
+"""A frame's name and fields, without addresses."""
+
+BODY_FRAMES = frozenset({8, 9})
+LOCAL_NED, GLOBAL_INT = 1, 5
+POSITION_AND_YAW = 8 | 16 | 32 | 64 | 128 | 256 | 2048
+VELOCITY_AND_YAW_RATE = 1 | 2 | 4 | 64 | 128 | 256 | 1024
+RC_CHANNELS = 18
+
+
+class Subscription(NamedTuple):
+    """A topic that the vehicle node subscribes to, and what its messages become."""
+
+    name: str
+    type: str
+    translate: Callable[[Any, Ns], Asked]
+
+
+def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
+    """All of them; *geoid* turns ellipsoidal altitudes into the autopilot's."""
+
+    def position_global(message: Any, now: Ns) -> Asked:
+        return _position_global(message, now, geoid)
+
+    return (
+        Subscription("setpoint_raw/local", "mavros_msgs/msg/PositionTarget", raw_local),
+        Subscription("setpoint_raw/global", "mavros_msgs/msg/GlobalPositionTarget", raw_global),
+        Subscription("setpoint_position/local", "geometry_msgs/msg/PoseStamped", position_local),
+        Subscription("setpoint_position/global", "geographic_msgs/msg/GeoPoseStamped", position_global),
+        Subscription("setpoint_velocity/cmd_vel", "geometry_msgs/msg/TwistStamped", velocity),
+        Subscription("rc/override", "mavros_msgs/msg/OverrideRCIn", rc_override),
+        Subscription("manual_control/send", "mavros_msgs/msg/ManualControl", manual_control),
+    )
+
+
+def _vector(value: Any) -> frames.Vector:
+    return value.x, value.y, value.z
+
+
+def _motion(velocity: frames.Vector, acceleration: frames.Vector) -> dict[str, float]:
+    vx, vy, vz = velocity
+    afx, afy, afz = acceleration
+    return {"vx": vx, "vy": vy, "vz": vz, "afx": afx, "afy": afy, "afz": afz}
+
+
+def raw_local(message: Any, now: Ns) -> Asked:
+    """``setpoint_raw/local``."""
+    body = message.coordinate_frame in BODY_FRAMES
+    turn = frames.flu_to_frd if body else frames.enu_to_ned
+    x, y, z = turn(_vector(message.position))
+    yaw = -message.yaw if body else frames.yaw_to_heading(message.yaw)
+    return "SET_POSITION_TARGET_LOCAL_NED", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": message.coordinate_frame,
+        "type_mask": message.type_mask,
+        "x": x,
+        "y": y,
+        "z": z,
+        **_motion(turn(_vector(message.velocity)), turn(_vector(message.acceleration_or_force))),
+        "yaw": yaw,
+        "yaw_rate": -message.yaw_rate,
+    }
+
+
+def raw_global(message: Any, now: Ns) -> Asked:
+    """``setpoint_raw/global``."""
+    velocity = frames.enu_to_ned(_vector(message.velocity))
+    acceleration = frames.enu_to_ned(_vector(message.acceleration_or_force))
+    return "SET_POSITION_TARGET_GLOBAL_INT", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": message.coordinate_frame,
+        "type_mask": message.type_mask,
+        "lat_int": round(message.latitude * 1e7),
+        "lon_int": round(message.longitude * 1e7),
+        "alt": message.altitude,
+        **_motion(velocity, acceleration),
+        "yaw": frames.yaw_to_heading(message.yaw),
+        "yaw_rate": -message.yaw_rate,
+    }
+
+
+def _heading(orientation: Any) -> float:
+    enu = (orientation.w, orientation.x, orientation.y, orientation.z)
+    return frames.yaw_to_heading(frames.quaternion_to_euler(enu)[2])
+
+
+def position_local(message: Any, now: Ns) -> Asked:
+    """``setpoint_position/local``."""
+    x, y, z = frames.enu_to_ned(_vector(message.pose.position))
+    return "SET_POSITION_TARGET_LOCAL_NED", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": LOCAL_NED,
+        "type_mask": POSITION_AND_YAW,
+        "x": x,
+        "y": y,
+        "z": z,
+        "yaw": _heading(message.pose.orientation),
+    }
+
+
+def _position_global(message: Any, now: Ns, geoid: Geoid) -> Asked:
+    position = message.pose.position
+    return "SET_POSITION_TARGET_GLOBAL_INT", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": GLOBAL_INT,
+        "type_mask": POSITION_AND_YAW,
+        "lat_int": round(position.latitude * 1e7),
+        "lon_int": round(position.longitude * 1e7),
+        "alt": geoid.to_amsl(position.altitude),
+        "yaw": _heading(message.pose.orientation),
+    }
+
+
+def velocity(message: Any, now: Ns) -> Asked:
+    """``setpoint_velocity/cmd_vel``: ENU metres per second, yaw rate anticlockwise."""
+    vx, vy, vz = frames.enu_to_ned(_vector(message.twist.linear))
+    return "SET_POSITION_TARGET_LOCAL_NED", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": LOCAL_NED,
+        "type_mask": VELOCITY_AND_YAW_RATE,
+        "vx": vx,
+        "vy": vy,
+        "vz": vz,
+        "yaw_rate": -message.twist.angular.z,
+    }
+
+
+def rc_override(message: Any, now: Ns) -> Asked:
+    """``rc/override``: microseconds, 0 releases a channel, 65535 leaves it as it is."""
+    channels = {f"chan{number}_raw": int(value) for number, value in enumerate(message.channels, start=1)}
+    return "RC_CHANNELS_OVERRIDE", channels
+
+
+def manual_control(message: Any, now: Ns) -> Asked:
+    """``manual_control/send``: x forward, y right, z throttle, r yaw clockwise, -1000..1000 (z 0..1000)."""
+    return "MANUAL_CONTROL", {
+        "x": round(message.x),
+        "y": round(message.y),
+        "z": round(message.z),
+        "r": round(message.r),
+        "buttons": message.buttons,
+    }
