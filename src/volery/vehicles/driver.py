@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
+from volery.base.errors import LinkError
 from volery.base.position import Position
 from volery.base.registry import Registry
-from volery.base.time import Ns, S
+from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.mission import MissionItem
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.telemetry import Telemetry, Velocity
 
 
 class Capability(Enum):
@@ -48,24 +49,30 @@ class Repeat(NamedTuple):
 class Step:
     """One thing asked of an autopilot, and how one sees that it is done.
 
-    ``send`` asks; it and every other function here is house code that never blocks, ``cycle`` excepted.
-    ``done`` looks at the telemetry. ``answer`` is the key of the acknowledgement that counts
-    (``Telemetry.answers``). ``again`` asks once more at this period: until the answer, or where the
-    autopilot gives none, until it is done. ``enters`` is the mode that this step commands. ``mode`` is the
-    mode in which it must stay while it goes on, ``armed`` whether it must stay armed. ``keep`` is sent all
-    the while. ``cycle`` is for carriers that are nodes of a graph: it runs in the caller's own task each
-    period and may block, so that its computing is charged to the caller. ``advice`` says what the user can
-    do if it is refused.
+    ``send`` asks. It and every other function here never blocks, unless there is a ``cycle``. ``done``
+    looks at the telemetry; where ``skippable``, a step that is done already is not asked for. ``answer`` is
+    the key of the acknowledgement that counts (``Telemetry.answers``). ``again`` asks once more at this
+    period: until the answer, or, where the autopilot gives none, until it is done.
+
+    ``enters`` is the mode that this step commands. ``mode`` is the mode in which it must stay while it goes
+    on, ``leads_to`` modes which the autopilot may choose by itself in the course of it, ``armed`` whether
+    it must stay armed.
+
+    ``keep`` is sent all the while. ``cycle`` is for carriers that are nodes of a graph: the step then runs
+    in the caller's own task, which does this each period; it and ``send`` may block, and their computing is
+    charged to the caller. ``advice`` says what the user can do if it is refused or not done in time.
     """
 
     ask: str
     send: Action
     done: Callable[[Telemetry], bool]
     within: Ns
+    skippable: bool = False
     answer: str = ""
-    again: Ns | None = S
+    again: Ns | None = None
     enters: str = ""
     mode: str = ""
+    leads_to: tuple[str, ...] = ()
     armed: bool = False
     keep: Repeat | None = None
     cycle: Repeat | None = None
@@ -75,7 +82,8 @@ class Step:
 class Sticks(NamedTuple):
     """The four sticks: pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1.
 
-    In altitude hold a throttle of 0.5 keeps the altitude. A rover takes roll for steering.
+    In altitude hold a throttle of 0.5 keeps the altitude. A rover takes roll for steering and throttle from
+    -1 (back) to 1.
     """
 
     pitch: float = 0.0
@@ -94,7 +102,7 @@ class Driver(Protocol):
     """The mode in which the autopilot obeys a computer: a pilot hands over by choosing it."""
 
     def ready(self, within: Ns) -> Sequence[Step]:
-        """Until it could arm and fly by position."""
+        """Until it could arm and go by position."""
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in."""
@@ -102,8 +110,8 @@ class Driver(Protocol):
     def disarm(self, force: bool) -> Sequence[Step]:
         """*force* stops the motors in the air, too."""
 
-    def takeoff(self, height: float) -> Sequence[Step]:
-        """To *height* metres above home, sequence from the ground and disarmed included."""
+    def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
+        """To *height* metres above home; the whole sequence from the ground and disarmed."""
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
         """To *goal* (AMSL, above home or, with ``Capability.TERRAIN``, above ground) at *speed* m/s."""
@@ -111,14 +119,14 @@ class Driver(Protocol):
     def hold(self) -> Sequence[Step]:
         """Stop and stay."""
 
-    def velocity(self, north: float, east: float, up: float, yaw_rate: float) -> Sequence[Step]:
-        """Follow m/s and degrees per second clockwise; it stands until the next step of any operation."""
+    def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Follow a velocity and degrees per second clockwise; stop after *lasting*, or at any other step."""
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn to *degrees* clockwise from north."""
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """And land there; a rover stops there."""
+        """A drone lands there, a rover stops there."""
 
     def land(self, within: Ns) -> Sequence[Step]:
         """Here, until disarmed."""
@@ -130,22 +138,22 @@ class Driver(Protocol):
         """The sticks command attitude and climb rate."""
 
     def manual(self) -> Sequence[Step]:
-        """The sticks command the vehicle directly (rovers)."""
+        """The sticks command a rover's wheels."""
 
     def sticks(self, sticks: Sticks | None) -> None:
-        """Keep sending these; ``None`` lets go of them."""
+        """Keep sending these until others come; ``None`` lets go of them."""
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
         """Replace the mission on board."""
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
-        """From its first item to its end; take-off included."""
+        """From its first item to its end, arming included."""
 
     def stop(self) -> None:
-        """Let go of set-points that are being repeated. The vehicle holds or follows its own mode."""
+        """Let go of sticks and of set-points that are being repeated."""
 
-    def problem(self) -> str:
-        """What is wrong with the way to the autopilot, in words; empty if nothing is."""
+    def problem(self) -> LinkError | None:
+        """What is wrong with the way to the autopilot, ready to be raised; ``None`` if nothing is."""
 
     def close(self) -> None:
         """Stop talking and let go of the link."""

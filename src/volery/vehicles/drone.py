@@ -1,0 +1,224 @@
+"""A drone: blocking operations, each seen on the telemetry before it returns."""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+
+from volery.base.errors import LinkError, OutOfBounds, Refused, UsageError
+from volery.base.position import AboveHome, Position
+from volery.base.time import Ns, from_seconds
+from volery.vehicles.driver import Capability, Sticks
+from volery.vehicles.limits import too_high
+from volery.vehicles.perform import RESTARTS
+from volery.vehicles.telemetry import Velocity
+from volery.vehicles.vehicle import NOWHERE, RETURN_OF_LINK_S, Goal, Vehicle, travel_within
+
+VELOCITY_LASTS_S = 3.0
+RETURN_CLIMB = 30.0
+"""Metres that a time-out allows an autopilot to climb before it returns; ArduPilot's RTL_ALT is 15."""
+
+
+class Drone(Vehicle):
+    """A multirotor. See ``Vehicle`` for its state and for what the arguments mean.
+
+    The operations of positioning (``takeoff``, ``goto``, ``return_home``) need a position; those of sticks
+    (``manual_control``, ``stabilize``, ``altitude_hold``) and ``land`` do not. One may change between them in
+    flight.
+    """
+
+    kind = "drone"
+
+    @property
+    def flying(self) -> bool:
+        """Off the ground, by the autopilot's own judgement."""
+        return self._look().flying
+
+    @property
+    def landed(self) -> bool:
+        """On the ground, by the autopilot's own judgement."""
+        return not self.flying
+
+    # -- with a position
+
+    def takeoff(self, height: float) -> None:
+        """Wait until it is ready, arm, and climb to *height* metres above home.
+
+        A sequence that is undone before lift-off (somebody changed the mode or disarmed) is started over, at
+        most 3 times.
+        """
+        self._require(Capability.TAKEOFF)
+        asked = f"take off to {height:g} m"
+        if not isfinite(height) or height <= 0:
+            raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
+        if self.flying:
+            where = f"it flies already, {self._driver.telemetry.above_home:.1f} m above home"
+            raise Refused(self.name, asked, f"{where}; goto(position) changes its height")
+        found = too_high(height, self.limits, self._driver.telemetry.home)
+        if found:
+            raise OutOfBounds(self.name, asked, found)
+        here = self._driver.telemetry.position
+        within = from_seconds(travel_within(0.0, height, None))
+        self._operate(
+            "takeoff",
+            asked,
+            lambda: self._driver.takeoff(height, within),
+            goal=lambda: self._above(here, height),
+            restarts=RESTARTS,
+        )
+
+    def goto(self, goal: Position, speed: float | None = None) -> None:
+        """Go straight to *goal* and stop there; *speed* in m/s over ground, else the autopilot's own.
+
+        Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or the straight way.
+        """
+        self._require(Capability.GOTO)
+        asked = f"go to {goal}"
+        if speed is not None:
+            self._require(Capability.SPEED)
+            if not speed > 0:
+                raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+        self._not_on_ground(asked)
+        self._check_altitude(goal)
+        self._check_path(asked, self.position, goal)
+        within = self._within(goal, speed)
+        self._operate(
+            "goto", asked, lambda: self._driver.goto(goal, speed, within), goal=lambda: self._goal(goal)
+        )
+
+    def return_home(self) -> None:
+        """Let the autopilot return to home and land there, until it is disarmed."""
+        self._require(Capability.RETURN_HOME)
+        home, here = self.home, self.position
+        self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
+        within = self._within(home, None) + self._landing_within(RETURN_CLIMB)
+        self._operate(
+            "return_home",
+            "return home",
+            lambda: self._driver.return_home(within),
+            goal=lambda: Goal(home.latitude, home.longitude, nan),
+        )
+
+    def set_velocity(
+        self,
+        north: float = 0.0,
+        east: float = 0.0,
+        up: float = 0.0,
+        yaw_rate: float = 0.0,
+        *,
+        lasting: float = VELOCITY_LASTS_S,
+    ) -> None:
+        """Fly at this velocity, m/s and degrees per second clockwise. Returns as soon as it is under way.
+
+        It stands for *lasting* seconds or until the next operation, then the drone stops: a program that
+        hangs does not fly away. A loop that controls calls it each time round.
+        """
+        self._require(Capability.VELOCITY)
+        velocity = Velocity(north, east, up)
+        asked = f"fly at {north:g} m/s north, {east:g} m/s east, {up:g} m/s up"
+        if not all(isfinite(part) for part in (*velocity, yaw_rate)):
+            raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
+        self._not_on_ground(asked)
+        self._operate(
+            "set_velocity",
+            asked,
+            lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
+        )
+
+    def set_heading(self, degrees: float) -> None:
+        """Turn to *degrees* clockwise from north, in place."""
+        self._require(Capability.HEADING)
+        asked = f"turn to {degrees:g} degrees"
+        if not isfinite(degrees):
+            raise UsageError(f"{self.name}: {asked}: not a number")
+        self._not_on_ground(asked)
+        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0))
+
+    def hold(self) -> None:
+        """Stop and stay where it is; on the ground it does that anyhow."""
+        if self.flying:
+            super().hold()
+
+    # -- without
+
+    def land(self) -> None:
+        """Descend here, until it is on the ground and disarmed."""
+        self._require(Capability.LAND)
+        here = self._driver.telemetry.position
+        within = self._landing_within(0.0)
+        self._operate(
+            "land",
+            "land",
+            lambda: self._driver.land(within),
+            goal=lambda: NOWHERE if here is None else Goal(here.latitude, here.longitude, nan),
+        )
+
+    def manual_control(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
+        """Hold the sticks like this until the next call.
+
+        Pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1, where 0.5 keeps the
+        altitude in altitude hold. They are sent again and again, so that the autopilot does not fall back on a transmitter. They take
+        effect in ``stabilize`` and ``altitude_hold`` and are let go by the operations with a position, and as
+        soon as somebody else changes the mode.
+        """
+        self._require(Capability.STICKS)
+        sticks = Sticks(pitch, roll, throttle, yaw)
+        for name, value, low in zip(Sticks._fields, sticks, (-1.0, -1.0, 0.0, -1.0), strict=True):
+            if not low <= value <= 1.0:
+                raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from {low:g} to 1")
+        with self._kernel:
+            self._performer.check_ours("manual control")
+            self._driver.sticks(sticks)
+
+    def stabilize(self) -> None:
+        """Fly by sticks: they command attitude and throttle. In the air, set the sticks first."""
+        self._require(Capability.STABILIZE)
+        self._operate("stabilize", "fly stabilized", self._driver.stabilize)
+
+    def altitude_hold(self) -> None:
+        """Fly by sticks: they command attitude and climb rate; the throttle's middle keeps the altitude."""
+        self._require(Capability.ALTITUDE_HOLD)
+        self._operate("altitude_hold", "hold the altitude", self._driver.altitude_hold)
+
+    # -- the end of a program
+
+    def come_to_rest(self) -> str:
+        """Land it if it is armed and nobody else has it; says what was done. For the end of a program.
+
+        It waits half a minute for a link that is lost at that moment.
+        """
+        seen = self._driver.telemetry
+        if seen.heard < 0:
+            return "was never heard"
+        with self._kernel:
+            self._driver.stop()
+        if self._performer.silent():
+            self._wait_for_return()
+        if not seen.armed:
+            return "is disarmed"
+        if seen.flying and seen.mode not in {self._performer.commanded, self._driver.handover}:
+            return f"is left to whoever flies it in {seen.mode}"
+        if not seen.flying:
+            self.disarm()
+            return "was disarmed on the ground"
+        self.land()
+        return "landed"
+
+    def _wait_for_return(self) -> None:
+        back = self._driver.telemetry.changed.wait_for(
+            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S), ends_activation=True
+        )
+        if not back:
+            raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has landed")
+
+    def _landing_within(self, climb: float) -> Ns:
+        """ArduPilot lands at 0.5 m/s; from an unknown height, allow for the highest."""
+        height = self._driver.telemetry.above_home
+        height = max(height, 0.0) if isfinite(height) else self.limits.highest
+        return from_seconds(travel_within(0.0, 2.0 * (height + climb), None))
+
+    def _above(self, here: Position | None, height: float) -> Goal:
+        home = self._driver.telemetry.home
+        if home is None:
+            return NOWHERE
+        over = here or home
+        return self._goal(Position(over.latitude, over.longitude, AboveHome(height)))

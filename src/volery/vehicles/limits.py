@@ -1,0 +1,256 @@
+"""Where a vehicle may go: stated limits about home, and a fence. Checked before a command, by straight paths.
+
+Everything is judged in the local frame about home: metres east, north and up of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot, inf
+from typing import NamedTuple
+
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame, Vector
+from volery.base.position import AMSL, AboveHome, Altitude, Position
+
+Corner = tuple[float, float]
+"""Latitude and longitude in degrees, or east and north in metres."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far and how high; all in metres, about home.
+
+    ``highest`` is the 120 m above ground to which drones may fly without a permit in the EU and much of the
+    world. ``lowest`` leaves 2 m for the error of an estimate: where a goal is lower than home, state it.
+    """
+
+    farthest: float = 10_000.0
+    highest: float = 120.0
+    lowest: float = -2.0
+
+    def __post_init__(self) -> None:
+        if self.farthest <= 0 or self.highest <= self.lowest:
+            raise UsageError(f"{self} leaves no room to fly: farthest > 0 and highest > lowest")
+
+
+@dataclass(frozen=True)
+class Zone:
+    """An area over which nothing may fly between ``floor`` and ``ceiling``; without these at any height.
+
+    ``corners`` are at least three (latitude, longitude) in degrees, in order around it.
+    """
+
+    name: str
+    corners: tuple[Corner, ...]
+    floor: Altitude | None = None
+    ceiling: Altitude | None = None
+
+    def __post_init__(self) -> None:
+        _check_corners(f"zone {self.name!r}", self.corners)
+        _check_heights(f"zone {self.name!r}", self.floor, self.ceiling)
+
+
+@dataclass(frozen=True)
+class Fence:
+    """Stay inside ``polygon`` (if it is given), between floor and ceiling, and out of every no-fly zone."""
+
+    polygon: tuple[Corner, ...] = ()
+    floor: Altitude | None = None
+    ceiling: Altitude | None = None
+    no_fly: tuple[Zone, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.polygon:
+            _check_corners("the fence", self.polygon)
+        _check_heights("the fence", self.floor, self.ceiling)
+
+
+def _check_corners(what: str, corners: Sequence[Corner]) -> None:
+    if len(corners) < 3:
+        raise UsageError(f"{what} has {len(corners)} corners; it takes at least 3")
+    for latitude, longitude in corners:
+        Position(latitude, longitude, AMSL(0.0))
+
+
+def _check_heights(what: str, *heights: Altitude | None) -> None:
+    for height in heights:
+        if height is not None and not isinstance(height, AMSL | AboveHome):
+            raise UsageError(f"{what}: {height} cannot be compared; give AMSL or AboveHome")
+
+
+class Home(NamedTuple):
+    """Home, and the local frame about it."""
+
+    amsl: float
+    frame: LocalFrame
+
+    @classmethod
+    def at(cls, position: Position) -> Home:
+        """*position* has an AMSL altitude."""
+        amsl = position.altitude.metres
+        return cls(amsl, LocalFrame(position.latitude, position.longitude, amsl))
+
+    def above(self, altitude: Altitude) -> float | None:
+        """Metres above home; ``None`` for kinds that take more than home to convert."""
+        if isinstance(altitude, AboveHome):
+            return altitude.metres
+        if isinstance(altitude, AMSL):
+            return altitude.metres - self.amsl
+        return None
+
+    def local(self, position: Position) -> Vector:
+        """East, north of home and metres above home. Up is the stated altitude's, not the tangent plane's.
+
+        Of an altitude of another kind the metres are taken as they are: the best guess without terrain.
+        """
+        up = self.above(position.altitude)
+        height = position.altitude.metres if up is None else up
+        east, north, _ = self.frame.to_enu(position.latitude, position.longitude, self.amsl + height)
+        return east, north, height
+
+
+def violation(start: Position, goal: Position, home: Position, limits: Limits, fence: Fence | None) -> str:
+    """Why one must not go straight from *start* to *goal*; empty if one may. *start*, *home* are AMSL."""
+    about = Home.at(home)
+    there = about.local(goal)
+    found = _beyond_limits(goal, there, about, limits)
+    if not found and fence is not None:
+        found = _beyond_fence((about.local(start), there), about, fence)
+    return found
+
+
+def too_high(height: float, limits: Limits, home: Position | None = None) -> str:
+    """Why *height* metres above home is out of bounds; with the hint for one who meant AMSL. Else empty."""
+    if height <= limits.highest:
+        return ""
+    hint = ""
+    if home is not None and limits.lowest <= height - home.altitude.metres <= limits.highest:
+        hint = f"; did you mean AMSL({height:g})? Home is {home.altitude.metres:g} m AMSL"
+    return f"{height:g} m above home asked, but the limit is {limits.highest:g} m (Limits.highest){hint}"
+
+
+def _beyond_limits(goal: Position, there: Vector, home: Home, limits: Limits) -> str:
+    far = hypot(there[0], there[1])
+    if far > limits.farthest:
+        return (
+            f"{goal} is {far / 1000:.1f} km from home, but the limit is "
+            f"{limits.farthest / 1000:g} km (Limits.farthest)"
+        )
+    up = there[2]
+    if up < limits.lowest:
+        return (
+            f"{goal} is {-up:.1f} m below home, underground as far as is known; the limit is "
+            f"{-limits.lowest:g} m below (Limits.lowest){_home_hint(goal, home, limits)}"
+        )
+    if isinstance(goal.altitude, AboveHome):
+        return too_high(up, limits, Position(home.frame.latitude, home.frame.longitude, AMSL(home.amsl)))
+    if up > limits.highest:
+        return f"{goal} is {up:.1f} m above home, but the limit is {limits.highest:g} m (Limits.highest)"
+    return ""
+
+
+def _home_hint(goal: Position, home: Home, limits: Limits) -> str:
+    if isinstance(goal.altitude, AMSL) and 0.0 <= goal.altitude.metres <= limits.highest:
+        height = goal.altitude.metres
+        return f"; did you mean AboveHome({height:g})? Home is {home.amsl:g} m AMSL"
+    return ""
+
+
+# -- polygons, in metres about home
+
+Segment = tuple[Vector, Vector]
+
+
+def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
+    if fence.polygon:
+        corners = [home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in fence.polygon]
+        if not _inside(path[1][:2], corners):
+            return "the goal is outside the fence"
+        if _inside(path[0][:2], corners) and not all(_parts_inside(path, corners)):
+            return "the straight way there leaves the fence"
+    low, high = _band(fence.floor, fence.ceiling, home)
+    if path[1][2] < low:
+        return f"the goal is below the fence's floor of {fence.floor}"
+    if path[1][2] > high:
+        return f"the goal is above the fence's ceiling of {fence.ceiling}"
+    for zone in fence.no_fly:
+        if _passes(path, zone, home):
+            return f"the straight way there leads through the no-fly zone {zone.name!r}"
+    return ""
+
+
+def _band(floor: Altitude | None, ceiling: Altitude | None, home: Home) -> tuple[float, float]:
+    """Metres above home from, to."""
+    low = None if floor is None else home.above(floor)
+    high = None if ceiling is None else home.above(ceiling)
+    return (-inf if low is None else low, inf if high is None else high)
+
+
+def _passes(path: Segment, zone: Zone, home: Home) -> bool:
+    """The path leads through the zone. Straight out of one in which it starts, it may go."""
+    corners = [home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in zone.corners]
+    part = _clipped(path, *_band(zone.floor, zone.ceiling, home))
+    if part is None:
+        return False
+    inside = _parts_inside(part, corners)
+    if part[0] == path[0] and inside[0] and not inside[-1]:
+        inside = inside[1:]
+    return any(inside)
+
+
+def _clipped(path: Segment, low: float, high: float) -> Segment | None:
+    """The part of *path* between two heights; ``None`` if there is none."""
+    start, end = path
+    rise = end[2] - start[2]
+    if abs(rise) < 1e-9:
+        return path if low <= start[2] <= high else None
+    shares = sorted(((low - start[2]) / rise, (high - start[2]) / rise))
+    first, last = max(0.0, shares[0]), min(1.0, shares[1])
+    if first > last:
+        return None
+    return _along(path, first), _along(path, last)
+
+
+def _along(path: Segment, share: float) -> Vector:
+    if share in {0.0, 1.0}:
+        return path[int(share)]
+    (x0, y0, z0), (x1, y1, z1) = path
+    return x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0)
+
+
+def _inside(point: Corner, corners: Sequence[Corner]) -> bool:
+    """Even-odd rule: a ray to the east crosses the outline an odd number of times."""
+    x, y = point
+    inside = False
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
+            inside = not inside
+    return inside
+
+
+def _parts_inside(path: Segment, corners: Sequence[Corner]) -> list[bool]:
+    """The path cut where it meets the outline: whether each part, from its start to its end, is inside."""
+    cuts = [0.0, *sorted(_meetings(path, corners)), 1.0]
+    return [
+        _inside(_along(path, (first + last) / 2.0)[:2], corners)
+        for first, last in pairwise(cuts)
+        if last - first > 1e-12 or len(cuts) == 2
+    ]
+
+
+def _meetings(path: Segment, corners: Sequence[Corner]) -> list[float]:
+    """How far along the path, 0 to 1, it meets the outline. Along an edge only its corners count."""
+    (x0, y0), (x1, y1) = path[0][:2], path[1][:2]
+    found = []
+    for (cx, cy), (dx, dy) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        turn = (x1 - x0) * (dy - cy) - (y1 - y0) * (dx - cx)
+        if abs(turn) < 1e-12:
+            continue
+        share = ((cx - x0) * (dy - cy) - (cy - y0) * (dx - cx)) / turn
+        along_edge = ((cx - x0) * (y1 - y0) - (cy - y0) * (x1 - x0)) / turn
+        if 0.0 < share < 1.0 and -1e-9 <= along_edge <= 1.0 + 1e-9:
+            found.append(share)
+    return found

@@ -1,0 +1,279 @@
+"""The one executor of steps: time-outs, refusals, starting over, takeover and silence, for every driver.
+
+It waits on telemetry. MAVLink does not say who changed a mode; so a mode that the autopilot is in without our
+having commanded it belongs to somebody else, and in the air it is never fought.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VoleryError
+from volery.base.time import MS, Ns, S, to_seconds
+from volery.kernel.api import Handle, Kernel
+from volery.kernel.waiting import Rate, sleep
+from volery.vehicles.driver import Driver, Repeat, Step
+from volery.vehicles.telemetry import Telemetry
+
+RESTARTS = 3
+"""How often a sequence that is undone before lift-off is started over."""
+
+TEXT_GRACE: Ns = 500 * MS
+"""The autopilot's reason often comes just after its refusal; so long it is waited for."""
+
+TEXT_BEFORE: Ns = 2 * S
+"""A text that explains a change of mode may come so much before the change is seen."""
+
+SILENCE: Ns = 5 * S
+"""A link that says nothing for so long is lost: five missed heartbeats."""
+
+
+class Performer:
+    """Runs steps for one vehicle. ``commanded`` is the mode that was asked for last; empty when not ours."""
+
+    def __init__(self, kernel: Kernel, driver: Driver, silence: Ns = SILENCE) -> None:
+        self._kernel = kernel
+        self._driver = driver
+        self._silence = silence
+        self.commanded = ""
+
+    def perform(self, asked: str, plan: Callable[[], Sequence[Step]], *, restarts: int = 0) -> None:
+        """Run the steps of *plan*; while it is undone before lift-off start over, at most *restarts* times.
+
+        Raises:
+            Refused: the autopilot said no; its own words are quoted.
+            Overridden, Failsafe: somebody else has the vehicle.
+            NotArrived: not seen to be done in time.
+            LinkLost: the autopilot has fallen silent.
+        """
+        undone = ""
+        for _ in range(restarts + 1):
+            undone = self._sequence(asked, plan())
+            if not undone:
+                return
+        times = f" and was started over {restarts} times" if restarts else ""
+        raise Overridden(self._driver.name, asked, f"{undone} before lift-off{times}")
+
+    def check_ours(self, asked: str) -> None:
+        """Raise ``Overridden`` if it flies in a mode that this program did not command."""
+        seen = self._driver.telemetry
+        if not seen.flying or seen.mode in {self.commanded, self._driver.handover}:
+            return
+        self.commanded = ""
+        kind = Failsafe if seen.failsafe else Overridden
+        raise kind(
+            self._driver.name,
+            asked,
+            f"flies in {seen.mode} (status {seen.status}), which this program did not command"
+            f"{self._last_text(0)}; to hand it over, switch the vehicle to {self._driver.handover}",
+        )
+
+    def _sequence(self, asked: str, steps: Sequence[Step]) -> str:
+        """Why it was undone on the ground; empty if all is done."""
+        for step in steps:
+            undone = _Attempt(self, self._kernel, self._driver, asked, step).run()
+            if undone:
+                return undone
+        return ""
+
+    def silent(self) -> bool:
+        """It spoke before, but not for so long that the link counts as lost."""
+        return self._kernel.now() - self._driver.telemetry.heard >= self._silence
+
+    def patience(self) -> Ns:
+        """How much longer it may be silent."""
+        return self._driver.telemetry.heard + self._silence - self._kernel.now()
+
+    def _last_text(self, since: Ns) -> str:
+        texts = self._driver.telemetry.texts_since(since)
+        return f"; it said {texts[-1]!r}" if texts else ""
+
+
+class _Attempt:
+    """One step under way."""
+
+    def __init__(self, owner: Performer, kernel: Kernel, driver: Driver, asked: str, step: Step) -> None:
+        self._owner = owner
+        self._kernel = kernel
+        self._driver = driver
+        self._asked = asked
+        self._step = step
+        self._seen: Telemetry = driver.telemetry
+        self._began: Ns = kernel.now()
+        self._mode_before = self._seen.mode
+        self._was_armed = self._seen.armed
+        self._changed = ""  # what somebody else did
+
+    def run(self) -> str:
+        """Why it was undone before lift-off; empty if it is done."""
+        step = self._step
+        if step.skippable and step.done(self._seen):
+            return ""
+        self._check_not_fought()
+        self._seen.answers.pop(step.answer, None)
+        if step.enters:
+            self._owner.commanded = step.enters
+        if step.cycle is None:
+            self._wait_for_telemetry()
+        else:
+            self._turn(step.cycle)
+        return self._judge()
+
+    def _check_not_fought(self) -> None:
+        """Guided is never commanded over a failsafe, not even over one that took the mode we were in."""
+        seen, enters = self._seen, self._step.enters
+        if seen.flying and seen.failsafe and enters == self._driver.handover and seen.mode != enters:
+            raise self._taken(f"is in a failsafe, in {seen.mode}")
+
+    # -- waiting
+
+    def _wait_for_telemetry(self) -> None:
+        handles: list[Handle] = []
+        with self._kernel as kernel:
+            self._step.send()
+            if self._step.again is not None:
+                handles.append(_later(kernel, self._step.again, self._ask_again))
+            if self._step.keep is not None:
+                handles.append(_later(kernel, self._step.keep.period, self._step.keep.action))
+            try:
+                while not self._over():
+                    left = self._time_left()
+                    self._seen.changed.wait_for(self._over, left, ends_activation=True)
+            finally:
+                for handle in handles:
+                    handle.cancel()
+
+    def _turn(self, cycle: Repeat) -> None:
+        """The node's own loop: send, spin, sleep, in the caller's task."""
+        step, rate = self._step, Rate(self._kernel, cycle.period)
+        step.send()
+        asked_at = kept_at = self._kernel.now()
+        while not self._over():
+            self._time_left()
+            cycle.action()
+            if step.again is not None and self._kernel.now() - asked_at >= step.again:
+                asked_at = self._kernel.now()
+                self._ask_again()
+            if step.keep is not None and self._kernel.now() - kept_at >= step.keep.period:
+                kept_at = self._kernel.now()
+                step.keep.action()
+            rate.sleep()
+
+    def _ask_again(self) -> None:
+        if self._step.answer not in self._seen.answers and not self._over():
+            self._step.send()
+
+    def _over(self) -> bool:
+        """Done, refused, or taken by somebody else."""
+        step, seen = self._step, self._seen
+        if step.done(seen):
+            return True
+        answer = seen.answers.get(step.answer)
+        if answer is not None and not answer.accepted:
+            return True
+        self._notice_changes()
+        return bool(self._changed)
+
+    def _notice_changes(self) -> None:
+        step, seen = self._step, self._seen
+        ours = step.enters or step.mode
+        if seen.mode == ours or seen.mode in step.leads_to:
+            self._mode_before = seen.mode
+        elif seen.mode != self._mode_before and not self._changed:
+            self._changed = f"changed from {self._mode_before} to {seen.mode}"
+        self._was_armed = self._was_armed or seen.armed
+        if step.armed and self._was_armed and not seen.armed and not self._changed:
+            self._changed = f"was disarmed in {seen.mode}"
+
+    def _time_left(self) -> Ns:
+        """Until the time-out or until the silence is too long; raises when one of them has come."""
+        if self._owner.silent():
+            raise self._lost()
+        left = self._began + self._step.within - self._kernel.now()
+        if left <= 0:
+            raise self._late()
+        return min(left, self._owner.patience())
+
+    # -- the end
+
+    def _judge(self) -> str:
+        if self._step.done(self._seen):
+            return ""
+        since = self._began
+        if self._changed:
+            since = max(self._began, self._kernel.now() - TEXT_BEFORE)
+        self._hear_reasons(self._step.cycle)
+        if not self._changed:
+            raise self._refused(since)
+        if self._seen.flying or self._seen.failsafe:
+            raise self._taken(self._changed, since)
+        return self._changed
+
+    def _hear_reasons(self, cycle: Repeat | None) -> None:
+        if cycle is None:
+            sleep(self._kernel, TEXT_GRACE)
+            return
+        rate, until = Rate(self._kernel, cycle.period), self._kernel.now() + TEXT_GRACE
+        while self._kernel.now() < until:
+            cycle.action()
+            rate.sleep()
+
+    def _refused(self, since: Ns) -> Refused:
+        texts = self._seen.texts_since(since, severity=5)
+        answer = self._seen.answers[self._step.answer]
+        said = "; ".join(dict.fromkeys(texts)) or "gave no reason"
+        what = f"the autopilot refused to {self._step.ask} ({answer.result}): {said}"
+        return Refused(self._driver.name, self._asked, what + self._advice())
+
+    def _taken(self, what: str, since: Ns | None = None) -> Overridden:
+        seen = self._seen
+        self._owner.commanded = ""
+        self._driver.stop()
+        texts = seen.texts_since(self._began if since is None else since)
+        said = f"; it said {texts[-1]!r}" if texts else ""
+        kind = Failsafe if seen.failsafe else Overridden
+        back = f"; to hand it back, switch the vehicle to {self._driver.handover}"
+        return kind(self._driver.name, self._asked, f"{what} (status {seen.status}){said}{back}")
+
+    def _late(self) -> NotArrived:
+        texts = self._seen.texts_since(self._began)
+        said = f"; the autopilot said {'; '.join(dict.fromkeys(texts[-3:]))!r}" if texts else ""
+        unanswered = ""
+        if self._step.answer and self._step.answer not in self._seen.answers:
+            unanswered = "; the autopilot never answered"
+        within = to_seconds(self._step.within)
+        what = f"to {self._step.ask} was not seen within {within:g} s; {_whereabouts(self._seen)}"
+        return NotArrived(self._driver.name, self._asked, f"{what}{unanswered}{said}{self._advice()}")
+
+    def _lost(self) -> VoleryError:
+        seen = self._seen
+        ago = seen.silence(self._kernel.now())
+        wrong = self._driver.problem()
+        why = f"; {wrong}" if wrong is not None else ""
+        return LinkLost(
+            f"{seen.name}: {self._asked}: nothing was heard for {ago:.1f} s{why}; "
+            f"last: {_whereabouts(seen)}, at {to_seconds(seen.heard):.1f} s"
+        )
+
+    def _advice(self) -> str:
+        return f"; {self._step.advice}" if self._step.advice else ""
+
+
+def _later(kernel: Kernel, period: Ns, action: Callable[[], None]) -> Handle:
+    """Each *period* from one period on."""
+    first = True
+
+    def tick() -> None:
+        nonlocal first
+        if first:
+            first = False
+            return
+        action()
+
+    return kernel.every(period, tick)
+
+
+def _whereabouts(seen: Telemetry) -> str:
+    armed = "armed" if seen.armed else "disarmed"
+    where = f"at {seen.position}" if seen.position is not None else "position unknown"
+    return f"{where}, mode {seen.mode or 'unknown'}, {armed}"

@@ -1,0 +1,97 @@
+"""A rover: blocking operations, each seen on the telemetry before it returns."""
+
+from __future__ import annotations
+
+from math import nan
+
+from volery.base.errors import LinkError, UsageError
+from volery.base.position import AboveHome, Position
+from volery.base.time import from_seconds
+from volery.vehicles.driver import Capability, Sticks
+from volery.vehicles.vehicle import RETURN_OF_LINK_S, Goal, Vehicle
+
+
+class Rover(Vehicle):
+    """A ground vehicle. See ``Vehicle`` for its state and for what the arguments mean."""
+
+    kind = "rover"
+
+    @property
+    def driving(self) -> bool:
+        """It moves, by the autopilot's estimate faster than 0.1 m/s."""
+        north, east, _ = self.velocity
+        return north * north + east * east > 0.01
+
+    def drive(self, goal: Position | tuple[float, float], speed: float | None = None) -> None:
+        """Wait until it is ready, arm if need be, drive straight to *goal* and stop there.
+
+        *goal* may be a latitude and a longitude; an altitude is not looked at. *speed* in m/s, else the
+        autopilot's own. Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or
+        the straight way.
+        """
+        self._require(Capability.GOTO)
+        latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
+        there = Position(latitude, longitude, AboveHome(0.0))
+        asked = f"drive to {latitude:.7f}, {longitude:.7f}"
+        if speed is not None and not speed > 0:
+            raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+        if self._driver.telemetry.position is None:
+            self.wait_ready()
+        here = self.position
+        level = Position(here.latitude, here.longitude, self.home.altitude)
+        self._check_path(asked, level, there)
+        within = self._within(there, speed or 1.0)
+        self._operate(
+            "drive",
+            asked,
+            lambda: self._driver.goto(there, speed, within),
+            goal=lambda: Goal(latitude, longitude, nan),
+        )
+
+    def return_home(self) -> None:
+        """Let the autopilot return to home and stop there."""
+        self._require(Capability.RETURN_HOME)
+        home, here = self.home, self.position
+        level = Position(here.latitude, here.longitude, home.altitude)
+        self._check_path("return home", level, home)
+        within = self._within(home, 1.0)
+        self._operate(
+            "return_home",
+            "return home",
+            lambda: self._driver.return_home(within),
+            goal=lambda: Goal(home.latitude, home.longitude, nan),
+        )
+
+    def manual(self) -> None:
+        """Drive by ``manual_control``."""
+        self._require(Capability.STICKS)
+        self._operate("manual", "drive by hand", self._driver.manual)
+
+    def manual_control(self, steering: float, throttle: float) -> None:
+        """Hold the controls so until the next call: steering (right +) and throttle (back -) in -1..1."""
+        self._require(Capability.STICKS)
+        for name, value in (("steering", steering), ("throttle", throttle)):
+            if not -1.0 <= value <= 1.0:
+                raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")
+        with self._kernel:
+            self._performer.check_ours("manual control")
+            self._driver.sticks(Sticks(roll=steering, throttle=throttle))
+
+    def come_to_rest(self) -> str:
+        """Stop and disarm it if nobody else has it; says what was done. For the end of a program."""
+        seen = self._driver.telemetry
+        if seen.heard < 0:
+            return "was never heard"
+        with self._kernel:
+            self._driver.stop()
+        if self._performer.silent() and not seen.changed.wait_for(
+            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S), ends_activation=True
+        ):
+            raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has stopped")
+        if not seen.armed:
+            return "is disarmed"
+        if seen.mode not in {self._performer.commanded, self._driver.handover}:
+            return f"is left to whoever drives it in {seen.mode}"
+        self.hold()
+        self.disarm()
+        return "stopped and was disarmed"
