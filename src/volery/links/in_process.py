@@ -50,7 +50,7 @@ class InProcess:
         self._closed = True
 
 
-def in_process(kernel: Kernel, name: str, delay: Ns = MS) -> tuple[InProcess, InProcess]:
+def in_process(kernel: Kernel, delay: Ns = MS, name: str = "link") -> tuple[InProcess, InProcess]:
     """The vehicle's side and the autopilot's side of a link called *name*."""
     ours, theirs = InProcess(kernel, name, delay), InProcess(kernel, f"{name} (autopilot)", delay)
     ours.peer, theirs.peer = theirs, ours

@@ -1,1 +1,31 @@
 """Drone and Rover: blocking operations, seen on telemetry; and what a driver is."""
+
+from volery.vehicles.driver import Capability, Driver, drivers
+from volery.vehicles.drone import Drone
+from volery.vehicles.limits import Fence, Limits, Zone
+from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
+from volery.vehicles.rover import Rover
+from volery.vehicles.telemetry import Attitude, Battery, Said, Velocity
+from volery.vehicles.vehicle import Vehicle
+
+__all__ = [
+    "Attitude",
+    "Battery",
+    "Capability",
+    "ChangeSpeed",
+    "Driver",
+    "Drone",
+    "Fence",
+    "Land",
+    "Limits",
+    "MissionItem",
+    "ReturnHome",
+    "Rover",
+    "Said",
+    "TakeOff",
+    "Vehicle",
+    "Velocity",
+    "Waypoint",
+    "Zone",
+    "drivers",
+]

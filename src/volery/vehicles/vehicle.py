@@ -1,11 +1,12 @@
 """What drones and rovers share: state, readiness, missions, and how an operation is carried out and recorded.
 
-Every call is an interaction point. One that waits blocks until what was asked is *seen* on the telemetry, has a
-time-out, and raises an error that names the vehicle, what was asked, what the autopilot said, and what to do.
+Every call is an interaction point. One that waits blocks until what was asked is *seen* on the telemetry, has
+a time-out, and raises an error that names the vehicle, what was asked, what the autopilot said, what to do.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from math import hypot, nan
 from typing import NamedTuple
@@ -60,11 +61,11 @@ def travel_within(distance: float, climb: float, speed: float | None) -> float:
     return MARGIN_S + across + abs(climb) / 0.5
 
 
-class Vehicle:
+class Vehicle(ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
-    *limits* and *fence* are checked before anything moves. *truth* is known in simulation only. A link that says
-    nothing for *silence* is lost; one that returns earlier is as if nothing had happened.
+    *limits* and *fence* are checked before anything moves. *truth* is known in simulation only. A link that
+    says nothing for *silence* is lost; one that returns earlier is as if nothing had happened.
     """
 
     kind = ""
@@ -170,26 +171,23 @@ class Vehicle:
     # -- getting there
 
     def wait_heard(self, within: float = HEARD_WITHIN_S) -> None:
-        """Until the autopilot is heard. Raises ``LinkSilent`` or ``LinkGarbled`` saying what is there instead."""
+        """Until the autopilot is heard. Raises ``LinkSilent`` or ``LinkGarbled``: what is there instead."""
         seen = self._driver.telemetry
-        heard = seen.changed.wait_for(
-            lambda: seen.heard >= 0 and self._driver.problem() is None,
-            from_seconds(within),
-            ends_activation=True,
-        )
-        if not heard:
+
+        def well_heard() -> bool:
+            return seen.heard >= 0 and self._driver.problem() is None
+
+        if not seen.changed.wait_for(well_heard, from_seconds(within), ends_activation=True):
             with self._kernel:
                 problem = self._driver.problem()
-            raise (
-                type(problem)(f"{self.name}: {problem}")
-                if problem is not None
-                else LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
-            )
+            if problem is not None:
+                raise type(problem)(f"{self.name}: {problem}")
+            raise LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
         if seen.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {seen.kind}, not a {self.kind}")
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:
-        """Until it could arm and go by position, at most *within* seconds. ``NotArrived`` quotes what it lacks."""
+        """Until it could arm and go by position, in at most *within* seconds; the error says what lacks."""
         self._operate("wait_ready", "be ready", lambda: self._driver.ready(from_seconds(within)))
 
     def arm(self) -> None:
@@ -206,7 +204,7 @@ class Vehicle:
         self._operate("hold", "hold", self._driver.hold)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
-        """Replace the mission on board. Its points are checked against limits and fence, each leg straight."""
+        """Replace the mission on board. Limits and fence are checked for each leg, taken as straight."""
         self._require(Capability.MISSION)
         items = list(mission)
         if not items:
@@ -221,6 +219,10 @@ class Vehicle:
         self._require(Capability.MISSION)
         asked = "carry out the mission on board"
         self._operate("start_mission", asked, lambda: self._driver.start_mission(from_seconds(within)))
+
+    @abstractmethod
+    def come_to_rest(self) -> str:
+        """Bring it down, or to a halt, unless somebody else has it; says what was done. For a program's end."""
 
     def close(self) -> None:
         """Stop talking to it. It goes on with what it does."""
@@ -293,8 +295,8 @@ class Vehicle:
     def _check_altitude(self, goal: Position) -> None:
         if isinstance(goal.altitude, Ellipsoidal):
             raise CapabilityError(
-                f"{self.name}: {goal.altitude} cannot be flown to: autopilots know the geoid, not the ellipsoid; "
-                f"subtract the geoid's height there and say AMSL"
+                f"{self.name}: {goal.altitude} cannot be flown to: autopilots count from the geoid; "
+                f"subtract its height there and say AMSL"
             )
         if isinstance(goal.altitude, AboveGround):
             self._require(Capability.TERRAIN)

@@ -15,7 +15,7 @@ def text(words: str) -> Frame:
 
 def test_frames_arrive_after_the_delay_in_order() -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, "radio", 5 * MS)
+    ours, theirs = in_process(kernel, 5 * MS, "radio")
     seen: list[tuple[int, str]] = []
     ours.receive(lambda frame: seen.append((kernel.now(), frame.fields["text"])))
     theirs.send(text("one"))
@@ -26,7 +26,7 @@ def test_frames_arrive_after_the_delay_in_order() -> None:
 
 def test_a_closed_end_neither_sends_nor_hears() -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, "radio")
+    ours, theirs = in_process(kernel, name="radio")
     seen: list[Frame] = []
     ours.receive(seen.append)
     theirs.send(text("under way"))
@@ -38,6 +38,6 @@ def test_a_closed_end_neither_sends_nor_hears() -> None:
 
 
 def test_a_field_that_does_not_fit_is_refused_where_it_is_sent() -> None:
-    ours, _ = in_process(VirtualKernel(), "radio")
+    ours, _ = in_process(VirtualKernel(), name="radio")
     with pytest.raises(UsageError, match="no field 'altitude'"):
         ours.send(Frame("HEARTBEAT", {"altitude": 1}, 1, 1))

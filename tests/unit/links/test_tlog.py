@@ -18,7 +18,7 @@ ARM = Frame("COMMAND_LONG", {"target_system": 1, "command": 400, "param1": 1.0},
 
 def record(path: Path) -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, "radio", 5 * MS)
+    ours, theirs = in_process(kernel, 5 * MS, "radio")
     tap = TlogTap(kernel, ours, path, epoch_us=1_700_000_000_000_000)
     tap.receive(lambda frame: None)
     theirs.send(BEAT)
