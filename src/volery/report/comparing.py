@@ -16,6 +16,7 @@ from volery.report.grids import (
     figure,
     milliseconds,
     number,
+    total,
     verdict,
 )
 from volery.requirements.record import ComponentRecord, RunRecord
@@ -37,8 +38,8 @@ def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> G
         ("simulated s", [Cell(number(record.sim_s, 1)) for record in records]),
         ("faster than real time", [Cell(number(record.real_time_factor, 0, "×")) for record in records]),
         ("parcels", [Cell(_parcels(record)) for record in records]),
-        ("energy of computers", [Cell(energy(_sum(_computers(record)))) for record in records]),
-        ("energy of vehicles", [Cell(energy(_sum(_vehicles(record)))) for record in records]),
+        ("energy of computers", [Cell(energy(total(_computers(record)))) for record in records]),
+        ("energy of vehicles", [Cell(energy(total(_vehicles(record)))) for record in records]),
     ]
     columns = (Column(""), *(Column(label, True) for label in labels))
     return Grid("The runs", columns, tuple((Cell(name), *cells) for name, cells in rows))
@@ -68,12 +69,6 @@ def _computers(record: RunRecord) -> list[float | None]:
 
 def _vehicles(record: RunRecord) -> list[float | None]:
     return [one.energy_j for one in record.vehicles.values()]
-
-
-def _sum(values: list[float | None]) -> float | None:
-    """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
-    known = [value for value in values if value is not None]
-    return sum(known) if values and len(known) == len(values) else None
 
 
 def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
@@ -202,9 +197,10 @@ def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> G
 
 
 def _relative(cells: list[Cell]) -> list[Cell]:
-    """Shares become fractions of the largest among the runs."""
-    largest = max((cell.share for cell in cells if cell.share is not None), default=0.0)
-    if largest <= 0.0:
+    """Shares become fractions of the largest among the runs; where all are the same, no bars."""
+    shares = [cell.share for cell in cells if cell.share is not None]
+    largest = max(shares, default=0.0)
+    if largest <= 0.0 or min(shares) > 0.99 * largest:
         return [Cell(cell.text, None, cell.status) for cell in cells]
     return [
         Cell(cell.text, None if cell.share is None else cell.share / largest, cell.status) for cell in cells

@@ -148,7 +148,7 @@ class Digest:
             self._remarks.append({"t": _seconds(at), "kind": kind, "who": who, "what": what})
 
     def data(self, ended: float | None = None) -> Json:
-        """Everything to draw, as JSON values, of a run that ended after so many seconds (else: its last event)."""
+        """Everything to draw, as JSON values; *ended*: when the run did, if not at its last event."""
         end = to_seconds(self._last) if ended is None else ended
         return {
             "end": round(end, 3),

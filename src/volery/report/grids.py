@@ -81,6 +81,12 @@ def energy(joules: float | None) -> str:
     return number(joules / 1e3, 1, "kJ") if abs(joules) >= 1e4 else figure(joules, "J")
 
 
+def total(values: list[float | None]) -> float | None:
+    """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
+    known = [value for value in values if value is not None]
+    return sum(known) if values and len(known) == len(values) else None
+
+
 def milliseconds(seconds: float | None) -> str:
     """A response time."""
     return number(None if seconds is None else 1e3 * seconds, 2)
@@ -118,19 +124,19 @@ def requirements_grid(record: RunRecord) -> Grid:
     rows = tuple(
         (
             Cell(name),
-            Cell(one.observable, status="quiet"),
-            Cell(bound(one)),
-            Cell(figure(one.observed, one.unit)),
             verdict(one),
+            Cell(figure(one.observed, one.unit)),
+            Cell(bound(one)),
+            Cell(one.observable, status="quiet"),
         )
         for name, one in record.requirements.items()
     )
     columns = (
         Column("requirement"),
-        Column("observable", essential=False),
-        Column("bound", True),
-        Column("observed", True),
         Column("verdict"),
+        Column("observed", True),
+        Column("bound", True),
+        Column("observable", essential=False),
     )
     return Grid("Requirements", columns, rows)
 

@@ -44,12 +44,9 @@ def _table(grid: Grid, essential: bool) -> Table:
     shown = [index for index, column in enumerate(grid.columns) if column.essential or not essential]
     for index in shown:
         column = grid.columns[index]
-        made.add_column(
-            column.title,
-            justify="right" if column.numeric else "left",
-            no_wrap=column.numeric,
-            overflow="fold",
-        )
+        whole = column.numeric or index == 0  # a name or a figure that is cut off would mislead
+        side: JustifyMethod = "right" if column.numeric else "left"
+        made.add_column(column.title, justify=side, no_wrap=whole, overflow="fold")
     for row in grid.rows:
         made.add_row(*(_text(row[index]) for index in shown))
     return made

@@ -57,7 +57,10 @@ UNKNOWN_CIRCUMSTANCES = Circumstances()
 
 
 class Accounts:
-    """A tap of the stream that keeps the accounts of a run. Ask for its ``record`` at any time."""
+    """A tap of the stream that keeps the accounts of a run. Ask for its ``record`` at any time.
+
+    ``last`` is the time of the latest event.
+    """
 
     def __init__(self, setup: RunSetup, energy: EnergyLaw = linear_energy) -> None:
         self.setup = setup
@@ -70,7 +73,7 @@ class Accounts:
         self._verdicts: dict[str, Verdict] = {}
         self._failures: list[Failure] = []
         self._warnings = dict.fromkeys(setup.warnings)
-        self._last: Ns = 0
+        self.last: Ns = 0
         self._folds: dict[type[Any], Callable[[Any], Ns]] = {
             Slice: self._slice,
             Charge: self._charge,
@@ -88,7 +91,7 @@ class Accounts:
         """Take one event into account."""
         fold = self._folds.get(type(event))
         at: Ns = event[0] if fold is None else fold(event)  # of all others only their time counts
-        self._last = max(self._last, at)
+        self.last = max(self.last, at)
 
     def _component(self, name: str, processor: str) -> ComponentLedger:
         ledger = self._components.get(name)
@@ -158,7 +161,7 @@ class Accounts:
     ) -> RunRecord:
         """The contents of ``run.json`` for a run that ended at *ended*; without it, at its last event."""
         setup = self.setup
-        elapsed = to_seconds(self._last if ended is None else ended)
+        elapsed = to_seconds(self.last if ended is None else ended)
         wall = circumstances.wall_s
         return RunRecord(
             system=setup.system,

@@ -32,6 +32,8 @@ from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_to_json
 
 MAGIC = b"\x89MCAP0\r\n"
 TRACE_SCHEMA = "volery-trace/1"
+OUTCOME = "outcome"
+"""The metadata that says how the run ended, by ``status`` and ``reason``."""
 MESSAGE_FRAME = "BQHIQQ"
 """Opcode, length, channel, sequence, log time, publish time: what stands before a message's data."""
 MESSAGE_OVERHEAD = struct.calcsize(f"<{MESSAGE_FRAME}") - 9
@@ -135,6 +137,10 @@ class McapWriter:
         index = records.MetadataIndex(offset=self._size, length=len(record), name=name)
         if self._put(record):
             self._summary.metadata.append(index)
+
+    def outcome(self, status: str, reason: str) -> None:
+        """Say how the run ended; a trace that does not is that of a killed run."""
+        self.metadata(OUTCOME, {"status": status, "reason": reason})
 
     def flush(self) -> None:
         """End the chunk and hand it to the operating system: it survives the death of this process."""

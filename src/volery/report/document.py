@@ -1,0 +1,268 @@
+"""The report of a run as one HTML file that needs no network: ``report.html``, from its folder's trace alone.
+
+If the folder has a ``run.json`` its figures are shown, since it alone knows the wall time; else the accounts
+are kept anew from the trace.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from volery.base.errors import UsageError
+from volery.report.digest import Digest, Json
+from volery.report.grids import (
+    Cell,
+    CellStatus,
+    Column,
+    Grid,
+    cost_grid,
+    energy,
+    laws_grid,
+    moment,
+    number,
+    operations_grid,
+    processors_grid,
+    requirements_grid,
+    ros_calls_grid,
+    total,
+    vehicles_grid,
+)
+from volery.requirements.accounts import Accounts
+from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record
+from volery.trace.mcap_writer import OUTCOME
+from volery.trace.reader import Reading
+from volery.trace.scenery import Scenery, scenery_from_json
+from volery.trace.setup import WORLD_ATTACHMENT
+
+TRACE_FILE = "trace.mcap"
+REPORT_FILE = "report.html"
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A figure worth standing at the top."""
+
+    name: str
+    value: str
+    note: str = ""
+    status: CellStatus = ""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Everything a report is made of."""
+
+    record: RunRecord
+    data: Json
+    lost: str = ""
+
+
+def gather(folder: Path) -> Material:
+    """Read the trace of *folder*, and its ``run.json`` if it has one. ``UsageError`` if there is no trace."""
+    with Reading(folder / TRACE_FILE) as reading:
+        attached = reading.attachments.get(WORLD_ATTACHMENT)
+        scenery: Scenery | None = scenery_from_json(attached.data) if attached else None
+        digest = Digest(reading.setup, scenery)
+        accounts = Accounts(reading.setup)
+        for event in reading.events():
+            digest(event)
+            accounts(event)
+    if (folder / RUN_FILE).exists():
+        record = read_record(folder)
+    else:
+        ending = reading.metadata.get(OUTCOME, {})
+        record = accounts.record(status_of(ending), ending.get("reason", "") or reading.lost)
+    return Material(record, digest.data(record.sim_s), reading.lost)
+
+
+def status_of(ending: Mapping[str, str]) -> Status:
+    """How a run ended, by what its trace says of it; one that was killed could not say it."""
+    known = (status for status in get_args(Status) if status == ending.get("status"))
+    return next(known, "unfinished")
+
+
+def write_report(folder: Path) -> Path:
+    """Write ``report.html`` into *folder* and say where it is. ``UsageError`` if that cannot be done."""
+    path = folder / REPORT_FILE
+    text = render(gather(folder))
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+    return path
+
+
+def environment() -> Environment:
+    """Where templates come from; everything they are given is escaped."""
+    return Environment(
+        loader=PackageLoader("volery.report"),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(material: Material) -> str:
+    """The document."""
+    record, data = material.record, material.data
+    states = _states(record)
+    return (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            title=record.system or "A run",
+            subtitle=_subtitle(record),
+            outcome=_outcome(record),
+            facts=_facts(record),
+            troubles=_troubles(record, material.lost),
+            requirements=requirements_grid(record),
+            moving=bool(data["vehicles"]),
+            computing=any(processor["components"] for processor in data["processors"]),
+            end=data["end"],
+            cost=cost_grid(record),
+            ros_calls=ros_calls_grid(record),
+            processors=processors_grid(record),
+            vehicles=vehicles_grid(record),
+            operations=operations_grid(record),
+            parcels=[_lane(name, parcel, states, record.sim_s) for name, parcel in record.parcels.items()],
+            states=[{"name": name, "colour": colour} for name, colour in states.items()],
+            ticks=_ticks(record.sim_s),
+            not_counted=record.not_counted,
+            warnings=record.warnings,
+            laws=laws_grid(record),
+            remarks=_remarks(data["remarks"]),
+            footer=_footer(record),
+            data=embedded(data),
+        )
+    )
+
+
+def embedded(data: Any) -> Markup:
+    """JSON that can stand within a script element: nothing in it can end the element."""
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def _subtitle(record: RunRecord) -> str:
+    named = (("allocation", record.allocation), ("scenario", record.scenario), ("fidelity", record.fidelity))
+    return " · ".join([*(f"{what} {name}" for what, name in named if name), f"seed {record.seed}"])
+
+
+def _outcome(record: RunRecord) -> Fact:
+    outcome = record.outcome
+    if outcome.status != "completed":
+        return Fact(outcome.status, outcome.reason, status="bad")
+    if outcome.requirements_met is None:
+        return Fact("completed", "no requirement was judged", status="warn")
+    if outcome.requirements_met:
+        return Fact("completed", "all requirements met", status="good")
+    missed = sum(1 for one in record.requirements.values() if one.met is False)
+    return Fact("completed", f"{missed} of {len(record.requirements)} requirements not met", status="bad")
+
+
+def _facts(record: RunRecord) -> list[Fact]:
+    facts = [Fact("simulated", moment(record.sim_s)[:-4], "h:mm:ss")]
+    if record.wall_s is not None:
+        speed = number(record.real_time_factor, 0, "× real time")
+        facts.append(Fact("it took", number(record.wall_s, 1, "s"), speed))
+    if record.parcels:
+        ended = [parcel.state for parcel in record.parcels.values()]
+        common = "delivered" if "delivered" in ended else max(ended, key=ended.count)
+        facts.append(Fact(f"parcels {common}", f"{ended.count(common)} of {len(ended)}"))
+    if record.vehicles:
+        flown = sum(one.distance_m for one in record.vehicles.values())
+        facts.append(
+            Fact("driven and flown", number(flown / 1000.0, 2, "km"), f"{len(record.vehicles)} vehicles")
+        )
+    computers = total([one.energy_j for one in record.processors.values()])
+    vehicles = total([one.energy_j for one in record.vehicles.values()])
+    if computers is not None:
+        facts.append(Fact("energy of computers", energy(computers)))
+    if vehicles is not None:
+        facts.append(Fact("energy of vehicles", energy(vehicles)))
+    misses = sum(one.deadline_misses for one in record.components.values())
+    if any(one.activations for one in record.components.values()):
+        facts.append(Fact("missed deadlines", str(misses), status="bad" if misses else ""))
+    return facts
+
+
+def _troubles(record: RunRecord, lost: str) -> list[str]:
+    said = [f"{moment(one.at_s)}  {one.who}: {one.what}" for one in record.failures]
+    if record.outcome.status != "completed" and record.outcome.reason != lost:
+        said.insert(0, f"{record.outcome.status}: {record.outcome.reason}")
+    return [*said, f"the trace: {lost}"] if lost else said
+
+
+def _states(record: RunRecord) -> dict[str, int]:
+    """A colour number for each state of parcels, in the order in which they first occur."""
+    names = dict.fromkeys(step.state for parcel in record.parcels.values() for step in parcel.history)
+    return {name: index % 8 + 1 for index, name in enumerate(names)}
+
+
+def _lane(name: str, parcel: ParcelRecord, states: dict[str, int], end: float) -> dict[str, Any]:
+    """One parcel as spans of a row that is 100 wide."""
+    steps = parcel.history
+    ends = [*(step.at_s for step in steps[1:]), max(end, steps[-1].at_s)]
+    whole = max(end, 1e-9)
+    spans = [
+        {
+            "left": 100.0 * step.at_s / whole,
+            "width": 100.0 * (until - step.at_s) / whole,
+            "colour": states[step.state],
+            "state": step.state,
+            "title": f"{step.state} until {moment(until)} by {step.component}  {step.detail}".strip(),
+        }
+        for step, until in zip(steps, ends, strict=True)
+    ]
+    history = Grid(
+        name,
+        (Column("at"), Column("state"), Column("by"), Column("detail")),
+        tuple(
+            (
+                Cell(moment(step.at_s)),
+                Cell(step.state),
+                Cell(step.component),
+                Cell(step.detail, status="quiet"),
+            )
+            for step in steps
+        ),
+    )
+    return {"name": name, "state": parcel.state, "spans": spans, "history": history}
+
+
+def _ticks(end: float) -> list[dict[str, Any]]:
+    steps = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200)
+    step = next((one for one in steps if end / one <= 8), 86400)
+    count = int(end // step) if end > 0 else 0
+    return [
+        {"left": 100.0 * index * step / end, "text": moment(index * step)[:-4]}
+        for index in range(count + 1)
+        if end
+    ]
+
+
+def _remarks(remarks: list[Json]) -> Grid:
+    statuses: dict[str, CellStatus] = {"failure": "bad", "refused": "bad", "warning": "warn"}
+    rows = tuple(
+        (
+            Cell(moment(remark["t"])),
+            Cell(remark["who"]),
+            Cell(remark["kind"], status=statuses.get(remark["kind"], "quiet")),
+            Cell(remark["what"]),
+        )
+        for remark in remarks
+    )
+    return Grid("Remarks", (Column("at"), Column("who"), Column("kind"), Column("what")), rows)
+
+
+def _footer(record: RunRecord) -> str:
+    made = [f"{name} {version}" for name, version in record.versions.items()]
+    return " · ".join(["volery: one model, simulated, priced and flown", *made])

@@ -1,0 +1,242 @@
+"""The documents of a run folder: from the trace alone, whole or cut, in one file, safe, small."""
+
+import json
+import re
+from html.parser import HTMLParser
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console, RenderableType
+
+from volery.base.errors import UsageError
+from volery.base.time import S
+from volery.report.comparison import compare, write_comparison
+from volery.report.document import gather, render, write_report
+from volery.report.recovery import recover
+from volery.report.terminal import comparison_table, cost_table, short_comparison, summary_table
+from volery.requirements.accounts import Accounts, Circumstances
+from volery.requirements.record import RunRecord, read_record, write_record
+from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.events import Event, Failure, Milestone, Text, VehicleState
+from volery.trace.mcap_writer import Attachment, McapWriter
+from volery.trace.scenery import scenery_to_json
+from volery.trace.setup import RunSetup
+
+_MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
+
+
+def make_run(folder: Path, megahertz: float = 1500.0, seconds: float = 120.0) -> RunRecord:
+    """A finished run folder, but for its report."""
+    folder.mkdir()
+    setup = sample_setup(onboard_mhz=megahertz)
+    accounts = Accounts(setup)
+    writer = McapWriter(folder / "trace.mcap", setup, [_MAP], lambda name: "string data\n")
+    for event in sample_events(seconds=seconds, onboard_mhz=megahertz):
+        accounts(event)
+        writer(event)
+    writer.outcome("completed", "")
+    writer.close()
+    record = accounts.record("completed", circumstances=Circumstances(2.0, {"volery": "0.1"}))
+    write_record(record, folder)
+    return record
+
+
+def small_run(folder: Path, *events: Event, setup: RunSetup | None = None) -> Path:
+    folder.mkdir()
+    writer = McapWriter(folder / "trace.mcap", setup or RunSetup())
+    for event in events:
+        writer(event)
+    writer.close()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The sample run at two frequencies."""
+    base = tmp_path_factory.mktemp("runs")
+    make_run(base / "one")
+    make_run(base / "two", 600.0)
+    return base / "one", base / "two"
+
+
+class _Tags(HTMLParser):
+    """Collects what a document refers to, and checks that elements are closed in order."""
+
+    void = frozenset({"meta", "link", "input", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.references: list[str] = []
+        self.scripts: list[dict[str, str | None]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.void:
+            self.open.append(tag)
+        if tag == "script":
+            self.scripts.append(dict(attrs))
+        self.references += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def parsed(html: str) -> _Tags:
+    tags = _Tags()
+    tags.feed(html)
+    assert tags.open == []
+    return tags
+
+
+def embedded(html: str) -> dict[str, object]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.DOTALL)
+    assert found
+    data: dict[str, object] = json.loads(found.group(1))
+    return data
+
+
+def shown(thing: RenderableType, width: int = 200) -> str:
+    console = Console(width=width, file=StringIO(), record=True)
+    console.print(thing)
+    return console.export_text()
+
+
+def test_one_file_that_asks_nothing_of_the_network(runs: tuple[Path, Path]) -> None:
+    html = write_report(runs[0]).read_text()
+    tags = parsed(html)
+    assert tags.references == ["data:,"]
+    assert "http://" not in html
+    assert "https://" not in html
+    assert "@import" not in html
+    assert "url(" not in html
+
+
+def test_says_what_was_asked_of_it(runs: tuple[Path, Path]) -> None:
+    html = render(gather(runs[1]))
+    for words in (
+        "hospital-delivery",
+        "1 of 3 requirements not met",
+        "drone_control is a Python node charged with figures of roscpp",
+        "operating system and ROS master",
+        "Arm: Battery below minimum",
+        "rpi4-cortex-a72",
+        "parcel_1",
+        "on rover_north",
+    ):
+        assert words in html
+    data = embedded(html)
+    assert data["end"] == pytest.approx(120.0, abs=0.2)
+    assert len(data["vehicles"]) == 4  # type: ignore[arg-type]
+
+
+def test_a_run_of_fifteen_minutes_stays_small(tmp_path: Path) -> None:
+    make_run(tmp_path / "long", seconds=900.0)
+    assert write_report(tmp_path / "long").stat().st_size < 5_000_000
+
+
+def test_words_of_others_cannot_break_out_of_the_page(tmp_path: Path) -> None:
+    evil = "</script><script>alert(1)</script><img src=x>"
+    folder = small_run(
+        tmp_path / "evil",
+        Text(0, evil, 3, evil),
+        Failure(1, evil, evil),
+        Milestone(2, evil, "parcel", evil, evil, evil),
+        setup=RunSetup(system=evil, warnings=(evil,), not_counted=(evil,)),
+    )
+    html = render(gather(folder))
+    tags = parsed(html)
+    assert len(tags.scripts) == 5
+    assert tags.references == ["data:,"]
+
+
+def test_an_empty_run_still_has_a_report(tmp_path: Path) -> None:
+    html = render(gather(small_run(tmp_path / "empty")))
+    parsed(html)
+    assert "A run" in html
+    assert 'id="map"' not in html
+
+
+def test_a_vehicle_without_a_map(tmp_path: Path) -> None:
+    still = VehicleState(S, "d", *[0.0] * 3, 1.0, *[0.0] * 6, *[float("nan")] * 5, 1.0, False, "HOLD")
+    html = render(gather(small_run(tmp_path / "bare", still)))
+    assert 'id="map"' in html
+    assert embedded(html)["scenery"] is None
+
+
+def test_a_folder_without_a_trace_is_a_usage_error(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"trace\.mcap"):
+        write_report(tmp_path)
+
+
+def test_a_killed_run_is_recovered_from_its_trace(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    whole = (runs[0] / "trace.mcap").read_bytes()
+    (tmp_path / "trace.mcap").write_bytes(whole[: 2 * len(whole) // 3])
+    found = recover(tmp_path)
+    assert found.record.outcome.status == "unfinished"
+    assert "never finished" in found.lost
+    assert found.record.wall_s is None
+    assert found.record.versions == {}
+    assert found.record.requirements["control"].met is True  # judged by what is there
+    assert found.record.components["drone_control"].processor == "onboard"
+    assert read_record(tmp_path) == found.record
+    assert "unfinished" in found.report.read_text()
+    timeline = json.loads((tmp_path / "timeline.json").read_text())
+    assert any(event["name"] == "drone_control" for event in timeline)
+
+
+def test_a_finished_run_that_lost_its_record(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    (tmp_path / "trace.mcap").write_bytes((runs[1] / "trace.mcap").read_bytes())
+    found = recover(tmp_path)
+    before = read_record(runs[1])
+    assert found.lost == ""
+    assert found.record.outcome == before.outcome
+    assert found.record.components == before.components
+    assert found.record.requirements == before.requirements
+
+
+def test_a_record_that_is_there_is_kept(runs: tuple[Path, Path]) -> None:
+    before = (runs[0] / "run.json").read_bytes()
+    assert recover(runs[0]).record.wall_s == 2.0
+    assert (runs[0] / "run.json").read_bytes() == before
+
+
+def test_runs_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    write_report(runs[0])
+    html = write_comparison(runs, tmp_path).read_text()
+    tags = parsed(html)
+    assert any(reference.endswith("one/report.html") for reference in tags.references)
+    for words in ("fast", "slow", "1 500", "600", "✗ not met", "drone_control"):
+        assert words in html.replace("\N{NO-BREAK SPACE}", " ")
+    text = shown(compare(runs).table)
+    assert "deadline misses" in text
+
+
+def test_one_run_cannot_be_compared(runs: tuple[Path, Path]) -> None:
+    with pytest.raises(UsageError, match="at least two"):
+        compare([runs[0]])
+
+
+def test_runs_of_the_same_allocation_go_by_their_folders(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    make_run(tmp_path / "again")
+    assert "again" in shown(compare([runs[0], tmp_path / "again"]).table)
+
+
+def test_tables_for_the_terminal(runs: tuple[Path, Path]) -> None:
+    records = [read_record(folder) for folder in runs]
+    text = shown(summary_table(records[1]))
+    for words in ("hospital-delivery", "not met", "drone_control", "not counted", "p95 ms", "60× real time"):
+        assert words in text
+    assert "fast" in shown(comparison_table(records))
+    assert "slow" in shown(short_comparison(records), 100)
+
+
+def test_a_narrow_terminal_drops_columns_but_never_digits(runs: tuple[Path, Path]) -> None:
+    record = read_record(runs[1])
+    wide, narrow = shown(cost_table(record), 160), shown(cost_table(record), 90)
+    misses = f"{record.components['drone_control'].deadline_misses:,}".replace(",", "\N{NO-BREAK SPACE}")
+    assert "language" in wide
+    assert "language" not in narrow
+    for text in (wide, narrow):
+        assert misses in text
+        assert "drone_control" in text
