@@ -55,13 +55,27 @@ def _register(into: Typestore, texts: dict[str, str]) -> None:
     parsed = {}
     for name, text in texts.items():
         try:
-            [parsed[name]] = get_types_from_msg(text, name).values()
+            # a service's halves read as messages, so that unqualified types are looked for among them
+            [parsed[name]] = get_types_from_msg(text, name.replace("/srv/", "/msg/")).values()
         except TypesysError as error:
             raise UsageError(f"{name}: not a ROS message definition: {error}") from error
+    for name, (_, fields) in parsed.items():
+        for label, what in fields:
+            inner = _inner_type(what)
+            if inner and inner not in parsed and inner not in into.fielddefs:
+                raise UsageError(f"{name}.{label}: no message type named {inner!r}; define it first")
     try:
         into.register(parsed)
     except TypesysError as error:
         raise UsageError(str(error)) from error
+
+
+def _inner_type(what: Any) -> str:
+    """The message type that a field is made of; empty for numbers and strings."""
+    kind, detail = what
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return _inner_type(detail[0])
+    return str(detail) if kind == Nodetype.NAME else ""
 
 
 def define(name: str, text: str) -> None:

@@ -14,7 +14,7 @@ from volery.faces.rospy import services, time, topics
 from volery.faces.rospy.errors import EXCEPTIONS
 from volery.faces.rospy.logging import LEVELS, loggers
 from volery.faces.rospy.session import Launch, Sessions
-from volery.graph import Graph
+from volery.graph import EmbeddedNode, Graph
 
 _BOUND = (
     topics.Publisher,
@@ -27,13 +27,17 @@ _BOUND = (
 )
 
 
-def modules(graph: Graph, launched: Mapping[str, Launch] | None = None) -> dict[str, ModuleType]:
+def modules(
+    graph: Graph,
+    launched: Mapping[str, Launch] | None = None,
+    nodes: Mapping[str, EmbeddedNode] | None = None,
+) -> dict[str, ModuleType]:
     """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
 
     *launched* says for each component what a launch file would (by the component's name, which names its
-    node then).
+    node then). *nodes* holds, by component, nodes that are there already: ``init_node`` finds its own there.
     """
-    sessions = Sessions(graph, launched or {})
+    sessions = Sessions(graph, launched or {}, nodes)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
         names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})

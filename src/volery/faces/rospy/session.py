@@ -113,10 +113,13 @@ def _in_words(error: Exception) -> str:
 class Sessions:
     """All components of one run that are nodes."""
 
-    def __init__(self, graph: Graph, launched: Mapping[str, Launch]) -> None:
+    def __init__(
+        self, graph: Graph, launched: Mapping[str, Launch], nodes: Mapping[str, EmbeddedNode] | None = None
+    ) -> None:
         self.graph = graph
         self.kernel = graph.kernel
         self._launched = launched
+        self._nodes = {} if nodes is None else nodes
         self._open: dict[str, Session] = {}
 
     def _component(self) -> str:
@@ -130,7 +133,7 @@ class Sessions:
         task = current_task(self.kernel)
         launch = self._launched.get(component, Launch())
         label = re.sub(r"\W", "_", component if component in self._launched else name)
-        node = self.graph.node(
+        node = self._nodes.get(component) or self.graph.node(
             label,
             launch.namespace,
             remaps=launch.remaps,

@@ -1,0 +1,178 @@
+import numpy as np
+import pytest
+
+from volery import messages
+from volery.base.errors import UsageError
+from volery.messages.store import store
+
+
+@pytest.mark.parametrize("name", messages.types())
+def test_every_type_starts_with_defaults_and_survives_its_bytes(name: str) -> None:
+    fresh = messages.new(name)
+    data = messages.to_cdr(fresh)
+    assert len(data) == messages.cdr_size(fresh)
+    assert messages.from_cdr(name, data) == fresh
+    assert fresh.copy() == fresh
+
+
+@pytest.mark.parametrize("name", messages.service_types())
+def test_every_service_has_a_request_and_a_response(name: str) -> None:
+    kind = messages.service(name)
+    for value in (kind.request(), kind.response()):
+        assert messages.from_cdr(value.__msgtype__, messages.to_cdr(value)) == value
+
+
+def test_both_spellings_of_a_name_are_one_class() -> None:
+    assert messages.message_class("std_msgs/String") is messages.message_class("std_msgs/msg/String")
+    assert messages.service("std_srvs/Trigger").name == "std_srvs/srv/Trigger"
+
+
+def test_a_string_has_the_bytes_of_ros_2() -> None:
+    assert messages.to_cdr(messages.new("std_msgs/String", data="hi")) == bytes.fromhex(
+        "00010000 03000000 686900"
+    )
+
+
+def test_nested_fields_may_be_given_as_dicts() -> None:
+    pose = messages.new(
+        "geometry_msgs/PoseStamped", pose={"position": {"x": 1.5}}, header={"frame_id": "map"}
+    )
+    assert (pose.pose.position.x, pose.pose.position.y, pose.header.frame_id) == (1.5, 0.0, "map")
+
+
+def test_defaults_are_fresh_for_each_message() -> None:
+    one, other = messages.new("geometry_msgs/PoseStamped"), messages.new("geometry_msgs/PoseStamped")
+    one.pose.position.x = 1.0
+    assert other.pose.position.x == 0.0
+
+
+def test_a_quaternion_starts_as_no_rotation() -> None:
+    assert messages.new("geometry_msgs/Quaternion").w == 1.0
+
+
+def test_a_copy_is_deep() -> None:
+    original = messages.new("mavros_msgs/RCIn", channels=[1500, 1600], header={"frame_id": "a"})
+    copied = original.copy()
+    original.channels[0] = 1000
+    original.header.frame_id = "b"
+    assert list(copied.channels) == [1500, 1600]
+    assert copied.channels.dtype == np.uint16
+    assert copied.header.frame_id == "a"
+
+
+def test_constants_are_attributes_of_the_class() -> None:
+    assert messages.message_class("mavros_msgs/PositionTarget").FRAME_BODY_NED == 8
+    assert messages.message_class("mavros_msgs/OverrideRCIn").CHAN_NOCHANGE == 65535
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (
+            lambda: messages.new("std_msgs/Strin"),
+            ["std_msgs/msg/Strin", "did you mean 'std_msgs/msg/String'"],
+        ),
+        (lambda: messages.new("no_msgs/Thing"), ["no_msgs/msg/Thing"]),
+        (
+            lambda: messages.new("std_msgs/String", dat="x"),
+            ["std_msgs/msg/String", "dat", "did you mean 'data'"],
+        ),
+        (lambda: messages.service("std_srvs/Triger"), ["did you mean 'std_srvs/srv/Trigger'"]),
+        (lambda: messages.to_cdr(messages.new("std_msgs/String", data=1)), ["data is 1", "string"]),
+        (
+            lambda: messages.to_cdr(messages.new("mavros_msgs/State", system_status=300)),
+            ["system_status is 300"],
+        ),
+        (
+            lambda: messages.to_cdr(messages.new("geometry_msgs/PoseStamped", pose=3)),
+            ["pose is 3", "geometry_msgs/msg/Pose"],
+        ),
+        (
+            lambda: messages.new("sensor_msgs/NavSatFix", position_covariance=[1.0]).copy(),
+            ["position_covariance", "9 values"],
+        ),
+        (lambda: messages.new("mavros_msgs/RCIn", channels=[[1], [2]]).copy(), ["channels"]),
+        (lambda: messages.from_cdr("std_msgs/String", b"abc"), ["std_msgs/msg/String", "3 bytes"]),
+        (lambda: messages.define("std_msgs/String", "string data"), ["package/msg/Name"]),
+        (lambda: messages.define("std_msgs/msg/String", "int32 data"), ["std_msgs/msg/String"]),
+        (lambda: messages.define("my_msgs/msg/Broken", "what is this"), ["my_msgs/msg/Broken"]),
+        (lambda: messages.define("my_msgs/srv/Broken", "int32 a"), ["---"]),
+    ],
+)
+def test_errors_name_the_offender(fault: object, words: list[str]) -> None:
+    with pytest.raises(UsageError) as raised:
+        fault()  # type: ignore[operator]
+    for word in words:
+        assert word in str(raised.value)
+
+
+def test_own_types_can_be_defined() -> None:
+    messages.define("parcel_msgs/msg/Parcel", "uint32 FRAGILE=1\nstring good\nuint32 flags\n")
+    messages.define("parcel_msgs/srv/Order", "Parcel parcel\n---\nbool accepted\n")
+    kind = messages.service("parcel_msgs/Order")
+    asked = kind.request(messages.new("parcel_msgs/Parcel", good="blood", flags=1))
+    assert messages.from_cdr(asked.__msgtype__, messages.to_cdr(asked)).parcel.good == "blood"
+
+
+def test_a_definition_holds_the_types_it_is_made_of() -> None:
+    text = messages.definition("sensor_msgs/NavSatFix")
+    assert "float64[9] position_covariance" in text
+    assert "MSG: std_msgs/Header" in text
+    assert "MSG: builtin_interfaces/Time" in text
+
+
+FINGERPRINTS = {
+    "mavros_msgs/msg/State": "11ba7686163d22281871f1cb42557e8957407469b0be813bdb1a8922c66e3131",
+    "mavros_msgs/msg/PositionTarget": "594c39cea4484f1cb007adf04b29a78bae77f29358c974ea5e849542ed168303",
+    "mavros_msgs/msg/GlobalPositionTarget": "0c324666a1e5fb904d7ad3f6ad862e83d6b9dd5d0937afe2a62fd972f3607a69",
+    "mavros_msgs/msg/Waypoint": "1c0e12bd70ab8a12a5d6f2e6f9d9bb3aea0860d02bccc30ca8d9d6f5f4f30b94",
+    "mavros_msgs/msg/OverrideRCIn": "e2fe61f060e059d9d2e0b4ed38d5779d88a365969d7d270e5e934c72c3637631",
+    "geographic_msgs/msg/GeoPoseStamped": "a8e603c050fa992a74283bb462a96fe9d2b151b7a67b14d77250ed7cb4ed96b7",
+}
+"""ROS 2's type hashes (REP-2011) of the definitions of mavros_msgs 2 and geographic_msgs: what peers compare."""
+
+
+@pytest.mark.parametrize(("name", "fingerprint"), FINGERPRINTS.items())
+def test_definitions_are_those_of_ros(name: str, fingerprint: str) -> None:
+    assert store().hash_rihs01(name) == f"RIHS01_{fingerprint}"
+
+
+def test_times_reckon() -> None:
+    time = messages.message_class("builtin_interfaces/Time")
+    duration = messages.message_class("builtin_interfaces/Duration")
+    later, earlier = time(5, 900_000_000), time(3, 0)
+    assert later - earlier == duration(2, 900_000_000)
+    assert earlier - later == duration(-3, 100_000_000)
+    assert (earlier - later).to_sec() == -2.9
+    assert later + duration(1, 200_000_000) == time(7, 100_000_000)
+    assert duration(1, 0) + earlier == time(4, 0)
+    assert later > earlier
+    assert duration(3, 0) / duration(2, 0) == 1.5
+    assert 2 * duration(1, 600_000_000) == duration(3, 200_000_000)
+    assert -duration(0, 500_000_000) == duration(-1, 500_000_000)
+    assert abs(-duration(0, 500_000_000)) == duration(0, 500_000_000)
+    assert not duration()
+    with pytest.raises(TypeError):
+        later + earlier
+    with pytest.raises(TypeError):
+        duration(1, 0) - later
+
+
+def test_ros_1_spelling_of_stamps_and_headers() -> None:
+    header = messages.new("std_msgs/Header", stamp={"sec": 1, "nanosec": 2})
+    assert (header.stamp.secs, header.stamp.nsecs, header.stamp.to_nsec()) == (1, 2, 1_000_000_002)
+    header.stamp.secs = 3
+    header.seq = 7
+    assert (header.stamp.sec, header.seq) == (3, 0)
+    assert messages.from_cdr("std_msgs/Header", messages.to_cdr(header)).stamp.sec == 3
+
+
+def test_packages_are_importable_modules() -> None:
+    modules = messages.modules()
+    assert modules["std_msgs.msg"].String("x").data == "x"
+    assert modules["std_msgs"].msg is modules["std_msgs.msg"]
+    assert modules["std_srvs.srv"].TriggerResponse(success=True).success
+    assert modules["mavros_msgs.srv"].SetMode.Request(custom_mode="GUIDED").custom_mode == "GUIDED"
+    assert modules["mavros_msgs.msg"].VFR_HUD is messages.message_class("mavros_msgs/VfrHud")
+    with pytest.raises(AttributeError, match=r"std_msgs\.msg has no 'Strng'.*did you mean 'String'"):
+        _ = modules["std_msgs.msg"].Strng
