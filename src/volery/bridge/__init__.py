@@ -5,6 +5,6 @@ no more: it waits for nothing to be done and repeats no command. It must not kno
 autopilots or drivers.
 """
 
-from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions
+from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions, serve_vehicle
 
-__all__ = ["VehicleNode", "VehicleNodeOptions"]
+__all__ = ["VehicleNode", "VehicleNodeOptions", "serve_vehicle"]

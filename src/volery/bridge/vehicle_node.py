@@ -194,6 +194,15 @@ class VehicleNode:
         self.wire.send_to("COMMAND_LONG", {"command": command, **fields})
 
 
+def serve_vehicle(
+    graph: Graph, link: Link, name: str, place: Place, options: VehicleNodeOptions = VehicleNodeOptions()
+) -> VehicleNode:
+    """Serve the autopilot behind *link* under ``/name`` until the run ends, computing at *place*."""
+    served = VehicleNode(graph, link, f"/{name}", options)
+    served.start(place, graph.kernel.root)
+    return served
+
+
 _SHOWN_BY = {
     1: "RAW_IMU",
     2: "SYS_STATUS",
