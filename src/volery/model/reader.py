@@ -57,17 +57,18 @@ def load(
     return _resolve(Context(form, vocabulary, problems, file.parent), made, options)
 
 
-def check(path: str | Path, vocabulary: Vocabulary) -> System:
+def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
     """Read the model with each of its allocations and each of its scenarios; return it as it stands.
 
     Raises what ``load`` raises, for all of them together.
     """
-    system = load(path, vocabulary)
+    options = tuple(overrides)
+    system = load(path, vocabulary, overrides=options)
     found: dict[str, ModelError] = {}
     variants = [(None, name) for name in system.allocations] + [(name, None) for name in system.scenarios]
     for scenario, allocation in variants:
         try:
-            load(path, vocabulary, scenario, allocation)
+            load(path, vocabulary, scenario, allocation, options)
         except CollectedModelError as several:
             found |= {str(error): error for error in several.errors}
         except ModelError as error:

@@ -69,11 +69,16 @@ def _instance(
     if not context.known((*path, "is"), form.component, "component", surroundings.components):
         return None
     component = surroundings.components[form.component]
+    settings = _merged(component.parameters, form.parameters)
+    for name in settings:
+        if name in component.requires:
+            what = f"{name!r} is a required port of {component.name}; a parameter needs another name"
+            context.problems.add((*path, "parameters", name), what)
     return Instance(
         name=str(path[-1]),
         component=component,
         connections=_connections(surroundings, path, form, component),
-        parameters=_merged(component.parameters, form.parameters),
+        parameters=settings,
         activity=_activity(component.activity, form),
         processor=processor,
         namespace=form.namespace,

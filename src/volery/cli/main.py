@@ -1,0 +1,219 @@
+"""``volery``: the commands and their options."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.console import Output
+from volery.cli.endings import FAILED, run_command
+
+app = typer.Typer(
+    help="Model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+model_app = typer.Typer(help="Look at a model without running it.", no_args_is_help=True)
+app.add_typer(model_app, name="model")
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but what is wrong.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+Seed = Annotated[int, typer.Option(help="Seeds every random stream of the run.")]
+Out = Annotated[Path | None, typer.Option(help="The run folder; by default a new one in ./runs.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the model; may be repeated."),
+]
+Fidelity = Annotated[
+    str,
+    typer.Option(metavar="times|code", help="Stated times, or the cost of the components' own code."),
+]
+Listen = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="tcp://HOST:PORT or udp://:PORT; without it, send to UDP 14550."),
+]
+Scenario = Annotated[str | None, typer.Option(help="A scenario of the model.")]
+Allocation = Annotated[str | None, typer.Option(help="An allocation of the model; by default its first.")]
+Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a model.yaml.")]
+
+
+def version(wanted: bool) -> None:
+    """Print the version and stop."""
+    if wanted:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"volery {installed('volery')}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers."""
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Where the run folders go.")] = Path("runs/demo"),
+    seed: Seed = 7,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Three parcels across a city, on two allocations side by side, and a report."""
+    from volery.cli import demo as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.demo(output, out, seed))
+
+
+@app.command()
+def new(
+    folder: Annotated[Path, typer.Argument(help="The folder to make.")],
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Make a small model that runs, to start from."""
+    from volery.cli import new as command
+
+    output = Output(quiet, False, debug)
+    run_command(output, lambda: command.new(output, folder))
+
+
+@app.command()
+def doctor(as_json: Json = False, debug: Debug = False) -> None:
+    """What is installed, what each missing part would enable, and how to get it."""
+    from volery.cli import doctor as command
+
+    output = Output(False, as_json, debug)
+    run_command(output, lambda: command.doctor(output))
+
+
+@app.command()
+def simulate(
+    model: Model,
+    fidelity: Fidelity = "code",
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    seed: Seed = 1,
+    overrides: Overrides = None,
+    speed: Annotated[str, typer.Option(help="Simulated seconds per second: max, 1, 10 ...")] = "max",
+    out: Out = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run a model in virtual time and judge its requirements.
+
+    Exit status: 0 if it completed and met every requirement, 2 for bad input, 1 otherwise.
+    """
+    from volery.cli import simulate as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(model, fidelity, allocation, scenario, seed, tuple(overrides or ()), speed, out)
+    run_command(output, lambda: command.simulate(output, wanted))
+
+
+@app.command()
+def fly(
+    mission: Annotated[Path, typer.Argument(help="A Python file with `def mission(drone: Drone)`.")],
+    on: Annotated[str, typer.Option(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...")],
+    seed: Seed = 1,
+    speed: Annotated[str, typer.Option(help="Of a simulated vehicle: max, 1, 10 ...")] = "max",
+    out: Out = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Fly a mission on a simulated or a real vehicle: the same file for each."""
+    from volery.cli import fly as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(mission, on, seed, speed, out)
+    run_command(output, lambda: command.fly(output, wanted))
+
+
+@app.command()
+def vehicle(
+    autopilot: Annotated[str, typer.Argument(help="Which autopilot to simulate.")] = "ardupilot",
+    listen: Listen = None,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per second.")] = 1.0,
+    home: Annotated[
+        str | None, typer.Option(metavar="LAT,LON,AMSL", help="Where it stands: degrees, metres.")
+    ] = None,
+    kind: Annotated[str, typer.Option(help="multirotor or rover.")] = "multirotor",
+    sensors: Annotated[str, typer.Option(help="consumer or rtk.")] = "consumer",
+    seed: Seed = 1,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Serve one simulated vehicle to ground stations, MAVSDK, MAVProxy or a script, until Ctrl-C."""
+    from volery.cli import vehicle as command
+
+    output = Output(quiet, False, debug)
+    wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed)
+    run_command(output, lambda: command.vehicle(output, wanted))
+
+
+@model_app.command("check")
+def model_check(
+    model: Model,
+    overrides: Overrides = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Check a model with each of its allocations and scenarios."""
+    from volery.cli import model as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.check(output, model, tuple(overrides or ())))
+
+
+@model_app.command("schema")
+def model_schema() -> None:
+    """Print the JSON Schema of models: give it to your editor."""
+    from volery.cli import model as command
+
+    output = Output(False, True, False)
+    run_command(output, lambda: command.print_schema(output))
+
+
+@model_app.command("observables")
+def model_observables(as_json: Json = False) -> None:
+    """List what requirements may bound."""
+    from volery.cli import model as command
+
+    output = Output(False, as_json, False)
+    run_command(output, lambda: command.print_observables(output))
+
+
+@app.command()
+def report(
+    folders: Annotated[list[Path], typer.Argument(help="A run folder; several are compared.")],
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Write the report of a run again, from its trace, even of a run that was killed; compare several."""
+    from volery.cli import report as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.report(output, folders))
+
+
+def main() -> None:
+    """The entry point."""
+    try:
+        app(prog_name="volery")
+    except ImportError as error:
+        Output().complain(f"volery: a part is missing: {error}; `volery doctor` says how to get it")
+        sys.exit(FAILED)

@@ -1,0 +1,105 @@
+"""``volery model``: check, schema, observables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from volery.base.errors import choices
+from volery.cli.console import Output
+from volery.cli.endings import OK
+from volery.model.reader import check as check_model
+from volery.model.readiness import gaps
+from volery.model.schema import schema
+from volery.model.system import Instance, System
+from volery.requirements.observables import OBSERVABLES
+from volery.run.vocabulary import vocabulary
+
+FIDELITIES = ("times", "code")
+
+
+def check(output: Output, model: Path, overrides: tuple[str, ...]) -> int:
+    """Check *model* in every variant; what is wrong is raised."""
+    words = vocabulary()
+    system = check_model(model, words, overrides)
+    missing = {fidelity: [str(gap) for gap in gaps(system, fidelity, words)] for fidelity in FIDELITIES}
+    output.show(_summary(system), _instances(system), *_readiness(missing))
+    output.give(
+        {
+            "name": system.name,
+            "allocations": list(system.allocations),
+            "scenarios": list(system.scenarios),
+            "instances": {one.name: one.component.name for one in system.instances},
+            "requirements": [one.name for one in system.requirements],
+            "missing": missing,
+        }
+    )
+    return OK
+
+
+def _summary(system: System) -> Text:
+    line = Text(system.name, style="bold")
+    line.append("  is a valid model", style="green")
+    allocations = choices(system.allocations).replace(" or ", " and ")
+    scenarios = choices(system.scenarios).replace(" or ", " and ")
+    line.append(f"  allocations: {allocations}  scenarios: {scenarios}", style="dim")
+    return line
+
+
+def _instances(system: System) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in (
+        "instance",
+        "component",
+        "language",
+        f"runs on ({system.allocation or 'nowhere'})",
+        "connected to",
+    ):
+        table.add_column(title)
+    for one in system.instances:
+        where = one.processor or "environment"
+        table.add_row(one.name, one.component.name, one.component.language, where, ", ".join(_targets(one)))
+    for vehicle in system.vehicles:
+        node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
+        table.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
+    return table
+
+
+def _targets(instance: Instance) -> Iterable[str]:
+    for connection in instance.connections.values():
+        for target in connection.targets:
+            yield str(target)
+
+
+def _readiness(missing: dict[str, list[str]]) -> Iterable[Text]:
+    for fidelity, found in missing.items():
+        if not found:
+            yield Text(f"✓ ready for fidelity {fidelity}", style="green")
+            continue
+        yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
+        for gap in found:
+            yield Text(f"    {gap}", style="dim")
+
+
+def print_schema(output: Output) -> int:
+    """The JSON Schema on standard output."""
+    output.give(schema())
+    return OK
+
+
+def print_observables(output: Output) -> int:
+    """The published list."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("observe", "unit", "what it is"):
+        table.add_column(title)
+    for one in OBSERVABLES:
+        subject = "application" if one.subject == "application" else f"<{one.subject}>"
+        table.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
+    output.show(table)
+    output.give([asdict(one) for one in OBSERVABLES])
+    return OK

@@ -1,0 +1,71 @@
+"""What a run says while it goes on: simulated time, speed, what the vehicles do, where the parcels are."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from volery.base.time import clock, to_seconds
+from volery.cli.console import Output
+
+if TYPE_CHECKING:
+    from volery.run.progress import Progress
+
+BETWEEN_S = 0.1
+"""Wall seconds between two pictures: drawing takes longer than a simulated second."""
+
+
+class Display:
+    """The picture of a run under way."""
+
+    def __init__(self, title: str, live: Live) -> None:
+        self._title = title
+        self._live = live
+        self._started = time.monotonic()
+        self._drawn = 0.0
+
+    def __call__(self, progress: Progress) -> None:
+        """Draw, unless it was drawn a moment ago."""
+        now = time.monotonic()
+        if now - self._drawn >= BETWEEN_S:
+            self._drawn = now
+            self._live.update(picture(self._title, progress, now - self._started))
+
+
+def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
+    """One line about the run and one for each vehicle."""
+    simulated = to_seconds(progress.now)
+    line = Text(f"{title}  ", style="bold")
+    line.append(clock(progress.now)[:-4], style="cyan")
+    if wall_s > 0.0:
+        line.append(f"  {simulated / wall_s:,.0f}× real time", style="dim")
+    parcels = ", ".join(f"{count} {state}" for state, count in progress.parcels.items())
+    line.append(f"  {parcels}" if parcels else "")
+    bar = ProgressBar(total=max(progress.limit, 1), completed=progress.now, width=40)
+    return Group(line, bar, _vehicles(progress))
+
+
+def _vehicles(progress: Progress) -> Table:
+    table = Table.grid(padding=(0, 2))
+    for one in progress.vehicles:
+        doing = f"{one.height:.1f} m" if one.armed else "on the ground"
+        table.add_row(f"  {one.name}", one.mode, "armed" if one.armed else "", doing)
+    return table
+
+
+@contextmanager
+def shown(output: Output, title: str) -> Iterator[Callable[[Progress], None] | None]:
+    """What a run is to call; ``None`` where nobody watches."""
+    if not output.shows_progress:
+        yield None
+        return
+    with Live(console=output.notes, transient=True, refresh_per_second=8) as live:
+        yield Display(title, live)

@@ -1,0 +1,73 @@
+"""``volery simulate``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.base.errors import UsageError
+from volery.cli.console import Output
+from volery.cli.endings import FAILED, OK
+from volery.cli.folders import next_folder
+from volery.cli.progress import shown
+from volery.model.reader import load
+from volery.report.terminal import summary_table
+from volery.run.result import Run
+from volery.run.simulate import Options
+from volery.run.simulate import simulate as run_simulation
+from volery.run.vocabulary import vocabulary
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for."""
+
+    model: Path
+    fidelity: str
+    allocation: str | None
+    scenario: str | None
+    seed: int
+    overrides: tuple[str, ...]
+    speed: str
+    out: Path | None
+
+
+def simulate(output: Output, wanted: Wanted) -> int:
+    """Run it, show the result; the exit status."""
+    pace = pace_of(wanted.speed)
+    system = load(wanted.model, vocabulary(), wanted.scenario, wanted.allocation, wanted.overrides)
+    folder = wanted.out or next_folder(system.name)
+    with shown(output, " · ".join(filter(None, (system.name, system.allocation, system.scenario)))) as show:
+        run = run_simulation(system, Options(wanted.fidelity, wanted.seed, pace, folder, show))
+    return tell(output, run)
+
+
+def pace_of(speed: str) -> float | None:
+    """Simulated seconds per second; ``None`` for as fast as it goes."""
+    if speed == "max":
+        return None
+    try:
+        pace = float(speed)
+    except ValueError:
+        pace = 0.0
+    if not 0.0 < pace < float("inf"):
+        raise UsageError(f"--speed {speed}: max, or how many simulated seconds per second, such as 1 or 10")
+    return pace
+
+
+def tell(output: Output, run: Run) -> int:
+    """Show a run that has ended, say where it is kept; the exit status."""
+    output.show(summary_table(run.record))
+    output.give(run.record.model_dump_json(by_alias=True, indent=2))
+    if run.folder is not None:
+        report = run.folder / "report.html"
+        output.note(f"{'report: ' + str(report) if report.exists() else 'run folder: ' + str(run.folder)}")
+    if run.error is not None:
+        output.complain(f"volery: {run.error}")
+    elif not run.completed:
+        output.complain(f"volery: {run.record.outcome.status}: {run.record.outcome.reason}")
+    for problem in run.problems:
+        output.complain(f"volery: {problem}")
+    for name in run.left:
+        output.complain(f"volery: {name} did not end when it was told to")
+    return OK if run.ok else FAILED
