@@ -35,10 +35,17 @@ from volery.world.columns import (
     U_PAYLOAD,
     U_THROTTLE,
     U_WIND,
+    W_AIR,
+    W_BEFORE,
+    W_GROUND,
+    W_ROTATION,
+    W_SLOPE,
+    W_THROTTLE,
+    W_TOTAL,
+    W_Y,
     Advance,
     Array,
     Bodies,
-    Work,
 )
 from volery.world.compiled import digest_of, world_sources
 from volery.world.multirotor import (
@@ -60,188 +67,163 @@ _LIGHT = 0.7  # of its weight: a body whose rotors lift less than this stays whe
 
 
 @njit(cache=False)
-def new_work() -> Work:
-    """Scratch for one compiled call."""
-    return Work(
-        np.zeros(INTEGRATED),
-        np.zeros(INTEGRATED),
-        np.zeros(INTEGRATED),
-        np.zeros((3, 3)),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(1),
-        np.zeros(4),
-        np.zeros(3),
-        np.zeros((3, 3)),
-        np.zeros(3),
-    )
-
-
-@njit(cache=False)
-def _slope(flying: bool, inputs: Array, parameters: Array, work: Work, resting: bool) -> None:
+def _slope(row: Array, flying: bool, resting: bool) -> None:
     if flying:
-        multirotor_slope(work.y, inputs, parameters, work, resting)
+        multirotor_slope(row, resting)
     else:
-        rover_slope(work.y, inputs, parameters, work, resting)
+        rover_slope(row, resting)
 
 
 @njit(cache=False)
-def _integrate(flying: bool, state: Array, inputs: Array, parameters: Array, work: Work) -> None:
+def _integrate(row: Array, flying: bool) -> None:
     """The classical fourth-order Runge-Kutta step (Kutta 1901) of the integrated columns."""
-    resting = state[S_RESTING] > 0.5
-    y, slope, total = work.y, work.slope, work.total
+    resting = row[S_RESTING] > 0.5
     for i in range(INTEGRATED):
-        y[i] = state[i]
-    _slope(flying, inputs, parameters, work, resting)
+        row[W_Y + i] = row[i]
+    _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        total[i] = slope[i]
-        y[i] = state[i] + 0.5 * STEP_S * slope[i]
-    _slope(flying, inputs, parameters, work, resting)
+        row[W_TOTAL + i] = row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        total[i] += 2.0 * slope[i]
-        y[i] = state[i] + 0.5 * STEP_S * slope[i]
-    _slope(flying, inputs, parameters, work, resting)
+        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        total[i] += 2.0 * slope[i]
-        y[i] = state[i] + STEP_S * slope[i]
-    _slope(flying, inputs, parameters, work, resting)
+        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        state[i] += STEP_S / 6.0 * (total[i] + slope[i])
+        row[i] += STEP_S / 6.0 * (row[W_TOTAL + i] + row[W_SLOPE + i])
 
 
 @njit(cache=False)
-def _normalise(state: Array) -> None:
+def _normalise(row: Array) -> None:
     square = 0.0
     for i in range(4):
-        square += state[S_ATTITUDE + i] * state[S_ATTITUDE + i]
+        square += row[S_ATTITUDE + i] * row[S_ATTITUDE + i]
     norm = sqrt(square)
     for i in range(4):
-        state[S_ATTITUDE + i] /= norm
+        row[S_ATTITUDE + i] /= norm
 
 
 @njit(cache=False)
-def _touches(state: Array, parameters: Array, rotation: Array) -> bool:
+def _touches(row: Array) -> bool:
     lowest = (
-        parameters[P_FEET] * abs(rotation[2, 0])
-        + parameters[P_FEET + 1] * abs(rotation[2, 1])
-        + parameters[P_FEET + 2] * rotation[2, 2]
+        row[P_FEET] * abs(row[W_ROTATION + 6])
+        + row[P_FEET + 1] * abs(row[W_ROTATION + 7])
+        + row[P_FEET + 2] * row[W_ROTATION + 8]
     )
-    touching: bool = state[S_POSITION + 2] - lowest < state[S_GROUND]
+    touching: bool = row[S_POSITION + 2] - lowest < row[S_GROUND]
     return touching
 
 
 @njit(cache=False)
-def _settle_flyer(state: Array, parameters: Array, work: Work) -> None:
+def _settle_flyer(row: Array) -> None:
     """Contact, rest and power at the end of a multirotor's step."""
-    touching = _touches(state, parameters, work.rotation)
-    if touching and state[S_ON_GROUND] == 0.0:
-        state[S_CONTACT_SPEED] = max(0.0, -work.before[2])
-        state[S_CONTACTS] += 1.0
-    state[S_ON_GROUND] = 1.0 if touching else 0.0
-    light = lift(state, parameters) < _LIGHT * parameters[P_MASS] * parameters[P_GRAVITY]
+    touching = _touches(row)
+    if touching and row[S_ON_GROUND] == 0.0:
+        row[S_CONTACT_SPEED] = max(0.0, -row[W_BEFORE + 2])
+        row[S_CONTACTS] += 1.0
+    row[S_ON_GROUND] = 1.0 if touching else 0.0
+    light = lift(row) < _LIGHT * row[P_MASS] * row[P_GRAVITY]
     speed = 0.0
     spin = 0.0
     for axis in range(3):
-        speed = max(speed, abs(state[S_VELOCITY + axis]))
-        spin = max(spin, abs(state[S_RATES + axis]))
-    still = state[S_RESTING] > 0.5 or (speed < _STILL_SPEED and spin < _STILL_RATE)
+        speed = max(speed, abs(row[S_VELOCITY + axis]))
+        spin = max(spin, abs(row[S_RATES + axis]))
+    still = row[S_RESTING] > 0.5 or (speed < _STILL_SPEED and spin < _STILL_RATE)
     resting = touching and light and still
-    state[S_RESTING] = 1.0 if resting else 0.0
+    row[S_RESTING] = 1.0 if resting else 0.0
     if resting:
         for axis in range(3):
-            state[S_VELOCITY + axis] = 0.0
-            state[S_RATES + axis] = 0.0
+            row[S_VELOCITY + axis] = 0.0
+            row[S_RATES + axis] = 0.0
 
 
 @njit(cache=False)
-def _settle_rover(state: Array, parameters: Array, work: Work, height_before: float) -> None:
+def _settle_rover(row: Array, height_before: float) -> None:
     """Height, velocity and rest at the end of a rover's step."""
-    climb = (state[S_GROUND] - height_before) / STEP_S
-    state[S_ON_GROUND] = 1.0
-    resting = work.throttle[1] == 0.0 and work.throttle[0] == 0.0 and abs(state[S_SPEED]) < 0.01
-    state[S_RESTING] = 1.0 if resting else 0.0
+    climb = (row[S_GROUND] - height_before) / STEP_S
+    row[S_ON_GROUND] = 1.0
+    resting = row[W_THROTTLE + 1] == 0.0 and row[W_THROTTLE] == 0.0 and abs(row[S_SPEED]) < 0.01
+    row[S_RESTING] = 1.0 if resting else 0.0
     if resting:
-        state[S_SPEED] = 0.0
+        row[S_SPEED] = 0.0
         climb = 0.0
-    follow_ground(state, parameters, state[S_GROUND], climb)
+    follow_ground(row, row[S_GROUND], climb)
 
 
 @njit(cache=False)
-def _felt(state: Array, parameters: Array, work: Work) -> None:
+def _felt(row: Array) -> None:
     """The step's mean specific force in body axes, and the way gone."""
-    rotation, before = work.rotation, work.before
-    ae = (state[S_VELOCITY] - before[0]) / STEP_S
-    an = (state[S_VELOCITY + 1] - before[1]) / STEP_S
-    au = (state[S_VELOCITY + 2] - before[2]) / STEP_S + parameters[P_GRAVITY]
+    ae = (row[S_VELOCITY] - row[W_BEFORE]) / STEP_S
+    an = (row[S_VELOCITY + 1] - row[W_BEFORE + 1]) / STEP_S
+    au = (row[S_VELOCITY + 2] - row[W_BEFORE + 2]) / STEP_S + row[P_GRAVITY]
     for axis in range(3):
-        state[S_FORCE + axis] = rotation[0, axis] * ae + rotation[1, axis] * an + rotation[2, axis] * au
+        row[S_FORCE + axis] = (
+            row[W_ROTATION + axis] * ae + row[W_ROTATION + 3 + axis] * an + row[W_ROTATION + 6 + axis] * au
+        )
     square = 0.0
     for axis in range(3):
-        square += state[S_VELOCITY + axis] * state[S_VELOCITY + axis]
-    state[S_DISTANCE] += sqrt(square) * STEP_S
+        square += row[S_VELOCITY + axis] * row[S_VELOCITY + axis]
+    row[S_DISTANCE] += sqrt(square) * STEP_S
 
 
 @njit(cache=False)
-def _power(flying: bool, state: Array, inputs: Array, parameters: Array, work: Work) -> None:
-    if flying:
-        power = electrical_power(state, inputs, parameters)
-    else:
-        power = electrical_rover(state, inputs, parameters, work)
-    volts, amps = volts_amps(state, parameters, power)
-    state[S_VOLTS] = volts
-    state[S_AMPS] = amps
-    state[S_PAYLOAD_ENERGY] += inputs[U_PAYLOAD] * STEP_S
+def _power(row: Array, flying: bool) -> None:
+    power = electrical_power(row, 0) if flying else electrical_rover(row)
+    volts, amps = volts_amps(row, 0, power)
+    row[S_VOLTS] = volts
+    row[S_AMPS] = amps
+    row[S_PAYLOAD_ENERGY] += row[U_PAYLOAD] * STEP_S
 
 
 @njit(cache=False)
-def electrical_rover(state: Array, inputs: Array, parameters: Array, work: Work) -> float:
+def electrical_rover(row: Array) -> float:
     """Watts drawn at a rover's battery."""
-    drive = drive_power(state[S_SPEED], work.slope[S_SPEED], parameters)
-    power: float = drive + parameters[P_IDLE_POWER] + inputs[U_PAYLOAD]
+    drive = drive_power(row, row[S_SPEED], row[W_SLOPE + S_SPEED])
+    power: float = drive + row[P_IDLE_POWER] + row[U_PAYLOAD]
     return power
 
 
 @njit(cache=False)
-def step_body(bodies: Bodies, body: int, work: Work) -> None:
-    """Advance one body from its grid step to the next under ``work.throttle``, and take the samples due
-    there.
-    """
-    state, inputs, parameters = bodies.state[body], bodies.inputs[body], bodies.parameters[body]
-    flying = parameters[P_KIND] == MULTIROTOR
+def step_body(bodies: Bodies, body: int, row: Array) -> None:
+    """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples."""
+    key = bodies.keys[body]
+    flying = row[P_KIND] == MULTIROTOR
     for axis in range(3):
-        work.before[axis] = state[S_VELOCITY + axis]
-        work.air[axis] = inputs[U_WIND + axis] + state[S_GUST + axis]
-    work.ground[0] = state[S_GROUND]
-    _integrate(flying, state, inputs, parameters, work)
-    height_before = state[S_POSITION + 2]
-    state[S_GROUND] = ground_height(bodies.heights, bodies.grid, state[S_POSITION], state[S_POSITION + 1])
+        row[W_BEFORE + axis] = row[S_VELOCITY + axis]
+        row[W_AIR + axis] = row[U_WIND + axis] + row[S_GUST + axis]
+    row[W_GROUND] = row[S_GROUND]
+    _integrate(row, flying)
+    height_before = row[S_POSITION + 2]
+    row[S_GROUND] = ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1])
     if flying:
-        _normalise(state)
-        rotation_matrix(state, work.rotation)
-        _settle_flyer(state, parameters, work)
+        _normalise(row)
+        rotation_matrix(row, 0)
+        _settle_flyer(row)
     else:
-        _settle_rover(state, parameters, work, height_before)
-        rotation_matrix(state, work.rotation)
-    _felt(state, parameters, work)
-    _power(flying, state, inputs, parameters, work)
-    bodies.reached[body] += 1
-    k = bodies.reached[body]
+        _settle_rover(row, height_before)
+        rotation_matrix(row, 0)
+    _felt(row)
+    _power(row, flying)
+    k = bodies.reached[body] + 1
+    bodies.reached[body] = k
     if k % GUST_EVERY == 0:
-        blow(state, inputs, parameters, bodies.keys[body], k)
-    sense(bodies, body, work.rotation, k)
+        blow(row, key, k)
+    sense(row, key, k)
 
 
 @njit(cache=False)
-def wake_body(bodies: Bodies, body: int, work: Work) -> None:
+def wake_body(row: Array, key: np.uint64) -> None:
     """What the instruments show at grid step 0, before anything moved."""
-    state, parameters = bodies.state[body], bodies.parameters[body]
-    rotation_matrix(state, work.rotation)
+    rotation_matrix(row, 0)
     for axis in range(3):
-        state[S_FORCE + axis] = work.rotation[2, axis] * parameters[P_GRAVITY]
-    _power(parameters[P_KIND] == MULTIROTOR, state, bodies.inputs[body], parameters, work)
-    sense(bodies, body, work.rotation, 0)
-    state[S_AWAKE] = 1.0
+        row[S_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
+    _power(row, row[P_KIND] == MULTIROTOR)
+    sense(row, key, 0)
+    row[S_AWAKE] = 1.0
 
 
 def _compose(sources: str) -> Advance:
@@ -249,14 +231,14 @@ def _compose(sources: str) -> Advance:
     def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
         if not sources:  # never so: its being named here makes the digest part of the cache's key
             return
-        work = new_work()
         for body in range(goals.shape[0]):
-            if bodies.state[body, S_AWAKE] == 0.0:
-                wake_body(bodies, body, work)
+            row = bodies.rows[body]
+            if row[S_AWAKE] == 0.0:
+                wake_body(row, bodies.keys[body])
             while bodies.reached[body] < goals[body]:
                 for i in range(4):
-                    work.throttle[i] = bodies.inputs[body, U_THROTTLE + i]
-                step_body(bodies, body, work)
+                    row[W_THROTTLE + i] = row[U_THROTTLE + i]
+                step_body(bodies, body, row)
 
     compiled: Advance = advance_bodies
     return compiled

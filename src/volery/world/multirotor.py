@@ -50,153 +50,180 @@ from volery.world.columns import (
     S_VELOCITY,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
+    W_AIR,
+    W_FORCE,
+    W_GROUND,
+    W_ROTATION,
+    W_SLOPE,
+    W_THROTTLE,
+    W_TORQUE,
+    W_Y,
     Array,
-    Work,
 )
 
 _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
 
 @njit(cache=False)
-def electrical_power(state: Array, inputs: Array, parameters: Array) -> float:
-    """Watts drawn at the battery's terminals: rotors, autopilot and payload."""
+def electrical_power(row: Array, at: int) -> float:
+    """Watts drawn at the battery by rotors, autopilot and payload, in the state from column *at*."""
     cubes = 0.0
     for i in range(4):
-        speed = state[S_ROTORS + i]
+        speed = row[at + S_ROTORS + i]
         cubes += speed * speed * speed
-    shaft = parameters[P_TORQUE] * cubes
-    power: float = shaft / parameters[P_EFFICIENCY] + parameters[P_IDLE_POWER] + inputs[U_PAYLOAD]
+    shaft = row[P_TORQUE] * cubes
+    power: float = shaft / row[P_EFFICIENCY] + row[P_IDLE_POWER] + row[U_PAYLOAD]
     return power
 
 
 @njit(cache=False)
-def volts_amps(state: Array, parameters: Array, power: float) -> tuple[float, float]:
-    """Terminal volts and amperes at a state of charge and a power."""
-    left = 1.0 - state[S_CHARGE] / parameters[P_CAPACITY]
-    open_volts = cell_voltage(left) * parameters[P_CELLS]
-    amps = current(open_volts, parameters[P_RESISTANCE], power)
-    return open_volts - parameters[P_RESISTANCE] * amps, amps
+def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
+    """Terminal volts and amperes at a power, in the state from column *at*."""
+    left = 1.0 - row[at + S_CHARGE] / row[P_CAPACITY]
+    open_volts = cell_voltage(left) * row[P_CELLS]
+    amps = current(open_volts, row[P_RESISTANCE], power)
+    return open_volts - row[P_RESISTANCE] * amps, amps
 
 
 @njit(cache=False)
-def _feet(y: Array, parameters: Array, work: Work, ground: float) -> None:
-    """Add what the ground does to four feet to work's force (east, north, up) and torque (body)."""
-    rotation, force, torque = work.rotation, work.force, work.torque
+def _feet(row: Array, ground: float) -> None:
+    """Add what the ground does to four feet to force (east, north, up) and torque (body)."""
     for foot in range(4):
-        x = parameters[P_FEET] if foot < 2 else -parameters[P_FEET]
-        left = parameters[P_FEET + 1] if foot % 2 == 0 else -parameters[P_FEET + 1]
-        up = -parameters[P_FEET + 2]
-        height = y[S_POSITION + 2] + rotation[2, 0] * x + rotation[2, 1] * left + rotation[2, 2] * up
+        x = row[P_FEET] if foot < 2 else -row[P_FEET]
+        left = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
+        up = -row[P_FEET + 2]
+        height = (
+            row[W_Y + S_POSITION + 2]
+            + row[W_ROTATION + 6] * x
+            + row[W_ROTATION + 7] * left
+            + row[W_ROTATION + 8] * up
+        )
         depth = ground - height
         if depth <= 0.0:
             continue
-        spin_x = y[S_RATES + 1] * up - y[S_RATES + 2] * left
-        spin_y = y[S_RATES + 2] * x - y[S_RATES] * up
-        spin_z = y[S_RATES] * left - y[S_RATES + 1] * x
-        ve = y[S_VELOCITY] + rotation[0, 0] * spin_x + rotation[0, 1] * spin_y + rotation[0, 2] * spin_z
-        vn = y[S_VELOCITY + 1] + rotation[1, 0] * spin_x + rotation[1, 1] * spin_y + rotation[1, 2] * spin_z
-        vu = y[S_VELOCITY + 2] + rotation[2, 0] * spin_x + rotation[2, 1] * spin_y + rotation[2, 2] * spin_z
-        normal = max(0.0, parameters[P_STIFFNESS] * depth - parameters[P_DAMPING] * vu)
-        grip = parameters[P_FRICTION] * normal / max(sqrt(ve * ve + vn * vn), _SLIP)
+        spin_x = row[W_Y + S_RATES + 1] * up - row[W_Y + S_RATES + 2] * left
+        spin_y = row[W_Y + S_RATES + 2] * x - row[W_Y + S_RATES] * up
+        spin_z = row[W_Y + S_RATES] * left - row[W_Y + S_RATES + 1] * x
+        ve = (
+            row[W_Y + S_VELOCITY]
+            + row[W_ROTATION] * spin_x
+            + row[W_ROTATION + 1] * spin_y
+            + row[W_ROTATION + 2] * spin_z
+        )
+        vn = (
+            row[W_Y + S_VELOCITY + 1]
+            + row[W_ROTATION + 3] * spin_x
+            + row[W_ROTATION + 4] * spin_y
+            + row[W_ROTATION + 5] * spin_z
+        )
+        vu = (
+            row[W_Y + S_VELOCITY + 2]
+            + row[W_ROTATION + 6] * spin_x
+            + row[W_ROTATION + 7] * spin_y
+            + row[W_ROTATION + 8] * spin_z
+        )
+        normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * vu)
+        grip = row[P_FRICTION] * normal / max(sqrt(ve * ve + vn * vn), _SLIP)
         fe, fn = -grip * ve, -grip * vn
-        force[0] += fe
-        force[1] += fn
-        force[2] += normal
-        bx = rotation[0, 0] * fe + rotation[1, 0] * fn + rotation[2, 0] * normal
-        by = rotation[0, 1] * fe + rotation[1, 1] * fn + rotation[2, 1] * normal
-        bz = rotation[0, 2] * fe + rotation[1, 2] * fn + rotation[2, 2] * normal
-        torque[0] += left * bz - up * by
-        torque[1] += up * bx - x * bz
-        torque[2] += x * by - left * bx
+        row[W_FORCE] += fe
+        row[W_FORCE + 1] += fn
+        row[W_FORCE + 2] += normal
+        bx = row[W_ROTATION] * fe + row[W_ROTATION + 3] * fn + row[W_ROTATION + 6] * normal
+        by = row[W_ROTATION + 1] * fe + row[W_ROTATION + 4] * fn + row[W_ROTATION + 7] * normal
+        bz = row[W_ROTATION + 2] * fe + row[W_ROTATION + 5] * fn + row[W_ROTATION + 8] * normal
+        row[W_TORQUE] += left * bz - up * by
+        row[W_TORQUE + 1] += up * bx - x * bz
+        row[W_TORQUE + 2] += x * by - left * bx
 
 
 @njit(cache=False)
-def rotation_matrix(state: Array, rotation: Array) -> None:
-    """The attitude quaternion in *state* as a matrix that takes body axes to east, north, up."""
-    w, x, y, z = state[S_ATTITUDE], state[S_ATTITUDE + 1], state[S_ATTITUDE + 2], state[S_ATTITUDE + 3]
-    rotation[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    rotation[0, 1] = 2.0 * (x * y - w * z)
-    rotation[0, 2] = 2.0 * (x * z + w * y)
-    rotation[1, 0] = 2.0 * (x * y + w * z)
-    rotation[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    rotation[1, 2] = 2.0 * (y * z - w * x)
-    rotation[2, 0] = 2.0 * (x * z - w * y)
-    rotation[2, 1] = 2.0 * (y * z + w * x)
-    rotation[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+def rotation_matrix(row: Array, at: int) -> None:
+    """The attitude of the state from column *at* as a matrix: body axes to east, north, up."""
+    w, x = row[at + S_ATTITUDE], row[at + S_ATTITUDE + 1]
+    y, z = row[at + S_ATTITUDE + 2], row[at + S_ATTITUDE + 3]
+    row[W_ROTATION] = 1.0 - 2.0 * (y * y + z * z)
+    row[W_ROTATION + 1] = 2.0 * (x * y - w * z)
+    row[W_ROTATION + 2] = 2.0 * (x * z + w * y)
+    row[W_ROTATION + 3] = 2.0 * (x * y + w * z)
+    row[W_ROTATION + 4] = 1.0 - 2.0 * (x * x + z * z)
+    row[W_ROTATION + 5] = 2.0 * (y * z - w * x)
+    row[W_ROTATION + 6] = 2.0 * (x * z - w * y)
+    row[W_ROTATION + 7] = 2.0 * (y * z + w * x)
+    row[W_ROTATION + 8] = 1.0 - 2.0 * (x * x + y * y)
 
 
 @njit(cache=False)
-def _spin_up(y: Array, throttle: Array, inputs: Array, parameters: Array, out: Array) -> None:
+def _spin_up(row: Array) -> None:
     """Rotor speeds, charge and energy: what changes even in a body at rest."""
-    power = electrical_power(y, inputs, parameters)
-    volts, amps = volts_amps(y, parameters, power)
-    top = parameters[P_ROTOR_TOP] * volts / parameters[P_FULL_VOLTS]
+    power = electrical_power(row, W_Y)
+    volts, amps = volts_amps(row, W_Y, power)
+    top = row[P_ROTOR_TOP] * volts / row[P_FULL_VOLTS]
     for i in range(4):
-        out[S_ROTORS + i] = (throttle[i] * top - y[S_ROTORS + i]) / parameters[P_ROTOR_LAG]
-    out[S_CHARGE] = amps
-    out[S_ENERGY] = volts * amps
+        row[W_SLOPE + S_ROTORS + i] = (row[W_THROTTLE + i] * top - row[W_Y + S_ROTORS + i]) / row[P_ROTOR_LAG]
+    row[W_SLOPE + S_CHARGE] = amps
+    row[W_SLOPE + S_ENERGY] = volts * amps
 
 
 @njit(cache=False)
-def _loads(y: Array, inputs: Array, parameters: Array, work: Work) -> None:
-    """Rotor and air loads into work: force east, north, up without gravity; torque forward, left, up."""
-    rotation, force, torque, air = work.rotation, work.force, work.torque, work.air
+def _loads(row: Array) -> None:
+    """Rotor and air loads: force east, north, up without gravity; torque forward, left, up."""
     lift = 0.0
-    torque[:] = 0.0
+    for axis in range(3):
+        row[W_TORQUE + axis] = 0.0
     for i in range(4):
-        square = y[S_ROTORS + i] * y[S_ROTORS + i]
-        thrust = parameters[P_THRUST] * square * inputs[U_MOTOR_HEALTH + i]
+        square = row[W_Y + S_ROTORS + i] * row[W_Y + S_ROTORS + i]
+        thrust = row[P_THRUST] * square * row[U_MOTOR_HEALTH + i]
         lift += thrust
-        torque[0] += parameters[P_ROTOR_Y + i] * thrust
-        torque[1] -= parameters[P_ROTOR_X + i] * thrust
-        torque[2] += parameters[P_ROTOR_SPIN + i] * parameters[P_TORQUE] * square
-    ve = y[S_VELOCITY] - air[0]
-    vn = y[S_VELOCITY + 1] - air[1]
-    vu = y[S_VELOCITY + 2] - air[2]
-    drag = parameters[P_DRAG_LINEAR] + parameters[P_DRAG_QUADRATIC] * sqrt(ve * ve + vn * vn + vu * vu)
-    force[0] = rotation[0, 2] * lift - drag * ve
-    force[1] = rotation[1, 2] * lift - drag * vn
-    force[2] = rotation[2, 2] * lift - drag * vu
+        row[W_TORQUE] += row[P_ROTOR_Y + i] * thrust
+        row[W_TORQUE + 1] -= row[P_ROTOR_X + i] * thrust
+        row[W_TORQUE + 2] += row[P_ROTOR_SPIN + i] * row[P_TORQUE] * square
+    ve = row[W_Y + S_VELOCITY] - row[W_AIR]
+    vn = row[W_Y + S_VELOCITY + 1] - row[W_AIR + 1]
+    vu = row[W_Y + S_VELOCITY + 2] - row[W_AIR + 2]
+    drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * sqrt(ve * ve + vn * vn + vu * vu)
+    row[W_FORCE] = row[W_ROTATION + 2] * lift - drag * ve
+    row[W_FORCE + 1] = row[W_ROTATION + 5] * lift - drag * vn
+    row[W_FORCE + 2] = row[W_ROTATION + 8] * lift - drag * vu
     for axis in range(3):
-        torque[axis] -= parameters[P_SPIN_DAMPING] * y[S_RATES + axis]
+        row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_Y + S_RATES + axis]
 
 
 @njit(cache=False)
-def multirotor_slope(y: Array, inputs: Array, parameters: Array, work: Work, resting: bool) -> None:
-    """The state's rate of change into ``work.slope``. A resting body keeps its place; its rotors may spin."""
-    slope, rotation, force, torque = work.slope, work.rotation, work.force, work.torque
-    _spin_up(y, work.throttle, inputs, parameters, slope)
+def multirotor_slope(row: Array, resting: bool) -> None:
+    """The state's rate of change. A resting body keeps its place; its rotors may spin."""
+    _spin_up(row)
     if resting:
-        slope[:S_ROTORS] = 0.0
+        for i in range(S_ROTORS):
+            row[W_SLOPE + i] = 0.0
         return
-    rotation_matrix(y, rotation)
-    _loads(y, inputs, parameters, work)
-    ground = work.ground[0]
-    reach = parameters[P_FEET] + parameters[P_FEET + 1] + parameters[P_FEET + 2]
-    if y[S_POSITION + 2] - ground < reach:
-        _feet(y, parameters, work, ground)
+    rotation_matrix(row, W_Y)
+    _loads(row)
+    ground = row[W_GROUND]
+    reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
+    if row[W_Y + S_POSITION + 2] - ground < reach:
+        _feet(row, ground)
     for axis in range(3):
-        slope[S_POSITION + axis] = y[S_VELOCITY + axis]
-        slope[S_VELOCITY + axis] = force[axis] / parameters[P_MASS]
-    slope[S_VELOCITY + 2] -= parameters[P_GRAVITY]
-    p, q, r = y[S_RATES], y[S_RATES + 1], y[S_RATES + 2]
-    w, x, z = y[S_ATTITUDE], y[S_ATTITUDE + 1], y[S_ATTITUDE + 3]
-    left = y[S_ATTITUDE + 2]
-    slope[S_ATTITUDE] = 0.5 * (-x * p - left * q - z * r)
-    slope[S_ATTITUDE + 1] = 0.5 * (w * p + left * r - z * q)
-    slope[S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
-    slope[S_ATTITUDE + 3] = 0.5 * (w * r + x * q - left * p)
-    ix, iy, iz = parameters[P_INERTIA], parameters[P_INERTIA + 1], parameters[P_INERTIA + 2]
-    slope[S_RATES] = (torque[0] + (iy - iz) * q * r) / ix
-    slope[S_RATES + 1] = (torque[1] + (iz - ix) * r * p) / iy
-    slope[S_RATES + 2] = (torque[2] + (ix - iy) * p * q) / iz
+        row[W_SLOPE + S_POSITION + axis] = row[W_Y + S_VELOCITY + axis]
+        row[W_SLOPE + S_VELOCITY + axis] = row[W_FORCE + axis] / row[P_MASS]
+    row[W_SLOPE + S_VELOCITY + 2] -= row[P_GRAVITY]
+    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    w, x, z = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 1], row[W_Y + S_ATTITUDE + 3]
+    left = row[W_Y + S_ATTITUDE + 2]
+    row[W_SLOPE + S_ATTITUDE] = 0.5 * (-x * p - left * q - z * r)
+    row[W_SLOPE + S_ATTITUDE + 1] = 0.5 * (w * p + left * r - z * q)
+    row[W_SLOPE + S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
+    row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * (w * r + x * q - left * p)
+    ix, iy, iz = row[P_INERTIA], row[P_INERTIA + 1], row[P_INERTIA + 2]
+    row[W_SLOPE + S_RATES] = (row[W_TORQUE] + (iy - iz) * q * r) / ix
+    row[W_SLOPE + S_RATES + 1] = (row[W_TORQUE + 1] + (iz - ix) * r * p) / iy
+    row[W_SLOPE + S_RATES + 2] = (row[W_TORQUE + 2] + (ix - iy) * p * q) / iz
 
 
 @njit(cache=False)
-def lift(state: Array, parameters: Array) -> float:
+def lift(row: Array) -> float:
     """The rotors' thrust together [N]."""
     squares = 0.0
     for i in range(4):
-        squares += state[S_ROTORS + i] * state[S_ROTORS + i]
-    thrust: float = parameters[P_THRUST] * squares
+        squares += row[S_ROTORS + i] * row[S_ROTORS + i]
+    thrust: float = row[P_THRUST] * squares
     return thrust

@@ -59,8 +59,8 @@ from volery.world.columns import (
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_MAG_BLOCKED,
+    W_ROTATION,
     Array,
-    Bodies,
 )
 from volery.world.noise import gaussian
 
@@ -160,7 +160,7 @@ def declared_sigma(name: str) -> Sigma:
 
 
 @njit(cache=False)
-def _drift(measured: Array, parameters: Array, key: np.uint64, k: int) -> None:
+def _drift(row: Array, key: np.uint64, k: int) -> None:
     """Move every slow error by one period."""
     stream = _SLOW
     for sensor, first, axes in (
@@ -171,96 +171,91 @@ def _drift(measured: Array, parameters: Array, key: np.uint64, k: int) -> None:
         (GPS_LEVEL, M_GPS_BIAS, 2),
         (GPS_HEIGHT, M_GPS_BIAS + 2, 1),
     ):
-        row = P_SENSOR + 4 * sensor
+        at = P_SENSOR + 4 * sensor
         for axis in range(axes):
-            kick = parameters[row + SENSOR_KICK] if k > 0 else parameters[row + SENSOR_SLOW]
-            decayed = parameters[row + SENSOR_DECAY] * measured[first + axis]
-            measured[first + axis] = decayed + kick * gaussian(key, stream, k)
+            kick = row[at + SENSOR_KICK] if k > 0 else row[at + SENSOR_SLOW]
+            decayed = row[at + SENSOR_DECAY] * row[first + axis]
+            row[first + axis] = decayed + kick * gaussian(key, stream, k)
             stream += 1
 
 
 @njit(cache=False)
-def _inertial(bodies: Bodies, body: int, k: int) -> None:
-    state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
-    key = bodies.keys[body]
-    gyro = parameters[P_SENSOR + 4 * GYRO + SENSOR_WHITE]
-    accel = parameters[P_SENSOR + 4 * ACCEL + SENSOR_WHITE]
+def _inertial(row: Array, key: np.uint64, k: int) -> None:
+    gyro = row[P_SENSOR + 4 * GYRO + SENSOR_WHITE]
+    accel = row[P_SENSOR + 4 * ACCEL + SENSOR_WHITE]
     for axis in range(3):
         sign = 1.0 if axis == 0 else -1.0
-        measured[M_GYRO + axis] = sign * state[S_RATES + axis] + measured[M_GYRO_BIAS + axis]
-        measured[M_ACCEL + axis] = sign * state[S_FORCE + axis] + measured[M_ACCEL_BIAS + axis]
+        row[M_GYRO + axis] = sign * row[S_RATES + axis] + row[M_GYRO_BIAS + axis]
+        row[M_ACCEL + axis] = sign * row[S_FORCE + axis] + row[M_ACCEL_BIAS + axis]
         if gyro > 0.0:
-            measured[M_GYRO + axis] += gyro * gaussian(key, _GYRO + axis, k)
-            measured[M_ACCEL + axis] += accel * gaussian(key, _ACCEL + axis, k)
+            row[M_GYRO + axis] += gyro * gaussian(key, _GYRO + axis, k)
+            row[M_ACCEL + axis] += accel * gaussian(key, _ACCEL + axis, k)
 
 
 @njit(cache=False)
-def _barometer(bodies: Bodies, body: int, k: int) -> None:
-    measured = bodies.measured[body]
-    if bodies.inputs[body, U_BARO_BLOCKED] != 0.0:
+def _barometer(row: Array, key: np.uint64, k: int) -> None:
+    if row[U_BARO_BLOCKED] != 0.0:
         return
-    noise = bodies.parameters[body, P_SENSOR + 4 * BARO + SENSOR_WHITE] * gaussian(
-        bodies.keys[body], _BARO, k
-    )
-    measured[M_BARO] = bodies.state[body, S_POSITION + 2] + measured[M_BARO_BIAS] + noise
-    measured[M_BARO_COUNT] += 1.0
+    noise = row[P_SENSOR + 4 * BARO + SENSOR_WHITE] * gaussian(key, _BARO, k)
+    row[M_BARO] = row[S_POSITION + 2] + row[M_BARO_BIAS] + noise
+    row[M_BARO_COUNT] += 1.0
 
 
 @njit(cache=False)
-def _compass(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
-    measured, parameters = bodies.measured[body], bodies.parameters[body]
-    if bodies.inputs[body, U_MAG_BLOCKED] != 0.0:
+def _compass(row: Array, key: np.uint64, k: int) -> None:
+    if row[U_MAG_BLOCKED] != 0.0:
         return
-    white = parameters[P_SENSOR + 4 * MAG + SENSOR_WHITE]
-    north, east, down = parameters[P_FIELD], parameters[P_FIELD + 1], parameters[P_FIELD + 2]
+    white = row[P_SENSOR + 4 * MAG + SENSOR_WHITE]
+    north, east, down = row[P_FIELD], row[P_FIELD + 1], row[P_FIELD + 2]
     for axis in range(3):
         sign = 1.0 if axis == 0 else -1.0
-        field = rotation[0, axis] * east + rotation[1, axis] * north - rotation[2, axis] * down
-        error = measured[M_MAG_BIAS + axis] + white * gaussian(bodies.keys[body], _MAG + axis, k)
-        measured[M_MAG + axis] = sign * field + error
-    measured[M_MAG_COUNT] += 1.0
+        field = (
+            row[W_ROTATION + axis] * east
+            + row[W_ROTATION + 3 + axis] * north
+            - row[W_ROTATION + 6 + axis] * down
+        )
+        error = row[M_MAG_BIAS + axis] + white * gaussian(key, _MAG + axis, k)
+        row[M_MAG + axis] = sign * field + error
+    row[M_MAG_COUNT] += 1.0
 
 
 @njit(cache=False)
-def _range_finder(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
-    state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
-    slant = (state[S_POSITION + 2] - state[S_GROUND]) / max(rotation[2, 2], 0.1)
-    slant += parameters[P_SENSOR + 4 * RANGE + SENSOR_WHITE] * gaussian(bodies.keys[body], _RANGE, k)
-    seen = slant <= parameters[P_RANGE_TOP] and rotation[2, 2] > 0.5
-    measured[M_RANGE] = max(slant, 0.0) if seen else -1.0
+def _range_finder(row: Array, key: np.uint64, k: int) -> None:
+    slant = (row[S_POSITION + 2] - row[S_GROUND]) / max(row[W_ROTATION + 8], 0.1)
+    slant += row[P_SENSOR + 4 * RANGE + SENSOR_WHITE] * gaussian(key, _RANGE, k)
+    seen = slant <= row[P_RANGE_TOP] and row[W_ROTATION + 8] > 0.5
+    row[M_RANGE] = max(slant, 0.0) if seen else -1.0
 
 
 @njit(cache=False)
-def _satellites(bodies: Bodies, body: int, k: int) -> None:
-    state, measured, parameters = bodies.state[body], bodies.measured[body], bodies.parameters[body]
-    if bodies.inputs[body, U_GPS_BLOCKED] != 0.0:
-        measured[M_GPS_FIX] = 0.0
+def _satellites(row: Array, key: np.uint64, k: int) -> None:
+    if row[U_GPS_BLOCKED] != 0.0:
+        row[M_GPS_FIX] = 0.0
         return
-    key = bodies.keys[body]
-    level = parameters[P_SENSOR + 4 * GPS_LEVEL + SENSOR_WHITE]
-    height = parameters[P_SENSOR + 4 * GPS_HEIGHT + SENSOR_WHITE]
-    speed = parameters[P_SENSOR + 4 * GPS_SPEED + SENSOR_WHITE]
+    level = row[P_SENSOR + 4 * GPS_LEVEL + SENSOR_WHITE]
+    height = row[P_SENSOR + 4 * GPS_HEIGHT + SENSOR_WHITE]
+    speed = row[P_SENSOR + 4 * GPS_SPEED + SENSOR_WHITE]
     for axis in range(3):
         source = 1 - axis if axis < 2 else 2
         sign = 1.0 if axis < 2 else -1.0
         white = level if axis < 2 else height
-        error = measured[M_GPS_BIAS + axis] + white * gaussian(key, _GPS + axis, k)
-        measured[M_GPS + axis] = sign * state[S_POSITION + source] + error
+        error = row[M_GPS_BIAS + axis] + white * gaussian(key, _GPS + axis, k)
+        row[M_GPS + axis] = sign * row[S_POSITION + source] + error
         noise = speed * gaussian(key, _SPEED + axis, k)
-        measured[M_GPS_VELOCITY + axis] = sign * state[S_VELOCITY + source] + noise
-    measured[M_GPS_FIX] = parameters[P_GPS_FIX]
-    measured[M_GPS_COUNT] += 1.0
+        row[M_GPS_VELOCITY + axis] = sign * row[S_VELOCITY + source] + noise
+    row[M_GPS_FIX] = row[P_GPS_FIX]
+    row[M_GPS_COUNT] += 1.0
 
 
 @njit(cache=False)
-def sense(bodies: Bodies, body: int, rotation: Array, k: int) -> None:
-    """Take the samples that fall due at step *k*. *rotation* is the body's at that step."""
+def sense(row: Array, key: np.uint64, k: int) -> None:
+    """Take the samples that fall due at step *k*; ``W_ROTATION`` is the body's at that step."""
     if k % SLOW_EVERY == 0:
-        _drift(bodies.measured[body], bodies.parameters[body], bodies.keys[body], k)
-    _inertial(bodies, body, k)
+        _drift(row, key, k)
+    _inertial(row, key, k)
     if k % AIR_EVERY == 0:
-        _barometer(bodies, body, k)
-        _compass(bodies, body, rotation, k)
-        _range_finder(bodies, body, rotation, k)
-    if k % int(bodies.parameters[body, P_GPS_PERIOD]) == 0:
-        _satellites(bodies, body, k)
+        _barometer(row, key, k)
+        _compass(row, key, k)
+        _range_finder(row, key, k)
+    if k % int(row[P_GPS_PERIOD]) == 0:
+        _satellites(row, key, k)

@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, pi, radians, sin
 
-import numpy as np
-
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.world.arithmetic import exponential
@@ -60,7 +58,6 @@ from volery.world.columns import (
     P_TORQUE,
     P_TURN_TOP,
     P_WHEELBASE,
-    PARAMETERS,
     ROVER,
     S_ATTITUDE,
     S_CHARGE,
@@ -68,7 +65,6 @@ from volery.world.columns import (
     S_ON_GROUND,
     S_POSITION,
     S_RESTING,
-    STATE,
     Array,
 )
 from volery.world.sensors import SLOW_EVERY, SensorSet, sensor_set
@@ -246,9 +242,8 @@ def _fill_rover(row: Array, spec: Rover) -> None:
     row[P_GRIP] = spec.grip
 
 
-def parameters_of(spec: BodySpec, frame: LocalFrame, wind: Wind) -> Array:
-    """The row of parameters that the compiled step reads for *spec*."""
-    row: Array = np.zeros(PARAMETERS)
+def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -> None:
+    """Write what the compiled step needs to know of *spec* into its row."""
     row[P_MASS] = spec.mass
     row[P_DRAG_LINEAR] = spec.drag_linear
     row[P_DRAG_QUADRATIC] = spec.drag_quadratic
@@ -267,12 +262,10 @@ def parameters_of(spec: BodySpec, frame: LocalFrame, wind: Wind) -> Array:
     else:
         _fill_rover(row, spec)
     _fill_sensors(row, sensor_set(spec.sensors))
-    return row
 
 
-def first_state(spec: BodySpec, terrain: Terrain) -> Array:
+def fill_state(row: Array, spec: BodySpec, terrain: Terrain) -> None:
     """At rest on the ground at ``spec.at`` (its height is the ground's), heading where it says."""
-    row: Array = np.zeros(STATE)
     ground = terrain.height(spec.at[0], spec.at[1])
     depth = spec.feet[2] - 0.005 if isinstance(spec, Multirotor) else 0.0
     row[S_POSITION : S_POSITION + 3] = spec.at[0], spec.at[1], ground + depth
@@ -281,4 +274,3 @@ def first_state(spec: BodySpec, terrain: Terrain) -> Array:
     row[S_CHARGE] = (1.0 - spec.battery.left) * spec.battery.capacity_ah * 3600.0
     row[S_GROUND] = ground
     row[S_ON_GROUND] = row[S_RESTING] = 1.0
-    return row

@@ -47,13 +47,13 @@ class Wind:
 
 
 @njit(cache=False)
-def blow(state: Array, inputs: Array, parameters: Array, key: np.uint64, k: int) -> None:
+def blow(row: Array, key: np.uint64, k: int) -> None:
     """Advance one body's gust by one gust period (call when k is a multiple of GUST_EVERY)."""
-    deviation = inputs[U_GUST]
+    deviation = row[U_GUST]
     if deviation == 0.0:
         return
-    decay = parameters[P_GUST_DECAY]
-    kick = parameters[P_GUST_KICK] * deviation
+    decay = row[P_GUST_DECAY]
+    kick = row[P_GUST_KICK] * deviation
     for axis in range(3):
         strength = kick if axis < 2 else 0.5 * kick
-        state[S_GUST + axis] = decay * state[S_GUST + axis] + strength * gaussian(key, _STREAM + axis, k)
+        row[S_GUST + axis] = decay * row[S_GUST + axis] + strength * gaussian(key, _STREAM + axis, k)

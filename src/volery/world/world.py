@@ -19,8 +19,6 @@ from volery.base.seeds import key
 from volery.base.time import MS, Ns
 from volery.world.bodies import advance_bodies
 from volery.world.columns import (
-    INPUTS,
-    MEASUREMENTS,
     P_CAPACITY,
     S_AMPS,
     S_ATTITUDE,
@@ -37,14 +35,16 @@ from volery.world.columns import (
     S_ROTORS,
     S_VELOCITY,
     S_VOLTS,
+    STATE,
     U_GUST,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
     U_WIND,
+    WORLD,
     Advance,
     Bodies,
 )
-from volery.world.specs import BodySpec, first_state, parameters_of
+from volery.world.specs import BodySpec, fill_parameters, fill_state
 from volery.world.terrain import Terrain
 from volery.world.wind import Wind
 
@@ -93,7 +93,7 @@ class World:
     """All bodies of a run. Rows of its arrays are in the order of *bodies*.
 
     *advance* is the compiled step; ``advance_bodies`` flies nothing and takes motor commands as inputs.
-    *columns* are those a composer adds for each body: inputs and memory.
+    *columns* is how many a composer adds to each row.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class World:
         frame: LocalFrame,
         wind: Wind | None = None,
         terrain: Terrain | None = None,
-        columns: tuple[int, int] = (0, 1),
+        columns: int = 0,
     ) -> None:
         self._now = now
         self._advance = advance
@@ -118,19 +118,18 @@ class World:
         wind, terrain = wind or Wind(), terrain or Terrain()
         heights, grid = terrain.arrays()
         self.arrays = Bodies(
-            state=np.array([first_state(spec, terrain) for spec in self.specs]),
-            inputs=np.zeros((count, INPUTS + columns[0])),
-            measured=np.zeros((count, MEASUREMENTS)),
-            memory=np.zeros((count, columns[1])),
-            parameters=np.array([parameters_of(spec, frame, wind) for spec in self.specs]),
+            rows=np.zeros((count, WORLD + columns)),
             keys=np.array([key(seed, f"world/body/{index}") for index in range(count)], dtype=np.uint64),
             reached=np.zeros(count, dtype=np.int64),
             heights=heights,
             grid=grid,
         )
-        self.arrays.inputs[:, U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
-        self.arrays.inputs[:, U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
-        self.arrays.inputs[:, U_GUST] = wind.gust
+        for row, spec in zip(self.arrays.rows, self.specs, strict=True):
+            fill_parameters(row, spec, frame, wind)
+            fill_state(row, spec, terrain)
+            row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
+            row[U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
+            row[U_GUST] = wind.gust
         self._dated: list[deque[_Dated]] = [deque() for _ in self.specs]
         self._looked = [-_WATCHED] * count
         self._goals = np.zeros(count, dtype=np.int64)
@@ -166,8 +165,8 @@ class World:
     def truth(self, body: int) -> Truth:
         """The true state of *body* now."""
         step = self.look(body)
-        row = self.arrays.state[body].tolist()
-        capacity = float(self.arrays.parameters[body, P_CAPACITY])
+        row = self.arrays.rows[body, :STATE].tolist()
+        capacity = float(self.arrays.rows[body, P_CAPACITY])
         return Truth(
             time=step * STEP,
             position=tuple(row[S_POSITION : S_POSITION + 3]),
@@ -210,4 +209,4 @@ class World:
         reached = int(self.arrays.reached[body])
         while dated and dated[0].step <= reached:
             _, column, values = dated.popleft()
-            self.arrays.inputs[body, column : column + len(values)] = values
+            self.arrays.rows[body, column : column + len(values)] = values

@@ -14,7 +14,7 @@ from math import hypot, inf
 from volery.autopilots.simulated.flight_columns import (
     C_AIDED,
     C_CONTROL,
-    COMMANDS,
+    FLIGHT,
     K_ACCEL,
     K_AIDED,
     K_ALIGNED,
@@ -35,7 +35,6 @@ from volery.autopilots.simulated.flight_columns import (
     K_TARGET_VELOCITY,
     K_THROTTLE,
     K_VELOCITY,
-    MEMORY,
     VISIBLE,
     Control,
 )
@@ -57,8 +56,6 @@ from volery.world.columns import (
     M_RANGE,
     S_AMPS,
     S_CHARGE,
-    S_ENERGY,
-    S_VOLTS,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_MAG_BLOCKED,
@@ -161,21 +158,28 @@ class Estimate:
         """Of the grid step whose state this is [ns]."""
         self._memory, self._sensed, self._state = rows
 
+    def _one(self, column: int) -> float:
+        return self._memory[column - K_POSITION]
+
     def _vector(self, column: int) -> Vector:
+        at = column - K_POSITION
         row = self._memory
-        return row[column], row[column + 1], row[column + 2]
+        return row[at], row[at + 1], row[at + 2]
+
+    def _four(self, column: int) -> tuple[float, float, float, float]:
+        at = column - K_POSITION
+        row = self._memory
+        return row[at], row[at + 1], row[at + 2], row[at + 3]
 
     def _sample(self, column: int) -> Vector:
+        at = column - M_GYRO
         row = self._sensed
-        return row[column], row[column + 1], row[column + 2]
+        return row[at], row[at + 1], row[at + 2]
 
     def _about_origin(self, column: int) -> Vector:
-        row = self._memory
-        return (
-            row[column] - row[K_ORIGIN],
-            row[column + 1] - row[K_ORIGIN + 1],
-            row[column + 2] - row[K_ORIGIN + 2],
-        )
+        north, east, down = self._vector(column)
+        origin = self._vector(K_ORIGIN)
+        return north - origin[0], east - origin[1], down - origin[2]
 
     @property
     def position(self) -> Vector:
@@ -210,8 +214,7 @@ class Estimate:
     @property
     def quaternion(self) -> Quaternion:
         """Forward, right, down to north, east, down; (w, x, y, z)."""
-        row = self._memory
-        return row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
+        return self._four(K_ATTITUDE)
 
     @property
     def rates(self) -> Vector:
@@ -221,33 +224,32 @@ class Estimate:
     @property
     def attitude_ok(self) -> bool:
         """Tilt and heading are aligned."""
-        return self._memory[K_ALIGNED] > 0.5
+        return self._one(K_ALIGNED) > 0.5
 
     @property
     def position_ok(self) -> bool:
         """Position and velocity in the plane are aided by satellites, or were within the last ten seconds."""
-        return self._memory[K_AIDED] > 0.5 and self._memory[K_GPS_AGE] < 10.0
+        return self._one(K_AIDED) > 0.5 and self._one(K_GPS_AGE) < 10.0
 
     @property
     def gps_age(self) -> float:
         """Seconds since the estimator last used a fix."""
-        return self._memory[K_GPS_AGE]
+        return self._one(K_GPS_AGE)
 
     @property
     def spread(self) -> tuple[float, float, float, float]:
         """The estimator's own standard deviations: plane, height [m]; speed in the plane, up [m/s]."""
-        row = self._memory
-        return row[K_SPREAD], row[K_SPREAD + 1], row[K_SPREAD + 2], row[K_SPREAD + 3]
+        return self._four(K_SPREAD)
 
     @property
     def heading_error(self) -> float:
         """Last difference of compass and estimate [rad]."""
-        return self._memory[K_HEADING_ERROR]
+        return self._one(K_HEADING_ERROR)
 
     @property
     def gps_innovation(self) -> float:
         """Last difference of fix and estimate in the plane, in standard deviations of it."""
-        return self._memory[K_GPS_LEVEL]
+        return self._one(K_GPS_LEVEL)
 
     @property
     def gyro(self) -> Vector:
@@ -267,17 +269,17 @@ class Estimate:
     @property
     def baro_altitude(self) -> float:
         """The barometer's height about the world's origin [m up]."""
-        return self._sensed[M_BARO]
+        return self._sensed[M_BARO - M_GYRO]
 
     @property
     def pressure(self) -> float:
         """Absolute [hPa], by the standard atmosphere at the barometer's height AMSL."""
-        return float(pressure_at(self._flight.frame.amsl + self._sensed[M_BARO])) / 100.0
+        return float(pressure_at(self._flight.frame.amsl + self._sensed[M_BARO - M_GYRO])) / 100.0
 
     @property
     def rangefinder(self) -> float | None:
         """Metres to the ground along the body's down axis; None out of range."""
-        distance = self._sensed[M_RANGE]
+        distance = self._sensed[M_RANGE - M_GYRO]
         return distance if distance >= 0.0 else None
 
     @cached_property
@@ -288,33 +290,32 @@ class Estimate:
     @property
     def battery_volts(self) -> float:
         """At the terminals [V]."""
-        return self._state[0]
+        return self._state[2]
 
     @property
     def battery_amps(self) -> float:
         """Drawn [A]."""
-        return self._state[1]
+        return self._state[3]
 
     @property
     def battery_used_mah(self) -> float:
         """Charge drawn since the pack was full [mAh]."""
-        return self._state[2] / 3.6
+        return self._state[0] / 3.6
 
     @property
     def battery_left(self) -> float:
         """Fraction of the capacity left, 0..1."""
-        return max(0.0, 1.0 - self._state[2] / self._flight.capacity_as)
+        return max(0.0, 1.0 - self._state[0] / self._flight.capacity_as)
 
     @property
     def battery_energy_j(self) -> float:
         """Energy drawn at the terminals since the start [J]."""
-        return self._state[3]
+        return self._state[1]
 
     @property
     def motors(self) -> tuple[float, float, float, float]:
         """Motor commands 0..1; rover: steering (right positive) and throttle -1..1, 0, 0."""
-        row = self._memory
-        return row[K_MOTORS], row[K_MOTORS + 1], row[K_MOTORS + 2], row[K_MOTORS + 3]
+        return self._four(K_MOTORS)
 
     @property
     def motor_pwm(self) -> tuple[int, int, int, int]:
@@ -330,17 +331,17 @@ class Estimate:
     @property
     def throttle(self) -> float:
         """Collective, 0..1 (rover: -1..1)."""
-        return self._memory[K_THROTTLE]
+        return self._one(K_THROTTLE)
 
     @property
     def hover_throttle(self) -> float:
         """Collective that is learnt to carry the weight."""
-        return self._memory[K_HOVER]
+        return self._one(K_HOVER)
 
     @property
     def landed(self) -> bool:
         """The landed detector is sure that it stands on the ground."""
-        return self._memory[K_LANDED] > 0.5
+        return self._one(K_LANDED) > 0.5
 
     @property
     def target(self) -> Vector:
@@ -379,12 +380,11 @@ class Flight:
         seen = self._seen
         if seen is not None and seen.time == time:
             return seen
-        arrays = self._world.arrays
-        state = arrays.state[self._body]
+        row = self._world.arrays.rows[self._body]
         rows = (
-            arrays.memory[self._body, :VISIBLE].tolist(),
-            arrays.measured[self._body, :M_GYRO_BIAS].tolist(),
-            [float(state[column]) for column in (S_VOLTS, S_AMPS, S_CHARGE, S_ENERGY)],
+            row[K_POSITION:VISIBLE].tolist(),
+            row[M_GYRO:M_GYRO_BIAS].tolist(),
+            row[S_CHARGE : S_AMPS + 1].tolist(),
         )
         self._seen = Estimate(self, time, rows)
         return self._seen
@@ -449,7 +449,7 @@ class Flight:
         """A receiver's sample (about the world's origin) as a fix."""
         sensors = sensor_set(self.spec.sensors)
         latitude, longitude, amsl = self.frame.from_ned(ned)
-        kind = int(sensed[M_GPS_FIX])
+        kind = int(sensed[M_GPS_FIX - M_GYRO])
         level, height, speed = sensors.noises[4:7]
         return GpsFix(
             fix_type=kind,
@@ -463,7 +463,7 @@ class Flight:
             eph=1.21 if kind else inf,
             epv=2.0 if kind else inf,
             satellites=10 if kind else 0,
-            count=int(sensed[M_GPS_COUNT]),
+            count=int(sensed[M_GPS_COUNT - M_GYRO]),
         )
 
 
@@ -487,6 +487,6 @@ def make_world(
         frame=frame,
         wind=wind,
         terrain=terrain,
-        columns=(COMMANDS, MEMORY),
+        columns=FLIGHT,
     )
     return world, [Flight(world, body) for body in range(len(specs))]

@@ -52,10 +52,10 @@ _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
 @njit(cache=False)
-def _rate_targets(memory: Array) -> tuple[float, float, float]:
+def _rate_targets(row: Array) -> tuple[float, float, float]:
     """Rates that turn the attitude into the demanded one, forward, right, down [rad/s]."""
-    w, x, y, z = memory[K_ATTITUDE], memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2], memory[K_ATTITUDE + 3]
-    tw, tx, ty, tz = memory[K_DEMAND], memory[K_DEMAND + 1], memory[K_DEMAND + 2], memory[K_DEMAND + 3]
+    w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
+    tw, tx, ty, tz = row[K_DEMAND], row[K_DEMAND + 1], row[K_DEMAND + 2], row[K_DEMAND + 3]
     ew = w * tw + x * tx + y * ty + z * tz
     sign = 2.0 if ew >= 0.0 else -2.0
     roll = sign * (w * tx - x * tw - y * tz + z * ty)
@@ -64,24 +64,24 @@ def _rate_targets(memory: Array) -> tuple[float, float, float]:
     return (
         clip(approach(roll, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
         clip(approach(pitch, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
-        clip(approach(yaw, _YAW_GAIN, _YAW_BRAKE) + memory[K_YAW_SPEED], -_TOP_RATE, _TOP_RATE),
+        clip(approach(yaw, _YAW_GAIN, _YAW_BRAKE) + row[K_YAW_SPEED], -_TOP_RATE, _TOP_RATE),
     )
 
 
 @njit(cache=False)
-def _torque(memory: Array, axis: int, wanted: float) -> float:
+def _torque(row: Array, axis: int, wanted: float) -> float:
     """One rate's PID: a share of full thrust by which motors are to differ."""
-    rate = memory[K_RATES + axis]
+    rate = row[K_RATES + axis]
     error = wanted - rate
-    if memory[K_LANDED] > 0.5 or memory[K_SPOOL] < 1.0:
-        memory[K_RATE_INTEGRAL + axis] *= 1.0 - STEP_S / 0.2
+    if row[K_LANDED] > 0.5 or row[K_SPOOL] < 1.0:
+        row[K_RATE_INTEGRAL + axis] *= 1.0 - STEP_S / 0.2
     else:
-        grown = memory[K_RATE_INTEGRAL + axis] + _I[axis] * error * STEP_S
-        memory[K_RATE_INTEGRAL + axis] = clip(grown, -_I_MOST, _I_MOST)
-    slope = (rate - memory[K_RATE_BEFORE + axis]) / STEP_S
-    memory[K_RATE_BEFORE + axis] = rate
-    memory[K_RATE_SLOPE + axis] += _SLOPE_FILTER * (slope - memory[K_RATE_SLOPE + axis])
-    torque: float = _P[axis] * error + memory[K_RATE_INTEGRAL + axis] - _D[axis] * memory[K_RATE_SLOPE + axis]
+        grown = row[K_RATE_INTEGRAL + axis] + _I[axis] * error * STEP_S
+        row[K_RATE_INTEGRAL + axis] = clip(grown, -_I_MOST, _I_MOST)
+    slope = (rate - row[K_RATE_BEFORE + axis]) / STEP_S
+    row[K_RATE_BEFORE + axis] = rate
+    row[K_RATE_SLOPE + axis] += _SLOPE_FILTER * (slope - row[K_RATE_SLOPE + axis])
+    torque: float = _P[axis] * error + row[K_RATE_INTEGRAL + axis] - _D[axis] * row[K_RATE_SLOPE + axis]
     return torque
 
 
@@ -94,46 +94,46 @@ def motor_output(thrust: float) -> float:
 
 
 @njit(cache=False)
-def _mix(memory: Array, parameters: Array, roll: float, pitch: float, yaw: float) -> None:
+def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     """Motor commands from three torques and the collective."""
     reach = 1e-9
     for i in range(4):
-        reach = max(reach, abs(parameters[P_ROTOR_X + i]), abs(parameters[P_ROTOR_Y + i]))
+        reach = max(reach, abs(row[P_ROTOR_X + i]), abs(row[P_ROTOR_Y + i]))
     low, high = 0.0, 0.0
     for i in range(4):
-        share = (roll * parameters[P_ROTOR_Y + i] + pitch * parameters[P_ROTOR_X + i]) / reach
-        memory[K_MOTORS + i] = share
+        share = (roll * row[P_ROTOR_Y + i] + pitch * row[P_ROTOR_X + i]) / reach
+        row[K_MOTORS + i] = share
         low, high = min(low, share), max(high, share)
     scale = 1.0 if high - low <= 1.0 else 1.0 / (high - low)
     low, high = low * scale, high * scale
-    wanted = memory[K_THROTTLE] * memory[K_SPOOL]
+    wanted = row[K_THROTTLE] * row[K_SPOOL]
     collective = clip(wanted, -low, max(1.0 - high, -low))
-    memory[K_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
+    row[K_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
     room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
     yaw = clip(yaw, -room, room)
     for i in range(4):
-        thrust = collective + scale * memory[K_MOTORS + i] - yaw * parameters[P_ROTOR_SPIN + i]
-        memory[K_MOTORS + i] = motor_output(thrust)
+        thrust = collective + scale * row[K_MOTORS + i] - yaw * row[P_ROTOR_SPIN + i]
+        row[K_MOTORS + i] = motor_output(thrust)
 
 
 @njit(cache=False)
-def fly_attitude(memory: Array, parameters: Array, control: int) -> None:
+def fly_attitude(row: Array, control: int) -> None:
     """One grid step of the inner loops: from the demanded attitude and collective to four motor commands."""
     if control in (OFF, IDLE):
         idle = _SPIN_ARM if control == IDLE else 0.0
         for i in range(4):
-            memory[K_MOTORS + i] = min(idle, memory[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
+            row[K_MOTORS + i] = min(idle, row[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
         for axis in range(3):
-            memory[K_RATE_INTEGRAL + axis] = 0.0
-            memory[K_RATE_BEFORE + axis] = memory[K_RATES + axis]
-            memory[K_RATE_SLOPE + axis] = 0.0
-        memory[K_SPOOL] = 0.0
-        memory[K_LOWER_LIMIT] = 1.0
+            row[K_RATE_INTEGRAL + axis] = 0.0
+            row[K_RATE_BEFORE + axis] = row[K_RATES + axis]
+            row[K_RATE_SLOPE + axis] = 0.0
+        row[K_SPOOL] = 0.0
+        row[K_LOWER_LIMIT] = 1.0
         return
-    memory[K_SPOOL] = min(1.0, memory[K_SPOOL] + STEP_S / _SPOOL_TIME)
-    roll_rate, pitch_rate, yaw_rate = _rate_targets(memory)
-    roll = _torque(memory, 0, roll_rate)
-    pitch = _torque(memory, 1, pitch_rate)
-    yaw = _torque(memory, 2, yaw_rate)
-    spool = memory[K_SPOOL]
-    _mix(memory, parameters, roll * spool, pitch * spool, yaw * spool)
+    row[K_SPOOL] = min(1.0, row[K_SPOOL] + STEP_S / _SPOOL_TIME)
+    roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
+    roll = _torque(row, 0, roll_rate)
+    pitch = _torque(row, 1, pitch_rate)
+    yaw = _torque(row, 2, yaw_rate)
+    spool = row[K_SPOOL]
+    _mix(row, roll * spool, pitch * spool, yaw * spool)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from volery.world.columns import INPUTS
+from volery.world.columns import WORLD
 
 
 class Control(IntEnum):
@@ -30,70 +30,69 @@ class Control(IntEnum):
 OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT, STEER, DRIVE = range(10)
 
 # --- commands ----------------------------------------------------------------------------------------------
-C_CONTROL = INPUTS
-C_POSITION = INPUTS + 1  # north, east, down about the estimator's origin [m]
-C_VELOCITY = INPUTS + 4  # north, east, down [m/s]
-C_ROLL = INPUTS + 7  # [rad]
-C_PITCH = INPUTS + 8  # [rad]
-C_YAW = INPUTS + 9  # [rad], clockwise from north
-C_YAW_RATE = INPUTS + 10  # [rad/s]
-C_YAW_IS = INPUTS + 11  # 0 hold the present heading, 1 go to C_YAW, 2 turn at C_YAW_RATE
-C_THROTTLE = INPUTS + 12  # 0..1; rover -1..1
-C_STEERING = INPUTS + 13  # rover -1..1, right positive
-C_CLIMB = INPUTS + 14  # [m/s] up
-C_SPEED = INPUTS + 15  # limit in the plane [m/s]
-C_SPEED_UP = INPUTS + 16  # limit [m/s]
-C_SPEED_DOWN = INPUTS + 17  # limit [m/s]
-C_ACCEL = INPUTS + 18  # limit in the plane [m/s^2]
-C_ACCEL_Z = INPUTS + 19  # limit [m/s^2]
-C_TILT = INPUTS + 20  # limit [rad]
-C_AIDED = INPUTS + 21  # 1: the estimator uses satellites; its origin is where it was when this became 1
-C_SERIAL = INPUTS + 22  # counts set-points: a change starts the shaping anew where the control changed
-COMMANDS = 23
+C_CONTROL = WORLD
+C_POSITION = WORLD + 1  # north, east, down about the estimator's origin [m]
+C_VELOCITY = WORLD + 4  # north, east, down [m/s]
+C_ROLL = WORLD + 7  # [rad]
+C_PITCH = WORLD + 8  # [rad]
+C_YAW = WORLD + 9  # [rad], clockwise from north
+C_YAW_RATE = WORLD + 10  # [rad/s]
+C_YAW_IS = WORLD + 11  # 0 hold the present heading, 1 go to C_YAW, 2 turn at C_YAW_RATE
+C_THROTTLE = WORLD + 12  # 0..1; rover -1..1
+C_STEERING = WORLD + 13  # rover -1..1, right positive
+C_CLIMB = WORLD + 14  # [m/s] up
+C_SPEED = WORLD + 15  # limit in the plane [m/s]
+C_SPEED_UP = WORLD + 16  # limit [m/s]
+C_SPEED_DOWN = WORLD + 17  # limit [m/s]
+C_ACCEL = WORLD + 18  # limit in the plane [m/s^2]
+C_ACCEL_Z = WORLD + 19  # limit [m/s^2]
+C_TILT = WORLD + 20  # limit [rad]
+C_AIDED = WORLD + 21  # 1: the estimator uses satellites; its origin is where it was when this became 1
+_K = WORLD + 22
 
 # --- memory: what the estimator believes (visible through ``Estimate``) -------------------------------------
-K_POSITION = 0  # north, east, down about the world's origin [m]
-K_VELOCITY = 3
-K_ATTITUDE = 6  # quaternion w, x, y, z: forward, right, down to north, east, down
-K_EULER = 10  # roll, pitch, yaw [rad]
-K_RATES = 13  # forward, right, down [rad/s]
-K_ACCEL = 16  # north, east, down, without gravity [m/s^2]
-K_ORIGIN = 19  # of the estimate, north, east, down about the world's origin [m]
-K_AIDED = 22  # 1 once satellites are used and positions are good
-K_ALIGNED = 23  # 1 once tilt and heading are known
-K_GPS_AGE = 24  # [s] since the last fix was used
-K_SPREAD = 25  # estimator's own standard deviation: plane, height [m], speed in the plane, up [m/s]
-K_HEADING_ERROR = 29  # last difference of compass and estimate [rad]
-K_MOTORS = 30  # four motor commands 0..1 (rover: steering, throttle -1..1)
-K_LANDED = 34  # 1: the landed detector is sure
-K_THROTTLE = 35  # collective, 0..1
-K_HOVER = 36  # learnt collective in hover
-K_TARGET = 37  # shaped target position, north, east, down about the world's origin [m]
-K_TARGET_VELOCITY = 40
-K_TARGET_ACCEL = 43
-K_TARGET_EULER = 46  # attitude asked for: roll, pitch, yaw [rad]
-K_GPS_LEVEL = 49  # difference of the last fix and the estimate in the plane, in sigmas
-VISIBLE = 50
+K_POSITION = _K  # north, east, down about the world's origin [m]
+K_VELOCITY = _K + 3
+K_ATTITUDE = _K + 6  # quaternion w, x, y, z: forward, right, down to north, east, down
+K_EULER = _K + 10  # roll, pitch, yaw [rad]
+K_RATES = _K + 13  # forward, right, down [rad/s]
+K_ACCEL = _K + 16  # north, east, down, without gravity [m/s^2]
+K_ORIGIN = _K + 19  # of the estimate, north, east, down about the world's origin [m]
+K_AIDED = _K + 22  # 1 once satellites are used and positions are good
+K_ALIGNED = _K + 23  # 1 once tilt and heading are known
+K_GPS_AGE = _K + 24  # [s] since the last fix was used
+K_SPREAD = _K + 25  # estimator's own standard deviation: plane, height [m], speed in the plane, up [m/s]
+K_HEADING_ERROR = _K + 29  # last difference of compass and estimate [rad]
+K_MOTORS = _K + 30  # four motor commands 0..1 (rover: steering, throttle -1..1)
+K_LANDED = _K + 34  # 1: the landed detector is sure
+K_THROTTLE = _K + 35  # collective, 0..1
+K_HOVER = _K + 36  # learnt collective in hover
+K_TARGET = _K + 37  # shaped target position, north, east, down about the world's origin [m]
+K_TARGET_VELOCITY = _K + 40
+K_TARGET_ACCEL = _K + 43
+K_TARGET_EULER = _K + 46  # attitude asked for: roll, pitch, yaw [rad]
+K_GPS_LEVEL = _K + 49  # difference of the last fix and the estimate in the plane, in sigmas
+VISIBLE = _K + 50
 # --- memory: private ----------------------------------------------------------------------------------------
-K_GYRO_BIAS = 50
-K_ACCEL_BIAS = 53  # north, east, down [m/s^2]
-K_COVARIANCE = 56  # three axes of pp pv pb vv vb bb
-K_SEEN_GPS = 74
-K_SEEN_BARO = 75
-K_SEEN_MAG = 76
-K_CONTROL = 77  # the control in force
-K_SERIAL = 78
-K_RATE_INTEGRAL = 79
-K_RATE_BEFORE = 82
-K_RATE_SLOPE = 85
-K_VELOCITY_INTEGRAL = 88
-K_YAW_TARGET = 91
-K_YAW_SPEED = 92
-K_SPOOL = 93  # 0 idle .. 1 full authority
-K_LANDED_FOR = 94  # [s]
-K_DEMAND = 95  # target attitude quaternion
-K_HEIGHT_ZERO = 99  # barometer's offset: its reading where height is zero [m up]
-K_ACCEL_SMOOTH = 100
-K_SPEED_INTEGRAL = 103
-K_LOWER_LIMIT = 104  # 1 while the collective is at its lower limit
-MEMORY = 105
+K_GYRO_BIAS = _K + 50
+K_ACCEL_BIAS = _K + 53  # north, east, down [m/s^2]
+K_COVARIANCE = _K + 56  # three axes of pp pv pb vv vb bb
+K_SEEN_GPS = _K + 74
+K_SEEN_BARO = _K + 75
+K_SEEN_MAG = _K + 76
+K_CONTROL = _K + 77  # the control in force
+K_RATE_INTEGRAL = _K + 79
+K_RATE_BEFORE = _K + 82
+K_RATE_SLOPE = _K + 85
+K_VELOCITY_INTEGRAL = _K + 88
+K_YAW_TARGET = _K + 91
+K_YAW_SPEED = _K + 92
+K_SPOOL = _K + 93  # 0 idle .. 1 full authority
+K_LANDED_FOR = _K + 94  # [s]
+K_DEMAND = _K + 95  # target attitude quaternion
+K_HEIGHT_ZERO = _K + 99  # barometer's offset: its reading where height is zero [m up]
+K_ACCEL_SMOOTH = _K + 100
+K_SPEED_INTEGRAL = _K + 103
+K_LOWER_LIMIT = _K + 104  # 1 while the collective is at its lower limit
+FLIGHT = _K + 105 - WORLD
+"""Columns that the flight loops add to a body's row."""

@@ -93,144 +93,144 @@ def _vertical(control: int) -> bool:
 
 
 @njit(cache=False)
-def _enter(memory: Array, control: int, before: int) -> None:
+def _enter(row: Array, control: int, before: int) -> None:
     """A new control takes over where the vehicle is and as fast as it is."""
     for axis in range(3):
         known = in_plane(before) if axis < 2 else _vertical(before)
         if not known:
-            memory[K_TARGET + axis] = memory[K_POSITION + axis]
-            memory[K_TARGET_VELOCITY + axis] = memory[K_VELOCITY + axis]
-            memory[K_TARGET_ACCEL + axis] = 0.0
-            memory[K_VELOCITY_INTEGRAL + axis] = 0.0
+            row[K_TARGET + axis] = row[K_POSITION + axis]
+            row[K_TARGET_VELOCITY + axis] = row[K_VELOCITY + axis]
+            row[K_TARGET_ACCEL + axis] = 0.0
+            row[K_VELOCITY_INTEGRAL + axis] = 0.0
     if before in (OFF, IDLE):
-        memory[K_YAW_TARGET] = memory[K_EULER + 2]
-        memory[K_YAW_SPEED] = 0.0
-        memory[K_TARGET_EULER] = 0.0
-        memory[K_TARGET_EULER + 1] = 0.0
+        row[K_YAW_TARGET] = row[K_EULER + 2]
+        row[K_YAW_SPEED] = 0.0
+        row[K_TARGET_EULER] = 0.0
+        row[K_TARGET_EULER + 1] = 0.0
 
 
 @njit(cache=False)
-def _stay(memory: Array) -> None:
+def _stay(row: Array) -> None:
     """On the ground: the target is where the vehicle stands, nothing is wound up."""
     for axis in range(3):
-        memory[K_TARGET + axis] = memory[K_POSITION + axis]
-        memory[K_TARGET_VELOCITY + axis] = 0.0
-        memory[K_TARGET_ACCEL + axis] = 0.0
-        memory[K_VELOCITY_INTEGRAL + axis] = 0.0
+        row[K_TARGET + axis] = row[K_POSITION + axis]
+        row[K_TARGET_VELOCITY + axis] = 0.0
+        row[K_TARGET_ACCEL + axis] = 0.0
+        row[K_VELOCITY_INTEGRAL + axis] = 0.0
 
 
 @njit(cache=False)
-def _move_target(memory: Array, axis: int, speed: float, accel: float) -> None:
+def _move_target(row: Array, axis: int, speed: float, accel: float) -> None:
     """Integrate one axis of the target towards a speed; *accel* is what the limits allow now."""
-    target_accel = ramp(memory[K_TARGET_ACCEL + axis], accel, _JERK * GUIDE_S)
-    memory[K_TARGET_ACCEL + axis] = target_accel
-    before = memory[K_TARGET_VELOCITY + axis]
-    memory[K_TARGET_VELOCITY + axis] = before + target_accel * GUIDE_S
-    memory[K_TARGET + axis] += (before + 0.5 * target_accel * GUIDE_S) * GUIDE_S
+    target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, _JERK * GUIDE_S)
+    row[K_TARGET_ACCEL + axis] = target_accel
+    before = row[K_TARGET_VELOCITY + axis]
+    row[K_TARGET_VELOCITY + axis] = before + target_accel * GUIDE_S
+    row[K_TARGET + axis] += (before + 0.5 * target_accel * GUIDE_S) * GUIDE_S
 
 
 @njit(cache=False)
-def _shape_plane(memory: Array, command: Array, control: int) -> None:
-    limit = command[C_ACCEL]
+def _shape_plane(row: Array, control: int) -> None:
+    limit = row[C_ACCEL]
     if control in (POSITION, POSITION_CLIMB):
-        north = command[C_POSITION] + memory[K_ORIGIN] - memory[K_TARGET]
-        east = command[C_POSITION + 1] + memory[K_ORIGIN + 1] - memory[K_TARGET + 1]
+        north = row[C_POSITION] + row[K_ORIGIN] - row[K_TARGET]
+        east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_TARGET + 1]
         distance = sqrt(north * north + east * east)
-        speed = min(approach(distance, _POSITION_GAIN, _PLANE_SHARE * limit), command[C_SPEED])
+        speed = min(approach(distance, _POSITION_GAIN, _PLANE_SHARE * limit), row[C_SPEED])
         scale = speed / distance if distance > 1e-9 else 0.0
         north, east = north * scale, east * scale
     else:
-        north, east = shorten(command[C_VELOCITY], command[C_VELOCITY + 1], command[C_SPEED])
-    dn = north - memory[K_TARGET_VELOCITY]
-    de = east - memory[K_TARGET_VELOCITY + 1]
+        north, east = shorten(row[C_VELOCITY], row[C_VELOCITY + 1], row[C_SPEED])
+    dn = north - row[K_TARGET_VELOCITY]
+    de = east - row[K_TARGET_VELOCITY + 1]
     gap = sqrt(dn * dn + de * de)
     push = min(approach(gap, _SHAPING_GAIN, _JERK), limit)
     scale = push / gap if gap > 1e-9 else 0.0
-    _move_target(memory, 0, north, dn * scale)
-    _move_target(memory, 1, east, de * scale)
+    _move_target(row, 0, north, dn * scale)
+    _move_target(row, 1, east, de * scale)
 
 
 @njit(cache=False)
-def _shape_height(memory: Array, command: Array, control: int) -> None:
-    limit = command[C_ACCEL_Z]
+def _shape_height(row: Array, control: int) -> None:
+    limit = row[C_ACCEL_Z]
     if control in (POSITION, VELOCITY_HEIGHT):
-        left = command[C_POSITION + 2] + memory[K_ORIGIN + 2] - memory[K_TARGET + 2]
+        left = row[C_POSITION + 2] + row[K_ORIGIN + 2] - row[K_TARGET + 2]
         down = approach(left, _POSITION_GAIN, _BRAKE_SHARE * limit)
     elif control == VELOCITY:
-        down = command[C_VELOCITY + 2]
+        down = row[C_VELOCITY + 2]
     else:
-        down = -command[C_CLIMB]
-    down = clip(down, -command[C_SPEED_UP], command[C_SPEED_DOWN])
-    push = approach(down - memory[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, _JERK)
-    _move_target(memory, 2, down, clip(push, -limit, limit))
+        down = -row[C_CLIMB]
+    down = clip(down, -row[C_SPEED_UP], row[C_SPEED_DOWN])
+    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, _JERK)
+    _move_target(row, 2, down, clip(push, -limit, limit))
 
 
 @njit(cache=False)
-def _leash(memory: Array) -> None:
+def _leash(row: Array) -> None:
     """A target that ran ahead (wind, a blocked motor) waits."""
-    dn = memory[K_TARGET] - memory[K_POSITION]
-    de = memory[K_TARGET + 1] - memory[K_POSITION + 1]
+    dn = row[K_TARGET] - row[K_POSITION]
+    de = row[K_TARGET + 1] - row[K_POSITION + 1]
     sn, se = shorten(dn, de, _LEASH)
-    memory[K_TARGET] = memory[K_POSITION] + sn
-    memory[K_TARGET + 1] = memory[K_POSITION + 1] + se
-    dd = clip(memory[K_TARGET + 2] - memory[K_POSITION + 2], -_LEASH, _LEASH)
-    memory[K_TARGET + 2] = memory[K_POSITION + 2] + dd
+    row[K_TARGET] = row[K_POSITION] + sn
+    row[K_TARGET + 1] = row[K_POSITION + 1] + se
+    dd = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_LEASH, _LEASH)
+    row[K_TARGET + 2] = row[K_POSITION + 2] + dd
 
 
 @njit(cache=False)
-def _wanted_accel(memory: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
+def _wanted_accel(row: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
     """Position and velocity loop of one axis [m/s^2]."""
-    error = memory[K_TARGET + axis] - memory[K_POSITION + axis]
-    speed = memory[K_TARGET_VELOCITY + axis] + approach(error, _POSITION_GAIN, 2.5)
-    miss = speed - memory[K_VELOCITY + axis]
+    error = row[K_TARGET + axis] - row[K_POSITION + axis]
+    speed = row[K_TARGET_VELOCITY + axis] + approach(error, _POSITION_GAIN, 2.5)
+    miss = speed - row[K_VELOCITY + axis]
     if not hold:
-        grown = memory[K_VELOCITY_INTEGRAL + axis] + integral * miss * GUIDE_S
-        memory[K_VELOCITY_INTEGRAL + axis] = clip(grown, -4.0, 4.0)
-    accel: float = memory[K_TARGET_ACCEL + axis] + gain * miss + memory[K_VELOCITY_INTEGRAL + axis]
+        grown = row[K_VELOCITY_INTEGRAL + axis] + integral * miss * GUIDE_S
+        row[K_VELOCITY_INTEGRAL + axis] = clip(grown, -4.0, 4.0)
+    accel: float = row[K_TARGET_ACCEL + axis] + gain * miss + row[K_VELOCITY_INTEGRAL + axis]
     return accel
 
 
 @njit(cache=False)
-def _turn(memory: Array, command: Array) -> None:
+def _turn(row: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
-    kind = int(command[C_YAW_IS])
+    kind = int(row[C_YAW_IS])
     if kind == 2:
-        wanted = command[C_YAW_RATE]
+        wanted = row[C_YAW_RATE]
     elif kind == 1:
-        error = wrap_angle(command[C_YAW] - memory[K_YAW_TARGET])
+        error = wrap_angle(row[C_YAW] - row[K_YAW_TARGET])
         wanted = clip(approach(error, 2.0, _SLEW_BRAKE), -_SLEW, _SLEW)
     else:
         wanted = 0.0
-    memory[K_YAW_SPEED] = ramp(memory[K_YAW_SPEED], wanted, 2.0 * _SLEW_BRAKE * GUIDE_S)
-    ahead = wrap_angle(memory[K_YAW_TARGET] - memory[K_EULER + 2])
+    row[K_YAW_SPEED] = ramp(row[K_YAW_SPEED], wanted, 2.0 * _SLEW_BRAKE * GUIDE_S)
+    ahead = wrap_angle(row[K_YAW_TARGET] - row[K_EULER + 2])
     if abs(ahead) > 0.5:
-        memory[K_YAW_TARGET] = wrap_angle(memory[K_EULER + 2] + clip(ahead, -0.5, 0.5))
-    memory[K_YAW_TARGET] = wrap_angle(memory[K_YAW_TARGET] + memory[K_YAW_SPEED] * GUIDE_S)
+        row[K_YAW_TARGET] = wrap_angle(row[K_EULER + 2] + clip(ahead, -0.5, 0.5))
+    row[K_YAW_TARGET] = wrap_angle(row[K_YAW_TARGET] + row[K_YAW_SPEED] * GUIDE_S)
 
 
 @njit(cache=False)
-def _demand_angles(memory: Array, roll: float, pitch: float) -> None:
+def _demand_angles(row: Array, roll: float, pitch: float) -> None:
     """Demand a roll, a pitch and the yaw target."""
-    yaw = memory[K_YAW_TARGET]
-    memory[K_TARGET_EULER] = roll
-    memory[K_TARGET_EULER + 1] = pitch
-    memory[K_TARGET_EULER + 2] = yaw
+    yaw = row[K_YAW_TARGET]
+    row[K_TARGET_EULER] = roll
+    row[K_TARGET_EULER + 1] = pitch
+    row[K_TARGET_EULER + 2] = yaw
     sr, cr = sine_cosine(0.5 * roll)
     sp, cp = sine_cosine(0.5 * pitch)
     sy, cy = sine_cosine(0.5 * yaw)
-    memory[K_DEMAND] = cr * cp * cy + sr * sp * sy
-    memory[K_DEMAND + 1] = sr * cp * cy - cr * sp * sy
-    memory[K_DEMAND + 2] = cr * sp * cy + sr * cp * sy
-    memory[K_DEMAND + 3] = cr * cp * sy - sr * sp * cy
+    row[K_DEMAND] = cr * cp * cy + sr * sp * sy
+    row[K_DEMAND + 1] = sr * cp * cy - cr * sp * sy
+    row[K_DEMAND + 2] = cr * sp * cy + sr * cp * sy
+    row[K_DEMAND + 3] = cr * cp * sy - sr * sp * cy
 
 
 @njit(cache=False)
-def _lean(memory: Array, command: Array, north: float, east: float, lift: float) -> None:
+def _lean(row: Array, north: float, east: float, lift: float) -> None:
     """Demand the attitude whose thrust gives an acceleration in the plane at a *lift* [m/s^2 up, with
     gravity].
     """
-    sy, cy = sine_cosine(memory[K_YAW_TARGET])
-    most = command[C_TILT]
+    sy, cy = sine_cosine(row[K_YAW_TARGET])
+    most = row[C_TILT]
     st, ct = sine_cosine(most)
     north, east = shorten(north, east, max(lift, 3.0) * st / ct)
     forward = north * cy + east * sy
@@ -238,66 +238,66 @@ def _lean(memory: Array, command: Array, north: float, east: float, lift: float)
     pitch = arc_tangent2(-forward, max(lift, 3.0))
     _, cp = sine_cosine(pitch)
     roll = arc_tangent2(right * cp, max(lift, 3.0))
-    _demand_angles(memory, clip(roll, -most, most), clip(pitch, -most, most))
+    _demand_angles(row, clip(roll, -most, most), clip(pitch, -most, most))
 
 
 @njit(cache=False)
-def _collective(memory: Array, lift: float) -> None:
+def _collective(row: Array, lift: float) -> None:
     """Collective for a vertical acceleration *lift* [m/s^2 up, gravity included] at the present tilt."""
-    x, y = memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2]
+    x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
     upright = 1.0 - 2.0 * (x * x + y * y)
-    memory[K_THROTTLE] = clip(memory[K_HOVER] * lift / _GRAVITY / clip(upright, 0.5, 1.0), 0.0, 1.0)
+    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / clip(upright, 0.5, 1.0), 0.0, 1.0)
 
 
 @njit(cache=False)
-def _learn_hover(memory: Array) -> None:
+def _learn_hover(row: Array) -> None:
     """Learn the collective that carries the weight, while the vehicle hardly accelerates."""
-    steady = memory[K_LANDED] < 0.5 and memory[K_SPOOL] >= 1.0 and abs(memory[K_VELOCITY + 2]) < 0.6
-    level = memory[K_ATTITUDE + 1] ** 2 + memory[K_ATTITUDE + 2] ** 2 < 0.002
-    if steady and level and abs(memory[K_ACCEL + 2]) < 1.0:
-        learnt = memory[K_HOVER] + GUIDE_S / _LEARN_TIME * (memory[K_THROTTLE] - memory[K_HOVER])
+    steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
+    level = row[K_ATTITUDE + 1] ** 2 + row[K_ATTITUDE + 2] ** 2 < 0.002
+    if steady and level and abs(row[K_ACCEL + 2]) < 1.0:
+        learnt = row[K_HOVER] + GUIDE_S / _LEARN_TIME * (row[K_THROTTLE] - row[K_HOVER])
         learnt = clip(learnt, 0.125, 0.6875)
-        memory[K_VELOCITY_INTEGRAL + 2] += _GRAVITY * (learnt / memory[K_HOVER] - 1.0)
-        memory[K_HOVER] = learnt
+        row[K_VELOCITY_INTEGRAL + 2] += _GRAVITY * (learnt / row[K_HOVER] - 1.0)
+        row[K_HOVER] = learnt
 
 
 @njit(cache=False)
-def guide(memory: Array, command: Array) -> None:
+def guide(row: Array) -> None:
     """One guidance period."""
-    control = int(command[C_CONTROL])
-    before = int(memory[K_CONTROL])
+    control = int(row[C_CONTROL])
+    before = int(row[K_CONTROL])
     if control != before:
-        _enter(memory, control, before)
-        memory[K_CONTROL] = control
+        _enter(row, control, before)
+        row[K_CONTROL] = control
     if control in (OFF, IDLE):
-        _stay(memory)
-        memory[K_THROTTLE] = 0.0
-        memory[K_YAW_TARGET] = memory[K_EULER + 2]
-        _demand_angles(memory, 0.0, 0.0)
+        _stay(row)
+        row[K_THROTTLE] = 0.0
+        row[K_YAW_TARGET] = row[K_EULER + 2]
+        _demand_angles(row, 0.0, 0.0)
         return
-    _turn(memory, command)
-    if memory[K_SPOOL] < 1.0 and memory[K_LANDED] > 0.5:
-        _stay(memory)
+    _turn(row)
+    if row[K_SPOOL] < 1.0 and row[K_LANDED] > 0.5:
+        _stay(row)
     if control in (ATTITUDE, CLIMB):
         share = GUIDE_S / _TC
-        roll = memory[K_TARGET_EULER] + share * (command[C_ROLL] - memory[K_TARGET_EULER])
-        pitch = memory[K_TARGET_EULER + 1] + share * (command[C_PITCH] - memory[K_TARGET_EULER + 1])
-        _demand_angles(memory, roll, pitch)
+        roll = row[K_TARGET_EULER] + share * (row[C_ROLL] - row[K_TARGET_EULER])
+        pitch = row[K_TARGET_EULER + 1] + share * (row[C_PITCH] - row[K_TARGET_EULER + 1])
+        _demand_angles(row, roll, pitch)
     if control == ATTITUDE:
-        x, y = memory[K_ATTITUDE + 1], memory[K_ATTITUDE + 2]
+        x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
         upright = clip(1.0 - 2.0 * (x * x + y * y), 0.7, 1.0)
-        memory[K_THROTTLE] = clip(command[C_THROTTLE] / upright, 0.0, 1.0)
+        row[K_THROTTLE] = clip(row[C_THROTTLE] / upright, 0.0, 1.0)
         return
-    _shape_height(memory, command, control)
-    lower = memory[K_LOWER_LIMIT] > 0.5
-    down = _wanted_accel(memory, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
+    _shape_height(row, control)
+    lower = row[K_LOWER_LIMIT] > 0.5
+    down = _wanted_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
     lift = clip(_GRAVITY - down, 0.0, _MOST_LIFT * _GRAVITY)
     if in_plane(control):
-        _shape_plane(memory, command, control)
-        _leash(memory)
-        landed = memory[K_LANDED] > 0.5
-        north = _wanted_accel(memory, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-        east = _wanted_accel(memory, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-        _lean(memory, command, north, east, _GRAVITY)
-    _collective(memory, lift)
-    _learn_hover(memory)
+        _shape_plane(row, control)
+        _leash(row)
+        landed = row[K_LANDED] > 0.5
+        north = _wanted_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+        east = _wanted_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+        _lean(row, north, east, _GRAVITY)
+    _collective(row, lift)
+    _learn_hover(row)

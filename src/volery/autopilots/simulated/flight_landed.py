@@ -29,25 +29,25 @@ _SURE = 1.0  # [s]
 
 
 @njit(cache=False)
-def detect_landing(memory: Array, control: int) -> None:
+def detect_landing(row: Array, control: int) -> None:
     """One guidance period of the detector."""
     motion = 0.0
     for axis in range(3):
-        smooth = memory[K_ACCEL_SMOOTH + axis]
-        smooth += 0.06 * (memory[K_ACCEL + axis] - smooth)  # 1 Hz
-        memory[K_ACCEL_SMOOTH + axis] = smooth
+        smooth = row[K_ACCEL_SMOOTH + axis]
+        smooth += 0.06 * (row[K_ACCEL + axis] - smooth)  # 1 Hz
+        row[K_ACCEL_SMOOTH + axis] = smooth
         motion += smooth * smooth
-    if memory[K_LANDED] > 0.5:
-        memory[K_LANDED_FOR] = 0.0
-        flying = control not in (OFF, IDLE) and memory[K_SPOOL] >= 1.0
-        if flying and memory[K_THROTTLE] > 0.8 * memory[K_HOVER]:
-            memory[K_LANDED] = 0.0
+    if row[K_LANDED] > 0.5:
+        row[K_LANDED_FOR] = 0.0
+        flying = control not in (OFF, IDLE) and row[K_SPOOL] >= 1.0
+        if flying and row[K_THROTTLE] > 0.8 * row[K_HOVER]:
+            row[K_LANDED] = 0.0
         return
-    quiet = motion < 1.0 and abs(memory[K_VELOCITY + 2]) < 1.0
-    low = memory[K_LOWER_LIMIT] > 0.5 or memory[K_THROTTLE] < 0.3 * memory[K_HOVER]
+    quiet = motion < 1.0 and abs(row[K_VELOCITY + 2]) < 1.0
+    low = row[K_LOWER_LIMIT] > 0.5 or row[K_THROTTLE] < 0.3 * row[K_HOVER]
     if quiet and low:
-        memory[K_LANDED_FOR] += _PERIOD
-        if memory[K_LANDED_FOR] >= _SURE:
-            memory[K_LANDED] = 1.0
+        row[K_LANDED_FOR] += _PERIOD
+        if row[K_LANDED_FOR] >= _SURE:
+            row[K_LANDED] = 1.0
     else:
-        memory[K_LANDED_FOR] = 0.0
+        row[K_LANDED_FOR] = 0.0

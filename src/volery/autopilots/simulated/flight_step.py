@@ -18,39 +18,38 @@ from volery.autopilots.simulated.flight_estimator import believe, first_belief
 from volery.autopilots.simulated.flight_guidance import GUIDE_EVERY, guide
 from volery.autopilots.simulated.flight_landed import detect_landing
 from volery.autopilots.simulated.flight_rover import guide_rover
-from volery.world.bodies import new_work, step_body, wake_body
-from volery.world.columns import MULTIROTOR, P_KIND, S_AWAKE, Advance, Bodies, Work
+from volery.world.bodies import step_body, wake_body
+from volery.world.columns import MULTIROTOR, P_KIND, S_AWAKE, W_THROTTLE, Advance, Array, Bodies
 from volery.world.compiled import digest_of, world_sources
 
 _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 
 
 @njit(cache=False)
-def _boot(bodies: Bodies, body: int, work: Work) -> None:
+def _boot(row: Array) -> None:
     """What an autopilot believes before its first step."""
-    memory = bodies.memory[body]
-    memory[K_HOVER] = _FIRST_HOVER
-    memory[K_LANDED] = 1.0
-    first_belief(bodies, body, work)
+    row[K_HOVER] = _FIRST_HOVER
+    row[K_LANDED] = 1.0
+    first_belief(row)
 
 
 @njit(cache=False)
-def _control(bodies: Bodies, body: int, work: Work) -> None:
-    """From the belief at this step to motor commands."""
-    memory, command, parameters = bodies.memory[body], bodies.inputs[body], bodies.parameters[body]
-    due = bodies.reached[body] % GUIDE_EVERY == 0
-    if parameters[P_KIND] != MULTIROTOR:
+def _control(row: Array, k: int) -> None:
+    """From the belief at step *k* to motor commands."""
+    due = k % GUIDE_EVERY == 0
+    if row[P_KIND] != MULTIROTOR:
         if due:
-            guide_rover(memory, command, parameters)
-        work.throttle[0] = -memory[K_MOTORS]
-        work.throttle[1] = memory[K_MOTORS + 1]
+            guide_rover(row)
+        row[W_THROTTLE] = -row[K_MOTORS]
+        row[W_THROTTLE + 1] = row[K_MOTORS + 1]
         return
+    control = int(row[C_CONTROL])
     if due:
-        guide(memory, command)
-        detect_landing(memory, int(command[C_CONTROL]))
-    fly_attitude(memory, parameters, int(command[C_CONTROL]))
+        guide(row)
+        detect_landing(row, control)
+    fly_attitude(row, control)
     for i in range(4):
-        work.throttle[i] = memory[K_MOTORS + i]
+        row[W_THROTTLE + i] = row[K_MOTORS + i]
 
 
 def _compose(sources: str) -> Advance:
@@ -58,15 +57,15 @@ def _compose(sources: str) -> Advance:
     def advance_flights(bodies: Bodies, goals: NDArray[np.int64]) -> None:
         if not sources:  # never so: its being named here makes the digest part of the cache's key
             return
-        work = new_work()
         for body in range(goals.shape[0]):
-            if bodies.state[body, S_AWAKE] == 0.0:
-                wake_body(bodies, body, work)
-                _boot(bodies, body, work)
+            row = bodies.rows[body]
+            if row[S_AWAKE] == 0.0:
+                wake_body(row, bodies.keys[body])
+                _boot(row)
             while bodies.reached[body] < goals[body]:
-                _control(bodies, body, work)
-                step_body(bodies, body, work)
-                believe(bodies, body, work)
+                _control(row, bodies.reached[body])
+                step_body(bodies, body, row)
+                believe(row, bodies.reached[body])
 
     compiled: Advance = advance_flights
     return compiled
