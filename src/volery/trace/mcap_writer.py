@@ -14,8 +14,6 @@ import struct
 import zlib
 from array import array
 from collections.abc import Callable, Iterable
-from contextlib import suppress
-from io import FileIO
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,10 +22,10 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from volery.base.errors import UsageError
 from volery.base.time import Ns, S
 from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
 from volery.trace.events import NONE, Event, Message, Published, VehicleState
+from volery.trace.output import Output
 from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_to_json
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -74,18 +72,11 @@ def _record(thing: records.McapRecord) -> bytes:
     return builder.end()  # type: ignore[no-untyped-call, no-any-return]  # the library left it bare
 
 
-def _write_all(file: FileIO, data: bytes) -> None:
-    rest = memoryview(data)
-    while rest:
-        rest = rest[file.write(rest) :]
-
-
 class McapWriter:
     """A tap of the stream that writes ``trace.mcap``. Call it with events, then ``close`` it.
 
-    Gives every type of published message to *definitions* once. Should the disk fill up or the file become
-    unwritable, the writer cuts the file back to its last whole record, keeps nothing more and says so in
-    ``problem``; a run need not end for it. Raises ``UsageError`` if the file cannot be made.
+    Gives every type of published message to *definitions* once. Raises ``UsageError`` if the file cannot be
+    made; what happens when the disk fills up is said at ``Output``.
     """
 
     def __init__(
@@ -96,14 +87,9 @@ class McapWriter:
         definitions: Definitions = _no_definition,
     ) -> None:
         self.path = path
-        self.problem = ""
-        try:
-            self._file = path.open("wb", buffering=0)
-        except OSError as error:
-            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        self._output = Output(path)
         self._definitions = definitions
         self._summary = _Summary()
-        self._size = 0
         self._body = bytearray()
         self._indexes: dict[int, array[int]] = {}
         self._chunk_ends: Ns = S
@@ -111,11 +97,16 @@ class McapWriter:
         self._published: dict[tuple[str, str, str], int] = {}
         self._writers: dict[type[Any], Callable[[Any], None]] = {kind: self._own(kind) for kind in OWN_EVENTS}
         self._writers[Published] = self._write_published
-        self._put(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
+        self._output.write(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
         self.metadata("volery", {"schema": TRACE_SCHEMA, "seed": str(setup.seed)})
         self.attach(Attachment(SETUP_ATTACHMENT, "application/json", setup_to_json(setup)))
         for attachment in attachments:
             self.attach(attachment)
+
+    @property
+    def problem(self) -> str:
+        """Why the trace is not whole; empty if it is."""
+        return self._output.problem
 
     def __call__(self, event: Event) -> None:
         """Write one event."""
@@ -126,16 +117,16 @@ class McapWriter:
         self.flush()
         name, media_type, data = attachment
         record = _record(records.Attachment(0, 0, name, media_type, data))
-        index = records.AttachmentIndex(self._size, len(record), 0, 0, len(data), name, media_type)
-        if self._put(record):
+        index = records.AttachmentIndex(self._output.size, len(record), 0, 0, len(data), name, media_type)
+        if self._output.write(record):
             self._summary.attachments.append(index)
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
         """Add words by name to the trace."""
         self.flush()
         record = _record(records.Metadata(name=name, metadata=values))
-        index = records.MetadataIndex(offset=self._size, length=len(record), name=name)
-        if self._put(record):
+        index = records.MetadataIndex(offset=self._output.size, length=len(record), name=name)
+        if self._output.write(record):
             self._summary.metadata.append(index)
 
     def outcome(self, status: str, reason: str) -> None:
@@ -152,24 +143,15 @@ class McapWriter:
         self._indexes = {}
         first = min(min(index[::2]) for index in indexes.values())
         last = max(max(index[::2]) for index in indexes.values())
-        chunk = _record(
-            records.Chunk(
-                compression="",
-                data=body,
-                message_start_time=first,
-                message_end_time=last,
-                uncompressed_crc=zlib.crc32(body),
-                uncompressed_size=len(body),
-            )
-        )
+        chunk = _record(records.Chunk("", body, last, first, zlib.crc32(body), len(body)))
         listed = b""
         offsets = {}
         for channel, index in indexes.items():
-            offsets[channel] = self._size + len(chunk) + len(listed)
+            offsets[channel] = self._output.size + len(chunk) + len(listed)
             listed += _index_record(channel, index)
         entry = records.ChunkIndex(
             chunk_length=len(chunk),
-            chunk_start_offset=self._size,
+            chunk_start_offset=self._output.size,
             compression="",
             compressed_size=len(body),
             message_end_time=last,
@@ -178,34 +160,17 @@ class McapWriter:
             message_start_time=first,
             uncompressed_size=len(body),
         )
-        if self._put(chunk + listed):
+        if self._output.write(chunk + listed):
             self._summary.chunk(entry, {channel: len(index) // 2 for channel, index in indexes.items()})
 
     def close(self) -> None:
         """Write what is left, the summary and the index. A second call does nothing."""
-        if self._file.closed:
+        if self._output.closed:
             return
         self.flush()
-        self._put(_record(records.DataEnd(0)))
-        self._put(self._summary.bytes(self._size) + MAGIC)
-        self._file.close()
-
-    def _put(self, data: bytes) -> bool:
-        if self.problem or self._file.closed:
-            return False
-        try:
-            _write_all(self._file, data)
-        except OSError as error:
-            self._give_up(error)
-            return False
-        self._size += len(data)
-        return True
-
-    def _give_up(self, error: OSError) -> None:
-        why = error.strerror or error
-        self.problem = f"cannot write {self.path} any more: {why}; the trace ends after {self._size} bytes"
-        with suppress(OSError):  # the reader copes with a file that is cut anywhere
-            self._file.truncate(self._size)
+        self._output.write(_record(records.DataEnd(0)))
+        self._output.write(self._summary.bytes(self._output.size) + MAGIC)
+        self._output.close()
 
     def _schema(self, name: str, text: str) -> int:
         known = self._schemas.get(name)
@@ -288,14 +253,20 @@ class _Summary:
     def __init__(self) -> None:
         self.schemas: list[bytes] = []
         self.channels: list[bytes] = []
-        self.chunks: list[records.ChunkIndex] = []
+        self._chunks: list[bytes] = []
+        self._first: Ns | None = None
+        self._last: Ns = 0
         self.attachments: list[records.AttachmentIndex] = []
         self.metadata: list[records.MetadataIndex] = []
         self._counts: dict[int, int] = {}
 
     def chunk(self, entry: records.ChunkIndex, counts: dict[int, int]) -> None:
         """A chunk was written, with so many messages per channel."""
-        self.chunks.append(entry)
+        self._chunks.append(_record(entry))
+        self._first = min(
+            entry.message_start_time, entry.message_start_time if self._first is None else self._first
+        )
+        self._last = max(entry.message_end_time, self._last)
         for channel, count in counts.items():
             self._counts[channel] = self._counts.get(channel, 0) + count
 
@@ -304,10 +275,10 @@ class _Summary:
             attachment_count=len(self.attachments),
             channel_count=len(self.channels),
             channel_message_counts=self._counts,
-            chunk_count=len(self.chunks),
+            chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
-            message_end_time=max((entry.message_end_time for entry in self.chunks), default=0),
-            message_start_time=min((entry.message_start_time for entry in self.chunks), default=0),
+            message_end_time=self._last,
+            message_start_time=self._first or 0,
             metadata_count=len(self.metadata),
             schema_count=len(self.schemas),
         )
@@ -318,7 +289,7 @@ class _Summary:
             (Opcode.SCHEMA, b"".join(self.schemas)),
             (Opcode.CHANNEL, b"".join(self.channels)),
             (Opcode.STATISTICS, _record(self._statistics())),
-            (Opcode.CHUNK_INDEX, b"".join(_record(entry) for entry in self.chunks)),
+            (Opcode.CHUNK_INDEX, b"".join(self._chunks)),
             (Opcode.ATTACHMENT_INDEX, b"".join(_record(entry) for entry in self.attachments)),
             (Opcode.METADATA_INDEX, b"".join(_record(entry) for entry in self.metadata)),
         ]

@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.trace.events import (
     Activation,
@@ -28,6 +26,7 @@ from volery.trace.events import (
     Slice,
     Verdict,
 )
+from volery.trace.output import Output
 
 _quote = json.JSONEncoder(ensure_ascii=False).encode
 
@@ -41,16 +40,13 @@ _RUN = "the run"
 class TimelineWriter:
     """A tap of the stream that writes ``timeline.json``. Call it with events, then ``close`` it.
 
-    Raises ``UsageError`` if the file cannot be made; should it become unwritable later, ``problem`` says so.
+    Raises ``UsageError`` if the file cannot be made; what happens when the disk fills up is said at
+    ``Output``.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.problem = ""
-        try:
-            self._file = path.open("w", encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        self._output = Output(path)
         self._lines: list[str] = []
         self._first = True
         self._processes: dict[str, int] = {}
@@ -69,6 +65,11 @@ class TimelineWriter:
             Verdict: self._verdict,
         }
 
+    @property
+    def problem(self) -> str:
+        """Why the timeline is not whole; empty if it is."""
+        return self._output.problem
+
     def __call__(self, event: Event) -> None:
         """Write one event, if the timeline shows its kind."""
         writer = self._writers.get(type(event))
@@ -77,15 +78,13 @@ class TimelineWriter:
 
     def close(self) -> None:
         """Let what is still under way end with the run, and close the file. A second call does nothing."""
-        if self._file.closed:
+        if self._output.closed:
             return
         for state in self._states.values():
             self._state_until(state, max(self._last, state.at))
         self._write_out()
-        if not self.problem:
-            self._write("\n]\n" if not self._first else "[]\n")
-        with suppress(OSError):  # what could not be written was reported when it happened
-            self._file.close()
+        self._output.write(b"[]\n" if self._first else b"\n]\n")
+        self._output.close()
 
     def _slice(self, event: Slice) -> None:
         where = self._threads.get((event.processor, str(event.core)))
@@ -169,17 +168,11 @@ class TimelineWriter:
             self._write_out()
 
     def _write_out(self) -> None:
-        if self._lines and not self.problem:
-            self._write(("[\n" if self._first else ",\n") + ",\n".join(self._lines))
+        if self._lines:
+            text = ("[\n" if self._first else ",\n") + ",\n".join(self._lines)
+            self._output.write(text.encode("utf-8", "replace"))
             self._first = False
         self._lines.clear()
-
-    def _write(self, text: str) -> None:
-        try:
-            self._file.write(text)
-            self._file.flush()
-        except OSError as error:
-            self.problem = f"cannot write {self.path} any more: {error.strerror or error}"
 
 
 def _introduction(what: str, where: str, name: str) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
@@ -184,8 +185,8 @@ def test_a_full_disk_leaves_a_readable_trace_and_a_problem(tmp_path: Path) -> No
     writer = McapWriter(path, sample_setup())
     begun = path.stat().st_size
     disk = _FullDisk(100_000)
-    writer._file.close()
-    writer._file = disk  # type: ignore[assignment]
+    writer._output._file.close()
+    writer._output._file = disk  # type: ignore[assignment]
     disk.content.write(path.read_bytes())
     for event in sample_events(seconds=20.0):
         writer(event)
@@ -227,3 +228,14 @@ def test_slices_and_failures_keep_their_order_of_telling(tmp_path: Path) -> None
         writer(event)
     writer.close()
     assert read(path).events == events
+
+
+def test_rosbags_reads_the_file_as_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path)
+    with AnyReader([path]) as reader:
+        found = [
+            reader.deserialize(raw, connection.msgtype)  # type: ignore[no-untyped-call]
+            for connection, _, raw in reader.messages()
+        ]
+    assert len(found) == len(events)
