@@ -1,8 +1,9 @@
 """The law of a rover: a bicycle on the ground.
 
 * Speed: v' = (u v_top - v) / T_v, at most the tyres' grip a_max; steering angle d' = (s d_top - d) / T_d;
-  heading' = v tan(d) / L, held to the grip by limiting the turn rate to a_max / v (Rajamani, Vehicle Dynamics
-  and Control, 2.2: the kinematic bicycle). A skid-steered one turns at s r_top with the lag T_d, at any speed.
+  heading' = v tan(d) / L, held to the grip by limiting the turn rate to a_max / v (Rajamani, Vehicle
+  Dynamics and Control, 2.2: the kinematic bicycle). A skid-steered one turns at s r_top with the lag T_d, at
+  any speed.
 * Power: rolling resistance, drag and acceleration against the drive's efficiency; braking returns nothing.
 * Valid: firm ground, slopes below about 15 degrees, no slip angle; the body follows the ground, level in
   attitude.

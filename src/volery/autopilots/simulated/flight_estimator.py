@@ -1,10 +1,10 @@
 """The estimator, compiled: what an autopilot believes, from its instruments alone.
 
-Attitude: gyros integrated every step; heading held by the compass; tilt held by what the velocity filter finds
-wrong with the acceleration (it takes an unknown lean for an acceleration that is not there), or by gravity
-itself while no satellites help. Position and velocity: one Kalman filter for each axis, of position, velocity
-and acceleration error (Gelb, Applied Optimal Estimation, 4.2), fed by satellites in the plane and by the
-barometer in height, or by satellites alone where they are the better (a real-time kinematic fix).
+Attitude: gyros integrated every step; heading held by the compass; tilt held by what the velocity filter
+finds wrong with the acceleration (it takes an unknown lean for an acceleration that is not there), or by
+gravity itself while no satellites help. Position and velocity: one Kalman filter for each axis, of position,
+velocity and acceleration error (Gelb, Applied Optimal Estimation, 4.2), fed by satellites in the plane and by
+the barometer in height, or by satellites alone where they are the better (a real-time kinematic fix).
 """
 
 from __future__ import annotations
