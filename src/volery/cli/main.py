@@ -45,9 +45,13 @@ Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a mo
 def version(wanted: bool) -> None:
     """Print the version and stop."""
     if wanted:
+        from importlib.metadata import PackageNotFoundError
         from importlib.metadata import version as installed
 
-        typer.echo(f"volery {installed('volery')}")
+        try:
+            typer.echo(f"volery {installed('volery')}")
+        except PackageNotFoundError:
+            typer.echo("volery, run from its source without being installed")
         raise typer.Exit
 
 

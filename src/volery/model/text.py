@@ -101,7 +101,7 @@ def parse(text: str, name: str) -> Node:
         with warnings.catch_warnings(action="ignore", category=ReusedAnchorWarning):
             root = yaml.compose(text)
     except MarkedYAMLError as error:
-        raise ModelError(_complaint(error), "", _mark(error, name)) from None
+        raise ModelError(_complaint(error, text), "", _mark(error, name)) from None
     except RecursionError:
         raise ModelError("nested too deeply to be a model", "", Location(name, 1)) from None
     except (YAMLError, ValueError) as error:
@@ -187,9 +187,16 @@ def _mark(error: MarkedYAMLError, name: str) -> Location:
     return Location(name, mark.line + 1 if mark else 1)
 
 
-def _complaint(error: MarkedYAMLError) -> str:
+def _complaint(error: MarkedYAMLError, text: str) -> str:
     parts = [part for part in (error.context, error.problem) if part]
-    return f"this is not YAML: {', '.join(parts)}"
+    lines = text.splitlines()
+    marks = [mark for mark in (error.problem_mark, error.context_mark) if mark and mark.line < len(lines)]
+    hint = (
+        '; within braces, put quotes around "Type[]"'
+        if any("[]" in lines[mark.line] for mark in marks)
+        else ""
+    )
+    return f"this is not YAML: {', '.join(parts)}{hint}"
 
 
 def _first_line(error: Exception) -> str:

@@ -379,6 +379,18 @@ SPOILT = {
         "",
         ["this is not YAML", "expected ',' or ']'"],
     ),
+    "brackets within braces": (
+        ('drones: "DroneService[]"', "drones: DroneService[]"),
+        "drones: DroneService[]",
+        "",
+        ["this is not YAML", 'put quotes around "Type[]"'],
+    ),
+    "a parameter called like a port": (
+        ("parameters: {steps: 4}", "parameters: {drone: 4}"),
+        "parameters: {drone: 4}",
+        "application.control.parameters.drone",
+        ["'drone' is a required port of drone_control; a parameter needs another name"],
+    ),
     "a tab": (("name: hospital-delivery", "\tname: x"), "\tname", "", ["this is not YAML", "'\\t'"]),
 }
 
