@@ -19,7 +19,7 @@ from volery.base.errors import ComponentError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
+    from types import FrameType, TracebackType
 
     from volery.base.time import Ns
     from volery.kernel.api import Kernel
@@ -73,18 +73,22 @@ class Interrupts:
         self._before: Any = None
         self._lock = threading.Lock()  # an accusation is made while the handler is in place, or not at all
         self._accusation: Accusation | None = None
-        self.pending = False
+        self._pending = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             self._before = signal.signal(signal.SIGINT, self._taken)
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
         if self._before is not None:
             with self._lock:
                 signal.signal(signal.SIGINT, self._before)
                 self._before = None
+        if isinstance(error, KeyboardInterrupt):
+            self._pending = False  # raised in user code before it was delivered
         self._deliver()
 
     def accuse(self, task: Task, now: Ns, what: str) -> None:
@@ -116,17 +120,17 @@ class Interrupts:
         task.summons = task.summons or error
 
     def _interrupt(self, frame: FrameType | None) -> None:
-        if self.pending:
+        if self._pending:
             raise KeyboardInterrupt
         task = self._kernel.current()
         in_user_code = task is not None and is_users(frame)
         if not (in_user_code and task is not None and task.adopted):
-            self.pending = True
+            self._pending = True
             self._kernel.post(self._deliver)
         if in_user_code:
             raise KeyboardInterrupt
 
     def _deliver(self) -> None:
-        if self.pending:
-            self.pending = False
+        if self._pending:
+            self._pending = False
             raise KeyboardInterrupt

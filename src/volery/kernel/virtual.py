@@ -137,9 +137,6 @@ class VirtualKernel:
                         self.record(activation)
         except Cancelled:
             pass
-        except KeyboardInterrupt:
-            if not self._interrupts.pending:
-                raise
         finally:
             self._bury(task)
 
@@ -244,7 +241,6 @@ class VirtualKernel:
     def cancel(self, scope: Scope, why: str) -> None:
         """Deliver ``Cancelled`` to every task of *scope* at its next interaction point."""
         scope.mark(why)
-        self._horizon = NEVER  # the hub looks whether the run has ended
         for task in scope.all_tasks():
             self.wake(task)
 
@@ -328,7 +324,7 @@ class VirtualKernel:
             self._horizon = self._until if pacer is None else NEVER
             while inbox:
                 inbox.popleft()()
-            if self.root.cancelled and self._adopted is None:
+            if self.root.cancelled:
                 return
             due = heap[0][0]
             if pacer is not None:
@@ -400,10 +396,10 @@ class VirtualKernel:
             else:
                 task.flow.parent = self._hub
                 self._resume(task)
-        self._current = None
         if hub is not None:
             hub.parent = self._hub
             hub.throw()
+        self._hub = self._current = None
         return [task.name for task in self.root.all_tasks()]
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from queue import Empty, SimpleQueue
-from time import monotonic, monotonic_ns
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Self
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.interrupt import Interrupts
-from volery.kernel.task import Cancelled, Place, Scope, Task
+from volery.kernel.task import STUBBORN, Cancelled, Place, Scope, Task
 from volery.kernel.timer import Every
 from volery.trace.events import Record, ignore
 
@@ -69,6 +69,7 @@ class WallKernel:
         self.events = 0
         self._speed = speed
         self._began: int | None = None
+        self._gone = threading.Condition(self._monitor)  # a task has ended, or never will
         self._heap: list[tuple[Ns, int, Entry]] = []
         self._tickets = count(1)
         self._inbox: deque[Action] = deque()
@@ -145,6 +146,7 @@ class WallKernel:
             task.done = True
             task.scope.tasks.remove(task)
             self._bell.put(None)
+            self._gone.notify_all()
 
     def _fail(self, error: BaseException) -> None:
         """Remember what run(), or the script that is adopted, is to be told."""
@@ -222,6 +224,7 @@ class WallKernel:
 
     def _answer(self, task: Task) -> None:
         task.answer()
+        self._gone.notify_all()
         while True:  # it swallows its end: this interaction point never returns
             task.flow.woken.wait()
 
@@ -341,17 +344,18 @@ class WallKernel:
 
     # -- the end
 
+    def _is_unwound(self) -> bool:
+        return all(task.refusals > STUBBORN for task in self.root.all_tasks())
+
     def close(self, why: str = "end of run", grace_s: float = GRACE_S) -> list[str]:
         """Unwind every task; returns the names of those that would not go within *grace_s* in all."""
         if self.current() is not None:
             raise UsageError("close() from inside a task: leave it first")
         self.cancel(self.root, why)
-        end = monotonic() + grace_s
-        for task in list(self.root.all_tasks()):
-            thread = task.flow.thread
-            if thread.ident is None:
-                self._bury(task)
-            else:
-                thread.join(max(0.0, end - monotonic()))
+        with self._monitor:
+            if self._began is None:
+                for task in list(self.root.all_tasks()):
+                    self._bury(task)
+            self._gone.wait_for(self._is_unwound, grace_s)
         self._stop()
         return [task.name for task in self.root.all_tasks()]

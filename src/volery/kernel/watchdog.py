@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 from volery.base.errors import UsageError
 
 if TYPE_CHECKING:
+    from volery.base.time import Ns
     from volery.kernel.api import Kernel
     from volery.kernel.interrupt import Interrupts
+    from volery.kernel.task import Task
 
 SAMPLES = 4
 """How often it looks within the time that it allows."""
@@ -31,6 +33,8 @@ class Watchdog:
         self._kernel, self._interrupts, self._patience_s = kernel, interrupts, patience_s
         self._stopped = threading.Event()
         self._thread: threading.Thread | None = None
+        self._seen: tuple[Task | None, Ns] = (None, 0)
+        self._since = 0.0  # on the wall: when it was first seen so
 
     def start(self) -> None:
         """Watch until ``stop``."""
@@ -43,12 +47,14 @@ class Watchdog:
         self._stopped.set()
 
     def _watch(self) -> None:
-        before: object = None
-        since = monotonic()
         while not self._stopped.wait(self._patience_s / SAMPLES):
-            task, now = self._kernel.current(), self._kernel.now()
-            if task is None or task.adopted or before != (task, now):
-                before, since = (task, now), monotonic()
-            elif monotonic() - since >= self._patience_s:
-                self._interrupts.accuse(task, now, f"it has not let go for {self._patience_s:g} s")
-                since = monotonic()
+            self.look(monotonic())
+
+    def look(self, moment: float) -> None:
+        """Compare what runs at this *moment*, seconds on the wall, with what ran when it last looked."""
+        task, now = self._kernel.current(), self._kernel.now()
+        if task is None or task.adopted or self._seen != (task, now):
+            self._seen, self._since = (task, now), moment
+        elif moment - self._since >= self._patience_s:
+            self._interrupts.accuse(task, now, f"it has not let go for {self._patience_s:g} s")
+            self._since = moment

@@ -1,0 +1,324 @@
+"""Schedules worked out by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.kernel.network import Network
+from volery.kernel.processor import Processor
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import at
+
+Slices = Callable[[], list[tuple[float, float, str, str]]]
+
+
+def compute(
+    kernel: VirtualKernel, processor: Processor, name: str, *, at: int, ms: int, priority: int = 0
+) -> None:
+    """From *at* milliseconds on, a task called *name* wants *ms* milliseconds."""
+
+    def body() -> None:
+        kernel.sleep_until(at * MS)
+        kernel.pay(ms * MS)
+
+    kernel.spawn(body, name, Place(name, processor, priority))
+
+
+def test_the_more_urgent_preempts_at_once(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "low", at=0, ms=10, priority=1)
+    compute(virtual, core, "high", at=4, ms=3, priority=2)
+    compute(virtual, core, "lowest", at=0, ms=1, priority=0)
+    virtual.run(S)
+    assert slices() == [
+        (0, 4, "cpu.0", "low"),
+        (4, 7, "cpu.0", "high"),
+        (7, 13, "cpu.0", "low"),
+        (13, 14, "cpu.0", "lowest"),
+    ]
+
+
+def test_equals_do_not_preempt_and_who_was_preempted_keeps_its_turn(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "a", at=0, ms=4, priority=1)
+    compute(virtual, core, "b", at=1, ms=4, priority=1)
+    compute(virtual, core, "urgent", at=2, ms=1, priority=9)
+    virtual.run(S)
+    assert slices() == [
+        (0, 2, "cpu.0", "a"),
+        (2, 3, "cpu.0", "urgent"),
+        (3, 5, "cpu.0", "a"),
+        (5, 9, "cpu.0", "b"),
+    ]
+
+
+def test_who_is_done_at_the_instant_of_its_preemption_is_done(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    done: list[int] = []
+
+    def low() -> None:
+        virtual.pay(5 * MS)
+        done.append(virtual.now())
+
+    def high() -> None:
+        virtual.sleep_until(5 * MS)
+        virtual.pay(10 * MS)
+
+    virtual.spawn(high, "high", Place("high", core, 9))  # its timer is set first: it comes first at 5 ms
+    virtual.spawn(low, "low", Place("low", core, 1))
+    virtual.run(S)
+    assert done == [5 * MS]
+    assert slices() == [(0, 5, "cpu.0", "low"), (5, 15, "cpu.0", "high")]
+
+
+def test_first_come_first_served_does_not_preempt(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="fifo")
+    compute(virtual, core, "a", at=0, ms=10, priority=1)
+    compute(virtual, core, "b", at=4, ms=3, priority=9)
+    compute(virtual, core, "c", at=3, ms=2, priority=5)
+    virtual.run(S)
+    assert slices() == [(0, 10, "cpu.0", "a"), (10, 12, "cpu.0", "c"), (12, 15, "cpu.0", "b")]
+
+
+def test_round_robin_takes_turns_of_a_quantum(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="round-robin", quantum=4 * MS)
+    compute(virtual, core, "a", at=0, ms=10)
+    compute(virtual, core, "b", at=0, ms=5, priority=9)
+    compute(virtual, core, "c", at=5, ms=2)
+    virtual.run(S)
+    assert slices() == [
+        (0, 4, "cpu.0", "a"),
+        (4, 8, "cpu.0", "b"),
+        (8, 12, "cpu.0", "a"),  # was behind b, and before c came
+        (12, 14, "cpu.0", "c"),
+        (14, 15, "cpu.0", "b"),
+        (15, 17, "cpu.0", "a"),
+    ]
+
+
+def test_round_robin_lets_one_go_on_whom_nobody_waits_for(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="round-robin", quantum=4 * MS)
+    compute(virtual, core, "a", at=0, ms=20)
+    compute(virtual, core, "b", at=10, ms=1)
+    virtual.run(S)
+    assert slices() == [(0, 12, "cpu.0", "a"), (12, 13, "cpu.0", "b"), (13, 21, "cpu.0", "a")]
+
+
+def test_two_cores_run_the_two_most_urgent(virtual: VirtualKernel, slices: Slices) -> None:
+    cores = Processor(virtual, "cpu", cores=2)
+    compute(virtual, cores, "a", at=0, ms=10, priority=1)
+    compute(virtual, cores, "b", at=0, ms=10, priority=2)
+    compute(virtual, cores, "c", at=4, ms=3, priority=3)
+    virtual.run(S)
+    assert sorted(slices()) == [
+        (0, 4, "cpu.0", "a"),
+        (0, 10, "cpu.1", "b"),
+        (4, 7, "cpu.0", "c"),
+        (7, 13, "cpu.0", "a"),
+    ]
+
+
+def test_a_job_keeps_its_core_and_a_new_one_takes_the_lowest_that_is_free(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
+    cores = Processor(virtual, "cpu", cores=3)
+    compute(virtual, cores, "short", at=0, ms=2)
+    compute(virtual, cores, "long", at=0, ms=10)
+    compute(virtual, cores, "next", at=5, ms=1)
+    virtual.run(S)
+    assert sorted(slices()) == [
+        (0, 2, "cpu.0", "short"),
+        (0, 10, "cpu.1", "long"),
+        (5, 6, "cpu.0", "next"),
+    ]
+
+
+def test_nested_calls_over_two_processors_with_preemption(virtual: VirtualKernel, slices: Slices) -> None:
+    """a on ``onboard`` calls b on ``ground``, which calls c on ``onboard`` (passive: at a's priority).
+
+    200 bytes take 1 ms of the medium and 2 ms to arrive.
+    """
+    onboard, ground = Processor(virtual, "onboard"), Processor(virtual, "ground")
+    radio = Network(virtual, "radio", bandwidth_bit_s=1_600_000, latency=2 * MS, loss=0.0, stream=Random(1))
+    result: list[float] = []
+
+    def call(place: Place, ms_before: int, ms_after: int, inner: Callable[[], None] | None = None) -> None:
+        radio.carry(200)
+        with at(virtual, place):
+            virtual.pay(ms_before * MS)
+            if inner is not None:
+                inner()
+            virtual.pay(ms_after * MS)
+        radio.carry(200)
+
+    def a() -> None:
+        virtual.pay(4 * MS)
+        c = Place("c", onboard, None)
+        call(Place("b", ground, 5), 3, 1, inner=lambda: call(c, 2, 0))
+        virtual.pay(1 * MS)
+        result.append(virtual.now() / MS)
+
+    virtual.spawn(a, "a", Place("a", onboard, 1))
+    compute(virtual, onboard, "urgent", at=2, ms=3, priority=9)
+    compute(virtual, ground, "busy", at=11, ms=2, priority=9)
+    virtual.run(S)
+    assert slices() == [
+        (0, 2, "onboard.0", "a"),
+        (2, 5, "onboard.0", "urgent"),
+        (5, 7, "onboard.0", "a"),
+        (10, 11, "ground.0", "b"),
+        (11, 13, "ground.0", "busy"),
+        (13, 15, "ground.0", "b"),
+        (18, 20, "onboard.0", "c"),
+        (23, 24, "ground.0", "b"),
+        (27, 28, "onboard.0", "a"),
+    ]
+    assert result == [28]
+
+
+def test_a_passive_component_computes_at_its_callers_priority(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+
+    def caller() -> None:
+        with at(virtual, Place("passive", core, None)):
+            virtual.pay(4 * MS)
+
+    virtual.spawn(caller, "caller", Place("caller", core, 5))
+    compute(virtual, core, "middle", at=1, ms=2, priority=3)
+    virtual.run(S)
+    assert slices() == [(0, 4, "cpu.0", "passive"), (4, 6, "cpu.0", "middle")]
+
+
+def test_background_computing_contends_and_nobody_waits_for_it(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
+    core = Processor(virtual, "cpu")
+    ros = Place("node", core, 5)
+    compute(virtual, core, "low", at=0, ms=5, priority=1)
+    compute(virtual, core, "high", at=3, ms=1, priority=9)
+    virtual.call_at(2 * MS, lambda: core.load(ros, 2 * MS))
+    virtual.run(S)
+    assert slices() == [
+        (0, 2, "cpu.0", "low"),
+        (2, 3, "cpu.0", "node"),
+        (3, 4, "cpu.0", "high"),
+        (4, 5, "cpu.0", "node"),
+        (5, 8, "cpu.0", "low"),
+    ]
+
+
+def test_the_background_of_a_place_is_one_thread(virtual: VirtualKernel, slices: Slices) -> None:
+    cores = Processor(virtual, "cpu", cores=2)
+    node = Place("node", cores)
+    for when in (0, 0, 3, 10):
+        virtual.call_at(when * MS, lambda: cores.load(node, 2 * MS))
+    virtual.run(S)
+    assert slices() == [(0, 6, "cpu.0", "node"), (10, 12, "cpu.0", "node")]
+
+
+def test_putting_another_job_on_a_core_takes_a_context_switch(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", context_switch=1 * MS)
+    compute(virtual, core, "low", at=0, ms=10, priority=1)
+    compute(virtual, core, "high", at=5, ms=3, priority=2)
+    virtual.run(S)
+    assert slices() == [(0, 5, "cpu.0", "low"), (5, 9, "cpu.0", "high"), (9, 16, "cpu.0", "low")]
+
+
+def test_going_on_with_the_same_task_takes_no_context_switch(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", context_switch=1 * MS)
+
+    def body() -> None:
+        virtual.pay(2 * MS)
+        virtual.sleep_until(10 * MS)
+        virtual.pay(2 * MS)
+
+    virtual.spawn(body, "a", Place("a", core))
+    virtual.run(S)
+    assert slices() == [(0, 3, "cpu.0", "a"), (10, 12, "cpu.0", "a")]
+
+
+def test_nor_does_it_when_something_happens_meanwhile(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", context_switch=1 * MS)
+
+    def body() -> None:
+        for _ in range(3):
+            virtual.pay(2 * MS)
+
+    virtual.spawn(body, "a", Place("a", core))
+    for when in range(10):
+        virtual.call_at(when * MS, lambda: None)
+    virtual.run(S)
+    assert [(start, end) for start, end, *_ in slices()] == [(0, 3), (3, 5), (5, 7)]
+
+
+def test_a_job_that_ends_with_its_turn_is_done(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="round-robin", quantum=4 * MS)
+    done: list[float] = []
+
+    def body() -> None:
+        virtual.pay(8 * MS)
+        done.append(virtual.now() / MS)
+
+    virtual.spawn(body, "a", Place("a", core))
+    compute(virtual, core, "b", at=6, ms=4)
+    virtual.run(S)
+    assert done == [8]
+    assert slices() == [(0, 8, "cpu.0", "a"), (8, 12, "cpu.0", "b")]
+
+
+def test_what_happens_at_the_instant_a_job_ends_comes_in_the_order_asked_for(virtual: VirtualKernel) -> None:
+    core = Processor(virtual, "cpu")
+    seen: list[str] = []
+
+    def body() -> None:
+        virtual.pay(5 * MS)
+        seen.append("done")
+
+    virtual.call_at(5 * MS, lambda: seen.append("asked for before"))
+    virtual.spawn(body, "a", Place("a", core))
+    virtual.run(S)
+    assert seen == ["asked for before", "done"]
+
+
+def test_busy_time_is_known_while_jobs_run(virtual: VirtualKernel) -> None:
+    cores = Processor(virtual, "cpu", cores=2)
+    compute(virtual, cores, "a", at=0, ms=10)
+    compute(virtual, cores, "b", at=5, ms=10)
+    seen: list[float] = []
+    for when in (2, 7, 20):
+        virtual.call_at(when * MS, lambda: seen.append(cores.busy_ns(virtual.now()) / MS))
+    virtual.run(S)
+    assert seen == [2, 9, 20]
+
+
+def test_nothing_takes_no_time(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "idle", at=0, ms=0)
+    core.load(Place("node", core), 0)
+    virtual.run(S)
+    assert slices() == []
+    assert virtual.now() == 0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"scheduler": "round-robbin"}, "cpu: no scheduler 'round-robbin' .did you mean 'round-robin'.*fifo"),
+        ({"cores": 0}, "cpu: cores 0"),
+        ({"quantum": 0}, "cpu: .*quantum 0 ns"),
+        ({"context_switch": -1}, "cpu: .*context switch -1 ns"),
+    ],
+)
+def test_a_processor_that_cannot_be_is_refused(
+    virtual: VirtualKernel, wrong: dict[str, int], said: str
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        Processor(virtual, "cpu", **wrong)  # type: ignore[arg-type]
