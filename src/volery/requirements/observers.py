@@ -273,6 +273,9 @@ def _lost_messages(application: str, setup: RunSetup) -> Observer:
 LANDINGS = ("land", "return_home")
 """Operations that end on the ground."""
 
+TRAVELS = ("goto", "drive")
+"""Operations that go to a point."""
+
 COMPONENT: dict[str, Make] = {
     "response_time": _response(_largest),
     "response_time_mean": _response(Distribution.mean),
@@ -287,9 +290,9 @@ COMPONENT: dict[str, Make] = {
 PROCESSOR: dict[str, Make] = {"utilisation": _utilisation}
 VEHICLE: dict[str, Make] = {
     "landing_offset": _worst(LANDINGS, lambda event: event.true_horizontal),
-    "goto_error": _worst(("goto",), lambda event: event.true_horizontal),
-    "goto_error_vertical": _worst(("goto",), lambda event: event.true_vertical),
-    "goto_error_by_estimate": _worst(("goto",), lambda event: event.estimate_horizontal),
+    "goto_error": _worst(TRAVELS, lambda event: event.true_horizontal),
+    "goto_error_vertical": _worst(TRAVELS, lambda event: event.true_vertical),
+    "goto_error_by_estimate": _worst(TRAVELS, lambda event: event.estimate_horizontal),
     "battery_min": _least_battery,
     "distance": _vehicle(lambda ledger: ledger.distance),
     "airborne_time": _vehicle(lambda ledger: to_seconds(ledger.airborne)),
