@@ -155,9 +155,9 @@ class Drone(Vehicle):
     def manual_control(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
         """Hold the sticks like this until the next call.
 
-        Pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1, where 0.5 keeps the
-        altitude in altitude hold. They are sent again and again, so that the autopilot does not fall back on
-        a transmitter. They take effect in ``stabilize`` and ``altitude_hold``, and are let go by the operations
+        Pitch (forward +), roll (right +), yaw (clockwise +) in -1..1; throttle in 0..1, where 0.5 keeps the
+        altitude in altitude hold. They are sent again and again: else the autopilot would fall back on a
+        transmitter. They take effect in ``stabilize`` and ``altitude_hold``, and are let go by the operations
         with a position and as soon as somebody else changes the mode.
         """
         self._require(Capability.STICKS)

@@ -222,7 +222,7 @@ class Vehicle(ABC):
 
     @abstractmethod
     def come_to_rest(self) -> str:
-        """Bring it down, or to a halt, unless somebody else has it; says what was done. For a program's end."""
+        """Bring it down, or to a halt, unless somebody else has it; says what was done. For the very end."""
 
     def close(self) -> None:
         """Stop talking to it. It goes on with what it does."""
