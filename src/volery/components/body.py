@@ -1,7 +1,7 @@
 """A vehicle as what surrounds it sees it: where it really is. For components of the environment only.
 
-A component of the application that requires a vehicle commands it and knows its autopilot's estimate. One of the
-environment, such as a beacon, a judge or an obstacle, is given this instead.
+A component of the application that requires a vehicle commands it and knows its autopilot's estimate. One of
+the environment, such as a beacon, a judge or an obstacle, is given this instead.
 """
 
 from __future__ import annotations

@@ -13,82 +13,97 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
+from itertools import repeat
+from operator import length_hint
 from typing import Any, TypeVar
 
 CELL = "__volery_steps__"
-TICK = "__volery_tick__"
+TICK = "__volery_tick_"
 
 WEIGHTS: Mapping[type[ast.AST], int] = {
-    ast.Assign: 1,
-    ast.AnnAssign: 1,
-    ast.AugAssign: 2,
     ast.Attribute: 1,
-    ast.Await: 2,
+    ast.AugAssign: 2,
+    ast.Await: 4,
     ast.BinOp: 1,
     ast.BoolOp: 1,
-    ast.Call: 5,
+    ast.Call: 3,
+    ast.ClassDef: 1000,
     ast.Compare: 1,
     ast.Delete: 1,
-    ast.Dict: 3,
-    ast.FormattedValue: 3,
-    ast.FunctionDef: 3,
-    ast.ClassDef: 50,
-    ast.Import: 5,
-    ast.ImportFrom: 5,
-    ast.List: 2,
-    ast.Raise: 10,
-    ast.Return: 1,
-    ast.Set: 3,
-    ast.Starred: 2,
-    ast.Subscript: 2,
-    ast.Try: 1,
-    ast.Tuple: 1,
+    ast.Dict: 7,
+    ast.DictComp: 14,
+    ast.FormattedValue: 8,
+    ast.FunctionDef: 7,
+    ast.GeneratorExp: 25,
+    ast.IfExp: 1,
+    ast.Import: 20,
+    ast.ImportFrom: 20,
+    ast.Lambda: 7,
+    ast.List: 4,
+    ast.ListComp: 12,
+    ast.Raise: 18,
+    ast.Set: 7,
+    ast.SetComp: 14,
+    ast.Subscript: 1,
+    ast.Tuple: 2,
     ast.UnaryOp: 1,
-    ast.With: 8,
-    ast.Yield: 3,
-    ast.ListComp: 5,
-    ast.SetComp: 6,
-    ast.DictComp: 6,
-    ast.GeneratorExp: 6,
-    ast.Lambda: 2,
+    ast.With: 10,
+    ast.Yield: 4,
 }
-"""Steps by kind of syntax: rounded ratios of the time that CPython 3.11 takes for it to that of a local
-addition.
+"""Steps by kind of syntax. One step is the addition of two local integers with the store of its result; the
+others are rounded ratios to it, as ``bench/counting.py`` measures them on CPython 3.11. Names, constants and
+plain stores are less than half a step and count as none.
 """
 
-PER_ROUND = 1
+PER_ROUND = 2
 """Steps that a loop takes for each round beside its body."""
+
+PER_ITEM = 4
+"""Steps that a comprehension takes for each item beside its expressions."""
 
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 _DIVERTS = (ast.Return, ast.Break, ast.Continue, ast.Raise)
 
 
+_PLENTY = 2**62
+
+
 class Steps:
-    """The counter that instrumented code of one run adds to. One flow of control runs at a time."""
+    """Counts what instrumented code of one run executes. One flow of control runs at a time.
+
+    Statements add to one cell. Inside expressions, where nothing can be assigned, an iterator of ``None`` is
+    advanced, one for each weight: that is cheap, false, and tells how often it was done.
+    """
 
     def __init__(self) -> None:
-        self.cell = [0]
+        self._cell = [0]
+        self._ticks: dict[int, tuple[repeat[None], int]] = {}
 
     def take(self) -> int:
         """Steps since it was last asked."""
-        steps, self.cell[0] = self.cell[0], 0
+        steps, self._cell[0] = self._cell[0], 0
+        for weight, (tick, left) in self._ticks.items():
+            now_left = length_hint(tick)
+            if now_left != left:
+                steps += weight * (left - now_left)
+                self._ticks[weight] = tick, now_left
         return steps
 
+    def instrument(self, tree: ast.Module) -> ast.Module:
+        """*tree* with counters; line numbers stay as they were."""
+        counters = _Counters()
+        counted: ast.Module = counters.visit(tree)
+        for weight in counters.ticks:
+            self._ticks.setdefault(weight, (repeat(None, _PLENTY), _PLENTY))
+        return ast.fix_missing_locations(counted)
+
     def names(self) -> dict[str, Any]:
-        """What a namespace needs for instrumented code to run in it."""
-        cell = self.cell
-
-        def tick(steps: int) -> None:
-            cell[0] += steps
-
-        return {CELL: cell, TICK: tick}
-
-
-def instrument(tree: ast.Module) -> ast.Module:
-    """*tree* with counters; line numbers stay as they were."""
-    counted: ast.Module = _Counters().visit(tree)
-    return ast.fix_missing_locations(counted)
+        """What a namespace needs for code that was instrumented here to run in it."""
+        return {
+            CELL: self._cell,
+            **{f"{TICK}{weight}__": tick.__next__ for weight, (tick, _) in self._ticks.items()},
+        }
 
 
 def weigh(node: ast.AST) -> int:
@@ -116,7 +131,13 @@ def _parts(node: ast.AST) -> Iterator[ast.AST]:
 
 
 class _Counters(ast.NodeTransformer):
-    """Puts a counter before each straight run of statements and into each comprehension and lambda."""
+    """Puts a counter before each straight run of statements and into each comprehension and lambda.
+
+    ``ticks`` are the weights of those that are inside expressions.
+    """
+
+    def __init__(self) -> None:
+        self.ticks: set[int] = set()
 
     def _block(self, body: list[ast.stmt], extra: int = 0) -> list[ast.stmt]:
         """*body* cut into straight runs: a new one starts behind each statement that may leave the block."""
@@ -169,24 +190,30 @@ class _Counters(ast.NodeTransformer):
         return node
 
     def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
-        node.body = _ticking(weigh(node.body) + 1, self.visit(node.body))
+        node.body = self._ticking(weigh(node.body) + 1, self.visit(node.body))
         return node
 
     def _visit_comprehension(self, node: Any) -> ast.AST:
-        steps = PER_ROUND + sum(
+        steps = PER_ITEM + sum(
             weigh(part) for name in ("elt", "key", "value") if (part := getattr(node, name, None)) is not None
         )
         for number, generator in enumerate(node.generators):
             inner = 0 if number == 0 else weigh(generator.iter)
             tests = sum(weigh(test) for test in generator.ifs)
             if generator.ifs:
-                generator.ifs[0] = _ticking(PER_ROUND + inner + tests, self.visit(generator.ifs[0]))
+                generator.ifs[0] = self._ticking(PER_ITEM + inner + tests, self.visit(generator.ifs[0]))
             else:
                 steps += inner
             generator.iter = self.visit(generator.iter)
         last = "value" if isinstance(node, ast.DictComp) else "elt"
-        setattr(node, last, _ticking(steps, self.visit(getattr(node, last))))
+        setattr(node, last, self._ticking(steps, self.visit(getattr(node, last))))
         return node  # type: ignore[no-any-return] # it is one of four kinds of node
+
+    def _ticking(self, steps: int, expression: ast.expr) -> ast.expr:
+        """``(__volery_tick_7__() or expression)``: the tick gives ``None``."""
+        self.ticks.add(steps)
+        tick = ast.Call(ast.Name(f"{TICK}{steps}__", ast.Load()), [], [])
+        return _at(ast.BoolOp(ast.Or(), [tick, expression]), expression)
 
     visit_ListComp = visit_SetComp = _visit_comprehension  # noqa: N815 (ast's naming)
     visit_DictComp = visit_GeneratorExp = _visit_comprehension  # noqa: N815 (ast's naming)
@@ -226,12 +253,6 @@ def _add(steps: int, place: ast.stmt) -> ast.stmt:
     """``__volery_steps__[0] += steps``."""
     cell = ast.Subscript(ast.Name(CELL, ast.Load()), ast.Constant(0), ast.Store())
     return _at(ast.AugAssign(cell, ast.Add(), ast.Constant(steps)), place)
-
-
-def _ticking(steps: int, expression: ast.expr) -> ast.expr:
-    """``(__volery_tick__(steps) or expression)``: the tick gives ``None``."""
-    tick = ast.Call(ast.Name(TICK, ast.Load()), [ast.Constant(steps)], [])
-    return _at(ast.BoolOp(ast.Or(), [tick, expression]), expression)
 
 
 Node = TypeVar("Node", ast.stmt, ast.expr)

@@ -22,7 +22,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError
-from volery.components.counting import Steps, instrument
+from volery.components.counting import Steps
 
 _PREFIX = "volery.user"
 
@@ -95,8 +95,8 @@ class Loader:
         if a file is executed on loading and raises.
         """
         full_name = f"{_PREFIX}.{name}.{source.path.stem}"
-        module = self._module(full_name, source.path)
         code = self._compile(source)
+        module = self._module(full_name, source.path)
         if as_main:
             module.__name__ = "__main__"
             exec(code, module.__dict__)
@@ -116,7 +116,7 @@ class Loader:
     def _compile(self, source: Source) -> CodeType:
         code = self._codes.get(source.path)
         if code is None:
-            tree = instrument(source.tree) if self.steps else source.tree
+            tree = self.steps.instrument(source.tree) if self.steps else source.tree
             code = compile(tree, str(source.path), "exec", dont_inherit=True)
             self._codes[source.path] = code
         return code
@@ -147,13 +147,13 @@ class Loader:
         known = self._shared.get(path)
         if known is not None:
             return known
-        source = parse(path)
+        code = self._compile(parse(path))
         module = self._module(f"{_PREFIX}.shared.{name}", path)
         if path.name == "__init__.py":
             module.__path__ = [str(path.parent)]
         self._shared[path] = module  # before it runs, as Python does: modules may import each other
         try:
-            self._execute(self._compile(source), module, name)
+            self._execute(code, module, name)
         except BaseException:
             del self._shared[path]
             raise

@@ -128,6 +128,9 @@ class Lock(Bound):
     def release(self) -> None:
         """Give it back. Never blocks, so that it also works in a task that is being ended."""
         if self._owner is None:
+            task = self.kernel.current()
+            if task is not None and task.scope.cancelled:
+                return  # its end came while it waited to have the lock back
             raise RuntimeError("release unlocked lock")
         self._owner = None
         self._free.notify()
