@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+from volery.base.time import S
+from volery.graph import Graph, NodeId
+from volery.kernel.processor import Processor
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+
+
+class Price(NamedTuple):
+    caller: int
+    background: int
+
+
+class Rig:
+    """A graph whose calls cost what ``prices`` says and whose messages take ``delay`` between processors."""
+
+    def __init__(self) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(self.events.append)
+        self.processor = Processor(self.kernel, "cpu", cores=2)
+        self.prices: dict[str, Price] = {}
+        self.asked: list[tuple[str, str, float]] = []
+        self.delay = 0
+        self.loses = False
+        self.carried: list[tuple[NodeId, NodeId, int, bool]] = []
+        self.graph = self.new_graph()
+
+    def new_graph(self, **options: Any) -> Graph:
+        return Graph(self.kernel, self.price, self.carry, **options)
+
+    def price(self, node: NodeId, call: str, x: float) -> Price:
+        self.asked.append((node.name, call, x))
+        return self.prices.get(call, Price(0, 0))
+
+    def carry(
+        self, sender: NodeId, receiver: NodeId, size: int, reliable: bool, deliver: Any, lost: Any
+    ) -> None:
+        self.carried.append((sender, receiver, size, reliable))
+        arrives = lost if self.loses and not reliable else deliver
+        self.kernel.call_at(self.kernel.now() + self.delay, arrives)
+
+    def task(self, body: Callable[[], None], name: str = "component", on_processor: bool = False) -> None:
+        place = Place(name, self.processor if on_processor else None)
+        self.kernel.spawn(body, name, place)
+
+    def run(self, *bodies: Callable[[], None], until: int = 100 * S) -> None:
+        """Run each body as a component of its own (named after the function)."""
+        for body in bodies:
+            self.task(body, body.__name__)
+        self.kernel.run(until)
+
+    def of(self, kind: type) -> list[Any]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()

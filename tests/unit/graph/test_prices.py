@@ -1,0 +1,117 @@
+from typing import Any
+
+import pytest
+
+from volery import messages
+from volery.base.time import MS, US
+from volery.graph import NodeId
+from volery.kernel.task import Place
+from volery.kernel.waiting import at
+from volery.trace.events import Charge, Message, Published, Slice
+
+STRING = "std_msgs/msg/String"
+SET_BOOL = "std_srvs/srv/SetBool"
+
+
+def test_every_call_into_ros_is_priced(rig: Any) -> None:
+    def node() -> None:
+        node = rig.graph.node("n")
+        node.subscribe("chat", STRING, lambda message: None)
+        node.subscribe("chat", STRING, lambda message: None)
+        publisher = node.advertise("chat", STRING)
+        node.serve("switch", SET_BOOL, lambda request: None)
+        node.client("switch", SET_BOOL)
+        publisher.publish(messages.new(STRING))
+        node.sleep(3 * MS)
+        node.spin_once(0)
+        node.spin_once(0)
+
+    rig.run(node)
+    assert rig.asked == [
+        ("/n", "init", 0.0),
+        ("/n", "node_handle", 0.0),
+        ("/n", "subscribe", 0.0),
+        ("/n", "subscribe", 0.0),
+        ("/n", "advertise", 0.0),
+        ("/n", "advertise_service", 0.0),
+        ("/n", "service_client", 0.0),
+        ("/n", "publish", 2.0),
+        ("/n", "sleep", 3000.0),
+        ("/n", "spin_once", 1.0),
+        ("/n", "spin_once", 0.0),
+    ]
+    assert [event.kind for event in rig.of(Charge)] == [f"ros:{call}" for _, call, _ in rig.asked]
+
+
+def test_the_caller_pays_before_anything_is_visible(rig: Any) -> None:
+    rig.prices["publish"] = type("P", (), {"caller": 40 * US, "background": 100 * US})()
+    seen: list[NodeId] = []
+
+    def talker() -> None:
+        node = rig.graph.node("talker")
+        node.subscribe("chat", STRING, lambda message: None)
+        publisher = node.advertise("chat", STRING)
+        rig.kernel.current().charge(7 * US)  # what its code owes is served before the call
+        publisher.publish(messages.new(STRING))
+        assert rig.kernel.now() == 47 * US
+        seen.append(rig.carried[0][0])
+
+    rig.task(talker, "talker", on_processor=True)
+    rig.kernel.run(MS)
+    [publish] = [event for event in rig.of(Charge) if event.kind == "ros:publish"]
+    assert publish == Charge(7 * US, "talker", "cpu", "ros:publish", 40 * US, 100 * US, 0.0)
+    assert [event.at for event in rig.of(Published)] == [47 * US]
+    assert [event.sent for event in rig.of(Message)] == [47 * US]
+    slices = [(event.start, event.end, event.task) for event in rig.of(Slice)]
+    assert slices == [
+        (0, 7 * US, "talker"),
+        (7 * US, 47 * US, "talker"),
+        (47 * US, 147 * US, "talker (background)"),
+    ]
+    assert seen == [("/talker", "talker", "cpu")]
+
+
+def test_the_cost_of_a_sleep_is_spent_during_it(rig: Any) -> None:
+    rig.prices["sleep"] = type("P", (), {"caller": 0, "background": 2 * MS})()
+
+    def sleeper() -> None:
+        node = rig.graph.node("sleeper")
+        node.sleep(10 * MS)
+        assert rig.kernel.now() == 10 * MS
+
+    rig.task(sleeper, "sleeper", on_processor=True)
+    rig.kernel.run(MS * 100)
+    assert [(event.start, event.end) for event in rig.of(Slice)] == [(0, 2 * MS)]
+
+
+def test_house_code_pays_in_the_background(rig: Any) -> None:
+    rig.prices["init"] = type("P", (), {"caller": 5 * US, "background": 1 * US})()
+    rig.graph.node("n", place=Place("n", rig.processor))
+    rig.kernel.run(MS)
+    assert [(event.start, event.end) for event in rig.of(Slice)] == [(0, 6 * US)]
+
+
+def test_a_passive_callee_pays_where_it_computes(rig: Any) -> None:
+    """Whoever calls a publisher from another place pays the caller's part there."""
+    rig.prices["publish"] = type("P", (), {"caller": 10 * US, "background": 3 * US})()
+    node = rig.graph.node("callee", place=Place("callee", rig.processor, priority=None))
+    publisher = node.advertise("chat", STRING)
+
+    def caller() -> None:
+        with at(rig.kernel, node.place):
+            publisher.publish(messages.new(STRING))
+
+    rig.run(caller)
+    assert {event.component for event in rig.of(Slice)} == {"callee"}
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_nobody_listening_costs_no_carrying(rig: Any, recorded: bool) -> None:
+    graph = rig.new_graph(records=lambda topic: recorded)
+
+    def talker() -> None:
+        graph.node("talker").advertise("chat", STRING).publish(messages.new(STRING))
+
+    rig.run(talker)
+    assert rig.carried == []
+    assert len(rig.of(Published)) == recorded
