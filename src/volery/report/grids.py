@@ -75,9 +75,11 @@ def figure(value: float | None, unit: str = "") -> str:
 
 
 def energy(joules: float | None) -> str:
-    """Joules, as kilojoules from ten thousand on."""
+    """Joules, kilojoules or megajoules, by size."""
     if joules is None:
         return NOTHING
+    if abs(joules) >= 1e7:
+        return number(joules / 1e6, 1, "MJ")
     return number(joules / 1e3, 1, "kJ") if abs(joules) >= 1e4 else figure(joules, "J")
 
 

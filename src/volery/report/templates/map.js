@@ -5,12 +5,12 @@
   const { data, at, before, colour, series, current } = stage;
   const scenery = data.scenery || { places: [], roads: [], corridors: [], areas: [] };
   const view = { x: 0, y: 0, scale: 1, fitted: true };
+  const bright = 90; // seconds of the way that stand out
   let followed = null;
   let size = [1, 1];
 
   function bounds() {
-    const xs = [], ys = [];
-    for (const vehicle of data.vehicles) { xs.push(...vehicle.x); ys.push(...vehicle.y); }
+    const xs = data.vehicles.flatMap((vehicle) => vehicle.x), ys = data.vehicles.flatMap((vehicle) => vehicle.y);
     for (const [, x, y] of scenery.places) { xs.push(x); ys.push(y); }
     if (!xs.length) for (const [, , outline] of scenery.areas) for (const [x, y] of outline) { xs.push(x); ys.push(y); }
     const low = (list) => list.reduce((a, b) => Math.min(a, b), Infinity);
@@ -136,8 +136,10 @@
     context.globalAlpha = 0.28;
     path(context, points);
     context.stroke();
-    const here = where(vehicle, time);
-    path(context, [...points.slice(0, before(vehicle.t, time) + 1), [here.x, here.y]]);
+    const from = Math.max(time - bright, vehicle.t[0]);
+    const [tail, here] = [where(vehicle, from), where(vehicle, time)];
+    const between = points.slice(before(vehicle.t, from) + 1, before(vehicle.t, time) + 1);
+    path(context, [[tail.x, tail.y], ...between, [here.x, here.y]]);
     context.globalAlpha = 0.9;
     context.lineWidth = 2.4;
     context.stroke();
