@@ -182,6 +182,21 @@ def model_check(
     run_command(output, lambda: command.check(output, model, tuple(overrides or ())))
 
 
+@model_app.command("show")
+def model_show(
+    model: Model,
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+    debug: Debug = False,
+) -> None:
+    """Draw a model in text: what runs on what, what is connected to what."""
+    from volery.cli import model as command
+
+    output = Output(False, False, debug)
+    run_command(output, lambda: command.show(output, model, allocation, scenario, tuple(overrides or ())))
+
+
 @model_app.command("schema")
 def model_schema() -> None:
     """Print the JSON Schema of models: give it to your editor."""

@@ -13,7 +13,9 @@ from rich.text import Text
 from volery.base.errors import choices
 from volery.cli.console import Output
 from volery.cli.endings import OK
+from volery.model.diagram import diagram
 from volery.model.reader import check as check_model
+from volery.model.reader import load
 from volery.model.readiness import gaps
 from volery.model.schema import schema
 from volery.model.system import Instance, System
@@ -84,6 +86,19 @@ def _readiness(missing: dict[str, list[str]]) -> Iterable[Text]:
         yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
         for gap in found:
             yield Text(f"    {gap}", style="dim")
+
+
+def show(
+    output: Output,
+    model: Path,
+    allocation: str | None,
+    scenario: str | None,
+    overrides: tuple[str, ...],
+) -> int:
+    """Draw one variant of *model*."""
+    system = load(model, vocabulary(), scenario, allocation, overrides)
+    output.show(Text(diagram(system), end=""))
+    return OK
 
 
 def print_schema(output: Output) -> int:
