@@ -1,0 +1,208 @@
+"""From a model to its running components: instances, ports, programs, nodes and the vehicles they command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from volery.bridge import serve_vehicle
+from volery.components.counting import Steps
+from volery.components.instance import Instance
+from volery.components.loading import Loader
+from volery.components.ports import Port, PortList
+from volery.components.python import Program, load_program, start
+from volery.components.stand_ins import stand_ins
+from volery.components.stub import StubProgram
+from volery.faces import rospy
+from volery.graph import EmbeddedNode, Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.model.system import Connection, System, TargetKind
+from volery.model.system import Instance as InstanceModel
+from volery.run.ending import Ending
+from volery.run.fleet import Fleet
+from volery.run.platform import Platform, is_node
+from volery.run.setup import node_name
+from volery.vehicles import Drone, Rover, Vehicle, drivers
+
+GRAPH_DRIVER = "mavros"
+"""Components command vehicles over topics and services under MAVROS's names."""
+
+
+class Connected:
+    """A program whose object is also given what it can only be given in its own flow of control.
+
+    *connect* joins the graph and so costs time; that is the component's.
+    """
+
+    def __init__(
+        self, program: Program, names: Iterable[str], connect: Callable[[], Mapping[str, Any]]
+    ) -> None:
+        self._program = program
+        self._names = tuple(names)
+        self._connect = connect
+
+    def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
+        """See ``Program``."""
+        self._program.check([*given, *self._names], operations, active)
+
+    def make(self, given: Mapping[str, Any]) -> object:
+        """See ``Program``."""
+        return self._program.make({**given, **self._connect()})
+
+    def run(self, thing: object) -> None:
+        """See ``Program``."""
+        self._program.run(thing)
+
+
+@dataclass(frozen=True)
+class Built:
+    """Components that are ready to start. ``start`` starts them in the order of the model."""
+
+    starters: tuple[Callable[[], object], ...]
+
+    def start(self) -> None:
+        """Every check comes first: nothing has started when something is missing."""
+        for starter in self.starters:
+            starter()
+
+
+class Builder:
+    """Makes the components of one run."""
+
+    def __init__(
+        self, system: System, kernel: VirtualKernel, platform: Platform, fleet: Fleet, ending: Ending
+    ) -> None:
+        self._system = system
+        self._kernel = kernel
+        self._platform = platform
+        self._fleet = fleet
+        self._ending = ending
+        self._graph = Graph(kernel, platform.price, platform.carry)
+        self._nodes: dict[str, EmbeddedNode] = {}
+        self._vehicles: list[Vehicle] = []
+        self._instances: dict[str, Instance] = {}
+
+    def build(self, fidelity: str, seed: int) -> Built:
+        """Load every file, make every instance, connect every port."""
+        steps = Steps() if fidelity == "code" else None
+        modules = rospy.modules(self._graph, self._launches(), self._nodes)
+        loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
+        models = self._system.instances
+        self._instances = {model.name: self._instance(model, steps) for model in models}
+        self._ending.vehicles = self._vehicles
+        return Built((*self._vehicle_nodes(), *(self._starter(model, loader) for model in models)))
+
+    def _launches(self) -> dict[str, rospy.Launch]:
+        return {
+            model.name: rospy.Launch(model.namespace, model.remap, dict(model.parameters))
+            for model in self._system.instances
+            if is_node(model)
+        }
+
+    def _instance(self, model: InstanceModel, steps: Steps | None) -> Instance:
+        return Instance(
+            self._kernel,
+            model.name,
+            self._platform.seat(model),
+            self._platform.pricing(model),
+            tuple(self._operations(model)),
+            steps.take if steps else None,
+        )
+
+    def _operations(self, model: InstanceModel) -> dict[str, str]:
+        """The operations that it provides, and what each returns."""
+        return {
+            name: signature.returns
+            for interface in model.component.provides.values()
+            for name, signature in self._system.interfaces[interface].operations.items()
+        }
+
+    def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
+        instance = self._instances[model.name]
+        commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
+        given = {**model.parameters, **self._given(model)}
+        program = self._program(model, loader)
+        if commands:
+            names = [one.port for one in commands]
+            program = Connected(program, names, lambda: self._connect(model, commands))
+        scope = self._ending.users.child(model.name)
+        return lambda: start(instance, program, given, scope, self._ending.failed)
+
+    def _program(self, model: InstanceModel, loader: Loader) -> Program:
+        component = model.component
+        if not component.path:
+            period = model.activity.period_ns if model.activity else None
+            return StubProgram(self._kernel, self._operations(model), period)
+        path = self._system.file_of(component)
+        return load_program(loader, model.name, path, component.class_name, component.where)
+
+    # -- ports
+
+    def _given(self, model: InstanceModel) -> dict[str, Any]:
+        """What its ports are connected to, vehicles apart, by the ports' names."""
+        found: dict[str, Any] = {}
+        for connection in model.connections.values():
+            kind = _kind(connection)
+            if kind is TargetKind.ENVIRONMENT:
+                found[connection.port] = self._system.environment
+            elif kind is TargetKind.INSTANCE:
+                ports = [self._port(model, target.name) for target in connection.targets]
+                found[connection.port] = PortList(ports) if connection.many else ports[0]
+        return found
+
+    def _port(self, model: InstanceModel, callee: str) -> Port:
+        here, there = model.processor, self._system.instance(callee).processor
+        return Port(
+            self._kernel,
+            model.name,
+            self._instances[callee],
+            self._platform.travel(here, there),
+            self._platform.travel(there, here),
+        )
+
+    def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
+        """Join the graph and command vehicles over it."""
+        node = self._graph.node(model.name, model.namespace, remaps=model.remap)
+        self._nodes[model.name] = node
+        found: dict[str, Any] = {}
+        for connection in commands:
+            vehicles = [
+                self._vehicle(node, target.name, connection.interface) for target in connection.targets
+            ]
+            found[connection.port] = vehicles if connection.many else vehicles[0]
+        return found
+
+    def _vehicle(self, node: EmbeddedNode, name: str, interface: str) -> Drone | Rover:
+        driver = drivers.load(GRAPH_DRIVER)(self._kernel, node, name, {"namespace": f"/{name}"})
+        kind = Drone if interface == "Drone" else Rover
+        vehicle = kind(self._kernel, name, driver, truth=self._fleet.truth(name))
+        self._vehicles.append(vehicle)
+        return vehicle
+
+    # -- nodes that serve vehicles
+
+    def _vehicle_nodes(self) -> Iterable[Callable[[], object]]:
+        for vehicle in self._system.vehicles:
+            if self._commanded(vehicle.name):
+                yield partial(self._serve, vehicle.name, vehicle.processor)
+
+    def _commanded(self, vehicle: str) -> bool:
+        return any(
+            target.kind is TargetKind.VEHICLE and target.name == vehicle
+            for model in self._system.instances
+            for connection in model.connections.values()
+            for target in connection.targets
+        )
+
+    def _serve(self, name: str, processor: str | None) -> None:
+        """In the root scope: it must outlive the components, for the way down."""
+        place = Place(node_name(name), self._platform.processors[processor] if processor else None)
+        serve_vehicle(self._graph, self._fleet.link(name), name, place)
+
+
+def _kind(connection: Connection) -> TargetKind | None:
+    """Of what it is connected to; all targets of a connection are of one kind."""
+    return connection.targets[0].kind if connection.targets else None

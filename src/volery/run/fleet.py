@@ -1,0 +1,108 @@
+"""The vehicles of a run: their bodies in one world, and for each the simulated autopilot that flies it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import cos, pi, radians, sin
+
+from volery.autopilots.simulated.autopilot import Autopilot
+from volery.autopilots.simulated.dialect import dialects
+from volery.autopilots.simulated.flight import Flight, make_world
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, Position
+from volery.base.time import MS, Ns
+from volery.kernel.api import Kernel
+from volery.links.in_process import in_process
+from volery.links.link import Link
+from volery.model.environment import Battery as BatteryModel
+from volery.model.environment import Vehicle as VehicleModel
+from volery.model.environment import Wind as WindModel
+from volery.world.specs import Battery, BodySpec, Multirotor, Rover
+from volery.world.wind import Wind
+
+LINK_DELAY: Ns = 2 * MS
+"""One way between an autopilot and the computer beside it, over a serial line."""
+
+CELL_NOMINAL_VOLTS = 3.7
+
+SAMPLING_PERIOD: Ns = 200 * MS
+"""How often the state of every vehicle is recorded."""
+
+
+class Fleet:
+    """Simulated vehicles, by name, in the order of the model."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        vehicles: Sequence[VehicleModel],
+        frame: LocalFrame,
+        wind: WindModel,
+        seed: int,
+    ) -> None:
+        self._kernel = kernel
+        self.frame = frame
+        specs = [body_of(vehicle) for vehicle in vehicles]
+        self.world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
+        self.flights: dict[str, Flight] = {}
+        self.autopilots: dict[str, Autopilot] = {}
+        for system, (vehicle, flight) in enumerate(zip(vehicles, flights, strict=True), start=1):
+            self.flights[vehicle.name] = flight
+            self.autopilots[vehicle.name] = Autopilot(
+                kernel,
+                flight,
+                dialects.load(vehicle.autopilot),
+                system=system,
+                parameters=vehicle.parameters,
+                warm=vehicle.started == "warm",
+                name=vehicle.name,
+            )
+
+    def link(self, vehicle: str) -> Link:
+        """A new link to the autopilot of *vehicle*, as over a serial line beside it."""
+        ours, theirs = in_process(self._kernel, LINK_DELAY, vehicle)
+        self.autopilots[vehicle].connect(theirs)
+        return ours
+
+    def truth(self, vehicle: str) -> Callable[[], Position]:
+        """Where *vehicle* really is: for judges, never for its commander."""
+        flight = self.flights[vehicle]
+
+        def look() -> Position:
+            latitude, longitude, amsl = self.frame.from_enu(flight.truth().position)
+            return Position(latitude, longitude, AMSL(amsl))
+
+        return look
+
+    def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
+        """Record the state of every vehicle now and then each *period*."""
+        self._kernel.every(period, self._record_states)
+
+    def _record_states(self) -> None:
+        for autopilot in self.autopilots.values():
+            self._kernel.record(autopilot.state())
+
+
+def wind_of(model: WindModel) -> Wind:
+    """The model says where it blows from, clockwise from north; the world wants the way it blows."""
+    towards = radians(model.direction_deg) + pi
+    return Wind(
+        east=model.speed_m_s * sin(towards), north=model.speed_m_s * cos(towards), gust=model.gusts_m_s
+    )
+
+
+def body_of(vehicle: VehicleModel) -> BodySpec:
+    """The body of a vehicle, standing where the model puts it."""
+    kind = Multirotor if vehicle.kind == "multirotor" else Rover
+    usual = kind().battery
+    return kind(
+        at=(vehicle.at.east_m, vehicle.at.north_m, 0.0),
+        heading_deg=vehicle.heading_deg,
+        sensors=vehicle.sensors,
+        battery=_battery(vehicle.battery, usual) if vehicle.battery else usual,
+    )
+
+
+def _battery(model: BatteryModel, usual: Battery) -> Battery:
+    cells = usual.cells if model.voltage_v is None else max(1, round(model.voltage_v / CELL_NOMINAL_VOLTS))
+    return Battery(model.capacity_coulomb / 3600.0, cells, usual.resistance_ohm, model.charge)

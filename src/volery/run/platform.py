@@ -1,0 +1,207 @@
+"""Processors and networks of a run: what serves computing, what computing costs there, what travels between.
+
+Graph and components report what they do; ``cost`` prices it; this module joins the two for the processors of
+one allocation. Nodes and components that are allocated to no processor compute and communicate in no time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from volery.base.errors import EstimateError, choices
+from volery.base.seeds import stream
+from volery.base.time import Ns, S
+from volery.components.instance import Seat
+from volery.components.ports import Travel
+from volery.components.pricing import FREE, Cost, Counted, Pricing, Stated
+from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
+from volery.graph.node import NodeId
+from volery.kernel.network import Network
+from volery.kernel.processor import Processor
+from volery.kernel.virtual import VirtualKernel
+from volery.model.system import ROS_LANGUAGES, Figure, Instance, System, TargetKind
+from volery.model.system import Network as NetworkModel
+from volery.model.system import Processor as ProcessorModel
+
+CALL_WITHIN: Ns = 10 * S
+"""A call whose arguments or result have not arrived by then raises ``LinkLost`` at its caller."""
+
+NO_COST = Price(0, 0)
+
+
+def is_node(instance: Instance) -> bool:
+    """True if *instance* is a node of the graph: by its language, or because it commands a vehicle."""
+    commands = any(
+        target.kind is TargetKind.VEHICLE
+        for connection in instance.connections.values()
+        for target in connection.targets
+    )
+    return commands or instance.component.language in ROS_LANGUAGES
+
+
+VEHICLE_NODE_LANGUAGE = "roscpp"
+"""The node that serves a vehicle stands for MAVROS, which is written with roscpp."""
+
+
+class Platform:
+    """The computers of one run."""
+
+    def __init__(self, system: System, kernel: VirtualKernel, seed: int, fidelity: str) -> None:
+        self._system = system
+        self._kernel = kernel
+        self._fidelity = fidelity
+        self._models = {model.name: model for model in system.processors}
+        self._entries = {model.name: catalogue().processor(model.kind) for model in system.processors}
+        self.processors = {model.name: self._processor(model) for model in system.processors}
+        self._networks = {model.name: self._network(model, seed) for model in system.networks}
+        self._languages = {instance.name: instance.component.language for instance in system.instances}
+        self._tariffs: dict[tuple[str, str], Tariff] = {}
+        self.warnings: dict[str, None] = {}  # an ordered set
+
+    def _processor(self, model: ProcessorModel) -> Processor:
+        kernel = self._kernel
+        if model.quantum_ns is None:
+            return Processor(kernel, model.name, cores=model.cores, scheduler=model.scheduler)
+        return Processor(
+            kernel, model.name, cores=model.cores, scheduler=model.scheduler, quantum=model.quantum_ns
+        )
+
+    def _network(self, model: NetworkModel, seed: int) -> Network:
+        return Network(
+            self._kernel,
+            model.name,
+            bandwidth_bit_s=round(model.bandwidth_bit_s),
+            latency=model.latency_ns,
+            loss=model.loss,
+            stream=stream(seed, f"network/{model.name}"),
+        )
+
+    def entry(self, processor: str) -> ProcessorEntry:
+        """What the catalogue says of the kind of *processor*."""
+        return self._entries[processor]
+
+    # -- what components are given
+
+    def seat(self, instance: Instance) -> Seat:
+        """Where *instance* computes."""
+        activity = instance.activity
+        priority = activity.priority if activity else None
+        deadline = activity.deadline_ns if activity else None
+        if instance.processor is None:
+            return Seat(priority=priority, deadline=deadline)
+        frequency = self._models[instance.processor].frequency_mhz
+        return Seat(self.processors[instance.processor], frequency, priority, deadline)
+
+    def pricing(self, instance: Instance) -> Pricing:
+        """What the own computing of *instance* costs, at this run's fidelity."""
+        if instance.processor is None:
+            return FREE
+        if self._fidelity == "code" and instance.component.path:
+            return self._counted(instance, instance.processor)
+        return self._stated(instance, instance.processor)
+
+    def _counted(self, instance: Instance, processor: str) -> Pricing:
+        law = self._entries[processor].code_law()
+        self.warnings.update(dict.fromkeys(law.warnings()))
+        return Counted(law.ns_per_step(self._models[processor].frequency_mhz))
+
+    def _stated(self, instance: Instance, processor: str) -> Pricing:
+        component = instance.component
+        scale = partial(self._scaled, instance, processor)
+        return Stated(
+            {name: scale(name, figures) for name, figures in component.operations.items()},
+            scale("activation", component.activation) if component.activation else None,
+        )
+
+    def _scaled(self, instance: Instance, processor: str, what: str, figures: tuple[Figure, ...]) -> Cost:
+        """The figure that is stated for this kind of processor, at the frequency that it runs at."""
+        model = self._models[processor]
+        fitting = [one for one in figures if one.processor == model.kind]
+        if not fitting:
+            stated = choices({one.processor for one in figures})
+            raise EstimateError(
+                f"{instance.name}: the time of {what!r} is stated for {stated}, but it is allocated to "
+                f"{processor}, of kind {model.kind}: state one for {model.kind} as well"
+            )
+        figure = min(fitting, key=lambda one: abs(one.frequency_hz - model.frequency_hz))
+        there, here = (figure.processor, figure.frequency_hz / 1e6), (model.kind, model.frequency_mhz)
+        time = scale_time(figure.time_ns, there, here)
+        if figure.energy_j is None:
+            return Cost(time)
+        return Cost(time, scale_energy(figure.energy_j, there, here, self._entries[processor].power_law()))
+
+    # -- what the graph is given
+
+    def price(self, node: NodeId, call: str, x: float) -> Price:
+        """What a call into ROS costs *node*."""
+        if not node.processor:
+            return NO_COST
+        language = self._languages.get(node.component, VEHICLE_NODE_LANGUAGE)
+        return self._tariff(node.processor, language)(call, x)
+
+    def _tariff(self, processor: str, language: str) -> Tariff:
+        tariff = self._tariffs.get((processor, language))
+        if tariff is None:
+            law = self._entries[processor].ros_law(language)
+            tariff = law.at(self._models[processor].frequency_mhz)
+            self._tariffs[processor, language] = tariff
+            self.warnings.update(dict.fromkeys(tariff.warnings))
+        return tariff
+
+    def foresee(self) -> None:
+        """Look up every law that nodes will need, so that what is missing or doubtful is known before the
+        start.
+        """
+        for instance in self._system.instances:
+            if instance.processor is not None and is_node(instance):
+                self._tariff(instance.processor, instance.component.language)
+        for vehicle in self._system.vehicles:
+            if vehicle.processor is not None:
+                self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
+
+    def carry(
+        self,
+        sender: NodeId,
+        receiver: NodeId,
+        size: int,
+        reliable: bool,
+        deliver: Callable[[], None],
+        lost: Callable[[], None],
+    ) -> None:
+        """Bring a message from node to node."""
+        network = self._between(sender.processor, receiver.processor)
+        if network is None:
+            self._kernel.call_at(self._kernel.now(), deliver)
+        elif reliable:
+            network.send_reliable(size, deliver, f"{sender.name}>{receiver.name}")
+        else:
+            network.send(size, deliver, lost)
+
+    def travel(self, one: str | None, other: str | None) -> Travel | None:
+        """How the arguments of a call get from processor to processor; ``None`` where that takes no time."""
+        network = self._between(one or "", other or "")
+        if network is None:
+            return None
+        return lambda size: network.carry(size, self._kernel.now() + CALL_WITHIN)
+
+    def _between(self, one: str, other: str) -> Network | None:
+        if one == other or not one or not other:
+            return None
+        model = self._system.network_between(one, other)
+        return self._networks[model.name] if model else None
+
+    # -- power
+
+    def powered_by(self) -> Mapping[str, tuple[str, ...]]:
+        """Vehicle -> processors that drain its battery."""
+        found: dict[str, tuple[str, ...]] = {}
+        for model in self._system.processors:
+            if model.powered_by is not None:
+                found[model.powered_by] = (*found.get(model.powered_by, ()), model.name)
+        return found
+
+    def watts(self, processor: str, busy_cores: float) -> float:
+        """What a processor draws with so many cores busy on average; ``EstimateError`` without figures."""
+        law = self._entries[processor].power_law()
+        return law.watts(busy_cores, self._models[processor].frequency_mhz)

@@ -1,0 +1,64 @@
+"""What a run says of itself while it goes on, for whoever shows it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from volery.base.time import Ns, S
+from volery.kernel.api import Kernel
+from volery.run.fleet import Fleet
+from volery.trace.events import Event, Milestone
+
+PERIOD: Ns = S
+
+
+@dataclass(frozen=True)
+class VehicleProgress:
+    """A vehicle as it is now: the autopilot's mode, whether it is armed, metres above the ground."""
+
+    name: str
+    mode: str
+    armed: bool
+    height: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands. ``limit`` is when it ends at the latest; ``parcels`` counts parcels by state."""
+
+    now: Ns
+    limit: Ns
+    vehicles: tuple[VehicleProgress, ...]
+    parcels: dict[str, int]
+
+
+Show = Callable[[Progress], None]
+"""Called about once a simulated second. It must not block and changes nothing."""
+
+
+class Reporter:
+    """Tells *show* how a run goes. A tap of its stream."""
+
+    def __init__(self, kernel: Kernel, fleet: Fleet, limit: Ns, show: Show) -> None:
+        self._kernel = kernel
+        self._fleet = fleet
+        self._limit = limit
+        self._show = show
+        self._parcels: dict[str, str] = {}
+        kernel.every(PERIOD, self._tell)
+
+    def __call__(self, event: Event) -> None:
+        """Follow parcels."""
+        if isinstance(event, Milestone) and event.kind == "parcel":
+            self._parcels[event.subject] = event.state
+
+    def _tell(self) -> None:
+        vehicles = tuple(self._vehicle(name) for name in self._fleet.flights)
+        self._show(Progress(self._kernel.now(), self._limit, vehicles, dict(Counter(self._parcels.values()))))
+
+    def _vehicle(self, name: str) -> VehicleProgress:
+        vehicle = self._fleet.autopilots[name].vehicle
+        truth = self._fleet.flights[name].truth()
+        return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)

@@ -1,0 +1,88 @@
+"""What is kept of a run: the stream with its taps, and the run folder.
+
+A run without a folder keeps accounts and verdicts alone. With one it writes ``trace.mcap`` and
+``timeline.json`` as it goes, and ``run.json`` and the reports at its end; see ``docs/run-folder.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from volery.base.errors import UsageError
+from volery.base.registry import Registry
+from volery.base.time import Ns
+from volery.messages.store import definition
+from volery.requirements.accounts import Accounts
+from volery.requirements.record import RunRecord, Status, write_record
+from volery.run.circumstances import Stopwatch, circumstances
+from volery.trace.events import Event, Verdict
+from volery.trace.mcap_writer import Attachment, McapWriter
+from volery.trace.setup import RunSetup
+from volery.trace.stream import Stream
+from volery.trace.timeline import TimelineWriter
+
+TRACE_FILE = "trace.mcap"
+TIMELINE_FILE = "timeline.json"
+
+Reporter = Callable[[Path], Path]
+"""Makes a document out of a finished run folder and says where it is."""
+
+reporters: Registry[Reporter] = Registry("volery.reporters", "report")
+
+
+def make_folder(out: Path) -> Path:
+    """*out* as an existing, writable folder; ``UsageError`` says why not."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".writable"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise UsageError(
+            f"cannot write into {out}: {error.strerror or error}; choose another with --out"
+        ) from error
+    return out
+
+
+class Recording:
+    """The stream of one run and everything that listens to it."""
+
+    def __init__(self, setup: RunSetup, out: Path | None, attachments: Iterable[Attachment] = ()) -> None:
+        self.stream = Stream()
+        self.accounts = Accounts(setup)
+        self.folder = make_folder(out) if out is not None else None
+        self.problems: list[str] = []
+        self._watch = Stopwatch()
+        self._writers: tuple[McapWriter | TimelineWriter, ...] = ()
+        self.stream.tap(self.accounts)
+        if self.folder is not None:
+            trace = McapWriter(self.folder / TRACE_FILE, setup, attachments, definition)
+            self._writers = (trace, TimelineWriter(self.folder / TIMELINE_FILE))
+            for writer in self._writers:
+                self.stream.tap(writer)
+
+    def __call__(self, event: Event) -> None:
+        """Record one event."""
+        self.stream(event)
+
+    def finish(self, status: Status, reason: str, ended: Ns, verdicts: Iterable[Verdict]) -> RunRecord:
+        """Close the books and the files. What could not be written stands in ``problems``."""
+        for verdict in verdicts:
+            self.stream(verdict)
+        for writer in self._writers:
+            writer.close()
+            if writer.problem:
+                self.problems.append(writer.problem)
+        record = self.accounts.record(status, reason, ended, circumstances(self._watch))
+        if self.folder is not None:
+            self._write_documents(record, self.folder)
+        return record
+
+    def _write_documents(self, record: RunRecord, folder: Path) -> None:
+        try:
+            write_record(record, folder)
+            for name in reporters.names():
+                reporters.load(name)(folder)
+        except (UsageError, OSError) as error:
+            self.problems.append(str(error))

@@ -1,0 +1,126 @@
+"""``simulate``: a model in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.base.errors import CapabilityError, UsageError, choices
+from volery.base.time import MS, Ns
+from volery.kernel.virtual import VirtualKernel
+from volery.model.reader import load
+from volery.model.system import System
+from volery.requirements.observables import Observers
+from volery.run.build import Builder
+from volery.run.ending import Ending
+from volery.run.fleet import Fleet
+from volery.run.platform import Platform
+from volery.run.power import PowerFeed
+from volery.run.progress import Reporter, Show
+from volery.run.recording import Recording
+from volery.run.result import Run
+from volery.run.setup import attachments_of, setup_of
+from volery.run.vocabulary import vocabulary
+
+FIDELITIES = ("times", "code")
+LATER = ("firmware", "hardware")
+GOAL_PERIOD: Ns = 100 * MS
+"""How often it is looked whether the model's ``until`` holds."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes."""
+
+    fidelity: str = "times"
+    seed: int = 1
+    pace: float | None = None
+    out: Path | None = None
+    show: Show | None = None
+
+
+AS_USUAL = Options()
+
+
+def simulate(
+    model: System | str | Path,
+    options: Options = AS_USUAL,
+    *,
+    scenario: str | None = None,
+    allocation: str | None = None,
+    overrides: Iterable[str] = (),
+) -> Run:
+    """Run *model* (a file, a folder with a ``model.yaml``, or a ``System``) in virtual time.
+
+    The same model, options and seed give the same trace, byte for byte. ``scenario``, ``allocation`` and
+    ``overrides`` (``path=value``) choose a variant of a model that is read from a file.
+
+    Raises ``ModelError`` and ``UsageError`` before anything has started; what happens later is in the
+    ``Run``.
+    """
+    _check_fidelity(options.fidelity)
+    if isinstance(model, System):
+        system = model
+    else:
+        system = load(model, vocabulary(), scenario, allocation, overrides)
+    return _Simulation(system, options).run()
+
+
+def _check_fidelity(fidelity: str) -> None:
+    if fidelity in LATER:
+        raise CapabilityError(f"fidelity {fidelity!r} is not there yet; there is {choices(FIDELITIES)}")
+    if fidelity not in FIDELITIES:
+        raise UsageError(f"no fidelity {fidelity!r}; there is {choices((*FIDELITIES, *LATER))}")
+
+
+class _Simulation:
+    """One execution of ``simulate``."""
+
+    def __init__(self, system: System, options: Options) -> None:
+        self._system = system
+        self._kernel = kernel = VirtualKernel(pace=options.pace)
+        platform = Platform(system, kernel, options.seed, options.fidelity)
+        setup = setup_of(system, platform, options.seed, options.fidelity)
+        self._ending = Ending(kernel)
+        surroundings = system.environment
+        self._fleet = Fleet(kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed)
+        builder = Builder(system, kernel, platform, self._fleet, self._ending)
+        self._built = builder.build(options.fidelity, options.seed)
+        self._recording = Recording(setup, options.out, attachments_of(system))
+        kernel.record = self._recording
+        self._observers = Observers(system.requirements, setup)
+        self._recording.stream.tap(self._observers)
+        if system.limits.until is not None:
+            self._goal = Observers((system.limits.until,), setup)
+            self._recording.stream.tap(self._goal)
+            kernel.every(GOAL_PERIOD, self._look_at_goal)
+        if options.show is not None:
+            reporter = Reporter(kernel, self._fleet, system.limits.duration_ns, options.show)
+            self._recording.stream.tap(reporter)
+        self._feed = PowerFeed(kernel, platform, self._fleet)
+        self._fleet.sample()
+
+    def _look_at_goal(self) -> None:
+        if self._goal.all_hold(self._kernel.now()):
+            self._ending.begin("completed", "its goal is reached")
+
+    def run(self) -> Run:
+        """Start, let time pass, end in order, close the books; also if the house itself has a fault."""
+        kernel, ending = self._kernel, self._ending
+        kernel.call_at(self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up"))
+        try:
+            with ending.signals():
+                self._built.start()
+                left = ending.pass_time()
+        except BaseException as fault:
+            ending.stop_hard(f"{type(fault).__name__}: {fault}")
+            self._close(())
+            raise
+        return self._close(left)
+
+    def _close(self, left: Sequence[str]) -> Run:
+        now, ending = self._kernel.now(), self._ending
+        verdicts = self._observers.verdicts(now)
+        record = self._recording.finish(ending.status, ending.reason, now, verdicts)
+        return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))

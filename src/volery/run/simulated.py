@@ -1,0 +1,101 @@
+"""Vehicles that ``sim:`` addresses describe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from volery.base.errors import UsageError, choices
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, Position
+from volery.base.seeds import stream
+from volery.kernel.api import Kernel
+from volery.links.link import Link
+from volery.links.wire import FAULT_OPTIONS, WireFaults, faults_of, wire
+from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
+from volery.run.fleet import LINK_DELAY, Fleet
+from volery.vehicles.address import Address
+
+HOME = (46.0828, -103.899, 880.0)
+"""Where simulated vehicles stand unless an address says otherwise: degrees, and metres AMSL."""
+
+OPTIONS = ("heading", "home", "kind", "sensors", "start", "wind", "wire", *FAULT_OPTIONS)
+"""What may follow ``sim:AUTOPILOT?``."""
+
+CARRIERS = ("values", "bytes")
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a ``sim:`` address describes: a vehicle in a world of its own, and the wire to it.
+
+    ``faults`` is ``None`` where frames travel as values.
+    """
+
+    vehicle: Vehicle
+    frame: LocalFrame
+    wind: Wind
+    faults: WireFaults | None = None
+
+
+def simulated(address: Address, name: str, kind: str = "multirotor") -> Simulated:
+    """Read a ``sim:`` address; *kind* is what is simulated unless it says otherwise.
+
+    Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
+    ``start=warm|cold``, ``wind=SPEED,FROM_DEG,GUSTS``, ``wire=values|bytes`` and, through bytes, the faults
+    of ``volery.links.wire``. Raises ``UsageError``.
+    """
+    address.only(*OPTIONS)
+    latitude, longitude, amsl = address.numbers("home", 3) or HOME
+    Position(latitude, longitude, AMSL(amsl))  # refuses what is off the globe
+    vehicle = Vehicle(
+        name=name,
+        kind=_one_of(address, "kind", VEHICLE_KINDS, kind),
+        autopilot=address.driver,
+        at=Place("home", latitude, longitude, amsl, 0.0, 0.0, "home"),
+        heading_deg=address.number("heading", 0.0),
+        sensors=_one_of(address, "sensors", SENSOR_SETS, "consumer"),
+        started=_one_of(address, "start", STARTS, "cold"),
+    )
+    wind = Wind(*(address.numbers("wind", 3) or ()))
+    return Simulated(vehicle, LocalFrame(latitude, longitude, amsl), wind, _faults(address))
+
+
+def _one_of(address: Address, option: str, valid: tuple[str, ...], default: str) -> str:
+    given = address.options.get(option, default)
+    if given not in valid:
+        raise UsageError(f"{address}: {option}={given!r}; there is {choices(valid)}")
+    return given
+
+
+def _faults(address: Address) -> WireFaults | None:
+    carrier = _one_of(address, "wire", CARRIERS, "values")
+    wanted = {name: value for name, value in address.options.items() if name in FAULT_OPTIONS}
+    if carrier == "values":
+        if wanted:
+            raise UsageError(f"{address}: {choices(wanted)} happens to bytes; add wire=bytes")
+        return None
+    return faults_of(wanted)
+
+
+def fleet_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Fleet:
+    """A world with these vehicles in it: its origin and its wind are the first one's."""
+    first = wanted[0]
+    vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
+    return Fleet(kernel, vehicles, first.frame, first.wind, seed)
+
+
+def _placed(vehicle: Vehicle, frame: LocalFrame) -> Vehicle:
+    at = vehicle.at
+    east, north, _ = frame.to_enu(at.latitude, at.longitude, at.amsl_m)
+    return replace(vehicle, at=replace(at, east_m=east, north_m=north))
+
+
+def link_to(kernel: Kernel, fleet: Fleet, wanted: Simulated, seed: int) -> Link:
+    """A link to its autopilot, as the address wants it."""
+    name = wanted.vehicle.name
+    if wanted.faults is None:
+        return fleet.link(name)
+    ours, theirs = wire(kernel, name, wanted.faults, stream(seed, f"wire/{name}"), delay=LINK_DELAY)
+    fleet.autopilots[name].connect(theirs)
+    return ours

@@ -1,0 +1,23 @@
+"""The names that point out of a model, as this installation knows them."""
+
+from __future__ import annotations
+
+from volery.autopilots.simulated.dialect import dialects
+from volery.cost import catalogue
+from volery.model.system import ProcessorKind, Vocabulary
+from volery.requirements.observables import OBSERVABLES
+
+LANGUAGES = frozenset({"python", "rospy"})
+"""Languages of components that run today."""
+
+FAULTS: frozenset[str] = frozenset()
+"""Kinds of faults that a scenario may inject."""
+
+
+def vocabulary() -> Vocabulary:
+    """What a model is checked against."""
+    kinds = {
+        name: ProcessorKind(entry.cores, entry.least_mhz * 1e6, entry.greatest_mhz * 1e6)
+        for name, entry in catalogue().processors.items()
+    }
+    return Vocabulary(kinds, LANGUAGES, frozenset(dialects.names()), OBSERVABLES, FAULTS)
