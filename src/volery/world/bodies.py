@@ -112,7 +112,7 @@ def _touches(row: Array) -> bool:
     lowest = (
         row[P_FEET] * abs(row[W_ROTATION + 6])
         + row[P_FEET + 1] * abs(row[W_ROTATION + 7])
-        + row[P_FEET + 2] * row[W_ROTATION + 8]
+        + row[P_FEET + 2] * abs(row[W_ROTATION + 8])
     )
     touching: bool = row[S_POSITION + 2] - lowest < row[S_GROUND]
     return touching

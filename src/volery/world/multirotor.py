@@ -7,7 +7,8 @@
   efficiency of motor and controller. Valid: hover and slow flight; inflow of climb or fast flight is left
   out, so are flapping, ground effect and the rotors' gyroscopic torque.
 * Drag: F = -(c_1 + c_2 |v|) v, v relative to the air; valid to about 20 m/s. Spinning is damped by -c_w w.
-* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s.
+* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down it
+  lies on four points as far above the centre.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ def _feet(row: Array, ground: float) -> None:
     for foot in range(4):
         x = row[P_FEET] if foot < 2 else -row[P_FEET]
         left = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
-        up = -row[P_FEET + 2]
+        up = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
         height = (
             row[W_Y + S_POSITION + 2]
             + row[W_ROTATION + 6] * x

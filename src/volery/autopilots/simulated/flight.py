@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, inf
+from math import hypot, inf, isfinite
 
 from volery.autopilots.simulated.flight_columns import (
     C_AIDED,
@@ -371,7 +371,6 @@ class Flight:
         """True for a multirotor, False for a rover."""
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         self._seen: Estimate | None = None
-        self._serial = 0.0
 
     def look(self) -> Estimate:
         """What the autopilot knows now; the same object until the next grid step."""
@@ -390,10 +389,14 @@ class Flight:
         return self._seen
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Hold *setpoint* from the next grid step on. A POSITION never expires here: time-outs are the
-        modes'.
+        """Hold *setpoint* from the next grid step on. None expires here: time-outs are the modes'.
+
+        Raises ``UsageError`` for a value that is not a finite number.
         """
-        self._world.drive(self._body, C_CONTROL, *setpoint.row())
+        row = setpoint.row()
+        if not isfinite(sum(row)):
+            raise UsageError(f"a set-point must be of finite numbers: {setpoint}")
+        self._world.drive(self._body, C_CONTROL, *row)
 
     def truth(self) -> Truth:
         """The true state, for judges and recorders; an autopilot must not ask."""
