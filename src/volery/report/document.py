@@ -35,10 +35,12 @@ from volery.report.grids import (
     vehicles_grid,
 )
 from volery.requirements.accounts import Accounts
+from volery.requirements.observables import Observers, bounds_of
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record
+from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME
 from volery.trace.reader import Reading
-from volery.trace.scenery import Scenery, scenery_from_json
+from volery.trace.scenery import scenery_from_json
 from volery.trace.setup import WORLD_ATTACHMENT
 
 TRACE_FILE = "trace.mcap"
@@ -64,20 +66,31 @@ class Material:
     lost: str = ""
 
 
-def gather(folder: Path) -> Material:
-    """Read the trace of *folder*, and its ``run.json`` if it has one. ``UsageError`` if there is no trace."""
+def gather(folder: Path, *taps: Record) -> Material:
+    """Read the trace of *folder*, and its ``run.json`` if it has one; *taps* are told every event as well.
+
+    Without a ``run.json`` the accounts are kept anew, and requirements that the run did not come to judge are
+    judged by what the trace holds. Raises ``UsageError`` if there is no trace or it breaks off before its
+    set-up.
+    """
     with Reading(folder / TRACE_FILE) as reading:
+        setup = reading.setup
         attached = reading.attachments.get(WORLD_ATTACHMENT)
-        scenery: Scenery | None = scenery_from_json(attached.data) if attached else None
-        digest = Digest(reading.setup, scenery)
-        accounts = Accounts(reading.setup)
+        digest = Digest(setup, scenery_from_json(attached.data) if attached else None)
+        accounts = Accounts(setup)
+        observers = Observers(bounds_of(setup), setup)
+        everybody: tuple[Record, ...] = (digest, accounts, observers, *taps)
+        judged = False
         for event in reading.events():
-            digest(event)
-            accounts(event)
+            judged = judged or isinstance(event, Verdict)
+            for tap in everybody:
+                tap(event)
+        ending = reading.metadata.get(OUTCOME, {})
     if (folder / RUN_FILE).exists():
         record = read_record(folder)
     else:
-        ending = reading.metadata.get(OUTCOME, {})
+        for verdict in () if judged else observers.verdicts(accounts.last):
+            accounts(verdict)
         record = accounts.record(status_of(ending), ending.get("reason", "") or reading.lost)
     return Material(record, digest.data(record.sim_s), reading.lost)
 
@@ -90,10 +103,14 @@ def status_of(ending: Mapping[str, str]) -> Status:
 
 def write_report(folder: Path) -> Path:
     """Write ``report.html`` into *folder* and say where it is. ``UsageError`` if that cannot be done."""
+    return write_document(gather(folder), folder)
+
+
+def write_document(material: Material, folder: Path) -> Path:
+    """The same for what has been gathered already."""
     path = folder / REPORT_FILE
-    text = render(gather(folder))
     try:
-        path.write_text(text, encoding="utf-8")
+        path.write_text(render(material), encoding="utf-8")
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
     return path

@@ -185,6 +185,12 @@ def test_a_killed_run_is_recovered_from_its_trace(runs: tuple[Path, Path], tmp_p
     assert any(event["name"] == "drone_control" for event in timeline)
 
 
+def test_where_there_is_nothing_to_recover_nothing_is_made(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"trace\.mcap"):
+        recover(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_finished_run_that_lost_its_record(runs: tuple[Path, Path], tmp_path: Path) -> None:
     (tmp_path / "trace.mcap").write_bytes((runs[1] / "trace.mcap").read_bytes())
     found = recover(tmp_path)
