@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from volery.base.errors import EstimateError, Location, ModelError, choices, did_you_mean
+from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
 from volery.cost.code import CodeLaw
 from volery.cost.energy import PowerLaw
 from volery.cost.figure import Figure
@@ -101,7 +101,7 @@ def read(text: str, name: str = "catalogue") -> Catalogue:
     try:
         data = YAML(typ="safe").load(text)
     except YAMLError as error:
-        raise ModelError(f"not YAML: {error}", where=Location(name, 1)) from error
+        raise ModelError(f"not YAML: {error}", name) from error
     entries = data.get("processors", {}) if isinstance(data, dict) else {}
     for kind, entry in entries.items():
         if isinstance(entry, dict):
@@ -109,9 +109,9 @@ def read(text: str, name: str = "catalogue") -> Catalogue:
     try:
         return Catalogue.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        path = ".".join(str(part) for part in first["loc"])
-        raise ModelError(first["msg"], path, Location(name, 1)) from error
+        wrong = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")  # typos first
+        said = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in wrong[:3])
+        raise ModelError(said, name) from error
 
 
 @cache

@@ -1,0 +1,112 @@
+import math
+
+import pytest
+
+from volery.base.errors import EstimateError, ModelError
+from volery.cost import catalogue, scale_energy, scale_time
+from volery.cost.catalogue import read
+from volery.cost.figure import Stated
+
+INTEL, ARM, HOST = "intel-i5-3470", "rpi4-cortex-a72", "generic-host"
+
+
+def stated_in(value: object) -> list[Stated]:
+    """Everything below *value* that says where it comes from."""
+    found = [value] if isinstance(value, Stated) else []
+    if isinstance(value, dict):
+        children = list(value.values())
+    else:
+        children = list(vars(value).values()) if hasattr(value, "__dict__") else []
+    for child in children:
+        found += stated_in(child)
+    return found
+
+
+def test_every_figure_says_where_it_comes_from() -> None:
+    figures = stated_in(dict(catalogue().processors))
+    assert len(figures) > 30
+    assert all(figure.source for figure in figures)
+
+
+def test_processors_and_their_ranges() -> None:
+    intel, arm = catalogue().processor(INTEL), catalogue().processor(ARM)
+    assert (intel.cores, intel.least_mhz, intel.greatest_mhz) == (4, 1600, 3000)
+    assert (arm.cores, arm.least_mhz, arm.greatest_mhz) == (4, 600, 1500)
+    arm.check_frequency(600)
+    arm.check_frequency(1500)
+    for outside in (599, 1501):
+        with pytest.raises(EstimateError, match=rf"{ARM}: {outside} MHz is outside.*600 to 1500 MHz"):
+            arm.check_frequency(outside)
+
+
+def test_an_unknown_processor_names_the_known_ones() -> None:
+    with pytest.raises(
+        EstimateError, match=r"'rpi4-cortex-a27'.*did you mean 'rpi4-cortex-a72'.*generic-host"
+    ):
+        catalogue().processor("rpi4-cortex-a27")
+
+
+def test_a_missing_figure_is_an_error() -> None:
+    host = catalogue().processor(HOST)
+    with pytest.raises(EstimateError, match="generic-host: the catalogue has no figures of ROS calls"):
+        host.ros_law("roscpp")
+    with pytest.raises(EstimateError, match="generic-host: the catalogue has no power figures"):
+        host.power_law()
+    with pytest.raises(EstimateError, match="no figure for counted cobol code"):
+        host.code_law("cobol")
+
+
+def test_the_power_of_a_raspberry_pi_is_inside_the_published_readings() -> None:
+    law = catalogue().processor(ARM).power_law()
+    assert 2.2 <= law.watts(0, 1500) <= 2.8
+    assert 5.1 <= law.watts(4, 1500) <= 6.5
+    assert law.watts(4, 600) < law.watts(4, 1500)
+    assert law.watts(2, 1500) == (law.watts(0, 1500) + law.watts(4, 1500)) / 2
+    assert law.band() == 0.2
+
+
+def test_energy_is_power_over_time() -> None:
+    law = catalogue().processor(ARM).power_law()
+    assert math.isclose(law.joules(30.0, 10.0, 1500), law.watts(3.0, 1500) * 10.0)
+
+
+def test_the_power_of_a_core_goes_with_frequency_and_voltage_squared() -> None:
+    law = catalogue().processor(INTEL).power_law()
+    assert law.core_w(3400) == 13.2
+    assert math.isclose(law.core_w(1600), 13.2 * 1600 / 3400 * (0.85 / 1.05) ** 2)
+
+
+def test_times_scale_with_the_clock_on_the_same_kind_only() -> None:
+    assert scale_time(2_000_000, (ARM, 1500), (ARM, 600)) == 5_000_000
+    assert scale_time(2_000_000, (ARM, 1500), (ARM, 1500)) == 2_000_000
+    with pytest.raises(EstimateError, match=f"stated for {ARM} says nothing about {INTEL}"):
+        scale_time(1, (ARM, 1500), (INTEL, 1600))
+    with pytest.raises(EstimateError, match="0 MHz"):
+        scale_time(1, (ARM, 1500), (ARM, 0))
+
+
+def test_energies_scale_with_the_voltage_squared() -> None:
+    law = catalogue().processor(ARM).power_law()
+    assert math.isclose(scale_energy(3e-3, (ARM, 1500), (ARM, 600), law), 3e-3 * (0.80 / 0.88) ** 2)
+
+
+def test_counted_code_is_flagged_as_uncalibrated() -> None:
+    law = catalogue().processor(ARM).code_law()
+    assert math.isclose(law.ns_per_step(1500), 80 / 1.5)
+    assert math.isclose(law.ns_per_step(600), 80 / 0.6)
+    [warning] = law.warnings()
+    assert "rpi4-cortex-a72" in warning
+    assert "uncalibrated" in warning
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("processors: {x: {cors: 4}}", r"processors\.x\.cors"),
+        ("processors: [", "not YAML"),
+        ("- 1", "dict|object|mapping"),
+    ],
+)
+def test_a_broken_catalogue_is_a_model_error(text: str, words: str) -> None:
+    with pytest.raises(ModelError, match=rf"(?i){words}"):
+        read(text)

@@ -1,0 +1,118 @@
+import math
+
+import pytest
+
+from volery.base.errors import EstimateError
+from volery.cost import Price, RosLaw, catalogue
+
+INTEL, ARM = "intel-i5-3470", "rpi4-cortex-a72"
+PLATFORMS = ((INTEL, 1600), (INTEL, 3000), (ARM, 600), (ARM, 1500))
+
+POINTS = {
+    "spin_once_first": (21500, 20380, 54381, 24403),
+    "spin_once_next": (6377, 6270, 21860, 9048),
+    "init": (433923, 300054, 18795260, 16195670),
+    "node_handle": (4137052, 2322393, 5583100, 4885054),
+    "service_client": (58706, 47143, 78275, 68099),
+    "advertise": (316862, 195434, 591091, 525178),
+    "subscribe": (1078574, 731497, 1445835, 1360615),
+    "advertise_service": (142290, 121073, 189720, 24403),
+}
+"""The paper's Tables I and II, ns, on the four platforms."""
+
+
+def law(kind: str) -> RosLaw:
+    return catalogue().processor(kind).ros_law("roscpp")
+
+
+@pytest.mark.parametrize("call", POINTS)
+@pytest.mark.parametrize(("index", "platform"), list(enumerate(PLATFORMS)))
+def test_calls_without_an_x_are_the_tables(call: str, index: int, platform: tuple[str, int]) -> None:
+    kind, frequency = platform
+    price = law(kind).price(call, 0, frequency)
+    assert (price.caller, price.background) == (POINTS[call][index], 0)
+
+
+def test_between_its_two_frequencies_a_call_is_on_their_line() -> None:
+    assert law(INTEL).price("init", 0, 2300).caller == round((433923 + 300054) / 2)
+    assert law(ARM).price("subscribe", 0, 1050).caller == round((1445835 + 1360615) / 2)
+
+
+@pytest.mark.parametrize(
+    ("platform", "constant", "each"),
+    [
+        ((INTEL, 1600), 1.959 * 1600 + 197717, -7.78 * 1600 + 51020),
+        ((INTEL, 3000), 1.959 * 3000 + 197717, -7.78 * 3000 + 51020),
+        ((ARM, 600), -128.46 * 600 + 254162, -22.656 * 600 + 85844),
+        ((ARM, 1500), -128.46 * 1500 + 254162, -22.656 * 1500 + 85844),
+    ],
+)
+def test_publish_splits_into_caller_and_background(
+    platform: tuple[str, int], constant: float, each: float
+) -> None:
+    kind, frequency = platform
+    for subscribers in (0, 1, 5):
+        price = law(kind).price("publish", subscribers, frequency)
+        assert price.caller == round(constant)
+        assert price.background == round(each * subscribers)
+
+
+@pytest.mark.parametrize(
+    ("platform", "slope", "constant"),
+    [
+        ((INTEL, 1600), 1.5645, -1.498 * 1600 + 22697),
+        ((INTEL, 3000), 1.1025, -1.498 * 3000 + 22697),
+        ((ARM, 600), 1.5611, -27.51 * 600 + 57231),
+        ((ARM, 1500), 0.6647, -27.51 * 1500 + 57231),
+    ],
+)
+def test_sleep_is_background_with_its_slope_per_gigahertz(
+    platform: tuple[str, int], slope: float, constant: float
+) -> None:
+    kind, frequency = platform
+    price = law(kind).price("sleep", 100_000, frequency)
+    assert price.caller == 0
+    assert math.isclose(price.background, slope * 100_000 + constant, abs_tol=1.0)
+
+
+def test_the_first_spin_of_a_node_costs_more_than_the_next() -> None:
+    assert law(INTEL).price("spin_once", 1, 3000).caller == POINTS["spin_once_first"][1]
+    assert law(INTEL).price("spin_once", 0, 3000).caller == POINTS["spin_once_next"][1]
+
+
+def test_an_unknown_call_is_an_error_and_never_zero() -> None:
+    with pytest.raises(EstimateError, match=r"'fly' of roscpp on intel-i5-3470.*publish"):
+        law(INTEL).price("fly", 0, 3000)
+
+
+def test_out_of_range_it_extrapolates_and_warns() -> None:
+    assert law(INTEL).warnings(3000) == ()
+    [warning] = law(INTEL).warnings(3600)
+    assert "intel-i5-3470 at 3600 MHz" in warning
+    assert "1600 to 3000 MHz" in warning
+    assert law(INTEL).price("init", 0, 3600).flags == (warning,)
+
+
+def test_where_a_line_goes_below_zero_there_is_no_estimate() -> None:
+    with pytest.raises(EstimateError, match=r"negative time for 'sleep' at 2500 MHz.*600 to 1500 MHz"):
+        law(ARM).price("sleep", 100_000, 2500)
+
+
+def test_a_python_node_charged_with_the_figures_of_roscpp_is_flagged() -> None:
+    borrowed = catalogue().processor(ARM).ros_law("rospy")
+    own = law(ARM)
+    assert borrowed.price("init", 0, 600)[:2] == own.price("init", 0, 600)[:2]
+    assert own.price("init", 0, 600).flags == ()
+    [flag] = borrowed.price("init", 0, 600).flags
+    assert "rospy nodes on rpi4-cortex-a72 are charged with roscpp figures" in flag
+
+
+def test_a_doubtful_figure_is_flagged_where_it_counts() -> None:
+    assert "probably a slip" in law(ARM).price("advertise_service", 0, 1500).flags[0]
+    assert law(ARM).price("advertise_service", 0, 600).flags == ()
+
+
+def test_prices_are_plain_integers() -> None:
+    price = law(ARM).price("publish", 2, 1234.5)
+    assert isinstance(price, Price)
+    assert all(type(part) is int for part in price[:2])
