@@ -11,9 +11,8 @@ from volery.cli.console import Output
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
-_BAD_INPUT = (ModelError, UsageError, EstimateError, CapabilityError)
-"""Errors that reach a command before anything has started: what was asked for makes no sense or is not there.
-"""
+BAD_INPUTS = (ModelError, UsageError, EstimateError, CapabilityError)
+"""What was asked for makes no sense or is not there: the file or the call must change."""
 
 
 def run_command(output: Output, command: Callable[[], int]) -> None:
@@ -29,7 +28,7 @@ def status_of(output: Output, command: Callable[[], int]) -> int:
         if output.debug:
             output.notes.print_exception()
         output.complain(f"volery: {error}")
-        return BAD_INPUT if isinstance(error, _BAD_INPUT) else FAILED
+        return BAD_INPUT if isinstance(error, BAD_INPUTS) else FAILED
     except KeyboardInterrupt:
         output.complain("volery: interrupted")
         return FAILED

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from volery.base.errors import UsageError
 from volery.cli.console import Output
 from volery.cli.folders import next_folder
 from volery.cli.progress import shown
@@ -18,7 +19,7 @@ class Wanted:
     """What was asked for."""
 
     mission: Path
-    url: str
+    urls: tuple[str, ...]
     seed: int
     speed: str
     out: Path | None
@@ -26,8 +27,11 @@ class Wanted:
 
 def fly(output: Output, wanted: Wanted) -> int:
     """Fly it, show the result; the exit status."""
+    if not wanted.mission.is_file():
+        what = "a Python file with `def mission(drone: Drone)` is expected"
+        raise UsageError(f"there is no file {str(wanted.mission)!r}; {what}")
     folder = wanted.out or next_folder(wanted.mission.stem)
-    with shown(output, f"{wanted.mission.name} on {wanted.url}") as show:
-        options = Options(seed=wanted.seed, pace=pace_of(wanted.speed), out=folder, show=show)
-        run = run_flight(wanted.mission, wanted.url, options)
+    pace = pace_of(wanted.speed)
+    with shown(output, f"{wanted.mission.name} on {', '.join(wanted.urls)}") as show:
+        run = run_flight(wanted.mission, wanted.urls, Options("hardware", wanted.seed, pace, folder, show))
     return tell(output, run)

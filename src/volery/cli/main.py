@@ -33,6 +33,10 @@ Fidelity = Annotated[
     str,
     typer.Option(metavar="times|code", help="Stated times, or the cost of the components' own code."),
 ]
+On = Annotated[
+    list[str],
+    typer.Option(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...; one per vehicle."),
+]
 Listen = Annotated[
     str | None,
     typer.Option(metavar="URL", help="tcp://HOST:PORT or udp://:PORT; without it, send to UDP 14550."),
@@ -129,7 +133,7 @@ def simulate(
 @app.command()
 def fly(
     mission: Annotated[Path, typer.Argument(help="A Python file with `def mission(drone: Drone)`.")],
-    on: Annotated[str, typer.Option(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...")],
+    on: On,
     seed: Seed = 1,
     speed: Annotated[str, typer.Option(help="Of a simulated vehicle: max, 1, 10 ...")] = "max",
     out: Out = None,
@@ -141,7 +145,7 @@ def fly(
     from volery.cli import fly as command
 
     output = Output(quiet, as_json, debug)
-    wanted = command.Wanted(mission, on, seed, speed, out)
+    wanted = command.Wanted(mission, tuple(on), seed, speed, out)
     run_command(output, lambda: command.fly(output, wanted))
 
 

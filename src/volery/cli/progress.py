@@ -49,7 +49,9 @@ def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
         line.append(f"  {simulated / wall_s:,.0f}× real time", style="dim")
     parcels = ", ".join(f"{count} {state}" for state, count in progress.parcels.items())
     line.append(f"  {parcels}" if parcels else "")
-    bar = ProgressBar(total=max(progress.limit, 1), completed=progress.now, width=40)
+    if not progress.limit:
+        return Group(line, _vehicles(progress))
+    bar = ProgressBar(total=progress.limit, completed=progress.now, width=40)
     return Group(line, bar, _vehicles(progress))
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from rich.traceback import Traceback
+
 from volery.base.errors import UsageError
 from volery.cli.console import Output
-from volery.cli.endings import FAILED, OK
+from volery.cli.endings import BAD_INPUT, BAD_INPUTS, FAILED, OK
 from volery.cli.folders import next_folder
 from volery.cli.progress import shown
 from volery.model.reader import load
@@ -63,6 +65,8 @@ def tell(output: Output, run: Run) -> int:
         report = run.folder / "report.html"
         output.note(f"{'report: ' + str(report) if report.exists() else 'run folder: ' + str(run.folder)}")
     if run.error is not None:
+        if output.debug:
+            output.notes.print(Traceback.from_exception(type(run.error), run.error, run.error.__traceback__))
         output.complain(f"volery: {run.error}")
     elif not run.completed:
         output.complain(f"volery: {run.record.outcome.status}: {run.record.outcome.reason}")
@@ -70,4 +74,6 @@ def tell(output: Output, run: Run) -> int:
         output.complain(f"volery: {problem}")
     for name in run.left:
         output.complain(f"volery: {name} did not end when it was told to")
+    if isinstance(run.error, BAD_INPUTS):
+        return BAD_INPUT
     return OK if run.ok else FAILED

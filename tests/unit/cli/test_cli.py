@@ -176,7 +176,7 @@ def test_simulate_refuses_what_makes_no_sense(arguments, complaint):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("pixhawk",), "no autopilot named 'pixhawk'"),
+        (("pixhawk",), "autopilot named 'pixhawk'"),
         (("--speed", "0"), "--speed 0"),
         (("--home", "1,2"), "home='1,2' should be 3 numbers"),
         (("--home", "100,2,3"), "latitude 100.0 is off the globe"),
