@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from volery.bridge import serve_vehicle
+from volery.components.body import Body
 from volery.components.counting import Steps
 from volery.components.instance import Instance
 from volery.components.loading import Loader
@@ -23,7 +24,7 @@ from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.run.ending import Ending
 from volery.run.fleet import Fleet
-from volery.run.platform import Platform, is_node
+from volery.run.platform import Platform, commanded_by, is_node
 from volery.run.setup import node_name
 from volery.vehicles import Drone, Rover, Vehicle, drivers
 
@@ -82,7 +83,7 @@ class Builder:
         self._ending = ending
         self._graph = Graph(kernel, platform.price, platform.carry)
         self._nodes: dict[str, EmbeddedNode] = {}
-        self._vehicles: list[Vehicle] = []
+        self._vehicles: dict[str, Vehicle] = {}
         self._instances: dict[str, Instance] = {}
 
     def build(self, fidelity: str, seed: int) -> Built:
@@ -92,7 +93,6 @@ class Builder:
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         models = self._system.instances
         self._instances = {model.name: self._instance(model, steps) for model in models}
-        self._ending.vehicles = self._vehicles
         return Built((*self._vehicle_nodes(), *(self._starter(model, loader) for model in models)))
 
     def _launches(self) -> dict[str, rospy.Launch]:
@@ -122,10 +122,10 @@ class Builder:
 
     def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
         instance = self._instances[model.name]
-        commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
         given = {**model.parameters, **self._given(model)}
         program = self._program(model, loader)
-        if commands:
+        if commanded_by(model):
+            commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
             names = [one.port for one in commands]
             program = Connected(program, names, lambda: self._connect(model, commands))
         scope = self._ending.users.child(model.name)
@@ -142,7 +142,7 @@ class Builder:
     # -- ports
 
     def _given(self, model: InstanceModel) -> dict[str, Any]:
-        """What its ports are connected to, vehicles apart, by the ports' names."""
+        """What its ports are connected to, by the ports' names; the vehicles that it commands come later."""
         found: dict[str, Any] = {}
         for connection in model.connections.values():
             kind = _kind(connection)
@@ -151,7 +151,13 @@ class Builder:
             elif kind is TargetKind.INSTANCE:
                 ports = [self._port(model, target.name) for target in connection.targets]
                 found[connection.port] = PortList(ports) if connection.many else ports[0]
+            elif kind is TargetKind.VEHICLE and model.is_environment:
+                bodies = [self._body(target.name) for target in connection.targets]
+                found[connection.port] = bodies if connection.many else bodies[0]
         return found
+
+    def _body(self, vehicle: str) -> Body:
+        return Body(self._kernel, vehicle, self._fleet.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
         here, there = model.processor, self._system.instance(callee).processor
@@ -179,23 +185,17 @@ class Builder:
         driver = drivers.load(GRAPH_DRIVER)(self._kernel, node, name, {"namespace": f"/{name}"})
         kind = Drone if interface == "Drone" else Rover
         vehicle = kind(self._kernel, name, driver, truth=self._fleet.truth(name))
-        self._vehicles.append(vehicle)
+        self._vehicles.setdefault(name, vehicle)  # one of its commanders brings it down in the end
+        self._ending.vehicles = tuple(self._vehicles.values())
         return vehicle
 
     # -- nodes that serve vehicles
 
     def _vehicle_nodes(self) -> Iterable[Callable[[], object]]:
+        commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
-            if self._commanded(vehicle.name):
+            if vehicle.name in commanded:
                 yield partial(self._serve, vehicle.name, vehicle.processor)
-
-    def _commanded(self, vehicle: str) -> bool:
-        return any(
-            target.kind is TargetKind.VEHICLE and target.name == vehicle
-            for model in self._system.instances
-            for connection in model.connections.values()
-            for target in connection.targets
-        )
 
     def _serve(self, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""

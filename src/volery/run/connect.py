@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from volery.base.errors import CapabilityError, VoleryError
+from volery.base.position import Position
 from volery.kernel.api import Kernel
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.run.fleet import Fleet
-from volery.run.simulated import Simulated, fleet_of, link_to, simulated
+from volery.run.simulated import HOME, Simulated, fleet_of, link_to, simulated
 from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import open_link
@@ -67,29 +68,27 @@ def connect(url: str, kind: type[V] = Drone, *, seed: int = 1) -> Iterator[V]:  
         kernel.close()
 
 
-def open_vehicles(urls: list[str], kind: type[Vehicle], *, seed: int, pace: float | None) -> Opened:
-    """Open all of *urls*: either simulated ones, in one world, or real ones."""
+def open_vehicles(
+    urls: list[str], kind: type[Vehicle], *, seed: int, pace: float | None, home: Position = HOME
+) -> Opened:
+    """Open all of *urls*: either simulated ones, in one world at *home*, or real ones."""
     addresses = [parse(url) for url in urls]
     names = _names(addresses)
-    if all(address.carrier == "sim" for address in addresses):
-        return _open_simulated(addresses, names, kind, seed, pace)
-    return _open_real(addresses, names, kind)
+    if any(address.carrier != "sim" for address in addresses):
+        return _open_real(addresses, names, kind)
+    wanted = [
+        simulated(address, name, KINDS[kind], home) for address, name in zip(addresses, names, strict=True)
+    ]
+    kernel = VirtualKernel(pace=pace)
+    fleet = fleet_of(kernel, wanted, seed)
+    vehicles = tuple(_simulated_vehicle(kernel, fleet, one, kind, seed) for one in wanted)
+    return Opened(kernel, vehicles, fleet)
 
 
 def _names(addresses: list[Address]) -> list[str]:
     if len(addresses) == 1:
         return [addresses[0].driver]
     return [f"{address.driver}_{number}" for number, address in enumerate(addresses, start=1)]
-
-
-def _open_simulated(
-    addresses: list[Address], names: list[str], kind: type[Vehicle], seed: int, pace: float | None
-) -> Opened:
-    kernel = VirtualKernel(pace=pace)
-    wanted = [simulated(address, name, KINDS[kind]) for address, name in zip(addresses, names, strict=True)]
-    fleet = fleet_of(kernel, wanted, seed)
-    vehicles = tuple(_simulated_vehicle(kernel, fleet, one, kind, seed) for one in wanted)
-    return Opened(kernel, vehicles, fleet)
 
 
 def _simulated_vehicle(

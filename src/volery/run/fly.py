@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from volery.base.errors import ComponentError, UsageError, VoleryError, choices
+from volery.base.position import AMSL, Position
 from volery.components.instance import describe
 from volery.components.loading import Loader
 from volery.components.python import load_function
@@ -23,6 +24,7 @@ from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import setup_of_flight
 from volery.run.simulate import AS_USUAL, Options
+from volery.run.simulated import HOME
 from volery.trace.events import Failure
 from volery.vehicles import Drone, Rover, Vehicle
 
@@ -35,9 +37,9 @@ FUNCTION = "mission"
 def fly(mission: Mission | str | Path, on: str | Sequence[str], options: Options = AS_USUAL) -> Run:
     """Fly *mission* (a function, or a file that defines ``mission``) on the vehicle at the address *on*.
 
-    With several addresses each vehicle flies it, all at once. The parameter's annotation says whether the
-    mission is for a ``Drone`` (also without one) or a ``Rover``. Simulated vehicles fly in virtual time, real
-    ones in real time.
+    A file's ``HOME`` is where simulated vehicles stand. With several addresses each vehicle flies it, all at
+    once. The parameter's annotation says whether the mission is for a ``Drone`` (also without one) or a
+    ``Rover``. Simulated vehicles fly in virtual time, real ones in real time.
 
     Raises ``UsageError`` and ``ModelError`` before anything has started; what happens later is in the
     ``Run``.
@@ -53,8 +55,10 @@ class _Flight:
 
     def __init__(self, mission: Mission | str | Path, urls: list[str], options: Options) -> None:
         self._path = None if callable(mission) else Path(mission)
-        kind = kind_of(mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION))
-        self._opened: Opened = open_vehicles(urls, kind, seed=options.seed, pace=options.pace)
+        looked_at = mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION)
+        self._opened: Opened = open_vehicles(
+            urls, kind_of(looked_at), seed=options.seed, pace=options.pace, home=home_of(looked_at)
+        )
         self._kernel = kernel = self._opened.kernel
         self._mission = self._load(mission, options.seed)
         self._ending = Ending(kernel)
@@ -131,3 +135,11 @@ def kind_of(mission: Mission) -> type[Vehicle]:
         )
     hint = hints.get(names[0], Drone)
     return Rover if hint is Rover else Drone
+
+
+def home_of(mission: Mission) -> Position:
+    """Where simulated vehicles stand: the ``HOME`` that stands beside the mission in its file, if one does."""
+    home = getattr(mission, "__globals__", {}).get("HOME", HOME)
+    if not isinstance(home, Position) or not isinstance(home.altitude, AMSL):
+        raise UsageError(f"HOME is {home!r}; state it as Position(LATITUDE, LONGITUDE, AMSL(METRES))")
+    return home

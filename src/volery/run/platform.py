@@ -30,14 +30,21 @@ CALL_WITHIN: Ns = 10 * S
 NO_COST = Price(0, 0)
 
 
-def is_node(instance: Instance) -> bool:
-    """True if *instance* is a node of the graph: by its language, or because it commands a vehicle."""
-    commands = any(
-        target.kind is TargetKind.VEHICLE
+def commanded_by(instance: Instance) -> tuple[str, ...]:
+    """The vehicles that *instance* commands. A component of the environment sees bodies and commands none."""
+    if instance.is_environment:
+        return ()
+    return tuple(
+        target.name
         for connection in instance.connections.values()
         for target in connection.targets
+        if target.kind is TargetKind.VEHICLE
     )
-    return commands or instance.component.language in ROS_LANGUAGES
+
+
+def is_node(instance: Instance) -> bool:
+    """True if *instance* is a node of the graph: by its language, or because it commands a vehicle."""
+    return bool(commanded_by(instance)) or instance.component.language in ROS_LANGUAGES
 
 
 VEHICLE_NODE_LANGUAGE = "roscpp"

@@ -16,8 +16,8 @@ from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, 
 from volery.run.fleet import LINK_DELAY, Fleet
 from volery.vehicles.address import Address
 
-HOME = (46.0828, -103.899, 880.0)
-"""Where simulated vehicles stand unless an address says otherwise: degrees, and metres AMSL."""
+HOME = Position(46.0825, -103.8995, AMSL(900))
+"""Where simulated vehicles stand unless an address or a mission says otherwise."""
 
 OPTIONS = ("heading", "home", "kind", "sensors", "start", "wind", "wire", *FAULT_OPTIONS)
 """What may follow ``sim:AUTOPILOT?``."""
@@ -38,16 +38,18 @@ class Simulated:
     faults: WireFaults | None = None
 
 
-def simulated(address: Address, name: str, kind: str = "multirotor") -> Simulated:
-    """Read a ``sim:`` address; *kind* is what is simulated unless it says otherwise.
+def simulated(address: Address, name: str, kind: str = "multirotor", home: Position = HOME) -> Simulated:
+    """Read a ``sim:`` address; *kind* and *home* hold unless it says otherwise.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
     ``start=warm|cold``, ``wind=SPEED,FROM_DEG,GUSTS``, ``wire=values|bytes`` and, through bytes, the faults
     of ``volery.links.wire``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
-    latitude, longitude, amsl = address.numbers("home", 3) or HOME
-    Position(latitude, longitude, AMSL(amsl))  # refuses what is off the globe
+    stated = address.numbers("home", 3)
+    if stated is not None:
+        home = Position(stated[0], stated[1], AMSL(stated[2]))
+    latitude, longitude, amsl = home.latitude, home.longitude, home.altitude.metres
     vehicle = Vehicle(
         name=name,
         kind=_one_of(address, "kind", VEHICLE_KINDS, kind),
