@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from traceback import walk_tb
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
@@ -17,6 +18,9 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Place, Scope, Server, Task
 from volery.kernel.waiting import Lock, Signal, at
 from volery.trace.events import Charge, Failure
+
+MARK = "__volery_user__"
+"""A name that every module of a component has: it tells the user's part of a traceback from a library's."""
 
 Failed = Callable[[str, Exception], None]
 """Told the name of a component whose flow of control has ended with an error, and the error."""
@@ -187,15 +191,16 @@ class Instance:
 
 
 def describe(error: BaseException) -> str:
-    """``ValueError: no such parcel (delivery_central.py:41)``: what a component raised, and where."""
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
+    """``ValueError: no such parcel (delivery_central.py:41)``: what was raised, and where in the user's code."""
     said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    if trace is None:
+    frames = [
+        (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
+    ]
+    theirs = [frame for frame in frames if MARK in frame[0]] or frames
+    if not theirs:
         return said
-    file = trace.tb_frame.f_code.co_filename.rpartition("/")[2]
-    return f"{said} ({file}:{trace.tb_lineno})"
+    _, file, line = theirs[-1]
+    return f"{said} ({file.rpartition('/')[2]}:{line})"
 
 
 def _forget(name: str, error: Exception) -> None:

@@ -23,8 +23,10 @@ from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError
 from volery.components.counting import Steps
+from volery.components.instance import MARK
 
 _PREFIX = "volery.user"
+OURS = "volery"
 
 
 @dataclass(frozen=True)
@@ -81,8 +83,8 @@ class Loader:
 
     stand_ins: Mapping[str, ModuleType] = field(default_factory=dict)
     steps: Steps | None = None
-    uncounted: set[str] = field(default_factory=set)
-    """Top-level names of real modules that the files import: what they compute is not counted."""
+    libraries: set[str] = field(default_factory=set)
+    """Top-level names of the libraries that the files import beside Python's own: they compute uncounted."""
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
@@ -107,6 +109,7 @@ class Loader:
     def _module(self, full_name: str, path: Path) -> ModuleType:
         module = ModuleType(full_name)
         module.__file__ = str(path)
+        module.__dict__[MARK] = True
         module.__dict__["__builtins__"] = self._builtins(path.parent)
         if self.steps:
             module.__dict__.update(self.steps.names())
@@ -133,7 +136,8 @@ class Loader:
                 self.steps.take()  # loading is no part of what a component does
 
     def _builtins(self, folder: Path) -> dict[str, Any]:
-        return {**vars(builtins), "__import__": _Import(self, folder)}
+        names = vars(self.stand_ins.get("builtins", builtins))
+        return {**names, "__import__": _Import(self, folder)}
 
     def sibling(self, name: str, folder: Path) -> ModuleType | None:
         """The module or package *name* (dotted) beside the file that asks for it; ``None`` if none is."""
@@ -193,8 +197,8 @@ class _Import:
     ) -> ModuleType:
         module = builtins.__import__(name, globals_, None, fromlist or ())
         top = name.partition(".")[0]
-        if top not in sys.builtin_module_names and top != "__future__":
-            self._loader.uncounted.add(top)
+        if top not in sys.stdlib_module_names and top != OURS:
+            self._loader.libraries.add(top)
         return module
 
     def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:

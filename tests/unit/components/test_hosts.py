@@ -330,3 +330,32 @@ def test_functions_and_classes_of_a_file(desk):
     assert load_class(path, "Kind").__name__ == "Kind"
     with pytest.raises(ModelError, match="no function 'missions'; there is mission"):
         load_function(desk.loader, path, "missions")
+
+
+def test_what_is_printed_is_a_line_of_the_trace_and_leaves_the_output_alone(desk, capsys):
+    path = desk.write(
+        "user.py",
+        """
+        import sys
+
+        class User:
+            def run(self):
+                print("to", "people", sep=" ")
+                print()
+                print("elsewhere", file=sys.stdout)
+        """,
+    )
+    desk.start(path, "User")
+    desk.kernel.run(S)
+    assert desk.of(Text) == [Text(0, "user", 6, "to people")]
+    assert capsys.readouterr() == ("elsewhere\n", "to people\n\n")
+
+
+def test_an_error_is_placed_in_the_users_file_and_libraries_are_noted(desk):
+    path = desk.write(
+        "user.py", "import json\nimport networkx\nclass User:\n    def run(self):\n        json.loads('{')\n"
+    )
+    desk.start(path, "User")
+    desk.kernel.run(S)
+    assert str(desk.failures[0][1]).endswith("(user.py:5)")
+    assert desk.loader.libraries == {"networkx"}

@@ -10,7 +10,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from volery.base.time import Ns, S
-from volery.components.stand_ins import chance, clock, flows, queues
+from volery.components.stand_ins import chance, clock, flows, queues, words
 from volery.kernel.api import Kernel
 
 EPOCH: Ns = 1_700_000_000 * S
@@ -20,6 +20,7 @@ EPOCH: Ns = 1_700_000_000 * S
 def stand_ins(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, ModuleType]:
     """By name, for ``Loader``. *epoch*: ``time.time_ns()`` at the start of the run."""
     return {
+        "builtins": words.builtins_module(kernel),
         "time": clock.time_module(kernel, epoch),
         "datetime": clock.datetime_module(kernel, epoch),
         "random": chance.random_module(kernel, seed),
