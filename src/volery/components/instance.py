@@ -191,7 +191,7 @@ class Instance:
 
 
 def describe(error: BaseException) -> str:
-    """``ValueError: no such parcel (delivery_central.py:41)``: what was raised, and where in the user's code."""
+    """``ValueError: no such parcel (delivery_central.py:41)``: what was raised, and where in their code."""
     said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     frames = [
         (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
