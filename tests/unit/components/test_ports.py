@@ -16,6 +16,7 @@ from volery.kernel import waiting
 from volery.kernel.processor import Processor
 from volery.kernel.task import Cancelled, Place
 from volery.kernel.virtual import VirtualKernel
+from volery.kernel.wall import WallKernel
 from volery.trace.events import Call, Charge, Failure, Slice
 
 
@@ -426,3 +427,35 @@ class Pair:
 )
 def test_sizes(value, size):
     assert size_of(value) == size
+
+
+def test_on_the_wall_clock_calls_are_the_same():
+    """Threads instead of greenlets; nothing waits, so nothing takes time here."""
+    events, told = [], []
+    kernel = WallKernel(record=events.append)
+    keeper = Keeper()
+    callee = Instance(kernel, "keeper", Seat(), FREE, ("keep",))
+    caller = Instance(kernel, "caller", Seat(priority=0))
+    faulty = Instance(kernel, "faulty", Seat(), FREE, ("boom",))
+    port, broken = (Port(kernel, "caller", one, None, None) for one in (callee, faulty))
+
+    class Body:
+        def run(self):
+            told.append(port.keep("parcel"))
+            try:
+                broken.boom()
+            finally:
+                kernel.cancel(kernel.root, "seen enough")
+
+    class Broken:
+        def boom(self):
+            raise ValueError("no")
+
+    failures = []
+    for instance, thing in ((callee, keeper), (faulty, Broken()), (caller, Body())):
+        start(instance, Given(thing), {}, kernel.root, lambda *failed: failures.append(failed))
+    kernel.run(60 * S)
+    assert kernel.close() == []
+    assert told == ["parcel"] == [keeper.kept]
+    calls = [(event.callee, event.outcome) for event in events if isinstance(event, Call)]
+    assert calls == [("keeper", "ok"), ("faulty", "ComponentError")]
