@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
-from math import hypot
+from math import hypot, isnan
 from typing import Any
 
 import numpy as np
@@ -55,15 +55,18 @@ class _Track:
 
     def add(self, event: VehicleState) -> None:
         at = to_seconds(event.at)
-        columns = self.columns
-        columns["t"].append(at)
-        columns["x"].append(event.x)
-        columns["y"].append(event.y)
-        columns["z"].append(event.z)
-        columns["v"].append(hypot(event.vx, event.vy, event.vz))
-        columns["battery"].append(event.battery)
         if not self.modes or self.modes[-1][1:] != (event.mode, event.armed):
             self.modes.append((at, event.mode, event.armed))
+        x, y, z = event.where()
+        if isnan(x):
+            return
+        columns = self.columns
+        columns["t"].append(at)
+        columns["x"].append(x)
+        columns["y"].append(y)
+        columns["z"].append(z)
+        columns["v"].append(hypot(event.vx, event.vy, event.vz))
+        columns["battery"].append(event.battery)
 
     def column(self, name: str) -> Floats:
         return np.frombuffer(self.columns[name], dtype=np.float64)
@@ -81,6 +84,7 @@ class Digest:
         self._processor_of = {one.name: one.processor for one in setup.components}
         self._parcels: dict[str, list[Milestone]] = {}
         self._remarks: list[Json] = []
+        self._left_out = 0
         self._lost: dict[str, list[int]] = {}
         self._last: Ns = 0
 
@@ -146,6 +150,8 @@ class Digest:
         self._last = max(self._last, at)
         if len(self._remarks) < _MOST_REMARKS or kind in ("failure", "refused"):
             self._remarks.append({"t": _seconds(at), "kind": kind, "who": who, "what": what})
+        else:
+            self._left_out += 1
 
     def data(self, ended: float | None = None) -> Json:
         """Everything to draw, as JSON values; *ended*: when the run did, if not at its last event."""
@@ -157,6 +163,7 @@ class Digest:
             "processors": [self._processor(name) for name in self._load],
             "parcels": [{"name": name, "steps": self._steps(steps)} for name, steps in self._parcels.items()],
             "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
+            "left_out": self._left_out,
             "messages": [
                 {"topic": topic, "sent": sent, "lost": lost}
                 for topic, (sent, lost) in sorted(self._lost.items())

@@ -156,6 +156,7 @@ def render(material: Material) -> str:
             warnings=record.warnings,
             laws=laws_grid(record),
             remarks=_remarks(data["remarks"]),
+            left_out=data["left_out"],
             footer=_footer(record),
             data=embedded(data),
         )

@@ -136,19 +136,22 @@ class VehicleLedger:
 
     def state(self, event: VehicleState) -> None:
         """It was seen; states come in the order of time."""
-        if not event.armed:
-            self.ground = event.z
         if self.last is not None:
             self._between(self.last, event)
+        z = event.where()[2]
+        if not event.armed and not isnan(z):
+            self.ground = z
         self.last = event
 
     def _between(self, before: VehicleState, after: VehicleState) -> None:
         elapsed = after.at - before.at
-        dx, dy, dz = after.x - before.x, after.y - before.y, after.z - before.z
-        self.distance += sqrt(dx * dx + dy * dy + dz * dz)
+        (x0, y0, z0), (x1, y1, z1) = before.where(), after.where()
+        moved = sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2 + (z1 - z0) ** 2)
+        if not isnan(moved):
+            self.distance += moved
         if before.armed:
             self.armed += elapsed
-            if self.setup.kind != "rover" and before.z - self.ground > AIRBORNE_M:
+            if self.setup.kind != "rover" and z0 - self.ground > AIRBORNE_M:
                 self.airborne += elapsed
         watts = (before.volts * before.amperes + after.volts * after.amperes) / 2.0
         if not isnan(watts):
@@ -181,7 +184,8 @@ class VehicleLedger:
 
 
 def _stands(state: VehicleState) -> bool:
-    return not state.armed and hypot(state.vx, state.vy, state.vz) < STILL_M_S
+    speed = hypot(state.vx, state.vy, state.vz)
+    return not state.armed and (isnan(speed) or speed < STILL_M_S)
 
 
 def _operation(event: Operation) -> OperationRecord:

@@ -92,7 +92,7 @@ class VehicleState(NamedTuple):
     """A vehicle as it is (truth, ENU metres about the world's origin) and as its autopilot believes.
 
     Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates
-    are NaN while the autopilot has none.
+    are NaN while the autopilot has none, and truth is NaN where nobody knows it, as with a real vehicle.
     """
 
     at: Ns
@@ -115,6 +115,12 @@ class VehicleState(NamedTuple):
     amperes: float
     armed: bool
     mode: str
+
+    def where(self) -> tuple[float, float, float]:
+        """The true position, else what the autopilot believes; NaN if neither is known."""
+        if self.x == self.x:  # false for NaN alone
+            return self.x, self.y, self.z
+        return self.estimated_x, self.estimated_y, self.estimated_z
 
 
 class Operation(NamedTuple):

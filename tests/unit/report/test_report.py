@@ -164,6 +164,26 @@ def test_a_vehicle_without_a_map(tmp_path: Path) -> None:
     assert embedded(html)["scenery"] is None
 
 
+def test_a_real_vehicle_whose_truth_nobody_knows(tmp_path: Path) -> None:
+    lost = VehicleState(0, "d", *[float("nan")] * 13, 0.5, *[float("nan")] * 2, True, "GUIDED")
+    events = [
+        lost,
+        *(lost._replace(at=n * S, estimated_x=2.0 * n, estimated_y=0.0, estimated_z=5.0) for n in (1, 2, 3)),
+    ]
+    folder = small_run(tmp_path / "real", *events)
+    html = render(gather(folder))
+    (vehicle,) = embedded(html)["vehicles"]  # type: ignore[misc]
+    assert vehicle["x"] == [2.0, 6.0]
+    assert vehicle["speed"] == {"t": [], "v": []}
+    recover(folder)
+    assert read_record(folder).vehicles["d"].distance_m == 4.0
+
+
+def test_more_words_than_fit_are_counted(tmp_path: Path) -> None:
+    html = render(gather(small_run(tmp_path / "talk", *(Text(n, "d", 6, f"line {n}") for n in range(1000)))))
+    assert "600 more stand in the trace alone" in html
+
+
 def test_a_folder_without_a_trace_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"trace\.mcap"):
         write_report(tmp_path)

@@ -156,6 +156,21 @@ def test_a_vehicle_flies_and_lands() -> None:
     assert books().vehicles["d"].landed is None
 
 
+def test_without_truth_the_estimate_counts_and_what_nobody_knows_does_not() -> None:
+    unknown = {"x": nan, "y": nan, "z": nan, "vx": nan, "vy": nan, "vz": nan, "volts": nan}
+    flight = books(
+        state(0, **unknown),
+        state(1 * S, **unknown, estimated_x=0.0, estimated_y=0.0, estimated_z=0.0),
+        state(2 * S, **unknown, estimated_x=3.0, estimated_y=4.0, estimated_z=0.0, armed=True),
+        state(3 * S, **unknown, estimated_x=3.0, estimated_y=4.0, estimated_z=5.0, armed=True),
+        state(4 * S, **unknown, estimated_x=3.0, estimated_y=4.0, estimated_z=5.0),
+    ).vehicles["d"]
+    assert flight.distance_m == 10.0
+    assert flight.airborne_s == 1.0
+    assert flight.energy_j is None
+    assert flight.landed is True
+
+
 def test_a_rover_is_never_airborne() -> None:
     on_a_hill = books(
         state(0, vehicle="r"), *[state(n * S, vehicle="r", z=50.0, armed=True) for n in (1, 2, 3)]

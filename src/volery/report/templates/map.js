@@ -129,6 +129,7 @@
   }
 
   function drawTrail(context, vehicle, ink, time) {
+    if (!vehicle.t.length) return;
     const points = vehicle.t.map((_, index) => [vehicle.x[index], vehicle.y[index]]);
     if (points.length < 2) return;
     context.strokeStyle = ink;
@@ -155,6 +156,7 @@
   }
 
   function drawVehicle(context, vehicle, ink, time) {
+    if (!vehicle.t.length) return;
     const spot = where(vehicle, time);
     const mode = current(vehicle.modes, time, (entry) => entry[0]);
     context.save();
@@ -206,7 +208,7 @@
       let x, y;
       const vehicle = data.vehicles.find((one) => one.name === step.vehicle);
       const place = scenery.places.find((one) => one[0] === step.place);
-      if (vehicle) ({ x, y } = where(vehicle, time));
+      if (vehicle && vehicle.t.length) ({ x, y } = where(vehicle, time));
       else if (place) [, x, y] = place;
       else continue;
       const key = step.vehicle || step.place;
@@ -249,7 +251,7 @@
     size = [width, height];
     if (view.fitted) fit();
     const time = stage.now;
-    if (followed !== null) {
+    if (followed !== null && data.vehicles[followed].t.length) {
       const spot = where(data.vehicles[followed], time);
       view.x = spot.x;
       view.y = spot.y;
@@ -260,7 +262,8 @@
     drawPlaces(context, taken);
     data.vehicles.forEach((vehicle, index) => drawVehicle(context, vehicle, colour(series(index)), time));
     drawParcels(context, time);
-    data.vehicles.forEach((vehicle, index) => {
+    data.vehicles.forEach((vehicle) => {
+      if (!vehicle.t.length) return;
       const spot = where(vehicle, time);
       const words = spot.z > 0.5 && vehicle.kind !== "rover" ? vehicle.name + "  " + Math.round(spot.z) + " m" : vehicle.name;
       label(context, words, toX(spot.x), toY(spot.y), colour("ink"), taken, -28, true);

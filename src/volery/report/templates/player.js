@@ -41,8 +41,10 @@
       const entry = current(vehicle.modes, time, (one) => one[0]);
       mode.textContent = entry ? entry[1] + (entry[2] ? "" : " · disarmed") : "not yet seen";
       const words = [];
-      if (vehicle.kind !== "rover") words.push(at(vehicle.height.t, vehicle.height.v, time).toFixed(1) + " m");
-      words.push(at(vehicle.speed.t, vehicle.speed.v, time).toFixed(1) + " m/s");
+      if (vehicle.kind !== "rover" && vehicle.height.t.length) {
+        words.push(at(vehicle.height.t, vehicle.height.v, time).toFixed(1) + " m");
+      }
+      if (vehicle.speed.t.length) words.push(at(vehicle.speed.t, vehicle.speed.v, time).toFixed(1) + " m/s");
       if (vehicle.battery.t.length) words.push(Math.round(at(vehicle.battery.t, vehicle.battery.v, time)) + " %");
       numbers.textContent = words.join("  ·  ");
     }
