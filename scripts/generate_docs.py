@@ -27,7 +27,8 @@ def observables() -> str:
     """What a requirement may bound."""
     lines = [
         "# Observables\n",
-        "What a requirement of a model may bound, as `<subject>.<quantity>`. An empty unit is a count or a share.\n",
+        "What a requirement of a model may bound, as `<subject>.<quantity>`.",
+        "An empty unit stands for a count or a share.\n",
     ]
     subject = ""
     for one in OBSERVABLES:
@@ -55,9 +56,8 @@ def processors() -> str:
             )
         if entry.power is not None:
             power = entry.power
-            lines.append(
-                f"- Power: {power.provenance}, within {power.band():.0%}; {power.source}. Valid: {power.validity}."
-            )
+            words = f"{power.provenance}, within {power.band():.0%}; {power.source}. Valid: {power.validity}"
+            lines.append(f"- Power: {words}.")
         for language, code in entry.code.items():
             lines.append(
                 f"- Counted code ({language}): {code.provenance}; {code.source}. Valid: {code.validity}."
