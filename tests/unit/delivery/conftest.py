@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-from volery.base import errors, position
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.components import services
 from volery.components.instance import Instance, Seat
 from volery.components.loading import Loader
 from volery.components.python import load_program, start
@@ -64,21 +61,13 @@ CITY = Environment(
 )
 
 
-def public_names():
-    """What a component's file finds under ``volery``."""
-    module = ModuleType("volery")
-    for room in (services, position, errors):
-        vars(module).update({name: value for name, value in vars(room).items() if not name.startswith("_")})
-    return module
-
-
 class Bench:
     """A kernel on which single components of the service run."""
 
     def __init__(self, seed=1, **modules):
         self.events = []
         self.kernel = VirtualKernel(self.events.append)
-        self.loader = Loader({**stand_ins(self.kernel, seed), "volery": public_names(), **modules})
+        self.loader = Loader({**stand_ins(self.kernel, seed), **modules})
         self.failures = []
 
     def start(self, file, class_name, operations=(), active=True, **given):
