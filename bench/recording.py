@@ -2,7 +2,7 @@
 
 The library is handed bytes that are ready; ours has to make them. Rounds take turns; figures are medians.
 
-    python bench/trace.py [--quick]
+    python bench/recording.py [--quick]
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def main() -> None:
             "accounts": fold(lambda: Accounts(setup), events),
             "digest of the report": fold(lambda: Digest(setup, None), events),
         }
-        candidates["reading trace.mcap"] = reader(trace)
+        candidates["reading it again"] = reader(trace)
         times: dict[str, list[float]] = {what: [] for what in candidates}
         for _ in range(1 if quick else 5):
             for what, action in candidates.items():
@@ -118,9 +118,8 @@ def main() -> None:
         print(
             f"{what:28} {1e6 * taken / len(events):6.2f} us an event  {taken / reference:5.2f} x the library"
         )
-    print(
-        f"trace: {size / len(events):.0f} bytes an event, {size / seconds * 3600 / 1e6:.0f} MB a simulated hour"
-    )
+    hourly = size / seconds * 3600 / 1e6
+    print(f"trace: {size / len(events):.0f} bytes an event, {hourly:.0f} MB a simulated hour")
 
 
 if __name__ == "__main__":
