@@ -49,7 +49,7 @@ class Repeat(NamedTuple):
 class Step:
     """One thing asked of an autopilot, and how one sees that it is done.
 
-    ``send`` asks. It and every other function here never blocks, unless there is a ``cycle``. ``done``
+    ``send`` asks. It and every other function here never blocks, unless the driver has a cycle. ``done``
     looks at the telemetry; where ``skippable``, a step that is done already is not asked for. ``answer`` is
     the key of the acknowledgement that counts (``Telemetry.answers``). ``again`` asks once more at this
     period: until the answer, or, where the autopilot gives none, until it is done.
@@ -58,9 +58,7 @@ class Step:
     on, ``leads_to`` modes which the autopilot may choose by itself in the course of it, ``armed`` whether
     it must stay armed.
 
-    ``keep`` is sent all the while. ``cycle`` is for carriers that are nodes of a graph: the step then runs
-    in the caller's own task, which does this each period; it and ``send`` may block, and their computing is
-    charged to the caller. ``advice`` says what the user can do if it is refused or not done in time.
+    ``keep`` is sent all the while. ``advice`` says what the user can do if it is refused or late.
     """
 
     ask: str
@@ -75,7 +73,6 @@ class Step:
     leads_to: tuple[str, ...] = ()
     armed: bool = False
     keep: Repeat | None = None
-    cycle: Repeat | None = None
     advice: str = ""
 
 
@@ -93,13 +90,27 @@ class Sticks(NamedTuple):
 
 
 class Driver(Protocol):
-    """Talks to one autopilot. Each operation answers with the steps to perform, in order."""
+    """Talks to one autopilot. Each operation answers with the steps to perform, in order.
+
+    ``handover`` is the mode in which the autopilot obeys a computer: a pilot hands over by choosing it.
+    ``cycle`` is for carriers that are nodes of a graph: one round of the node's own loop, which takes in what
+    has arrived and sleeps for its period. Whoever waits goes round in its own task, which pays for it.
+    """
 
     name: str
     telemetry: Telemetry
-    capabilities: frozenset[Capability]
     handover: str
-    """The mode in which the autopilot obeys a computer: a pilot hands over by choosing it."""
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        """What this vehicle can be asked for; empty until it has been heard."""
+
+    @property
+    def cycle(self) -> Action | None:
+        """``None`` where what arrives is taken in by itself."""
+
+    def look(self) -> None:
+        """Take in what has arrived, without waiting."""
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Until it could arm and go by position."""

@@ -204,9 +204,7 @@ class Drone(Vehicle):
         return "landed"
 
     def _wait_for_return(self) -> None:
-        back = self._driver.telemetry.changed.wait_for(
-            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S), ends_activation=True
-        )
+        back = self._performer.wait(lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S))
         if not back:
             raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has landed")
 

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 
 from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VoleryError
 from volery.base.time import MS, Ns, S, to_seconds
-from volery.kernel.api import Handle, Kernel
-from volery.kernel.waiting import Rate, sleep
-from volery.vehicles.driver import Driver, Repeat, Step
+from volery.kernel.api import Action, Handle, Kernel
+from volery.kernel.waiting import sleep
+from volery.vehicles.driver import Driver, Step
 from volery.vehicles.telemetry import Telemetry
 
 RESTARTS = 3
@@ -76,6 +76,18 @@ class Performer:
                 return undone
         return ""
 
+    def wait(self, holds: Callable[[], bool], within: Ns) -> bool:
+        """Until it *holds* of the telemetry (True), at most for *within* (False)."""
+        cycle = self._driver.cycle
+        if cycle is None:
+            return self._driver.telemetry.changed.wait_for(holds, within, ends_activation=True)
+        until = self._kernel.now() + within
+        while not holds():
+            if self._kernel.now() >= until:
+                return False
+            cycle()
+        return True
+
     def silent(self) -> bool:
         """It spoke before, but not for so long that the link counts as lost."""
         return self._kernel.now() - self._driver.telemetry.heard >= self._silence
@@ -113,10 +125,10 @@ class _Attempt:
         self._seen.answers.pop(step.answer, None)
         if step.enters:
             self._owner.commanded = step.enters
-        if step.cycle is None:
+        if self._driver.cycle is None:
             self._wait_for_telemetry()
         else:
-            self._turn(step.cycle)
+            self._go_round(self._driver.cycle)
         return self._judge()
 
     def _check_not_fought(self) -> None:
@@ -143,21 +155,21 @@ class _Attempt:
                 for handle in handles:
                     handle.cancel()
 
-    def _turn(self, cycle: Repeat) -> None:
-        """The node's own loop: send, spin, sleep, in the caller's task."""
-        step, rate = self._step, Rate(self._kernel, cycle.period)
+    def _go_round(self, cycle: Action) -> None:
+        """The node's own loop, in the caller's task."""
+        step = self._step
         step.send()
         asked_at = kept_at = self._kernel.now()
         while not self._over():
             self._time_left()
-            cycle.action()
-            if step.again is not None and self._kernel.now() - asked_at >= step.again:
-                asked_at = self._kernel.now()
+            cycle()
+            now = self._kernel.now()
+            if step.again is not None and now - asked_at >= step.again:
+                asked_at = now
                 self._ask_again()
-            if step.keep is not None and self._kernel.now() - kept_at >= step.keep.period:
-                kept_at = self._kernel.now()
+            if step.keep is not None and now - kept_at >= step.keep.period:
+                kept_at = now
                 step.keep.action()
-            rate.sleep()
 
     def _ask_again(self) -> None:
         if self._step.answer not in self._seen.answers and not self._over():
@@ -202,21 +214,20 @@ class _Attempt:
         since = self._began
         if self._changed:
             since = max(self._began, self._kernel.now() - TEXT_BEFORE)
-        self._hear_reasons(self._step.cycle)
+        self._hear_reasons()
         if not self._changed:
             raise self._refused(since)
         if self._seen.flying or self._seen.failsafe:
             raise self._taken(self._changed, since)
         return self._changed
 
-    def _hear_reasons(self, cycle: Repeat | None) -> None:
-        if cycle is None:
+    def _hear_reasons(self) -> None:
+        until = self._kernel.now() + TEXT_GRACE
+        if self._driver.cycle is None:
             sleep(self._kernel, TEXT_GRACE)
             return
-        rate, until = Rate(self._kernel, cycle.period), self._kernel.now() + TEXT_GRACE
         while self._kernel.now() < until:
-            cycle.action()
-            rate.sleep()
+            self._driver.cycle()
 
     def _refused(self, since: Ns) -> Refused:
         texts = self._seen.texts_since(since, severity=5)

@@ -84,8 +84,8 @@ class Rover(Vehicle):
             return "was never heard"
         with self._kernel:
             self._driver.stop()
-        if self._performer.silent() and not seen.changed.wait_for(
-            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S), ends_activation=True
+        if self._performer.silent() and not self._performer.wait(
+            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)
         ):
             raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has stopped")
         if not seen.armed:

@@ -160,6 +160,8 @@ class Vehicle(ABC):
             return self._driver.capabilities
 
     def _look(self) -> Telemetry:
+        if self._driver.cycle is not None:
+            self._driver.look()
         with self._kernel:
             return self._driver.telemetry
 
@@ -177,12 +179,14 @@ class Vehicle(ABC):
         def well_heard() -> bool:
             return seen.heard >= 0 and self._driver.problem() is None
 
-        if not seen.changed.wait_for(well_heard, from_seconds(within), ends_activation=True):
+        if not self._performer.wait(well_heard, from_seconds(within)):
             with self._kernel:
                 problem = self._driver.problem()
             if problem is not None:
                 raise type(problem)(f"{self.name}: {problem}")
             raise LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
+        if not seen.kind:
+            seen.kind = self.kind  # MAVROS does not say what it is
         if seen.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {seen.kind}, not a {self.kind}")
 

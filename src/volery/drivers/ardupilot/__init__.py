@@ -6,13 +6,29 @@ from collections.abc import Mapping
 
 from volery.drivers.ardupilot.driver import ArduPilot
 from volery.drivers.ardupilot.mavlink import OPTIONS, MavlinkCommands, check_options
+from volery.drivers.ardupilot.mavros import OPTIONS as MAVROS_OPTIONS
+from volery.drivers.ardupilot.mavros import MavrosCommands, geoid_of
+from volery.graph import EmbeddedNode
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 
-__all__ = ["ArduPilot", "open_driver"]
+__all__ = ["ArduPilot", "open_driver", "open_mavros"]
 
 
 def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> ArduPilot:
-    """An ArduPilot behind a MAVLink *link*. It begins to listen and to send heartbeats at once."""
+    """An ArduPilot behind a MAVLink *link*. It begins to listen and to send heartbeats at once.
+
+    Options: ``rate`` of the position and ``attitude`` in Hz, ``system`` id of the autopilot.
+    """
     check_options(options, *OPTIONS)
     return ArduPilot(kernel, name, MavlinkCommands(kernel, link, name, options))
+
+
+def open_mavros(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[str, str]) -> ArduPilot:
+    """An ArduPilot behind a vehicle node with MAVROS's names, commanded by *node*.
+
+    Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.
+    """
+    check_options(options, *MAVROS_OPTIONS)
+    namespace = options.get("namespace", f"/{name}")
+    return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, namespace, geoid_of(options)))

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 from volery.base.errors import LinkError
 from volery.base.position import Position
-from volery.vehicles.driver import Repeat
+from volery.kernel.api import Action
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 # Keys of the acknowledgements in ``Telemetry.answers``.
@@ -37,11 +37,17 @@ class Item(NamedTuple):
 class Commands(Protocol):
     """What can be sent to an ArduPilot. Answers arrive in ``telemetry.answers`` under the keys above.
 
-    With a ``cycle`` the calls block, and whoever waits runs it; without, nothing blocks.
+    With a ``cycle`` the calls block; without, none does.
     """
 
     telemetry: Telemetry
-    cycle: Repeat | None
+
+    @property
+    def cycle(self) -> Action | None:
+        """See ``Driver``."""
+
+    def look(self) -> None:
+        """See ``Driver``."""
 
     def set_mode(self, mode: str) -> None:
         """Change the mode, by ArduPilot's name."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import isfinite
-from typing import Any
 
 from volery.base.errors import LinkError, UsageError
 from volery.base.position import AboveHome, Position
@@ -21,7 +20,7 @@ from volery.drivers.ardupilot.commands import Commands
 from volery.drivers.ardupilot.items import items_of
 from volery.drivers.ardupilot.modes import DRONE_KIND, GUIDED
 from volery.drivers.ardupilot.setpoints import VELOCITY_PERIOD, Setpoints
-from volery.kernel.api import Kernel
+from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Capability, Repeat, Step, Sticks
 from volery.vehicles.mission import MissionItem, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -74,6 +73,15 @@ class ArduPilot:
         """By the kind of vehicle; none until it has been heard."""
         return {"drone": _DRONE, "rover": _SHARED}.get(self.telemetry.kind, _NOTHING)
 
+    @property
+    def cycle(self) -> Action | None:
+        """The carrier's."""
+        return self._commands.cycle
+
+    def look(self) -> None:
+        """Take in what has arrived."""
+        self._commands.look()
+
     def problem(self) -> LinkError | None:
         """What is wrong with the way to the autopilot."""
         return self._commands.problem()
@@ -87,7 +95,7 @@ class ArduPilot:
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Until the arming checks pass and there is a position."""
-        step = self._step(
+        step = Step(
             ask="be ready to arm and to go by position",
             send=_nothing,
             done=lambda seen: seen.ready or seen.armed,
@@ -100,7 +108,7 @@ class ArduPilot:
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in."""
-        step = self._step(
+        step = Step(
             ask="arm",
             send=lambda: self._commands.arm(True),
             done=lambda seen: seen.armed,
@@ -113,7 +121,7 @@ class ArduPilot:
 
     def disarm(self, force: bool) -> Sequence[Step]:
         """In the air it is refused without *force*."""
-        step = self._step(
+        step = Step(
             ask="disarm",
             send=lambda: self._commands.arm(False, force=force),
             done=lambda seen: not seen.armed,
@@ -131,7 +139,7 @@ class ArduPilot:
             near = abs(seen.above_home - height) <= NEAR_UP_M
             return seen.flying and near and abs(seen.velocity.up) <= STANDING_M_S
 
-        climb = self._step(
+        climb = Step(
             ask=f"climb to {height:g} m",
             send=lambda: self._commands.takeoff(height),
             done=up,
@@ -149,7 +157,7 @@ class ArduPilot:
         """GUIDED, then a target; a rover is armed on the way."""
         rover = self.telemetry.kind != DRONE_KIND
         start = (*self.ready(READY_WITHIN), *self._guided(), *self.arm()) if rover else self._guided()
-        target = self._step(
+        target = Step(
             ask=f"reach {goal}",
             send=lambda: self._commands.target(goal),
             done=at(goal, rover),
@@ -163,9 +171,9 @@ class ArduPilot:
     def hold(self) -> Sequence[Step]:
         """A rover in HOLD; a drone in GUIDED, first without velocity, then where it has stopped."""
         if self.telemetry.kind != DRONE_KIND:
-            stand = self._step(ask="stand", send=_nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
+            stand = Step(ask="stand", send=_nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
             return (*self._change("HOLD"), stand)
-        brake = self._step(
+        brake = Step(
             ask="stop",
             send=self._setpoints.stand_still,
             done=standing,
@@ -190,7 +198,7 @@ class ArduPilot:
             off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
             return abs(off) <= TURNED_DEG
 
-        turn = self._step(
+        turn = Step(
             ask=f"turn to {degrees:g} degrees",
             send=lambda: self._commands.turn(degrees),
             done=turned,
@@ -210,7 +218,7 @@ class ArduPilot:
         def home(seen: Telemetry) -> bool:
             return seen.home is not None and distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
 
-        come = self._step(
+        come = Step(
             ask="return home",
             send=_nothing,
             done=lambda seen: home(seen) and standing(seen),
@@ -267,7 +275,7 @@ class ArduPilot:
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
         """By MAVLink's mission protocol."""
         items = items_of(mission)
-        step = self._step(
+        step = Step(
             ask=f"take a mission of {len(items)} items",
             send=lambda: self._commands.upload(items),
             done=lambda seen: key.MISSION in seen.answers and seen.answers[key.MISSION].accepted,
@@ -280,7 +288,7 @@ class ArduPilot:
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
         """Ready, GUIDED, armed, AUTO, start; to its end: disarmed, at the last point, or said to be over."""
-        begin = self._step(
+        begin = Step(
             ask="start the mission",
             send=self._commands.start_mission,
             done=lambda seen: key.START in seen.answers and seen.answers[key.START].accepted,
@@ -290,7 +298,7 @@ class ArduPilot:
             mode="AUTO",
             armed=True,
         )
-        go_on = self._step(
+        go_on = Step(
             ask="finish the mission",
             send=self._commands.watch_mission,
             done=self._mission_over,
@@ -312,12 +320,9 @@ class ArduPilot:
 
     # -- pieces of sequences
 
-    def _step(self, **stated: Any) -> Step:
-        return Step(cycle=self._commands.cycle, **stated)
-
     def _now(self, ask: str, action: Callable[[], None]) -> Step:
         """Something that is done as soon as it is sent."""
-        return self._step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN)
+        return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN)
 
     def _change(self, mode: str) -> Sequence[Step]:
         def send() -> None:
@@ -325,7 +330,7 @@ class ArduPilot:
             self._commands.set_mode(mode)
 
         self._setpoints.unfollow()
-        step = self._step(
+        step = Step(
             ask=f"change to {mode}",
             send=send,
             done=lambda seen: seen.mode == mode,
@@ -342,7 +347,7 @@ class ArduPilot:
         return (*self._change(GUIDED), self._now("let go of the sticks", self._setpoints.release))
 
     def _at_speed(self, speed: float) -> Sequence[Step]:
-        step = self._step(
+        step = Step(
             ask=f"go at {speed:g} m/s",
             send=lambda: self._commands.speed(speed),
             done=lambda seen: key.SPEED in seen.answers and seen.answers[key.SPEED].accepted,
@@ -356,7 +361,7 @@ class ArduPilot:
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        down = self._step(ask=ask, send=_nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
+        down = Step(ask=ask, send=_nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
         return (*self._change(mode), self._now("let go of the sticks", self._setpoints.release), down)
 
     def _stay(self) -> None:

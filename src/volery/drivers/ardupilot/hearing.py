@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import nan
+from math import degrees, nan
 from typing import Any
 
 from volery.base.position import AMSL, Position
 from volery.drivers.ardupilot.modes import DRONE_KIND, KINDS, mode_name
 from volery.drivers.ardupilot.texts import Texts
+from volery.drivers.ardupilot.vocabulary import ACTIVE, ARMED, FAILSAFE, ON_GROUND, UNDEFINED
 from volery.kernel.api import Kernel
 from volery.links.mavlink import constant, entry_name
 from volery.trace.events import Text
@@ -16,17 +17,12 @@ from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Veloci
 
 Fields = Mapping[str, Any]
 
-_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
-_FAILSAFE = (constant("MAV_STATE_CRITICAL"), constant("MAV_STATE_EMERGENCY"))
-_ACTIVE = constant("MAV_STATE_ACTIVE")
-_ON_GROUND = constant("MAV_LANDED_STATE_ON_GROUND")
-_UNDEFINED = constant("MAV_LANDED_STATE_UNDEFINED")
 _PREARM = constant("MAV_SYS_STATUS_PREARM_CHECK")
 _POSITION = constant("EKF_POS_HORIZ_ABS")
 _NO_POSITION = constant("EKF_CONST_POS_MODE")
 _COMPLETE = constant("MISSION_STATE_COMPLETE")
 _UNKNOWN_16 = 65535
-_UNKNOWN_TEMPERATE = -1
+_UNKNOWN = -1
 
 
 class Hearing:
@@ -36,7 +32,7 @@ class Hearing:
         self._kernel = kernel
         self._seen = telemetry
         self._texts = Texts(self._say)
-        self._landed_state = _UNDEFINED
+        self._landed_state = UNDEFINED
         self._estimates_position = False
         self._handlers: Mapping[str, Callable[[Fields], None]] = {
             "HEARTBEAT": self._heartbeat,
@@ -67,10 +63,10 @@ class Hearing:
         seen.kind = KINDS.get(kind) or entry_name("MAV_TYPE", kind).lower().replace("_", " ")
         seen.autopilot = "ArduPilot"
         seen.mode = mode_name(seen.kind, fields["custom_mode"])
-        seen.armed = bool(fields["base_mode"] & _ARMED)
+        seen.armed = bool(fields["base_mode"] & ARMED)
         status: int = fields["system_status"]
         seen.status = entry_name("MAV_STATE", status).lower()
-        seen.failsafe = status in _FAILSAFE
+        seen.failsafe = status in FAILSAFE
         self._judge_flying(status)
 
     def _judge_flying(self, status: int) -> None:
@@ -78,13 +74,13 @@ class Hearing:
         seen = self._seen
         if seen.kind != DRONE_KIND:
             seen.flying = seen.armed and seen.mode != "HOLD"
-        elif self._landed_state == _UNDEFINED:
-            seen.flying = seen.armed and status == _ACTIVE
+        elif self._landed_state == UNDEFINED:
+            seen.flying = seen.armed and status == ACTIVE
 
     def _extended_state(self, fields: Fields) -> None:
         self._landed_state = fields["landed_state"]
-        if self._landed_state != _UNDEFINED and self._seen.kind == DRONE_KIND:
-            self._seen.flying = self._landed_state != _ON_GROUND
+        if self._landed_state != UNDEFINED and self._seen.kind == DRONE_KIND:
+            self._seen.flying = self._landed_state != ON_GROUND
 
     def _global_position(self, fields: Fields) -> None:
         """Before there is an estimate, ArduPilot sends zeros."""
@@ -105,9 +101,9 @@ class Hearing:
         volts, amperes = fields["voltage_battery"], fields["current_battery"]
         remaining: int = fields["battery_remaining"]
         seen.battery = Battery(
-            nan if remaining == _UNKNOWN_TEMPERATE else remaining / 100.0,
+            nan if remaining == _UNKNOWN else remaining / 100.0,
             nan if volts == _UNKNOWN_16 else volts / 1000.0,
-            nan if amperes == _UNKNOWN_TEMPERATE else amperes / 100.0,
+            nan if amperes == _UNKNOWN else amperes / 100.0,
         )
         seen.ready = seen.armable and self._estimates_position
 
@@ -125,9 +121,8 @@ class Hearing:
         self._seen.satellites = fields["satellites_visible"]
 
     def _attitude(self, fields: Fields) -> None:
-        degrees = 57.29577951308232
-        heading = fields["yaw"] * degrees % 360.0
-        self._seen.attitude = Attitude(fields["roll"] * degrees, fields["pitch"] * degrees, heading)
+        heading = degrees(fields["yaw"]) % 360.0
+        self._seen.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
 
     def _reached(self, fields: Fields) -> None:
         self._seen.mission_reached = fields["seq"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isnan
 
 from volery.base.errors import UsageError
@@ -13,6 +13,14 @@ from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, 
 
 GROUND_SPEED = 1.0
 UNCHANGED_THROTTLE = -1.0
+
+
+INT_FRAMES: Mapping[int, int] = {
+    constant("MAV_FRAME_GLOBAL"): constant("MAV_FRAME_GLOBAL_INT"),
+    constant("MAV_FRAME_GLOBAL_RELATIVE_ALT"): constant("MAV_FRAME_GLOBAL_RELATIVE_ALT_INT"),
+    constant("MAV_FRAME_GLOBAL_TERRAIN_ALT"): constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"),
+}
+"""Of a global frame in degrees, the one whose latitude and longitude are whole numbers."""
 
 
 def frame_of(position: Position) -> int:

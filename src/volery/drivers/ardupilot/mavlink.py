@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import radians
 from typing import Any
 
 from volery.base.errors import LinkError, LinkGarbled, LinkSilent, UsageError, choices, did_you_mean
@@ -11,16 +12,24 @@ from volery.base.time import MS, Ns, S
 from volery.drivers.ardupilot import commands as key
 from volery.drivers.ardupilot.commands import Item
 from volery.drivers.ardupilot.hearing import Hearing
-from volery.drivers.ardupilot.items import frame_of
+from volery.drivers.ardupilot.items import INT_FRAMES, frame_of
 from volery.drivers.ardupilot.modes import DRONE_KIND, NUMBERS
 from volery.drivers.ardupilot.streams import Streams
 from volery.drivers.ardupilot.upload import Upload
-from volery.kernel.api import Kernel
+from volery.drivers.ardupilot.vocabulary import (
+    FORCE,
+    GROUND_SPEED,
+    LEFT_ALONE,
+    POSITION_ONLY,
+    SHORTEST_WAY,
+    UNCHANGED,
+    VELOCITY_AND_YAW_RATE,
+)
+from volery.kernel.api import Action, Kernel
 from volery.links.link import Frame, Link
 from volery.links.mavlink import constant, entry_name, message_type
 from volery.links.parser import Heard
 from volery.trace.events import LinkState
-from volery.vehicles.driver import Repeat
 from volery.vehicles.telemetry import Answer, Telemetry, Velocity
 
 GCS_SYSTEM, GCS_COMPONENT = 255, 190
@@ -28,17 +37,6 @@ GCS_SYSTEM, GCS_COMPONENT = 255, 190
 
 HEARTBEAT_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
-
-POSITION_ONLY = 0x0DF8
-VELOCITY_AND_YAW_RATE = 0x05C7
-"""Type masks of SET_POSITION_TARGET_*: which fields to ignore."""
-
-FORCE = 21196.0
-GROUND_SPEED = 1.0
-UNCHANGED = -1.0
-SHORTEST_WAY = 0.0
-
-LEFT_ALONE = 65535
 
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
@@ -78,7 +76,7 @@ class MavlinkCommands:
     Options: ``rate`` of the position and ``attitude`` in Hz, ``system``.
     """
 
-    cycle: Repeat | None = None
+    cycle: Action | None = None
 
     def __init__(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> None:
         self.telemetry = Telemetry(kernel, name)
@@ -98,6 +96,9 @@ class MavlinkCommands:
         self._beat = kernel.every(HEARTBEAT_PERIOD, self._tick)
 
     # -- hearing
+
+    def look(self) -> None:
+        """What arrives is taken in by itself."""
 
     def _receive(self, frame: Frame) -> None:
         if not self._is_ours(frame):
@@ -244,7 +245,7 @@ class MavlinkCommands:
             vx=velocity.north,
             vy=velocity.east,
             vz=-velocity.up,
-            yaw_rate=yaw_rate * 0.017453292519943295,
+            yaw_rate=radians(yaw_rate),
         )
 
     def turn(self, degrees: float) -> None:
@@ -281,13 +282,6 @@ class MavlinkCommands:
         """MISSION_CURRENT tells the end of missions that do not land."""
         self._streams.want("MISSION_CURRENT", S)
         self._streams.look(self._kernel.now())
-
-
-INT_FRAMES: Mapping[int, int] = {
-    constant("MAV_FRAME_GLOBAL"): constant("MAV_FRAME_GLOBAL_INT"),
-    constant("MAV_FRAME_GLOBAL_RELATIVE_ALT"): constant("MAV_FRAME_GLOBAL_RELATIVE_ALT_INT"),
-    constant("MAV_FRAME_GLOBAL_TERRAIN_ALT"): constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"),
-}
 
 
 def _for_us(fields: Mapping[str, Any]) -> bool:

@@ -1,0 +1,115 @@
+"""What MAVROS's topics say, as ``Telemetry``. One method for each topic that is listened to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import nan
+from typing import Any
+
+from volery.base.frames import enu_to_ned
+from volery.base.geoid import Geoid
+from volery.base.position import AMSL, Position
+from volery.drivers.ardupilot.vocabulary import ACTIVE, FAILSAFE, ON_GROUND, UNDEFINED
+from volery.kernel.api import Kernel
+from volery.links.mavlink import entry_name
+from volery.vehicles.telemetry import Battery, Said, Telemetry, Velocity
+
+NO_FIX = -1
+
+Handler = Callable[[Any], None]
+
+
+class MavrosHearing:
+    """Turns messages into telemetry. ``node_seen``: somebody publishes the state, be it of no autopilot."""
+
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, geoid: Geoid) -> None:
+        self.node_seen = False
+        self._kernel = kernel
+        self._seen = telemetry
+        self._geoid = geoid
+        self._landed_state = UNDEFINED
+        self._has_fix = False
+        self._has_local_position = False
+
+    def topics(self) -> Mapping[str, tuple[str, Handler]]:
+        """Type and handler of each topic."""
+        return {
+            "state": ("mavros_msgs/msg/State", self._state),
+            "extended_state": ("mavros_msgs/msg/ExtendedState", self._extended_state),
+            "global_position/global": ("sensor_msgs/msg/NavSatFix", self._global),
+            "global_position/rel_alt": ("std_msgs/msg/Float64", self._relative_altitude),
+            "global_position/compass_hdg": ("std_msgs/msg/Float64", self._heading),
+            "local_position/velocity_local": ("geometry_msgs/msg/TwistStamped", self._velocity),
+            "home_position/home": ("mavros_msgs/msg/HomePosition", self._home),
+            "battery": ("sensor_msgs/msg/BatteryState", self._battery),
+            "statustext/recv": ("mavros_msgs/msg/StatusText", self._text),
+            "mission/reached": ("mavros_msgs/msg/WaypointReached", self._reached),
+        }
+
+    def _heard(self) -> None:
+        self._seen.heard = self._kernel.now()
+        self._seen.changed.notify()
+
+    def _state(self, message: Any) -> None:
+        self.node_seen = True
+        if not message.connected:
+            return
+        seen = self._seen
+        seen.autopilot = "ArduPilot"
+        seen.mode = message.mode
+        seen.armed = bool(message.armed)
+        seen.status = entry_name("MAV_STATE", message.system_status).lower()
+        seen.failsafe = message.system_status in FAILSAFE
+        if seen.kind == "rover":
+            seen.flying = seen.armed and seen.mode != "HOLD"
+        elif self._landed_state == UNDEFINED:
+            seen.flying = seen.armed and message.system_status == ACTIVE
+        self._heard()
+
+    def _extended_state(self, message: Any) -> None:
+        self._landed_state = message.landed_state
+        if self._landed_state != UNDEFINED and self._seen.kind != "rover":
+            self._seen.flying = self._landed_state != ON_GROUND
+        self._heard()
+
+    def _global(self, message: Any) -> None:
+        self._has_fix = message.status.status > NO_FIX
+        if message.latitude != 0.0 or message.longitude != 0.0:
+            altitude = AMSL(self._geoid.to_amsl(message.altitude))
+            self._seen.position = Position(message.latitude, message.longitude, altitude)
+        self._judge_ready()
+        self._heard()
+
+    def _relative_altitude(self, message: Any) -> None:
+        self._seen.above_home = message.data
+
+    def _heading(self, message: Any) -> None:
+        self._seen.attitude = self._seen.attitude._replace(heading=message.data)
+
+    def _velocity(self, message: Any) -> None:
+        linear = message.twist.linear
+        north, east, down = enu_to_ned((linear.x, linear.y, linear.z))
+        self._seen.velocity = Velocity(north, east, -down)
+        self._has_local_position = True
+        self._judge_ready()
+
+    def _home(self, message: Any) -> None:
+        altitude = AMSL(self._geoid.to_amsl(message.geo.altitude))
+        self._seen.home = Position(message.geo.latitude, message.geo.longitude, altitude)
+        self._judge_ready()
+
+    def _judge_ready(self) -> None:
+        seen = self._seen
+        placed = seen.position is not None and seen.home is not None
+        seen.ready = seen.armable = self._has_fix and self._has_local_position and placed
+
+    def _battery(self, message: Any) -> None:
+        """ROS counts a current that discharges as negative."""
+        amperes = -message.current if message.current == message.current else nan
+        self._seen.battery = Battery(message.percentage, message.voltage, amperes)
+
+    def _text(self, message: Any) -> None:
+        self._seen.texts.append(Said(self._kernel.now(), message.severity, message.text))
+
+    def _reached(self, message: Any) -> None:
+        self._seen.mission_reached = message.wp_seq
