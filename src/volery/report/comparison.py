@@ -10,7 +10,7 @@ from typing import NamedTuple
 from rich.console import RenderableType
 
 from volery.base.errors import UsageError
-from volery.report.comparing import all_comparisons
+from volery.report.comparison_grids import all_comparisons
 from volery.report.document import REPORT_FILE, environment, gather
 from volery.report.grids import labels
 from volery.report.terminal import comparison_table

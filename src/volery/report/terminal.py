@@ -10,7 +10,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from volery.report.comparing import (
+from volery.report.comparison_grids import (
     all_comparisons,
     cost_matrix,
     outcome_comparison,

@@ -7,12 +7,14 @@ Memory does not grow with time, only with what the run is made of and with what 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from math import fsum
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
 from volery.requirements.ledgers import ComponentLedger, EnergyLaw, VehicleLedger, known, linear_energy
 from volery.requirements.record import (
+    ComponentRecord,
     FailureRecord,
     LawRecord,
     OutcomeRecord,
@@ -170,27 +172,13 @@ class Accounts:
             scenario=setup.scenario,
             seed=setup.seed,
             outcome=OutcomeRecord(status=status, reason=reason, requirements_met=self._all_met()),
-            components={
-                name: ledger.record(self._above_idle(ledger.processor))
-                for name, ledger in self._components.items()
-            },
+            components=self._component_records(),
             processors={name: self._processor_record(name, elapsed) for name in self._processors},
             vehicles={name: ledger.record() for name, ledger in self._vehicles.items()},
             parcels={subject: _parcel(steps) for subject, steps in self._parcels.items()},
             requirements=self._requirements(),
-            failures=[
-                FailureRecord(at_s=to_seconds(one.at), who=one.who, what=one.what) for one in self._failures
-            ],
-            laws=[
-                LawRecord(
-                    name=one.name,
-                    source=one.source,
-                    provenance=one.provenance,
-                    validity=one.validity,
-                    warning=one.warning,
-                )
-                for one in setup.laws
-            ],
+            failures=[_failure(one) for one in self._failures],
+            laws=[LawRecord.model_validate(asdict(law)) for law in setup.laws],
             not_counted=[*setup.not_counted, *self._not_counted()],
             warnings=list(self._warnings),
             versions=dict(sorted(circumstances.versions.items())),
@@ -198,6 +186,12 @@ class Accounts:
             wall_s=wall,
             real_time_factor=elapsed / wall if wall else None,
         )
+
+    def _component_records(self) -> dict[str, ComponentRecord]:
+        return {
+            name: ledger.record(self._above_idle(ledger.processor))
+            for name, ledger in self._components.items()
+        }
 
     def _above_idle(self, processor: str) -> Callable[[float], float | None]:
         setup = self._processors.get(processor)
@@ -261,6 +255,10 @@ class Accounts:
             if self._energy(setup, 1.0, 1.0) is None:
                 missing.append(f"{name}: no power figures for {setup.kind or 'this processor'}, so no energy")
         return missing
+
+
+def _failure(event: Failure) -> FailureRecord:
+    return FailureRecord(at_s=to_seconds(event.at), who=event.who, what=event.what)
 
 
 def _parcel(steps: list[Milestone]) -> ParcelRecord:

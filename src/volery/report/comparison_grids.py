@@ -19,7 +19,7 @@ from volery.report.grids import (
     total,
     verdict,
 )
-from volery.requirements.record import ComponentRecord, RunRecord
+from volery.requirements.record import ComponentRecord, RunRecord, VehicleRecord
 
 
 def _names(dictionaries: Iterable[Iterable[str]]) -> list[str]:
@@ -165,32 +165,21 @@ def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) ->
     return Grid("Processors", columns, tuple(rows))
 
 
+_VEHICLE_QUESTIONS: tuple[tuple[str, Callable[[VehicleRecord], Cell]], ...] = (
+    ("distance m", lambda one: Cell(number(one.distance_m), share=one.distance_m)),
+    ("airborne s", lambda one: Cell(number(one.airborne_s), share=one.airborne_s)),
+    ("energy", lambda one: Cell(energy(one.energy_j), share=one.energy_j)),
+)
+
+
 def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
     """Each vehicle: how far, how long, with what energy, run beside run."""
     rows = []
     for name in _names(record.vehicles for record in records):
         found = [record.vehicles.get(name) for record in records]
-        for question, cells in (
-            (
-                "distance m",
-                [
-                    Cell(number(one.distance_m), share=one.distance_m) if one else Cell(NOTHING)
-                    for one in found
-                ],
-            ),
-            (
-                "airborne s",
-                [
-                    Cell(number(one.airborne_s), share=one.airborne_s) if one else Cell(NOTHING)
-                    for one in found
-                ],
-            ),
-            (
-                "energy",
-                [Cell(energy(one.energy_j), share=one.energy_j) if one else Cell(NOTHING) for one in found],
-            ),
-        ):
-            first = Cell(name if question == "distance m" else "")
+        for index, (question, take) in enumerate(_VEHICLE_QUESTIONS):
+            cells = [take(one) if one else Cell(NOTHING) for one in found]
+            first = Cell("" if index else name)
             rows.append((first, Cell(question, status="quiet"), *_relative(cells)))
     columns = (Column("vehicle"), Column(""), *(Column(label, True) for label in labels))
     return Grid("Vehicles", columns, tuple(rows))
