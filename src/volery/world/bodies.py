@@ -200,7 +200,8 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
     height_before = row[S_POSITION + 2]
     row[S_GROUND] = ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1])
     if flying:
-        _normalise(row)
+        if row[S_RESTING] == 0.0:
+            _normalise(row)
         rotation_matrix(row, 0)
         _settle_flyer(row)
     else:

@@ -7,11 +7,11 @@ the size of a large model car. Figures are estimated unless a file that makes on
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, pi, radians, sin
+from math import pi, radians
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
-from volery.world.arithmetic import exponential
+from volery.world.arithmetic import exponential, sine_cosine
 from volery.world.battery import CELL_FULL_VOLTS
 from volery.world.bodies import STEP_S
 from volery.world.columns import (
@@ -67,6 +67,7 @@ from volery.world.columns import (
     S_RESTING,
     Array,
 )
+from volery.world.magnetism import magnetic_field
 from volery.world.sensors import SLOW_EVERY, SensorSet, sensor_set
 from volery.world.terrain import Terrain
 from volery.world.wind import GUST_EVERY, Wind
@@ -182,21 +183,6 @@ class Rover:
 BodySpec = Multirotor | Rover
 
 
-def magnetic_field(frame: LocalFrame) -> Vector:
-    """The earth's field at the frame's origin: north, east, down in gauss.
-
-    Law: the centred dipole of IGRF-13 at 2020 (g10 = -29404.8, g11 = -1450.9, h11 = 4652.5 nT). Within about
-    15 degrees and 20 % of the full model: fit for a compass that uses the same law, not for surveying.
-    """
-    g10, g11, h11 = -29404.8e-5, -1450.9e-5, 4652.5e-5
-    lat, lon = radians(frame.latitude), radians(frame.longitude)
-    around = g11 * cos(lon) + h11 * sin(lon)
-    north = around * sin(lat) - g10 * cos(lat)
-    east = g11 * sin(lon) - h11 * cos(lon)
-    down = -2.0 * (g10 * sin(lat) + around * cos(lat))
-    return north, east, down
-
-
 def _fill_sensors(row: Array, sensors: SensorSet) -> None:
     for index, noise in enumerate(sensors.noises):
         decay = exponential(-SLOW_EVERY * STEP_S / noise.time)
@@ -270,7 +256,7 @@ def fill_state(row: Array, spec: BodySpec, terrain: Terrain) -> None:
     depth = spec.feet[2] - 0.005 if isinstance(spec, Multirotor) else 0.0
     row[S_POSITION : S_POSITION + 3] = spec.at[0], spec.at[1], ground + depth
     half = (pi / 2.0 - radians(spec.heading_deg)) / 2.0
-    row[S_ATTITUDE], row[S_ATTITUDE + 3] = cos(half), sin(half)
+    row[S_ATTITUDE + 3], row[S_ATTITUDE] = sine_cosine(half)
     row[S_CHARGE] = (1.0 - spec.battery.left) * spec.battery.capacity_ah * 3600.0
     row[S_GROUND] = ground
     row[S_ON_GROUND] = row[S_RESTING] = 1.0

@@ -1,0 +1,187 @@
+"""The grid of time: who looks, and how often, changes nothing."""
+
+import math
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame
+from volery.base.time import MS
+from volery.world.columns import S_POSITION, S_RESTING, S_ROTORS, U_PAYLOAD, U_THROTTLE
+from volery.world.compiled import digest_of
+from volery.world.magnetism import magnetic_field
+from volery.world.sensors import declared_sigma, sensor_set
+from volery.world.specs import Multirotor, Rover
+from volery.world.terrain import Terrain
+from volery.world.wind import Wind
+from volery.world.world import STEP, World
+
+SPECS = (Multirotor(), Rover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))
+
+
+def fly(clock, frame, looks, seed=3, wind=None):
+    """Three bodies, one second, a fixed schedule of inputs; *looks* are extra ones (milliseconds, body)."""
+    clock.now = 0
+    world = World(clock, SPECS, seed=seed, frame=frame, wind=wind)
+    for millisecond in range(1000):
+        clock.now = millisecond * MS
+        if millisecond % 100 == 7:
+            world.drive(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
+            world.drive(1, U_THROTTLE, 0.1, 0.3)
+        for _ in range(looks.count((millisecond, 0))):
+            world.look(0)
+        for body in (1, 2):
+            if (millisecond, body) in looks:
+                world.look(body)
+    clock.now = 1000 * MS
+    for body in range(3):
+        world.look(body)
+    return world.arrays.rows.tobytes()
+
+
+def test_extra_looks_change_not_a_byte(clock, frame):
+    alone = fly(clock, frame, [])
+    assert fly(clock, frame, [(m, b) for m in range(0, 1000, 3) for b in range(3)]) == alone
+    assert fly(clock, frame, [(8, 0), (8, 0), (9, 0), (10, 2)]) == alone
+
+
+def test_another_seed_gives_other_noise_and_the_same_seed_the_same(clock, frame):
+    wind = Wind(east=3.0, gust=1.0)
+    assert fly(clock, frame, [], 3, wind) == fly(clock, frame, [], 3, wind)
+    assert fly(clock, frame, [], 4, wind) != fly(clock, frame, [], 3, wind)
+
+
+def test_an_input_acts_from_the_next_grid_step_on(clock, frame):
+    world = World(clock, [Multirotor()], frame=frame)
+    clock.now = 10 * STEP
+    world.look(0)
+    world.drive(0, U_THROTTLE, 0.5, 0.5, 0.5, 0.5)
+    clock.now = 11 * STEP + STEP - 1
+    assert world.truth(0).rotors[0] == 0.0
+    clock.now = 12 * STEP
+    assert world.truth(0).rotors[0] > 0.0
+
+
+def test_a_state_holds_over_its_whole_step(clock, frame):
+    world = World(clock, [Multirotor()], frame=frame)
+    clock.now = 5 * STEP
+    first = world.truth(0)
+    clock.now = 6 * STEP - 1
+    assert world.truth(0) is not first
+    assert world.truth(0) == first
+
+
+def test_bodies_that_nobody_looks_at_are_not_computed(clock, frame):
+    world = World(clock, SPECS, frame=frame)
+    for _ in range(20):
+        clock.wait(0.1)
+        world.look(0)
+    assert world.arrays.reached.tolist() == [1000, 0, 0]
+    world.look(2)
+    assert world.arrays.reached.tolist() == [1000, 0, 1000]
+
+
+def test_bodies_in_view_advance_together_in_one_call(clock, frame):
+    world = World(clock, SPECS, frame=frame)
+    for body in range(3):
+        world.look(body)
+    before = world.advances
+    clock.wait(0.1)
+    for body in range(3):
+        world.look(body)
+    assert world.advances == before + 1
+
+
+def test_a_resting_body_does_not_move_or_turn(clock, frame):
+    world = World(clock, [Multirotor(heading_deg=30.0)], frame=frame, wind=Wind(east=8.0, gust=2.0))
+    before = world.truth(0)
+    clock.wait(20)
+    after = world.truth(0)
+    assert after.position == before.position
+    assert after.attitude == before.attitude
+    assert after.on_ground
+
+
+def test_wind_carries_what_has_drag_and_gusts_have_their_deviation(clock, frame, ideal_battery):
+    spec = Multirotor(sensors="perfect", battery=ideal_battery)
+    world = World(clock, [spec], frame=frame, wind=Wind(east=5.0, north=-2.0))
+    row = world.arrays.rows[0]
+    row[S_POSITION + 2] = 1000.0
+    row[S_RESTING] = 0.0
+    row[S_ROTORS : S_ROTORS + 4] = spec.hover_speed
+    row[U_THROTTLE : U_THROTTLE + 4] = spec.hover_speed / spec.top_speed
+    clock.wait(60)
+    east, north, up = world.truth(0).velocity
+    assert (east, north) == pytest.approx((5.0, -2.0), abs=0.01)
+    assert up == pytest.approx(0.0, abs=0.01)
+
+
+def test_terrain_is_bilinear_between_its_posts_and_level_beyond(clock, frame):
+    terrain = Terrain(heights=((0.0, 10.0), (20.0, 30.0)), spacing=10.0)
+    assert terrain.height(5.0, 5.0) == pytest.approx(15.0)
+    assert terrain.height(-50.0, 0.0) == pytest.approx(0.0)
+    assert terrain.height(50.0, 50.0) == pytest.approx(30.0)
+    world = World(clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, terrain=terrain)
+    world.drive(0, U_THROTTLE, 0.0, 0.1)
+    clock.wait(4)
+    east, _, up = world.truth(0).position
+    assert up == pytest.approx(10.0 + min(east, 10.0), abs=1e-6)
+    assert east > 2.0
+
+
+@pytest.mark.parametrize("terrain", [{"heights": ((1.0,), (1.0, 2.0))}, {"heights": ((),)}, {"spacing": 0.0}])
+def test_impossible_terrain_is_refused(terrain):
+    with pytest.raises(UsageError, match="terrain"):
+        Terrain(**terrain)
+
+
+def test_impossible_wind_and_empty_worlds_are_refused(clock, frame):
+    with pytest.raises(UsageError, match="gust"):
+        Wind(gust=-1.0)
+    with pytest.raises(UsageError, match="at least one"):
+        World(clock, [], frame=frame)
+
+
+def test_an_unknown_sensor_set_is_named_with_the_valid_ones(clock, frame):
+    with pytest.raises(
+        UsageError, match=r"'consumr' \(did you mean 'consumer'\?\); there is consumer, perfect or rtk"
+    ):
+        World(clock, [Multirotor(sensors="consumr")], frame=frame)
+
+
+def test_declared_deviations_tell_the_sets_apart():
+    assert declared_sigma("consumer").horizontal > 0.5
+    assert declared_sigma("rtk").horizontal < 0.05
+    assert declared_sigma("perfect") == (0.0, 0.0)
+    assert sensor_set("rtk").gps_fix == 6
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "declination", "inclination", "gauss"),
+    [(47.40, 8.55, 3.3, 63.4, 0.484), (-35.36, 149.17, 12.4, -66.2, 0.583)],
+)
+def test_the_earths_field_is_that_of_the_charts(latitude, longitude, declination, inclination, gauss):
+    north, east, down = magnetic_field(LocalFrame(latitude, longitude, 0.0))
+    across = math.hypot(north, east)
+    assert math.degrees(math.atan2(east, north)) == pytest.approx(declination, abs=4.0)
+    assert math.degrees(math.atan2(down, across)) == pytest.approx(inclination, abs=3.0)
+    assert math.hypot(across, down) == pytest.approx(gauss, rel=0.06)
+
+
+def test_payload_power_is_dated_like_any_input(clock, frame):
+    world = World(clock, [Rover()], frame=frame)
+    world.payload_power(0, 12.0)
+    assert world.arrays.rows[0, U_PAYLOAD] == 0.0
+    clock.wait(10)
+    truth = world.truth(0)
+    assert truth.payload_j == pytest.approx(12.0 * (10.0 - STEP / 1e9), rel=1e-9)
+
+
+def test_the_digest_of_sources_changes_with_any_of_them(tmp_path):
+    one, two = tmp_path / "a.py", tmp_path / "b.py"
+    one.write_text("x = 1")
+    two.write_text("y = 1")
+    before = digest_of([one, two])
+    assert digest_of([two, one]) == before
+    two.write_text("y = 2")
+    assert digest_of([one, two]) != before
