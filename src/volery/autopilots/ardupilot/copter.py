@@ -1,0 +1,333 @@
+"""ArduCopter 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.autopilots.ardupilot import boot, commands, missions, radio, status, tuning
+from volery.autopilots.ardupilot.arming import (
+    INFO,
+    Check,
+    between,
+    disarm,
+    failing,
+    flies_by_position,
+    look_before_arming,
+    lost_position,
+    low_battery,
+    needs_no_position,
+    no_mission,
+    not_armable,
+)
+from volery.autopilots.ardupilot.failsafes import CopterFailsafes
+from volery.autopilots.ardupilot.honoured import COPTER as HONOURED
+from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, set_mode, switch
+from volery.autopilots.ardupilot.status import ACTIVE, CRITICAL, STANDBY, XY_CONTROL, Z_CONTROL, Health
+from volery.autopilots.ardupilot.tables import BUILDERS, ORDER, streams
+from volery.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
+from volery.autopilots.simulated.dialect import Dialect
+from volery.autopilots.simulated.flight import Flight
+from volery.autopilots.simulated.manoeuvres.guided import Guided
+from volery.autopilots.simulated.manoeuvres.mission import FlyMission, copter_leg
+from volery.autopilots.simulated.manoeuvres.pilot import AltitudeHold, ByPilot, Loiter, Stabilize
+from volery.autopilots.simulated.manoeuvres.points import Brake, Land, Return
+from volery.autopilots.simulated.mavlink.command_service import DENIED, FAILED
+from volery.autopilots.simulated.mode import Mode
+from volery.autopilots.simulated.parameters import Parameter, load
+from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import MS, S, from_seconds
+
+QUADROTOR = 2
+"""MAV_TYPE."""
+
+CAPABILITIES = 64_495
+"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+
+BY_HAND = CUSTOM | STABILIZED | MANUAL
+BY_ITSELF = BY_HAND | GUIDED
+LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
+
+READY = round(2.28 * S)
+ORIGIN = round(19.852 * S)
+POSITION = round(41.45 * S)
+EACH_SECOND = round(0.285 * S)
+
+ARMED_WORDS = ("Arming motors", "Disarming motors")
+LANDED_TO_DISARM = 200 * MS
+"""Recorded: disarmed 2.07 s after touch-down. The landed detector takes most of it."""
+STORE_COUNTERS_EVERY = 30 * S
+ALIGNS_ABOVE = 2.5
+"""Height [m] at which the compass is trusted anew."""
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(0, "STABILIZE", BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(2, "ALT_HOLD", BY_HAND, AltitudeHold, Z_CONTROL, pilot=True),
+        Mode(
+            3,
+            "AUTO",
+            BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, copter_leg),
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            armable=False,
+            starts_high=True,
+        ),
+        Mode(
+            4,
+            "GUIDED",
+            BY_ITSELF,
+            Guided,
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            user_takeoff=True,
+            starts_high=True,
+        ),
+        Mode(
+            5,
+            "LOITER",
+            BY_ITSELF,
+            Loiter,
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            pilot=True,
+            user_takeoff=True,
+        ),
+        Mode(6, "RTL", BY_ITSELF, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(9, "LAND", BY_HAND, Land, LEVEL_AND_HEIGHT, armable=False),
+        Mode(17, "BRAKE", BY_ITSELF, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+    )
+}
+
+CHECKS = (
+    Check("Need Alt Estimate", flies_by_position(0.0, 5.7)),
+    Check("Gyros not healthy", between(0.0, 1.8)),
+    Check("Accels inconsistent", between(1.8, 11.5)),
+    Check("Gyros inconsistent", between(11.5, 22.35)),
+    Check("EKF attitude is bad", between(0.0, 5.6)),
+    Check("Compass not healthy", between(0.0, 2.4)),
+    Check("AHRS: EKF3 not started", needs_no_position(0.0, 4.28)),
+    Check("AHRS: waiting for home", flies_by_position(0.0, 19.852)),
+    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Battery 1 below minimum arming voltage", low_battery),
+    Check("Need Position Estimate", lost_position),
+    Check("Mode requires mission", no_mission),
+)
+
+HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
+
+
+def before_arming(vehicle: Vehicle) -> list[str]:
+    """What would show as not ready."""
+    return failing(vehicle, CHECKS)
+
+
+def problems(vehicle: Vehicle) -> list[str]:
+    """All that speaks against arming now: readiness first, then mode and sticks."""
+    found = before_arming(vehicle)
+    may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
+    if not may_arm_auto:
+        found += not_armable(vehicle)
+    throttle = round(vehicle.parameters["RCMAP_THROTTLE"])
+    if vehicle.parameters["FS_THR_ENABLE"] and vehicle.sticks[throttle] < vehicle.parameters["FS_THR_VALUE"]:
+        found.append("Throttle below failsafe")
+    elif not vehicle.mode.starts_high and _throttle_is_high(vehicle):
+        found.append("Throttle too high")
+    return found
+
+
+def _throttle_is_high(vehicle: Vehicle) -> bool:
+    sticks = ByPilot(vehicle)
+    throttle = sticks.pilot.throttle
+    return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
+
+
+def ready(vehicle: Vehicle) -> None:
+    """Set-up has ended: on the ground, in the mode that INITIAL_MODE names."""
+    vehicle.landed = True
+    initial = MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
+    if initial is not vehicle.mode:
+        vehicle.enter(initial)
+
+
+def on_warm(vehicle: Vehicle) -> None:
+    """As after a complete boot."""
+    ready(vehicle)
+    boot.home_set(vehicle)
+    vehicle.prearm_ok = not before_arming(vehicle)
+
+
+def each_second(vehicle: Vehicle) -> None:
+    """Readiness, and the counters of hours."""
+    if vehicle.uptime() < READY:
+        return
+    look_before_arming(vehicle, before_arming)
+    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
+        vehicle.counted_at = vehicle.uptime()
+        if vehicle.flight_time:
+            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
+        vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)
+
+
+def on_step(vehicle: Vehicle) -> None:
+    """At each tick: sticks that expire, touch-down, disarming by itself."""
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(COPTER.transmitter):
+        radio.fail(vehicle)
+    radio.expire(vehicle)
+    if not vehicle.armed:
+        return
+    if not vehicle.landed:
+        vehicle.idle_since = vehicle.kernel.now()
+        vehicle.flight_time += COPTER.tick
+        _notice_flight(vehicle)
+    else:
+        _disarm_by_itself(vehicle)
+
+
+def _notice_flight(vehicle: Vehicle) -> None:
+    height = vehicle.height
+    if height > ALIGNS_ABOVE and "aligned" not in vehicle.said:
+        vehicle.said.add("aligned")
+        for text in boot.both("EKF3 IMU{unit} MAG0 in-flight yaw alignment complete"):
+            vehicle.say(INFO, text)
+    if height < 1.0:
+        truth = vehicle.flight.truth()
+        if truth.contacts != vehicle.contacts:
+            vehicle.contacts = truth.contacts
+            vehicle.say(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
+
+
+def _disarm_by_itself(vehicle: Vehicle) -> None:
+    now = vehicle.kernel.now()
+    finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
+    if finished and now - vehicle.landed_at >= LANDED_TO_DISARM:
+        disarm(vehicle, ARMED_WORDS[1], force=True)
+        return
+    if ByPilot(vehicle).pilot.throttle > 0.0:
+        vehicle.idle_since = now
+    delay = vehicle.parameters["DISARM_DELAY"]
+    if delay > 0.0 and now - vehicle.idle_since >= from_seconds(delay):
+        disarm(vehicle, ARMED_WORDS[1], force=True)
+
+
+def on_disarmed(vehicle: Vehicle) -> None:
+    """The hover throttle that was learnt is stored."""
+    vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
+
+
+def system_status(vehicle: Vehicle) -> int:
+    """MAV_STATE: a failsafe, standing, or flying."""
+    if vehicle.failsafes:
+        return CRITICAL
+    return STANDBY if vehicle.landed else ACTIVE
+
+
+def greet(vehicle: Vehicle) -> None:
+    """Said to whoever lists the parameters."""
+    shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
+    vehicle.say(INFO, "ArduCopter V4.5.6 (7ce11b41)")
+    vehicle.say(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+    vehicle.say(INFO, f"Frame: QUAD/{shape}")
+
+
+def board(vehicle: Vehicle) -> str:
+    """The board's own number, different for each system id."""
+    return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """The recorded list."""
+    return load("volery.autopilots.ardupilot", "data/copter.parameters")
+
+
+def own_parameters(system: int, flight: Flight) -> dict[str, float]:
+    """What follows from the vehicle."""
+    return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.capacity_as / 3.6}
+
+
+def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
+    """A copter does not store stream rates."""
+
+
+def refuse_interval(vehicle: Vehicle, number: int) -> int:
+    """SET_MESSAGE_INTERVAL of a message that the firmware does not know."""
+    vehicle.say(INFO, f"No ap_message for mavlink id ({number})")
+    return DENIED
+
+
+_FAILSAFES = CopterFailsafes(switch, ARMED_WORDS[1])
+
+COPTER = Dialect(
+    name="ardupilot",
+    kind="multirotor",
+    boot_mode=MODES[0],
+    boot_events=boot.copter_events(ready),
+    boot_bytes=boot.bytes_at(
+        (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
+    ),
+    ready_after=READY,
+    origin_after=ORIGIN,
+    position_after=POSITION,
+    local_position_after=POSITION,
+    on_warm=on_warm,
+    heartbeat_first=(round(1.05 * S),),
+    heartbeat_from=round(2.037 * S),
+    deaf_until=100 * MS,
+    each_second=each_second,
+    each_second_from=EACH_SECOND,
+    modes=MODES,
+    tuning=tuning.copter,
+    transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    stands=True,
+    motors_rest=2 * S,
+    spool_time=500 * MS,
+    takeoff_slew=100 * MS,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=on_disarmed,
+    guided_arrived=lambda _vehicle: None,
+    guided_stale=lambda _vehicle: None,
+    mission_item_done=missions.item_done,
+    mission_item_begins=missions.item_begins,
+    mission_ended=missions.copter_ended,
+    mission_action=missions.act,
+    messages={
+        **BUILDERS,
+        "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
+            vehicle, CAPABILITIES, board(vehicle).encode()
+        ),
+        "ESC_TELEMETRY_1_TO_4": status.esc_telemetry,
+        "HEARTBEAT": lambda vehicle: status.heartbeat(vehicle, QUADROTOR, system_status(vehicle)),
+        "SYS_STATUS": partial(status.sys_status, health=HEALTH),
+        "TERRAIN_REPORT": status.terrain_report,
+        "WIND": status.wind,
+    },
+    message_order=ORDER,
+    streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
+    on_stream_request=_ignored,
+    usual_period=lambda _name: 0,
+    refuse_interval=refuse_interval,
+    unknown_message=FAILED,
+    commands=commands.copter(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    handlers={
+        "HEARTBEAT": radio.on_heartbeat,
+        "MANUAL_CONTROL": radio.on_manual_control,
+        "RC_CHANNELS_OVERRIDE": radio.on_override,
+        "SET_ATTITUDE_TARGET": copter_attitude,
+        "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
+        "SET_POSITION_TARGET_LOCAL_NED": copter_local,
+    },
+    set_mode=set_mode,
+    set_mode_ack=11,
+    on_parameter_list=greet,
+    stored_item=missions.stored_item,
+    home_item=missions.home_item,
+    go_to_item=commands.go_to_item,
+    mission_grew=missions.mission_grew,
+    timesync_every=10 * S,
+    parameters=parameters,
+    own_parameters=own_parameters,
+    honoured=HONOURED,
+)

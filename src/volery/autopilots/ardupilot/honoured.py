@@ -1,0 +1,105 @@
+"""The parameters that change what a simulated ArduPilot does. All others are kept, listed and read back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_STICKS = {
+    **{
+        f"RCMAP_{stick}": f"channel of the {stick.lower()} stick"
+        for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")
+    },
+    **{
+        f"RC{channel}_{part}": f"{words} of channel {channel}"
+        for channel in range(1, 17)
+        for part, words in (
+            ("MIN", "lower end"),
+            ("TRIM", "middle"),
+            ("MAX", "upper end"),
+            ("DZ", "dead zone"),
+            ("REVERSED", "direction"),
+        )
+    },
+}
+
+_SHARED = {
+    **_STICKS,
+    "ARMING_CHECK": "0 skips all checks, anything else makes all of them",
+    "BATT_ARM_MAH": "charge that arming asks for",
+    "BATT_ARM_VOLT": "voltage that arming asks for",
+    "BATT_CAPACITY": "charge of the full battery; set from the vehicle's own unless given",
+    "BATT_CRT_MAH": "critical level by charge",
+    "BATT_CRT_VOLT": "critical level by voltage",
+    "BATT_FS_CRT_ACT": "what happens at the critical level",
+    "BATT_FS_LOW_ACT": "what happens at the low level",
+    "BATT_LOW_MAH": "low level by charge",
+    "BATT_LOW_TIMER": "how long the voltage must stay below a level",
+    "BATT_LOW_VOLT": "low level by voltage",
+    "FS_GCS_ENABLE": "what happens when the ground station falls silent",
+    "FS_GCS_TIMEOUT": "after which time that is",
+    "FS_THR_ENABLE": "what happens when the throttle channel falls below FS_THR_VALUE",
+    "FS_THR_VALUE": "pulse width of a lost transmitter",
+    "INITIAL_MODE": "mode after boot",
+    "RC_OVERRIDE_TIME": "overrides fall back to the transmitter after that; 0 refuses them, below 0 they stay",
+    "RNGFND1_TYPE": "any type but 0 sends RANGEFINDER and DISTANCE_SENSOR",
+    "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
+    "SYSID_MYGCS": "the system id whose heartbeats and sticks count",
+}
+
+COPTER: Mapping[str, str] = MappingProxyType(
+    {
+        **_SHARED,
+        "ANGLE_MAX": "largest lean",
+        "AUTO_OPTIONS": "bit 0 allows arming in AUTO, bit 1 its take-off without a raised throttle",
+        "CIRCLE_RADIUS": "circle of LOITER_TURNS",
+        "CIRCLE_RATE": "turn rate on it",
+        "DISARM_DELAY": "idle on the ground it disarms after that",
+        "FRAME_TYPE": "the shape that is named when parameters are listed; it flies as built",
+        "FS_EKF_ACTION": "what happens when the position is lost in flight",
+        "FS_EKF_THRESH": "0 switches that off",
+        "FS_OPTIONS": "bits 0, 1, 2, 3, 4: when a failsafe changes nothing",
+        "GUID_TIMEOUT": "after which velocities and attitudes without news end",
+        "LAND_ALT_LOW": "below that it lands slowly",
+        "LAND_SPEED": "slow landing speed",
+        "LAND_SPEED_HIGH": "landing speed above; 0: WPNAV_SPEED_DN",
+        "LOIT_ACC_MAX": "LOITER's largest acceleration",
+        "LOIT_ANG_MAX": "LOITER's largest lean; 0: two thirds of ANGLE_MAX",
+        "LOIT_BRK_ACCEL": "LOITER's braking",
+        "LOIT_BRK_DELAY": "how long it glides before",
+        "LOIT_SPEED": "LOITER's largest speed",
+        "MOT_THST_HOVER": "hover thrust; learnt in flight and stored on disarming",
+        "PILOT_ACCEL_Z": "the pilot's vertical acceleration",
+        "PILOT_SPEED_DN": "the pilot's largest descent; 0: PILOT_SPEED_UP",
+        "PILOT_SPEED_UP": "the pilot's largest climb",
+        "PILOT_Y_RATE": "the pilot's turn rate",
+        "RTL_ALT": "height of the return",
+        "RTL_ALT_FINAL": "height to stay at over home; 0 lands",
+        "RTL_CLIMB_MIN": "least climb of the return",
+        "RTL_CONE_SLOPE": "lower return close to home",
+        "RTL_LOIT_TIME": "wait over home",
+        "RTL_SPEED": "speed of the return; 0: WPNAV_SPEED",
+        "THR_DZ": "dead zone about the middle of the throttle",
+        "WPNAV_ACCEL": "acceleration in the plane",
+        "WPNAV_ACCEL_Z": "vertical acceleration",
+        "WPNAV_RADIUS": "radius within which a waypoint is reached",
+        "WPNAV_SPEED": "speed in the plane",
+        "WPNAV_SPEED_DN": "descent",
+        "WPNAV_SPEED_UP": "climb",
+        "WP_YAW_BEHAVIOR": "1 and 2 turn the nose along a mission's path",
+    }
+)
+"""A copter's, and what each changes."""
+
+ROVER: Mapping[str, str] = MappingProxyType(
+    {
+        **_SHARED,
+        "ATC_ACCEL_MAX": "acceleration; 0: 1 m/s^2",
+        "CRUISE_SPEED": "speed where WP_SPEED is 0",
+        "FS_ACTION": "what station and radio failsafes do",
+        "RTL_SPEED": "speed of the return; 0: WP_SPEED",
+        "WP_RADIUS": "radius within which a waypoint is reached",
+        "WP_SPEED": "speed",
+    }
+)
+"""A rover's, and what each changes."""

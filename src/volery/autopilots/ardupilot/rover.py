@@ -1,0 +1,266 @@
+"""ArduRover 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.autopilots.ardupilot import boot, commands, missions, radio, status, tuning
+from volery.autopilots.ardupilot.arming import (
+    INFO,
+    WARNING,
+    Check,
+    between,
+    failing,
+    look_before_arming,
+    lost_position,
+    low_battery,
+    no_mission,
+    not_armable,
+)
+from volery.autopilots.ardupilot.copter import board, own_parameters, refuse_interval
+from volery.autopilots.ardupilot.failsafes import RoverFailsafes
+from volery.autopilots.ardupilot.honoured import ROVER as HONOURED
+from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, set_mode, switch
+from volery.autopilots.ardupilot.motion import Fields, nav_controller
+from volery.autopilots.ardupilot.status import (
+    ACTIVE,
+    ATTITUDE_CONTROL,
+    CALIBRATING,
+    CRITICAL,
+    RATE_CONTROL,
+    STANDBY,
+    XY_CONTROL,
+    YAW_CONTROL,
+    Health,
+)
+from volery.autopilots.ardupilot.tables import ALL, BUILDERS, ORDER, streams
+from volery.autopilots.ardupilot.targets import rover_global, rover_local
+from volery.autopilots.simulated.dialect import Dialect
+from volery.autopilots.simulated.manoeuvres.mission import FlyMission
+from volery.autopilots.simulated.manoeuvres.rover import GuidedRover, Manual, ReturnRover, Stand, rover_leg
+from volery.autopilots.simulated.mavlink.command_service import FAILED
+from volery.autopilots.simulated.mode import Mode
+from volery.autopilots.simulated.parameters import Parameter, load
+from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import MS, S
+
+GROUND_ROVER = 10
+"""MAV_TYPE."""
+
+CAPABILITIES = 61_935
+"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+
+BY_ITSELF = CUSTOM | GUIDED
+STEERED = RATE_CONTROL | ATTITUDE_CONTROL | YAW_CONTROL | XY_CONTROL
+
+READY = round(2.355 * S)
+HOME = round(10.36 * S)
+POSITION = round(42.08 * S)
+
+ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
+STORE_COUNTERS_EVERY = 30 * S
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(0, "MANUAL", CUSTOM | MANUAL, Manual, pilot=True),
+        Mode(4, "HOLD", CUSTOM, Stand),
+        Mode(
+            10,
+            "AUTO",
+            BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, rover_leg),
+            STEERED,
+            needs_position=True,
+        ),
+        Mode(11, "RTL", BY_ITSELF, ReturnRover, STEERED, needs_position=True, armable=False),
+        Mode(15, "GUIDED", BY_ITSELF, GuidedRover, STEERED, needs_position=True),
+    )
+}
+
+INITIALISING = Mode(16, "INITIALISING", CUSTOM | MANUAL, Stand, armable=False)
+
+CHECKS = (
+    Check("Gyros not healthy", between(0.0, 1.85)),
+    Check("Accels inconsistent", between(1.85, 11.5)),
+    Check("Gyros inconsistent", between(11.5, 22.4)),
+    Check("Compass not healthy", between(0.0, 2.4)),
+    Check("AHRS: waiting for home", between(0.0, 10.36)),
+    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Battery 1 below minimum arming voltage", low_battery),
+    Check("Need Position Estimate", lost_position),
+    Check("Mode requires mission", no_mission),
+)
+
+HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))
+
+STREAM_PARAMETERS = {
+    1: "RAW_SENS",
+    2: "EXT_STAT",
+    3: "RC_CHAN",
+    4: "RAW_CTRL",
+    6: "POSITION",
+    10: "EXTRA1",
+    11: "EXTRA2",
+    12: "EXTRA3",
+    13: "ADSB",
+}
+"""Where a rover stores the rate of a stream."""
+
+
+def before_arming(vehicle: Vehicle) -> list[str]:
+    """What would show as not ready."""
+    return failing(vehicle, CHECKS)
+
+
+def problems(vehicle: Vehicle) -> list[str]:
+    """All that speaks against arming now."""
+    return before_arming(vehicle) + not_armable(vehicle)
+
+
+def ready(vehicle: Vehicle) -> None:
+    """Set-up has ended."""
+    vehicle.enter(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
+
+
+def on_warm(vehicle: Vehicle) -> None:
+    """As after a complete boot."""
+    ready(vehicle)
+    boot.home_set(vehicle)
+    vehicle.prearm_ok = not before_arming(vehicle)
+
+
+def each_second(vehicle: Vehicle) -> None:
+    """Readiness, and the counters of hours."""
+    if vehicle.uptime() < READY:
+        return
+    look_before_arming(vehicle, before_arming)
+    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
+        vehicle.counted_at = vehicle.uptime()
+        if vehicle.flight_time:
+            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
+        vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)
+
+
+def on_step(vehicle: Vehicle) -> None:
+    """At each tick: sticks that expire."""
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(ROVER.transmitter):
+        radio.fail(vehicle)
+    radio.expire(vehicle)
+    if vehicle.armed:
+        vehicle.flight_time += ROVER.tick
+
+
+def guided_arrived(vehicle: Vehicle) -> None:
+    """A rover says so as if it were a mission."""
+    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": 0})
+
+
+def guided_stale(vehicle: Vehicle) -> None:
+    """No target for three seconds."""
+    vehicle.say(WARNING, "target not received last 3secs, stopping")
+
+
+def system_status(vehicle: Vehicle) -> int:
+    """MAV_STATE: a failsafe, starting, holding, or driving."""
+    if vehicle.failsafes:
+        return CRITICAL
+    if vehicle.mode is INITIALISING:
+        return CALIBRATING
+    return STANDBY if vehicle.mode.name == "HOLD" else ACTIVE
+
+
+def greet(vehicle: Vehicle) -> None:
+    """Said to whoever lists the parameters."""
+    vehicle.say(INFO, "ArduRover V4.5.6 (7ce11b41)")
+    vehicle.say(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+
+
+def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
+    """A rover stores the rates that it was asked for."""
+    names = STREAM_PARAMETERS.values() if stream == ALL else [STREAM_PARAMETERS[stream]]
+    for name in names:
+        vehicle.set_parameter(f"SR{index}_{name}", rate)
+
+
+def navigation(vehicle: Vehicle) -> Fields | None:
+    """NAV_CONTROLLER_OUTPUT: only in modes that steer by themselves."""
+    return nav_controller(vehicle) if vehicle.mode.controls else None
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """What is recorded of them, and documented."""
+    return load("volery.autopilots.ardupilot", "data/rover.parameters")
+
+
+_FAILSAFES = RoverFailsafes(switch, ARMED_WORDS[1])
+
+ROVER = Dialect(
+    name="ardupilot",
+    kind="rover",
+    boot_mode=INITIALISING,
+    boot_events=boot.rover_events(ready),
+    boot_bytes=boot.bytes_at(
+        (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+    ),
+    ready_after=READY,
+    origin_after=HOME,
+    position_after=POSITION,
+    local_position_after=HOME,
+    on_warm=on_warm,
+    heartbeat_first=(round(1.025 * S),),
+    heartbeat_from=round(3.04 * S),
+    deaf_until=100 * MS,
+    each_second=each_second,
+    each_second_from=round(0.345 * S),
+    modes=MODES,
+    tuning=tuning.rover,
+    transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    throttle_centred=True,
+    stands=False,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=lambda _vehicle: None,
+    guided_arrived=guided_arrived,
+    guided_stale=guided_stale,
+    mission_item_done=missions.item_done,
+    mission_item_begins=missions.item_begins,
+    mission_ended=missions.rover_ended,
+    mission_action=missions.act,
+    messages={
+        **BUILDERS,
+        "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
+            vehicle, CAPABILITIES, board(vehicle).encode()
+        ),
+        "HEARTBEAT": lambda vehicle: status.heartbeat(vehicle, GROUND_ROVER, system_status(vehicle)),
+        "NAV_CONTROLLER_OUTPUT": navigation,
+        "RC_CHANNELS_SCALED": status.rc_channels_scaled,
+        "SYS_STATUS": partial(status.sys_status, health=HEALTH),
+    },
+    message_order=ORDER,
+    streams=streams(("RC_CHANNELS_SCALED",), ()),
+    on_stream_request=on_stream_request,
+    usual_period=lambda _name: 0,
+    refuse_interval=refuse_interval,
+    unknown_message=FAILED,
+    commands=commands.rover(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    handlers={
+        "HEARTBEAT": radio.on_heartbeat,
+        "MANUAL_CONTROL": radio.on_manual_control,
+        "RC_CHANNELS_OVERRIDE": radio.on_override,
+        "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
+        "SET_POSITION_TARGET_LOCAL_NED": rover_local,
+    },
+    set_mode=set_mode,
+    set_mode_ack=11,
+    on_parameter_list=greet,
+    stored_item=missions.stored_item,
+    home_item=missions.home_item,
+    go_to_item=commands.go_to_item,
+    mission_grew=missions.mission_grew,
+    timesync_every=10 * S,
+    parameters=parameters,
+    own_parameters=own_parameters,
+    honoured=HONOURED,
+)

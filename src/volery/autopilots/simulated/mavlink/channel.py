@@ -1,0 +1,42 @@
+"""One link of an autopilot, and whom an answer goes to."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from volery.autopilots.simulated.mavlink.streams import Streams
+from volery.links.link import ByteLink, Frame, Link
+
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+
+
+class Channel:
+    """A link with its streams. ``index`` counts the links in the order in which they were connected."""
+
+    def __init__(self, link: Link, index: int, system: int) -> None:
+        self.link = link
+        self.index = index
+        self.streams: Streams
+        self._system = system
+
+    def send(self, name: str, fields: dict[str, Any]) -> None:
+        """Send a message as the autopilot."""
+        self.link.send(Frame(name, fields, self._system, AUTOPILOT))
+
+    def send_bytes(self, data: bytes) -> None:
+        """Bytes that are no message, where the link carries bytes; else nothing."""
+        if isinstance(self.link, ByteLink):
+            self.link.send_bytes(data)
+
+
+class Peer(NamedTuple):
+    """Who asked: through which link, and with which ids."""
+
+    channel: Channel
+    system: int
+    component: int
+
+    def answer(self, name: str, **fields: Any) -> None:
+        """Send a message that names the asker as its target."""
+        self.channel.send(name, {**fields, "target_system": self.system, "target_component": self.component})

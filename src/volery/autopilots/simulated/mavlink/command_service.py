@@ -1,0 +1,157 @@
+"""MAVLink's commands: long and int form brought to one shape, handed to the dialect, acknowledged.
+
+What concerns the link itself (message intervals, single messages) is answered here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from volery.autopilots.simulated.mavlink.channel import Peer
+from volery.autopilots.simulated.plan import GLOBAL_RELATIVE
+from volery.base.time import MS, US
+from volery.links.mavlink import message_type_of
+
+if TYPE_CHECKING:
+    from volery.autopilots.simulated.vehicle import Vehicle
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+"""MAV_RESULT."""
+
+GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
+REQUEST_PROTOCOL_VERSION, REQUEST_CAPABILITIES = 519, 520
+
+SHORTEST_PERIOD_US = 2_500
+
+
+class Command(NamedTuple):
+    """A command, whichever form it came in. ``x`` and ``y`` are degrees where they are a place."""
+
+    number: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: float
+    y: float
+    z: float
+    frame: int
+    is_int: bool
+
+
+Handler = Callable[["Vehicle", Command], int]
+"""Does it and returns a MAV_RESULT."""
+
+
+def from_long(fields: dict[str, Any]) -> Command:
+    """COMMAND_LONG."""
+    return Command(
+        fields["command"],
+        fields["param1"],
+        fields["param2"],
+        fields["param3"],
+        fields["param4"],
+        fields["param5"],
+        fields["param6"],
+        fields["param7"],
+        GLOBAL_RELATIVE,
+        is_int=False,
+    )
+
+
+def from_int(fields: dict[str, Any]) -> Command:
+    """COMMAND_INT."""
+    return Command(
+        fields["command"],
+        fields["param1"],
+        fields["param2"],
+        fields["param3"],
+        fields["param4"],
+        fields["x"] / 1e7,
+        fields["y"] / 1e7,
+        fields["z"],
+        fields["frame"],
+        is_int=True,
+    )
+
+
+class CommandService:
+    """Answers for one vehicle."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._own: dict[int, Callable[[Peer, Command], int]] = {
+            GET_MESSAGE_INTERVAL: self._get_interval,
+            SET_MESSAGE_INTERVAL: self._set_interval,
+            REQUEST_MESSAGE: self._request_message,
+            REQUEST_PROTOCOL_VERSION: lambda peer, _: self._send(peer, "PROTOCOL_VERSION"),
+            REQUEST_CAPABILITIES: lambda peer, _: self._send(peer, "AUTOPILOT_VERSION"),
+        }
+
+    def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """COMMAND_LONG."""
+        self._perform(peer, from_long(fields))
+
+    def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """COMMAND_INT."""
+        self._perform(peer, from_int(fields))
+
+    def _perform(self, peer: Peer, command: Command) -> None:
+        own = self._own.get(command.number)
+        if own is not None:
+            result = own(peer, command)
+        else:
+            handler = self._vehicle.dialect.commands.get(command.number)
+            result = UNSUPPORTED if handler is None else handler(self._vehicle, command)
+        self.acknowledge(peer, command.number, result)
+
+    def acknowledge(self, peer: Peer, number: int, result: int) -> None:
+        """Send the COMMAND_ACK."""
+        peer.answer("COMMAND_ACK", command=number, result=result, progress=0, result_param2=0)
+
+    # -- messages on request
+
+    def _get_interval(self, peer: Peer, command: Command) -> int:
+        number = round(command.param1)
+        name = self._name(number)
+        if name is None:
+            return FAILED
+        period = peer.channel.streams.period(name)
+        peer.channel.send("MESSAGE_INTERVAL", {"message_id": number, "interval_us": period // US or -1})
+        return ACCEPTED
+
+    def _set_interval(self, peer: Peer, command: Command) -> int:
+        number, interval = round(command.param1), command.param2
+        name = self._name(number)
+        if name is None:
+            return self._vehicle.dialect.refuse_interval(self._vehicle, number)
+        if self._vehicle.uptime() < self._vehicle.dialect.deaf_until:
+            return ACCEPTED
+        if interval == 0:
+            period = self._vehicle.dialect.usual_period(name)
+        else:
+            period = max(SHORTEST_PERIOD_US, round(interval)) * US if interval > 0 else 0
+        peer.channel.streams.set((name,), period // MS * MS if period > MS else period)
+        return ACCEPTED
+
+    def _request_message(self, peer: Peer, command: Command) -> int:
+        name = self._name(round(command.param1))
+        if name is None:
+            return self._vehicle.dialect.unknown_message
+        return self._send(peer, name)
+
+    def _send(self, peer: Peer, name: str) -> int:
+        """Send it after the acknowledgement."""
+
+        def send() -> None:
+            fields = self._vehicle.dialect.messages[name](self._vehicle)
+            if fields is not None:
+                peer.channel.send(name, fields)
+
+        self._vehicle.outlet.after_answer(send)
+        return ACCEPTED
+
+    def _name(self, number: int) -> str | None:
+        kind = message_type_of(number)
+        return kind.name if kind is not None and kind.name in self._vehicle.dialect.messages else None

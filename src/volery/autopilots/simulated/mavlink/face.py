@@ -1,0 +1,240 @@
+"""The MAVLink face of a vehicle: links, heartbeats, streams, and which part answers which message.
+
+A frame is handled a few milliseconds after it arrived, in order. What handling it makes the vehicle say
+goes out after the answer, as the recorded firmware does it once it has booted.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from volery.autopilots.simulated.mavlink.channel import Channel, Peer
+from volery.autopilots.simulated.mavlink.command_service import CommandService
+from volery.autopilots.simulated.mavlink.mission_service import MissionService
+from volery.autopilots.simulated.mavlink.parameter_service import ParameterService, value_fields
+from volery.autopilots.simulated.mavlink.streams import Streams
+from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import S
+from volery.kernel.api import Action, Handle
+from volery.links.link import Frame, Link
+from volery.trace.events import Text
+
+Handler = Callable[[Peer, dict[str, Any]], None]
+
+TEXT_LENGTH = 50
+BROADCAST = 0
+
+
+class Face:
+    """One vehicle's ``Outlet``, and its ear."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._kernel = vehicle.kernel
+        self.channels: list[Channel] = []
+        self._arrived: deque[tuple[Channel, Frame]] = deque()
+        self._handling = False
+        self._after: list[Action] = []
+        self._text_id = 0
+        self._clocks: list[Handle] = []
+        parameters = ParameterService(vehicle)
+        missions = MissionService(vehicle)
+        self._commands = CommandService(vehicle)
+        self._handlers: dict[str, Handler] = {
+            "COMMAND_INT": self._commands.on_int,
+            "COMMAND_LONG": self._commands.on_long,
+            "MISSION_ACK": missions.on_ack,
+            "MISSION_CLEAR_ALL": missions.on_clear,
+            "MISSION_COUNT": missions.on_count,
+            "MISSION_ITEM": missions.on_item,
+            "MISSION_ITEM_INT": missions.on_item_int,
+            "MISSION_REQUEST": missions.on_request,
+            "MISSION_REQUEST_INT": missions.on_request_int,
+            "MISSION_REQUEST_LIST": missions.on_request_list,
+            "MISSION_SET_CURRENT": missions.on_set_current,
+            "PARAM_REQUEST_LIST": self._on_parameter_list(parameters.on_list),
+            "PARAM_REQUEST_READ": parameters.on_read,
+            "PARAM_SET": parameters.on_set,
+            "PING": self._on_ping,
+            "REQUEST_DATA_STREAM": self._on_stream_request,
+            "SET_MODE": self._on_set_mode,
+            "TIMESYNC": self._on_timesync,
+        }
+
+    # -- links
+
+    def connect(self, link: Link) -> None:
+        """Listen to and speak on this link, too."""
+        vehicle = self._vehicle
+        channel = Channel(link, len(self.channels), vehicle.system)
+        channel.streams = Streams(
+            self._kernel, vehicle.dialect.message_order, lambda names: self._burst(channel, names)
+        )
+        self.channels.append(channel)
+        if vehicle.uptime() >= vehicle.dialect.ready_after:
+            channel.streams.start()
+        link.receive(lambda frame: self._hear(channel, frame))
+
+    def disconnect(self, link: Link) -> None:
+        """Nobody is there any more."""
+        for channel in [channel for channel in self.channels if channel.link is link]:
+            channel.streams.stop()
+            self.channels.remove(channel)
+
+    def _burst(self, channel: Channel, names: Sequence[str]) -> None:
+        messages, vehicle = self._vehicle.dialect.messages, self._vehicle
+        for name in names:
+            fields = messages[name](vehicle)
+            if fields is not None:
+                channel.send(name, fields)
+
+    def send_bytes(self, data: bytes) -> None:
+        """Bytes that are no message, to links that carry bytes."""
+        for channel in self.channels:
+            channel.send_bytes(data)
+
+    # -- the clock
+
+    def start(self) -> None:
+        """The vehicle was switched on: heartbeats and time requests from its boot on."""
+        self.stop()
+        vehicle, dialect = self._vehicle, self._vehicle.dialect
+        age = vehicle.uptime()
+        for after in dialect.heartbeat_first:
+            if after >= age:
+                self._at_uptime(after, lambda: self.announce("HEARTBEAT"))
+        self._regularly(dialect.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
+        if dialect.timesync_every:
+            self._regularly(dialect.timesync_every, dialect.timesync_every, self._ask_time)
+        if age >= dialect.ready_after:
+            self.stream()
+        else:
+            self._at_uptime(dialect.ready_after, self.stream)
+
+    def stop(self) -> None:
+        """Fall silent."""
+        for clock in self._clocks:
+            clock.cancel()
+        self._clocks.clear()
+        for channel in self.channels:
+            channel.streams.stop()
+
+    def stream(self) -> None:
+        """Send what was asked for."""
+        for channel in self.channels:
+            channel.streams.start()
+
+    def _at_uptime(self, uptime: int, action: Action) -> None:
+        self._clocks.append(self._kernel.call_at(self._vehicle.boot_at + uptime, action))
+
+    def _regularly(self, first: int, period: int, action: Action) -> None:
+        """Each *period*, in phase with the boot; not before *first*."""
+        age = self._vehicle.uptime()
+        if age > first:
+            first += -(-(age - first) // period) * period
+        begin = lambda: self._clocks.append(self._kernel.every(period, action))  # noqa: E731
+        self._at_uptime(first, begin)
+
+    def _ask_time(self) -> None:
+        fields = {"tc1": 0, "ts1": self._vehicle.uptime() // 1000 * 1000 + self._vehicle.system}
+        for channel in self.channels:
+            channel.send("TIMESYNC", fields)
+
+    # -- speaking
+
+    def say(self, severity: int, text: str) -> None:
+        """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
+        self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
+        chunks = [text[start : start + TEXT_LENGTH] for start in range(0, max(1, len(text)), TEXT_LENGTH)]
+        if len(chunks) > 1:
+            self._text_id = self._text_id % 65_535 + 1
+        number = self._text_id if len(chunks) > 1 else 0
+        for place, chunk in enumerate(chunks):
+            fields = {"severity": severity, "text": chunk, "id": number, "chunk_seq": place}
+            self._tell_all("STATUSTEXT", fields)
+
+    def parameter(self, name: str) -> None:
+        """PARAM_VALUE to everyone."""
+        found = self._vehicle.parameters.find(name)
+        if found is not None:
+            self._tell_all("PARAM_VALUE", value_fields(self._vehicle.parameters, found))
+
+    def announce(self, message: str) -> None:
+        """That message to everyone."""
+        fields = self._vehicle.dialect.messages[message](self._vehicle)
+        if fields is not None:
+            self._tell_all(message, fields)
+
+    def tell(self, message: str, fields: dict[str, Any]) -> None:
+        """A message that is no state, such as an event, to everyone."""
+        self._tell_all(message, fields)
+
+    def _tell_all(self, name: str, fields: dict[str, Any]) -> None:
+        def tell() -> None:
+            for channel in self.channels:
+                channel.send(name, fields)
+
+        self.after_answer(tell)
+
+    def after_answer(self, action: Action) -> None:
+        """Once the frame in hand has been answered; at once if there is none, or the autopilot is still
+        booting.
+        """
+        if self._handling and self._vehicle.uptime() >= self._vehicle.dialect.ready_after:
+            self._after.append(action)
+        else:
+            action()
+
+    # -- hearing
+
+    def _hear(self, channel: Channel, frame: Frame) -> None:
+        self._arrived.append((channel, frame))
+        self._kernel.call_at(self._kernel.now() + self._vehicle.dialect.answer_delay, self._handle)
+
+    def _handle(self) -> None:
+        channel, frame = self._arrived.popleft()
+        name, fields = frame.name, frame.fields
+        if fields.get("target_system", BROADCAST) not in (BROADCAST, self._vehicle.system):
+            return
+        self._handling = True
+        own = self._handlers.get(name)
+        if own is not None:
+            own(Peer(channel, frame.system, frame.component), fields)
+        else:
+            heard = self._vehicle.dialect.handlers.get(name)
+            if heard is not None:
+                heard(self._vehicle, fields, frame.system)
+        self._handling = False
+        after, self._after = self._after, []
+        for action in after:
+            action()
+
+    def _on_parameter_list(self, listing: Handler) -> Handler:
+        def on_list(peer: Peer, fields: dict[str, Any]) -> None:
+            listing(peer, fields)
+            self._vehicle.dialect.on_parameter_list(self._vehicle)
+
+        return on_list
+
+    def _on_stream_request(self, peer: Peer, fields: dict[str, Any]) -> None:
+        vehicle, dialect = self._vehicle, self._vehicle.dialect
+        stream = fields["req_stream_id"]
+        rate = fields["req_message_rate"] if fields["start_stop"] else 0
+        names = dialect.streams.get(stream)
+        if names is not None:
+            peer.channel.streams.set(names, S // rate if rate else 0)
+            dialect.on_stream_request(vehicle, peer.channel.index, stream, rate)
+
+    def _on_set_mode(self, peer: Peer, fields: dict[str, Any]) -> None:
+        result = self._vehicle.dialect.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
+        self._commands.acknowledge(peer, self._vehicle.dialect.set_mode_ack, result)
+
+    def _on_ping(self, peer: Peer, fields: dict[str, Any]) -> None:
+        if fields["target_system"] == BROADCAST:
+            peer.answer("PING", time_usec=fields["time_usec"], seq=fields["seq"])
+
+    def _on_timesync(self, peer: Peer, fields: dict[str, Any]) -> None:
+        if fields["tc1"] == 0:
+            peer.channel.send("TIMESYNC", {"tc1": self._vehicle.uptime(), "ts1": fields["ts1"]})
