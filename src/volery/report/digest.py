@@ -85,6 +85,8 @@ class Digest:
         self._parcels: dict[str, list[Milestone]] = {}
         self._remarks: list[Json] = []
         self._left_out = 0
+        self._heard: set[tuple[str, str]] = set()
+        self._hears: dict[str, set[str]] = {}
         self._lost: dict[str, list[int]] = {}
         self._last: Ns = 0
 
@@ -130,6 +132,16 @@ class Digest:
         counts = self._lost.setdefault(event.topic, [0, 0])
         counts[0] += 1
         counts[1] += event.received == NONE
+        if (event.topic, event.subscriber) not in self._heard:
+            self._heard.add((event.topic, event.subscriber))
+            vehicle = event.topic.lstrip("/").partition("/")[0]
+            if vehicle in self._tracks:
+                self._hears.setdefault(event.subscriber.strip("/"), set()).add(vehicle)
+
+    def _names_of_vehicles(self) -> dict[str, str]:
+        """What a state may call a vehicle: its own name, or a node that listens to it alone."""
+        alone = {name: next(iter(heard)) for name, heard in self._hears.items() if len(heard) == 1}
+        return alone | {name: name for name in self._tracks}
 
     def _remark(self, event: Event) -> None:
         match event:
@@ -171,8 +183,8 @@ class Digest:
         }
 
     def _steps(self, steps: list[Milestone]) -> list[Json]:
-        vehicles = list(self._tracks)
-        places = [place.name for place in self._scenery.places] if self._scenery else []
+        vehicles = self._names_of_vehicles()
+        places = {place.name: place.name for place in self._scenery.places} if self._scenery else {}
         return [
             {
                 "t": _seconds(step.at),
@@ -211,12 +223,12 @@ def _merge(bins: list[int], together: int, count: int) -> list[int]:
     return [sum(filled[at : at + together]) for at in range(0, count, together)]
 
 
-def _mentioned(step: Milestone, names: list[str]) -> str:
+def _mentioned(step: Milestone, names: dict[str, str]) -> str:
     """Which of *names* the state, else the detail, speaks of; the longest: drone_11 contains drone_1."""
     for words in (step.state, step.detail):
         found = [name for name in names if name in words]
         if found:
-            return max(found, key=len)
+            return names[max(found, key=len)]
     return ""
 
 

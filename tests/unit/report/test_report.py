@@ -18,7 +18,7 @@ from volery.report.terminal import comparison_table, cost_table, short_compariso
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.events import Event, Failure, Milestone, Text, VehicleState
+from volery.trace.events import Event, Failure, Message, Milestone, Text, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
 from volery.trace.scenery import scenery_to_json
 from volery.trace.setup import RunSetup
@@ -177,6 +177,25 @@ def test_a_real_vehicle_whose_truth_nobody_knows(tmp_path: Path) -> None:
     assert vehicle["speed"] == {"t": [], "v": []}
     recover(folder)
     assert read_record(folder).vehicles["d"].distance_m == 4.0
+
+
+def test_a_parcel_is_drawn_with_the_vehicle_of_the_component_that_has_it(tmp_path: Path) -> None:
+    still = VehicleState(
+        0, "rover_7", *[0.0] * 3, 1.0, *[0.0] * 6, *[0.0] * 3, 1.0, 12.0, 1.0, True, "GUIDED"
+    )
+    folder = small_run(
+        tmp_path / "carried",
+        still,
+        Message(0, 1, "/rover_7/mavros/state", "rover_7/mavros", "driver", 10),
+        Message(0, 1, "/rover_7/mavros/state", "rover_7/mavros", "watcher", 10),
+        still._replace(vehicle="rover_8"),
+        Message(0, 1, "/rover_8/mavros/state", "rover_8/mavros", "watcher", 10),
+        Milestone(1, "central", "parcel", "p", "to_port", "driver"),
+        Milestone(2, "central", "parcel", "p", "seen", "watcher"),
+        Milestone(3, "central", "parcel", "p", "on rover_8", "driver"),
+    )
+    (parcel,) = embedded(render(gather(folder)))["parcels"]  # type: ignore[misc]
+    assert [step["vehicle"] for step in parcel["steps"]] == ["rover_7", "", "rover_8"]
 
 
 def test_more_words_than_fit_are_counted(tmp_path: Path) -> None:

@@ -199,21 +199,27 @@
     context.restore();
   }
 
-  // Where a parcel is: on the vehicle or at the place that its state speaks of.
+  // Where a parcel is: on the vehicle or at the place that its state speaks of, else where it was left.
+  function spotOf(parcel, time) {
+    for (let index = parcel.steps.findLastIndex((step) => step.t <= time), until = time; index >= 0; index--) {
+      const step = parcel.steps[index];
+      const vehicle = data.vehicles.find((one) => one.name === step.vehicle);
+      if (vehicle && vehicle.t.length) return where(vehicle, until);
+      const place = scenery.places.find((one) => one[0] === step.place);
+      if (place) return { x: place[1], y: place[2] };
+      until = step.t;
+    }
+    return null;
+  }
+
   function drawParcels(context, time) {
     const stacked = {};
     for (const parcel of data.parcels) {
-      const step = current(parcel.steps, time, (entry) => entry.t);
-      if (!step) continue;
-      let x, y;
-      const vehicle = data.vehicles.find((one) => one.name === step.vehicle);
-      const place = scenery.places.find((one) => one[0] === step.place);
-      if (vehicle && vehicle.t.length) ({ x, y } = where(vehicle, time));
-      else if (place) [, x, y] = place;
-      else continue;
-      const key = step.vehicle || step.place;
+      const spot = spotOf(parcel, time);
+      if (!spot) continue;
+      const key = Math.round(toX(spot.x) / 8) + "/" + Math.round(toY(spot.y) / 8);
       const row = stacked[key] = (stacked[key] || 0) + 1;
-      const left = toX(x) + 8 + 11 * (row - 1), top = toY(y) - 20;
+      const left = toX(spot.x) + 8 + 11 * (row - 1), top = toY(spot.y) - 20;
       context.beginPath();
       context.roundRect(left, top, 11, 11, 2);
       context.fillStyle = "#c99a5b";
