@@ -37,7 +37,7 @@ def modules(
     *launched* says for each component what a launch file would (by the component's name, which names its
     node then). *nodes* holds, by component, nodes that are there already: ``init_node`` finds its own there.
     """
-    sessions = Sessions(graph, launched or {}, nodes)
+    sessions = Sessions(graph, {} if launched is None else launched, nodes)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
         names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import builtins
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import pytest
+
+from volery.base.time import S
+from volery.faces.rospy import Launch, modules
+from volery.graph import EmbeddedNode, Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+
+
+class Free(NamedTuple):
+    caller: int = 0
+    background: int = 0
+
+
+class Stage:
+    """Runs texts of Python files as components that import rospy."""
+
+    def __init__(self) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(self.events.append)
+        self.priced: list[tuple[str, str]] = []
+        self.graph = Graph(self.kernel, self._price, self._carry)
+        self.launched: dict[str, Launch] = {}
+        self.nodes: dict[str, EmbeddedNode] = {}
+        self.modules = modules(self.graph, self.launched, self.nodes)
+        self.out: list[Any] = []
+
+    def _price(self, node: Any, call: str, x: float) -> Free:
+        self.priced.append((node.name, call))
+        return Free()
+
+    def _carry(self, sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+        self.kernel.call_at(self.kernel.now(), deliver)
+
+    def load(self, text: str) -> ModuleType:
+        def find(
+            name: str, globals_: Any = None, locals_: Any = None, wanted: Any = (), level: int = 0
+        ) -> Any:
+            if name in self.modules:
+                return self.modules[name]
+            raise ImportError(name)
+
+        module = ModuleType("user")
+        module.__dict__["__builtins__"] = {**vars(builtins), "__import__": find, "out": self.out.append}
+        exec(text, module.__dict__)
+        return module
+
+    def component(self, name: str, text: str) -> None:
+        """The text is the body of a function that runs as component *name*."""
+        lines = "\n".join(f"    {line}" for line in text.strip("\n").splitlines())
+        main: Callable[[], None] = self.load(f"import rospy\ndef main():\n{lines}\n").main
+        self.kernel.spawn(main, name, Place(name))
+
+    def run(self, until: int = 60 * S) -> list[Any]:
+        self.kernel.call_at(until + 1, lambda: None)  # nodes that only wait are no deadlock yet
+        self.kernel.run(until)
+        return self.out
+
+    def of(self, kind: type) -> list[Any]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
