@@ -93,16 +93,38 @@ def _vertical(control: int) -> bool:
 
 
 @njit(cache=False)
+def _upright(row: Array) -> float:
+    """Cosine of the tilt, held above a half."""
+    x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
+    return clip(1.0 - 2.0 * (x * x + y * y), 0.5, 1.0)
+
+
+@njit(cache=False)
+def _disturbance(row: Array, axis: int) -> float:
+    """What the thrust now balances besides inertia (drag, wind, a wrong hover throttle) [m/s^2]."""
+    w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
+    lift = row[K_THROTTLE] / row[K_HOVER] * _GRAVITY
+    if axis == 0:
+        thrust = -2.0 * (x * z + w * y) * lift
+    elif axis == 1:
+        thrust = -2.0 * (y * z - w * x) * lift
+    else:
+        thrust = _GRAVITY - _upright(row) * lift
+    return clip(thrust - row[K_ACCEL + axis], -4.0, 4.0)
+
+
+@njit(cache=False)
 def _enter(row: Array, control: int, before: int) -> None:
-    """A new control takes over where the vehicle is and as fast as it is."""
+    """A new control takes over where the vehicle is, as fast as it is, and with what holds it now."""
+    grounded = before in (OFF, IDLE)
     for axis in range(3):
         known = in_plane(before) if axis < 2 else _vertical(before)
         if not known:
             row[K_TARGET + axis] = row[K_POSITION + axis]
             row[K_TARGET_VELOCITY + axis] = row[K_VELOCITY + axis]
             row[K_TARGET_ACCEL + axis] = 0.0
-            row[K_VELOCITY_INTEGRAL + axis] = 0.0
-    if before in (OFF, IDLE):
+            row[K_VELOCITY_INTEGRAL + axis] = 0.0 if grounded else _disturbance(row, axis)
+    if grounded:
         row[K_YAW_TARGET] = row[K_EULER + 2]
         row[K_YAW_SPEED] = 0.0
         row[K_TARGET_EULER] = 0.0
@@ -244,9 +266,7 @@ def _lean(row: Array, north: float, east: float, lift: float) -> None:
 @njit(cache=False)
 def _collective(row: Array, lift: float) -> None:
     """Collective for a vertical acceleration *lift* [m/s^2 up, gravity included] at the present tilt."""
-    x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
-    upright = 1.0 - 2.0 * (x * x + y * y)
-    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / clip(upright, 0.5, 1.0), 0.0, 1.0)
+    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
 
 
 @njit(cache=False)
@@ -284,9 +304,7 @@ def guide(row: Array) -> None:
         pitch = row[K_TARGET_EULER + 1] + share * (row[C_PITCH] - row[K_TARGET_EULER + 1])
         _demand_angles(row, roll, pitch)
     if control == ATTITUDE:
-        x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
-        upright = clip(1.0 - 2.0 * (x * x + y * y), 0.7, 1.0)
-        row[K_THROTTLE] = clip(row[C_THROTTLE] / upright, 0.0, 1.0)
+        row[K_THROTTLE] = clip(row[C_THROTTLE] / _upright(row), 0.0, 1.0)
         return
     _shape_height(row, control)
     lower = row[K_LOWER_LIMIT] > 0.5

@@ -1,0 +1,74 @@
+"""One vehicle in a world of its own, with a clock that is set by hand."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from volery.autopilots.simulated.flight import Control, Setpoint, make_world
+from volery.base.frames import LocalFrame
+from volery.base.time import MS, S
+from volery.world.specs import Multirotor, Rover
+
+HERE = LocalFrame(-35.363261, 149.165230, 584.0)
+LOOK = 50 * MS
+
+
+class Flown:
+    """A vehicle on its own: drive it, wait, and see what was."""
+
+    def __init__(self, spec, seed=1, wind=None):
+        self.now = 0
+        self.world, (self.flight,) = make_world(lambda: self.now, [spec], seed=seed, frame=HERE, wind=wind)
+
+    def seconds(self):
+        return self.now / S
+
+    def wait(self, seconds, until=lambda estimate, truth: False):
+        """Look twenty times a second; returns (seconds since the call, estimate, truth) of each look."""
+        start = self.now
+        seen = []
+        while self.now < start + round(seconds * S):
+            self.now += LOOK
+            estimate, truth = self.flight.look(), self.flight.truth()
+            seen.append(((self.now - start) / S, estimate, truth))
+            if until(estimate, truth):
+                break
+        return seen
+
+    def drive(self, control, **targets):
+        self.flight.drive(Setpoint(control, **targets))
+
+    def ready(self, settle=20.0):
+        """Origin set, armed, motors idling."""
+        self.wait(1)
+        self.flight.set_origin()
+        self.wait(settle)
+        self.drive(Control.IDLE)
+        self.wait(2)
+        return self
+
+    def hover(self, height=10.0, **limits):
+        """At a height above the origin, settled."""
+        self.ready()
+        self.drive(Control.POSITION, position=(0.0, 0.0, -height), **limits)
+        self.wait(20)
+        return self
+
+
+@pytest.fixture
+def drone():
+    return lambda sensors="consumer", seed=1, wind=None, **spec: Flown(
+        Multirotor(sensors=sensors, **spec), seed, wind
+    )
+
+
+@pytest.fixture
+def rover():
+    return lambda sensors="consumer", seed=1, **spec: Flown(Rover(sensors=sensors, **spec), seed)
+
+
+@pytest.fixture(scope="session")
+def recorded():
+    """Figures read from recordings of ArduPilot 4.5.6."""
+    return json.loads((Path(__file__).parents[2] / "golden" / "ardupilot-flight.json").read_text())
