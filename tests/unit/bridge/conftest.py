@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+from volery import messages
+from volery.base.geoid import Geoid
+from volery.base.time import MS, S
+from volery.bridge import VehicleNode, VehicleNodeOptions
+from volery.graph import BEST_AVAILABLE, Graph, QoS
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.links.in_process import in_process
+from volery.links.link import Frame
+from volery.trace.events import Text
+
+
+class Free(NamedTuple):
+    caller: int = 0
+    background: int = 0
+
+
+class Aviary:
+    """A vehicle node with a scripted autopilot behind it and a user's node in front."""
+
+    def __init__(self, geoid: float = 0.0) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(self.events.append)
+        self.priced: list[tuple[str, str]] = []
+        self.graph = Graph(self.kernel, self._price, self._carry)
+        ours, self._theirs = in_process(self.kernel, MS, name="drone_1")
+        self._theirs.receive(self._hear)
+        self.sent: list[Frame] = []
+        self.answers: dict[str, Callable[[dict[str, Any]], None]] = {}
+        self.node = VehicleNode(self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=Geoid(geoid)))
+        self.node.start(Place("mavros"), self.kernel.root)
+        self.user = self.graph.node("user", place=Place("user"))
+        self.got: dict[str, list[Any]] = {}
+
+    def _price(self, node: Any, call: str, x: float) -> Free:
+        self.priced.append((node.name, call))
+        return Free()
+
+    def _carry(self, sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+        self.kernel.call_at(self.kernel.now(), deliver)
+
+    def _hear(self, frame: Frame) -> None:
+        self.sent.append(frame)
+        answer = self.answers.get(frame.name)
+        if answer is not None:
+            answer(frame.fields)
+
+    def say(self, name: str, /, **fields: Any) -> None:
+        """The autopilot sends a message."""
+        self._theirs.send(Frame(name, fields, 1, 1))
+
+    def heartbeat(self, **fields: Any) -> None:
+        self.say("HEARTBEAT", **{"type": 2, "autopilot": 3, "base_mode": 81, "system_status": 3, **fields})
+
+    def asked(self, *names: str) -> list[dict[str, Any]]:
+        """The fields of what the autopilot was sent under these names."""
+        return [frame.fields for frame in self.sent if frame.name in names]
+
+    def hear(self, topic: str, message_type: str) -> list[Any]:
+        """Collect the messages of a topic."""
+        heard = self.got[topic] = []
+        late = QoS(reliability=BEST_AVAILABLE, durability=BEST_AVAILABLE)
+        self.user.subscribe(f"/drone_1/{topic}", message_type, heard.append, late)
+        return heard
+
+    def tell(self, topic: str, message_type: str, **fields: Any) -> None:
+        """Publish once, from the user's node."""
+        publisher = self.user.advertise(f"/drone_1/{topic}", message_type)
+        publisher.publish(messages.new(message_type, **fields))
+
+    def call(self, service: str, service_type: str, **fields: Any) -> Any:
+        """Call a service from the user's node; lets time pass until it is answered."""
+        answers: list[Any] = []
+
+        def body() -> None:
+            client = self.user.client(f"/drone_1/{service}", service_type)
+            client.wait()
+            answers.append(client.call(messages.request(service_type, **fields)))
+
+        self.kernel.spawn(body, "user", Place("user"))
+        for _ in range(200):
+            self.run(100 * MS)
+            if answers:
+                return answers[0]
+        raise AssertionError(f"{service} has not answered within {200 * 100 * MS / S} s")
+
+    def run(self, duration: int) -> None:
+        """Let time pass, then take what has arrived."""
+        until = self.kernel.now() + duration
+        self.kernel.call_at(until + 1, lambda: None)
+        self.kernel.run(until)
+        while self.user.spin_once(0):
+            pass
+
+    def of_texts(self) -> list[Text]:
+        return [event for event in self.events if isinstance(event, Text)]
+
+    def connect(self) -> None:
+        """One heartbeat, and the loop has seen it."""
+        self.heartbeat()
+        self.run(200 * MS)
+        self.sent.clear()
+
+
+@pytest.fixture
+def aviary() -> Aviary:
+    return Aviary()
+
+
+@pytest.fixture
+def raised_aviary() -> Aviary:
+    """Where the geoid is 47 m above the ellipsoid."""
+    return Aviary(47.0)
