@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -156,7 +157,7 @@ def declared_sigma(name: str) -> Sigma:
     level = noises[GPS_LEVEL].white ** 2 + noises[GPS_LEVEL].slow ** 2
     height = noises[GPS_HEIGHT].white ** 2 + noises[GPS_HEIGHT].slow ** 2
     air = noises[BARO].white ** 2 + noises[BARO].slow ** 2
-    return Sigma(horizontal=(2.0 * level) ** 0.5, vertical=(height + air) ** 0.5)
+    return Sigma(horizontal=sqrt(2.0 * level), vertical=sqrt(height + air))
 
 
 @njit(cache=False)

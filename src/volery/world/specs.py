@@ -7,7 +7,7 @@ the size of a large model car. Figures are estimated unless a file that makes on
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import pi, radians
+from math import pi, radians, sqrt
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
@@ -111,7 +111,7 @@ def x_frame(arm: float) -> tuple[Rotor, Rotor, Rotor, Rotor]:
     Front right and rear left turn anticlockwise seen from above (reaction to the right), the other two
     clockwise.
     """
-    side = arm * 0.5**0.5
+    side = arm * sqrt(0.5)
     return Rotor(side, -side, -1), Rotor(-side, side, -1), Rotor(side, side, 1), Rotor(-side, -side, 1)
 
 
@@ -143,17 +143,16 @@ class Multirotor:
     def torque_coefficient(self) -> float:
         """k_Q = k_T^1.5 / (FM sqrt(2 rho A)): see ``multirotor``."""
         disc = pi * self.propeller_diameter**2 / 4.0
-        induced: float = (2.0 * AIR_DENSITY * disc) ** 0.5
+        induced = sqrt(2.0 * AIR_DENSITY * disc)
         coefficient: float = (
-            self.thrust_coefficient * self.thrust_coefficient**0.5 / (self.figure_of_merit * induced)
+            self.thrust_coefficient * sqrt(self.thrust_coefficient) / (self.figure_of_merit * induced)
         )
         return coefficient
 
     @property
     def hover_speed(self) -> float:
         """Rotor speed at which four rotors carry the weight [rad/s]."""
-        speed: float = (self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient)) ** 0.5
-        return speed
+        return sqrt(self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient))
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,7 @@ def _fill_sensors(row: Array, sensors: SensorSet) -> None:
     for index, noise in enumerate(sensors.noises):
         decay = exponential(-SLOW_EVERY * STEP_S / noise.time)
         at = P_SENSOR + 4 * index
-        row[at : at + 4] = noise.white, noise.slow, decay, noise.slow * (1.0 - decay * decay) ** 0.5
+        row[at : at + 4] = noise.white, noise.slow, decay, noise.slow * sqrt(1.0 - decay * decay)
     row[P_GPS_PERIOD] = round(1.0 / (sensors.gps_rate * STEP_S))
     row[P_GPS_FIX] = sensors.gps_fix
     row[P_RANGE_TOP] = sensors.range_top
@@ -201,7 +200,7 @@ def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     row[P_SPIN_DAMPING] = spec.spin_damping
     row[P_FEET : P_FEET + 3] = spec.feet
     row[P_STIFFNESS] = weight / 4.0 / 0.005  # stands 5 mm deep in its four springs
-    row[P_DAMPING] = (spec.mass * row[P_STIFFNESS]) ** 0.5 * 0.8  # a little below critical for four feet
+    row[P_DAMPING] = sqrt(spec.mass * row[P_STIFFNESS]) * 0.8  # a little below critical for four feet
     row[P_FRICTION] = spec.friction
     for index, rotor in enumerate(spec.rotors):
         row[P_ROTOR_X + index] = rotor.forward
@@ -239,7 +238,7 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
     row[P_FULL_VOLTS] = 0.0
     row[P_IDLE_POWER] = spec.idle_power
     decay = exponential(-GUST_EVERY * STEP_S / wind.gust_time)
-    row[P_GUST_DECAY], row[P_GUST_KICK] = decay, (1.0 - decay * decay) ** 0.5
+    row[P_GUST_DECAY], row[P_GUST_KICK] = decay, sqrt(1.0 - decay * decay)
     row[P_GRAVITY] = STANDARD_GRAVITY
     row[P_FIELD : P_FIELD + 3] = magnetic_field(frame)
     if isinstance(spec, Multirotor):

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numba import njit
@@ -42,7 +43,7 @@ class Wind:
     @property
     def gust_time(self) -> float:
         """Correlation time T = L / V in seconds, V at least 2 m/s."""
-        speed: float = (self.east**2 + self.north**2 + self.up**2) ** 0.5
+        speed = sqrt(self.east * self.east + self.north * self.north + self.up * self.up)
         return self.gust_length / max(speed, 2.0)
 
 
