@@ -51,8 +51,8 @@ class Performer:
             undone = self._sequence(asked, plan())
             if not undone:
                 return
-        times = f" and was started over {restarts} times" if restarts else ""
-        raise Overridden(self._driver.name, asked, f"{undone} before lift-off{times}")
+        times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
+        raise Overridden(self._driver.name, asked, undone + times + self._last_text())
 
     def check_ours(self, asked: str) -> None:
         """Raise ``Overridden`` if it flies in a mode that this program did not command."""
@@ -64,8 +64,8 @@ class Performer:
         raise kind(
             self._driver.name,
             asked,
-            f"flies in {seen.mode} (status {seen.status}), which this program did not command"
-            f"{self._last_text(0)}; to hand it over, switch the vehicle to {self._driver.handover}",
+            f"is in {seen.mode} (status {seen.status}), which this program did not command"
+            f"{self._last_text()}; to hand it over, switch the vehicle to {self._driver.handover}",
         )
 
     def _sequence(self, asked: str, steps: Sequence[Step]) -> str:
@@ -96,8 +96,8 @@ class Performer:
         """How much longer it may be silent."""
         return self._driver.telemetry.heard + self._silence - self._kernel.now()
 
-    def _last_text(self, since: Ns) -> str:
-        texts = self._driver.telemetry.texts_since(since)
+    def _last_text(self) -> str:
+        texts = self._driver.telemetry.texts_since(0)
         return f"; it said {texts[-1]!r}" if texts else ""
 
 

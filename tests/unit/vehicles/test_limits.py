@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
+from volery.vehicles.limits import Fence, Home, Limits, Zone, too_high, violation
+
+HOME = Position(46.0828, -103.8990, AMSL(900.0))
+FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
+
+
+def at(east: float, north: float, up: float = 10.0) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, up))
+    return Position(latitude, longitude, AMSL(900.0 + up))
+
+
+def corners(*points: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    return tuple((at(*point).latitude, at(*point).longitude) for point in points)
+
+
+SQUARE = corners((-50, 20), (50, 20), (50, 120), (-50, 120))
+
+
+def check(start: Position, goal: Position, fence: Fence | None = None, limits: Limits | None = None) -> str:
+    return violation(start, goal, HOME, limits or Limits(), fence)
+
+
+def test_within_everything() -> None:
+    assert check(at(0, 0), at(100, 100)) == ""
+
+
+def test_limits_about_home() -> None:
+    assert "10.1 km from home" in check(at(0, 0), at(0, 10_100))
+    assert check(at(0, 0), at(0, 10_100), limits=Limits(farthest=11_000)) == ""
+    assert "underground" in check(at(0, 0), at(0, 10, -3))
+    assert check(at(0, 0), at(0, 10, -3), limits=Limits(lowest=-50)) == ""
+    assert "121.0 m above home" in check(at(0, 0), at(0, 10, 121))
+    assert "150.0 m above home" in check(at(0, 0), Position(46.083, -103.899, AboveGround(150)))
+
+
+def test_hints_for_who_mixed_up_altitudes() -> None:
+    mixed = Position(46.083, -103.899, AboveHome(940))
+    assert "did you mean AMSL(940)? Home is 900 m AMSL" in check(at(0, 0), mixed)
+    assert "did you mean AboveHome(40)?" in check(at(0, 0), Position(46.083, -103.899, AMSL(40)))
+    assert "did you mean" not in too_high(5000.0, Limits(), HOME)
+    assert "did you mean" not in too_high(940.0, Limits())
+
+
+def test_a_fence_is_not_left_by_the_goal_nor_on_the_way() -> None:
+    bent = Fence(polygon=corners((-10, -10), (100, -10), (100, 100), (90, 100), (90, 10), (-10, 10)))
+    assert check(at(0, 0), at(95, 0), bent) == ""
+    assert "outside the fence" in check(at(0, 0), at(0, 50), bent)
+    assert "leaves the fence" in check(at(0, 0), at(95, 95), bent)
+
+
+def test_a_fence_has_a_floor_and_a_ceiling() -> None:
+    fence = Fence(floor=AboveHome(5), ceiling=AMSL(930))
+    assert check(at(0, 0), at(0, 50, 20), fence) == ""
+    assert "below the fence's floor of 5 m above home" in check(at(0, 0), at(0, 50, 3), fence)
+    assert "above the fence's ceiling of 930 m AMSL" in check(at(0, 0), at(0, 50, 31), fence)
+
+
+def test_a_zone_is_neither_entered_nor_crossed() -> None:
+    fence = Fence(no_fly=(Zone("school", SQUARE),))
+    assert "no-fly zone 'school'" in check(at(0, 0), at(0, 60), fence)
+    assert "no-fly zone 'school'" in check(at(0, 0), at(0, 200), fence)
+    assert check(at(0, 0), at(100, 0), fence) == ""
+    assert "school" in check(at(-60, 10), at(60, 130), fence)  # through two of its corners
+
+
+def test_a_zone_may_be_passed_above_and_left() -> None:
+    fence = Fence(no_fly=(Zone("school", SQUARE, ceiling=AboveHome(30)),))
+    assert check(at(0, 0, 40), at(0, 200, 40), fence) == ""
+    assert "school" in check(at(0, 0, 40), at(0, 200, 10), fence)
+    assert check(at(0, 10, 40), at(0, 10, 10), fence) == ""
+    assert check(at(0, 60, 10), at(0, 0, 10), fence) == ""  # it starts inside, and leaves
+    assert "school" in check(at(0, 60, 40), at(0, 60, 10), fence)
+
+
+def test_what_makes_no_sense_as_a_fence() -> None:
+    with pytest.raises(UsageError, match="zone 'x' has 2 corners"):
+        Zone("x", SQUARE[:2])
+    with pytest.raises(UsageError, match="the fence has 1 corners"):
+        Fence(polygon=SQUARE[:1])
+    with pytest.raises(UsageError, match="cannot be compared"):
+        Fence(ceiling=Ellipsoidal(900))
+    with pytest.raises(UsageError, match="off the globe"):
+        Zone("x", ((0, 0), (0, 1), (95, 1)))
+    with pytest.raises(UsageError, match="no room to fly"):
+        Limits(highest=-5)
+
+
+metres = st.floats(-300, 300)
+
+
+@given(metres, metres, metres, metres)
+def test_against_a_path_taken_in_small_steps(x0: float, y0: float, x1: float, y1: float) -> None:
+    """A path is refused if one of its points is clearly inside the zone, and not if none is even near."""
+    fence = Fence(no_fly=(Zone("school", SQUARE),))
+    refused = bool(check(at(x0, y0), at(x1, y1), fence))
+    points = [(x0 + (x1 - x0) * k / 200, y0 + (y1 - y0) * k / 200) for k in range(201)]
+    depths = [min(50 - abs(x), 50 - abs(y - 70)) for x, y in points]
+    starts_inside = depths[0] > 0
+    if max(depths) > 0.5 and not starts_inside:
+        assert refused
+    if max(depths) < -0.5:
+        assert not refused
+
+
+@given(metres, metres)
+def test_home_is_where_the_local_frame_begins(east: float, north: float) -> None:
+    local = Home.at(HOME).local(at(east, north, 25.0))
+    assert local[0] == pytest.approx(east, abs=0.01)
+    assert local[1] == pytest.approx(north, abs=0.01)
+    assert local[2] == pytest.approx(25.0)
