@@ -11,6 +11,7 @@ from volery.report.grids import (
     Column,
     Grid,
     bound,
+    brief,
     count,
     energy,
     figure,
@@ -91,8 +92,8 @@ def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord])
 
 Take = Callable[[ComponentRecord], Cell]
 _QUESTIONS: tuple[tuple[str, Take], ...] = (
-    ("execution s", lambda one: Cell(number(one.cpu_s, 3), share=one.cpu_s)),
-    ("of it ROS s", lambda one: Cell(number(one.ros_cpu_s, 3), share=one.ros_cpu_s)),
+    ("execution s", lambda one: Cell(brief(one.cpu_s), share=one.cpu_s)),
+    ("of it ROS s", lambda one: Cell(brief(one.ros_cpu_s), share=one.ros_cpu_s)),
     ("response p95 ms", lambda one: Cell(milliseconds(one.response_s.p95), share=one.response_s.p95)),
     ("response max ms", lambda one: Cell(milliseconds(one.response_s.max), share=one.response_s.max)),
     (

@@ -36,6 +36,7 @@ from volery.report.grids import (
 )
 from volery.requirements.accounts import Accounts
 from volery.requirements.observables import Observers, bounds_of
+from volery.requirements.observers import DELIVERED
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record
 from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME
@@ -192,9 +193,8 @@ def _facts(record: RunRecord) -> list[Fact]:
         speed = number(record.real_time_factor, 0, "× real time")
         facts.append(Fact("it took", number(record.wall_s, 1, "s"), speed))
     if record.parcels:
-        ended = [parcel.state for parcel in record.parcels.values()]
-        common = "delivered" if "delivered" in ended else max(ended, key=ended.count)
-        facts.append(Fact(f"parcels {common}", f"{ended.count(common)} of {len(ended)}"))
+        states = [parcel.state for parcel in record.parcels.values()]
+        facts.append(Fact("parcels delivered", f"{states.count(DELIVERED)} of {len(states)}"))
     if record.vehicles:
         flown = sum(one.distance_m for one in record.vehicles.values())
         facts.append(

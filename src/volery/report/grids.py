@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import floor, log10
 from typing import Literal
 
 from volery.base.time import clock, from_seconds
@@ -87,6 +88,13 @@ def total(values: list[float | None]) -> float | None:
     """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
     known = [value for value in values if value is not None]
     return sum(known) if values and len(known) == len(values) else None
+
+
+def brief(seconds: float) -> str:
+    """Seconds to a millisecond; what is shorter than ten, to two digits that say something."""
+    if seconds == 0.0 or seconds >= 0.01:
+        return number(seconds, 3)
+    return f"{seconds:.{1 - floor(log10(seconds))}f}"
 
 
 def milliseconds(seconds: float | None) -> str:
@@ -172,7 +180,7 @@ def _cost_row(name: str, one: ComponentRecord, longest: float) -> tuple[Cell, ..
         Cell(name),
         Cell(one.processor or "none", status="" if one.processor else "warn"),
         Cell(one.language or NOTHING, status="quiet"),
-        Cell(number(one.cpu_s, 3), share=one.cpu_s / longest if longest else None),
+        Cell(brief(one.cpu_s), share=one.cpu_s / longest if longest else None),
         Cell(NOTHING if ros_share is None else number(100.0 * ros_share, 1, "%")),
         Cell(count(sum(one.ros_calls.values()))),
         Cell(count(one.activations)),

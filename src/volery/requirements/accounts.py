@@ -68,6 +68,7 @@ class Accounts:
         self.setup = setup
         self._energy = energy
         self._components = {one.name: ComponentLedger(one, one.processor) for one in setup.components}
+        self._declared = tuple(self._components)
         self._processors = {one.name: one for one in setup.processors}
         self._busy: dict[str, Ns] = dict.fromkeys(self._processors, 0)
         self._vehicles = {one.name: VehicleLedger(one) for one in setup.vehicles}
@@ -188,9 +189,11 @@ class Accounts:
         )
 
     def _component_records(self) -> dict[str, ComponentRecord]:
+        """Without the house's own flows of control, which were neither set up nor allocated."""
         return {
             name: ledger.record(self._above_idle(ledger.processor))
             for name, ledger in self._components.items()
+            if ledger.processor or name in self._declared
         }
 
     def _above_idle(self, processor: str) -> Callable[[float], float | None]:
@@ -243,18 +246,21 @@ class Accounts:
 
     def _not_counted(self) -> list[str]:
         """What the accounts themselves can see is missing."""
-        missing = []
-        for name, ledger in self._components.items():
-            if not ledger.processor:
-                missing.append(
-                    f"{name}: allocated to no processor, so its computing took no time and no energy"
-                )
-            elif ledger.uncounted():
-                missing.append(f"{name}: no cost of its own code was counted, only its ROS calls")
-        for name, setup in self._processors.items():
-            if self._energy(setup, 1.0, 1.0) is None:
-                missing.append(f"{name}: no power figures for {setup.kind or 'this processor'}, so no energy")
-        return missing
+        homeless = [name for name in self._declared if not self._components[name].processor]
+        uncounted = [
+            name for name, ledger in self._components.items() if ledger.processor and ledger.uncounted()
+        ]
+        powerless = [
+            f"{name} ({setup.kind or 'unknown'})"
+            for name, setup in self._processors.items()
+            if self._energy(setup, 1.0, 1.0) is None
+        ]
+        missing = (
+            ("their own code, of which nothing but ROS calls was counted", uncounted),
+            ("all computing, since they are allocated to no processor", homeless),
+            ("energy, for want of power figures", powerless),
+        )
+        return [f"{', '.join(names)}: {what}" for what, names in missing if names]
 
 
 def _failure(event: Failure) -> FailureRecord:

@@ -1,5 +1,6 @@
 """Accounts: what a stream of events comes to."""
 
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -119,10 +120,9 @@ def test_deadlines_and_responses_of_activations() -> None:
 
 
 def test_a_passive_component_answers_calls() -> None:
-    found = books(
-        Call(0, 3 * MS, "a", "planner", "path", "ok"), Call(0, 5 * MS, "a", "planner", "path", "ok")
-    )
-    response = found.components["planner"].response_s
+    asked = Call(0, 3 * MS, "a", "planner", "path", "ok")
+    setup = RunSetup(components=(ComponentSetup("planner"),))
+    response = books(asked, asked._replace(end=5 * MS), setup=setup).components["planner"].response_s
     assert (response.of, response.count, response.mean, response.max) == ("calls", 2, 0.004, 0.005)
 
 
@@ -131,10 +131,15 @@ def test_what_the_accounts_see_is_missing() -> None:
         Activation(0, 1, "control", NONE),
         Charge(0, "control", "onboard", "ros:publish", 1, 0, 0.0),
         Call(0, 1, "a", "nowhere", "ask", "ok"),
+        Activation(0, 1, "safety", NONE),
+        setup=replace(
+            SETUP, components=(*SETUP.components, ComponentSetup("nowhere"), ComponentSetup("somewhere"))
+        ),
     )
-    assert any(line.startswith("control: no cost of its own code") for line in found.not_counted)
-    assert any(line.startswith("nowhere: allocated to no processor") for line in found.not_counted)
+    assert "control: their own code, of which nothing but ROS calls was counted" in found.not_counted
+    assert "nowhere, somewhere: all computing, since they are allocated to no processor" in found.not_counted
     assert found.components["nowhere"].energy_j is None
+    assert "safety" not in found.components
 
 
 def test_a_vehicle_flies_and_lands() -> None:

@@ -131,12 +131,15 @@
     }
     const bins = processor.misses.length;
     const top = Array.from({ length: bins }, (_, bin) => shown.reduce((sum, one) => sum + (one.share[bin] || 0), 0));
-    const high = Math.min(100, Math.max(1, 1.15 * top.reduce((a, b) => Math.max(a, b), 0)));
+    const peak = top.reduce((a, b) => Math.max(a, b), 0);
+    const usual = [...top].sort((a, b) => a - b)[Math.floor(0.98 * (bins - 1))] || 0;
+    const cut = peak > 4 * usual && usual > 0; // a rare peak must not flatten everything else
+    const high = Math.min(100, Math.max(cut ? 0.1 : 1, cut ? 2 * usual : 1.15 * peak));
     const caption = make("figcaption");
     const title = make("h3", "", processor.name);
     const cores = processor.cores === 1 ? "1 core" : processor.cores + " cores";
     const missed = processor.misses.reduce((a, b) => a + b, 0);
-    title.append(make("small", "", cores + (missed ? ", " + missed + " missed deadlines" : "")));
+    title.append(make("small", "", cores + (cut ? ", peak " + peak.toFixed(1) + " % beyond the chart" : "") + (missed ? ", " + missed + " missed deadlines" : "")));
     caption.append(title);
     const holderOf = make("div", "chart");
     figure.append(caption, holderOf);

@@ -63,7 +63,7 @@
       context.fill();
     }
     context.strokeStyle = colour("road");
-    context.lineWidth = Math.min(Math.max(6 * view.scale, 2.5), 14);
+    context.lineWidth = Math.min(Math.max(6 * view.scale, 2.5), 9);
     for (const road of scenery.roads) { path(context, road); context.stroke(); }
     context.strokeStyle = colour("lane");
     context.lineWidth = 1.5;
