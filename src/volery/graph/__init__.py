@@ -7,6 +7,7 @@ are asked of two functions that are given from above.
 from volery.graph.embedded import EmbeddedNode
 from volery.graph.graph import Graph, ServiceState, TopicState
 from volery.graph.node import (
+    AS_OFFERED,
     BEST_AVAILABLE,
     BEST_EFFORT,
     DEFAULT,
@@ -33,6 +34,7 @@ from volery.graph.node import (
 from volery.graph.services import ServiceError
 
 __all__ = [
+    "AS_OFFERED",
     "BEST_AVAILABLE",
     "BEST_EFFORT",
     "DEFAULT",

@@ -11,7 +11,7 @@ from volery.graph import names
 from volery.graph.clock import CLOCK
 from volery.graph.context import Context, Member
 from volery.graph.group import CallbackGroup, Work
-from volery.graph.node import DEFAULT, Callback, Group, Handler, QoS
+from volery.graph.node import AS_OFFERED, DEFAULT, Callback, Group, Handler, QoS
 from volery.graph.services import EmbeddedClient, EmbeddedService
 from volery.graph.timing import NodeRate, NodeTimer, sleep
 from volery.graph.topics import EmbeddedPublisher, EmbeddedSubscription, topic
@@ -91,7 +91,7 @@ class EmbeddedNode:
         topic_name: str,
         message_type: str,
         callback: Callback,
-        qos: QoS = DEFAULT,
+        qos: QoS = AS_OFFERED,
         group: Group | None = None,
     ) -> EmbeddedSubscription:
         """Call *callback* with each message of a topic."""

@@ -45,6 +45,8 @@ class QoS:
 
 
 DEFAULT = QoS()
+AS_OFFERED = QoS(reliability=BEST_AVAILABLE, durability=BEST_AVAILABLE)
+"""What a subscription wants unless it says otherwise: whatever the publisher offers, as in ROS 1."""
 SENSOR_DATA = QoS(depth=5, reliability=BEST_EFFORT)
 LATCHED = QoS(depth=1, durability=TRANSIENT_LOCAL)
 
@@ -190,7 +192,7 @@ class Node(Protocol):
         topic: str,
         message_type: str,
         callback: Callback,
-        qos: QoS = DEFAULT,
+        qos: QoS = AS_OFFERED,
         group: Group | None = None,
     ) -> Subscription:
         """Call *callback* with each message of a topic, in *group* (the node's own if none is given)."""

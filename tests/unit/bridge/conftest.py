@@ -9,7 +9,7 @@ from volery import messages
 from volery.base.geoid import Geoid
 from volery.base.time import MS, S
 from volery.bridge import VehicleNode, VehicleNodeOptions
-from volery.graph import BEST_AVAILABLE, Graph, QoS
+from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
@@ -66,8 +66,7 @@ class Aviary:
     def hear(self, topic: str, message_type: str) -> list[Any]:
         """Collect the messages of a topic."""
         heard = self.got[topic] = []
-        late = QoS(reliability=BEST_AVAILABLE, durability=BEST_AVAILABLE)
-        self.user.subscribe(f"/drone_1/{topic}", message_type, heard.append, late)
+        self.user.subscribe(f"/drone_1/{topic}", message_type, heard.append)
         return heard
 
     def tell(self, topic: str, message_type: str, **fields: Any) -> None:

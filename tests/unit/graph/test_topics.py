@@ -5,7 +5,7 @@ import pytest
 from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.graph import BEST_AVAILABLE, BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, QoS
+from volery.graph import AS_OFFERED, BEST_AVAILABLE, BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, QoS
 from volery.trace.events import NONE, Message, Published, Text
 
 STRING = "std_msgs/msg/String"
@@ -140,6 +140,10 @@ def test_latched_messages_reach_who_comes_late(rig: Any) -> None:
 def test_transient_local_keeps_as_many_as_its_depth(rig: Any) -> None:
     offered = QoS(depth=2, durability=TRANSIENT_LOCAL)
     assert late(rig, offered, QoS(durability=BEST_AVAILABLE)) == ["b", "c", "d"]
+
+
+def test_a_subscription_takes_what_is_offered_unless_it_says_otherwise(rig: Any) -> None:
+    assert late(rig, LATCHED, AS_OFFERED) == ["c", "d"]
 
 
 def test_a_volatile_subscriber_hears_only_what_follows(rig: Any) -> None:
