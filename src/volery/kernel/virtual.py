@@ -284,7 +284,7 @@ class VirtualKernel:
         """
         if self._current is not None or (self._hub is not None and self._hub is getcurrent()):
             raise UsageError("run() from inside the run: time passes while a task blocks")
-        self._until = until
+        self._until = min(until, FOREVER)
         self._owner = getcurrent()
         with self._watched():
             self._hub_runs()

@@ -168,8 +168,9 @@ def test_park_says_whether_it_was_woken(kernel: Kernel, spawn: Spawn) -> None:
 
     def sleeper() -> None:
         said.append(kernel.park(kernel.now() + MS, "nobody"))
-        kernel.call_at(kernel.now() + MS, lambda: kernel.wake(task))
-        said.append(kernel.park(kernel.now() + LONG, "somebody"))
+        with kernel:  # nobody wakes it before it waits
+            kernel.call_at(kernel.now() + MS, lambda: kernel.wake(task))
+            said.append(kernel.park(kernel.now() + LONG, "somebody"))
         parked.set()
 
     task = spawn(sleeper)

@@ -122,8 +122,15 @@ def test_user_code_cannot_swallow_an_interrupt(virtual: VirtualKernel, spawn: Sp
 
 def test_a_script_that_blocks_is_interrupted_in_its_wait(kernel: Kernel) -> None:
     never: Queue[int] = Queue(kernel, "never")
-    with kernel.adopt("script"):
-        kernel.call_at(10 * MS, ctrl_c)
+
+    def once_it_waits() -> None:
+        if script.waiting_for == "never":
+            ctrl_c()
+        else:
+            kernel.call_at(kernel.now() + MS, once_it_waits)
+
+    with kernel.adopt("script") as script:
+        kernel.call_at(0, once_it_waits)
         with pytest.raises(KeyboardInterrupt):
             never.get()
         sleep(kernel, MS)  # and may go on
