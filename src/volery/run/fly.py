@@ -138,7 +138,7 @@ def kind_of(mission: Mission) -> type[Vehicle]:
 
 
 def home_of(mission: Mission) -> Position:
-    """Where simulated vehicles stand: the ``HOME`` that stands beside the mission in its file, if one does."""
+    """Where simulated vehicles stand: the ``HOME`` beside the mission in its file, if there is one."""
     home = getattr(mission, "__globals__", {}).get("HOME", HOME)
     if not isinstance(home, Position) or not isinstance(home.altitude, AMSL):
         raise UsageError(f"HOME is {home!r}; state it as Position(LATITUDE, LONGITUDE, AMSL(METRES))")

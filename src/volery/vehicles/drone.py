@@ -122,6 +122,7 @@ class Drone(Vehicle):
             "set_velocity",
             asked,
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
+            noted=False,
         )
 
     def set_heading(self, degrees: float) -> None:
@@ -140,10 +141,14 @@ class Drone(Vehicle):
 
     # -- without
 
-    def land(self) -> None:
-        """Descend here, until it is on the ground and disarmed."""
+    def land(self, at: Position | None = None) -> None:
+        """Descend here, until it is on the ground and disarmed.
+
+        *at* is where it was to touch down, if that is not here: the record measures against it. The autopilot
+        goes straight down either way.
+        """
         self._require(Capability.LAND)
-        here = self._driver.telemetry.position
+        here = at or self._driver.telemetry.position
         within = self._landing_within(0.0)
         self._operate(
             "land",

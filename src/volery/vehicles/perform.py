@@ -191,7 +191,7 @@ class _Attempt:
         ours = step.enters or step.mode
         if seen.mode == ours or seen.mode in step.leads_to:
             self._mode_before = seen.mode
-        elif seen.mode != self._mode_before and not self._changed:
+        elif ours and seen.mode != self._mode_before and not self._changed:
             self._changed = f"changed from {self._mode_before} to {seen.mode}"
         self._was_armed = self._was_armed or seen.armed
         if step.armed and self._was_armed and not seen.armed and not self._changed:

@@ -254,8 +254,12 @@ class Vehicle(ABC):
         goal: Callable[[], Goal] = lambda: NOWHERE,
         restarts: int = 0,
         ours: bool = True,
+        noted: bool = True,
     ) -> None:
-        """Perform and record it. *ours*: refuse it while somebody else flies the vehicle."""
+        """Perform and record it. *ours*: refuse it while somebody else flies the vehicle.
+
+        *noted* False: record it only if it fails; a loop of set-points is no list of operations.
+        """
         self._hear()
         with self._kernel as kernel:
             self._take(kernel.current(), operation)
@@ -271,7 +275,8 @@ class Vehicle(ABC):
         finally:
             with self._kernel.guard:
                 self._busy = None
-                self._record(start, operation, asked, (outcome, said), goal())
+                if noted or outcome != "ok":
+                    self._record(start, operation, asked, (outcome, said), goal())
 
     def _take(self, task: Task | None, operation: str) -> None:
         """One operation at a time: two tasks that command one vehicle is a fault of the program."""

@@ -24,7 +24,7 @@ from volery.kernel.api import Action, Handle, Kernel
 from volery.links.link import Link
 from volery.trace.events import VehicleState
 
-WARM_UP = 20 * MS
+WARM_UP = 300 * MS
 """A warm vehicle has its position and its home this long after it was made."""
 
 
@@ -72,9 +72,14 @@ class Autopilot:
         """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
         return self.dialect.boot_bytes[0].data if self.dialect.boot_bytes else b""
 
-    def connect(self, link: Link) -> None:
-        """Serve this link, too. The first one starts a vehicle that waits for a client."""
+    def connect(self, link: Link, *, switch_on: bool = True) -> None:
+        """Serve this link, too. The first one switches a cold vehicle on, unless *switch_on* is False."""
         self.face.connect(link)
+        if switch_on:
+            self.switch_on()
+
+    def switch_on(self) -> None:
+        """Boot now, if that has not happened yet: a firmware on TCP waits for its first client."""
         if not self._booted:
             self._booted = True
             self._boot(0)
@@ -106,7 +111,7 @@ class Autopilot:
         else:
             for event in dialect.boot_events:
                 self._at(event.after, lambda act=event.act: act(vehicle))  # type: ignore[misc]
-            for words in dialect.boot_bytes:
+            for words in dialect.boot_bytes[1:]:  # the banner is sent by whoever accepts a client
                 self._at(words.after, lambda data=words.data: self.face.send_bytes(data))  # type: ignore[misc]
         self.face.start()
         self._clocks.append(self._kernel.every(dialect.tick, self._tick))

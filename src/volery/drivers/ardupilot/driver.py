@@ -9,6 +9,7 @@ and never expires; a velocity stands for 3 s. Sticks fall back on the transmitte
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import isfinite
 
 from volery.base.errors import LinkError, UsageError
@@ -149,14 +150,19 @@ class ArduPilot:
             mode=GUIDED,
             armed=True,
         )
-        return (*self.ready(READY_WITHIN), *self._guided(), *self.arm(), climb)
+        return (*self._armed_in_guided(), climb)
+
+    def _armed_in_guided(self) -> Sequence[Step]:
+        """Whoever changes the mode meanwhile has it: to arm in another one is not what was asked."""
+        armed = (replace(step, mode=GUIDED) for step in self.arm())
+        return (*self.ready(READY_WITHIN), *self._guided(), *armed)
 
     # -- by position
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
         """GUIDED, then a target; a rover is armed on the way."""
         rover = self.telemetry.kind != DRONE_KIND
-        start = (*self.ready(READY_WITHIN), *self._guided(), *self.arm()) if rover else self._guided()
+        start = self._armed_in_guided() if rover else self._guided()
         target = Step(
             ask=f"reach {goal}",
             send=lambda: self._commands.target(goal),

@@ -26,11 +26,15 @@ _UNKNOWN = -1
 
 
 class Hearing:
-    """Turns messages into telemetry. ``hear`` one; it says whether it was of interest."""
+    """Turns messages into telemetry. ``hear`` one; it says whether it was of interest.
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry) -> None:
+    *record*: the autopilot's texts go into the trace, too.
+    """
+
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
         self._kernel = kernel
         self._seen = telemetry
+        self._records = record
         self._texts = Texts(self._say)
         self._landed_state = UNDEFINED
         self._estimates_position = False
@@ -134,4 +138,5 @@ class Hearing:
     def _say(self, severity: int, text: str) -> None:
         now = self._kernel.now()
         self._seen.texts.append(Said(now, severity, text))
-        self._kernel.record(Text(now, self._seen.name, severity, text))
+        if self._records:
+            self._kernel.record(Text(now, self._seen.name, severity, text))

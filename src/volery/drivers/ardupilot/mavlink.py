@@ -52,7 +52,7 @@ KEYS: Mapping[int, str] = {
     constant("MAV_CMD_MISSION_START"): key.START,
 }
 
-OPTIONS = ("attitude", "baud", "rate", "system")
+OPTIONS = ("attitude", "baud", "rate", "system", "texts")
 
 
 def stream_periods(rate: float, attitude: float) -> dict[str, Ns]:
@@ -73,7 +73,8 @@ def stream_periods(rate: float, attitude: float) -> dict[str, Ns]:
 class MavlinkCommands:
     """See ``Commands``. ``system`` is the autopilot's id; ``None`` takes the first ArduPilot that speaks.
 
-    Options: ``rate`` of the position and ``attitude`` in Hz, ``system``.
+    Options: ``rate`` of the position and ``attitude`` in Hz, ``system``; ``texts=unrecorded`` where the autopilot
+    records its texts itself, as a simulated one does.
     """
 
     cycle: Action | None = None
@@ -84,7 +85,7 @@ class MavlinkCommands:
         self._link = link
         self._system = _whole("system", options, None)
         self._component = 1
-        self._hearing = Hearing(kernel, self.telemetry)
+        self._hearing = Hearing(kernel, self.telemetry, record=_recorded(options))
         self._streams = Streams(
             stream_periods(_number("rate", options, 10.0, least=0.1), _number("attitude", options, 0.0)),
             self._request,
@@ -300,6 +301,13 @@ def _number(name: str, options: Mapping[str, str], default: float, *, least: flo
     if not least <= number <= 100.0:
         raise UsageError(f"{name}={given!r} is no rate in Hz from {least:g} to 100")
     return number
+
+
+def _recorded(options: Mapping[str, str]) -> bool:
+    given = options.get("texts", "recorded")
+    if given not in {"recorded", "unrecorded"}:
+        raise UsageError(f"texts={given!r}; there is recorded or unrecorded")
+    return given == "recorded"
 
 
 def _whole(name: str, options: Mapping[str, str], default: int | None) -> int | None:
