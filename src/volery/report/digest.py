@@ -10,7 +10,7 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass, field
 from math import hypot, isnan
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -73,7 +73,11 @@ class _Track:
 
 
 class Digest:
-    """Call it with every event of a run, then ask for its ``data``."""
+    """Call it with the events of a run, at least of the kinds in ``listens``, then ask for its ``data``."""
+
+    listens: ClassVar[frozenset[type[Any]]] = frozenset(
+        (VehicleState, Slice, Activation, Milestone, Message, Failure, Operation, LinkState, Text)
+    )
 
     def __init__(self, setup: RunSetup, scenery: Scenery | None) -> None:
         self._setup = setup

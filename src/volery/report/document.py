@@ -7,7 +7,7 @@ are kept anew from the trace.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -68,32 +68,38 @@ class Material:
 
 
 def gather(folder: Path, *taps: Record) -> Material:
-    """Read the trace of *folder*, and its ``run.json`` if it has one; *taps* are told every event as well.
+    """Read the trace of *folder*, and its ``run.json`` if it has one.
 
-    Without a ``run.json`` the accounts are kept anew, and requirements that the run did not come to judge are
-    judged by what the trace holds. Raises ``UsageError`` if there is no trace or it breaks off before its
-    set-up.
+    Without a ``run.json`` the accounts are kept anew, *taps* are told every event as well, and requirements
+    that the run did not come to judge are judged by what the trace holds. Raises ``UsageError`` if there is
+    no trace or it breaks off before its set-up.
     """
     with Reading(folder / TRACE_FILE) as reading:
         setup = reading.setup
         attached = reading.attachments.get(WORLD_ATTACHMENT)
         digest = Digest(setup, scenery_from_json(attached.data) if attached else None)
-        accounts = Accounts(setup)
-        observers = Observers(bounds_of(setup), setup)
-        everybody: tuple[Record, ...] = (digest, accounts, observers, *taps)
-        judged = False
-        for event in reading.events():
-            judged = judged or isinstance(event, Verdict)
-            for tap in everybody:
-                tap(event)
-        ending = reading.metadata.get(OUTCOME, {})
-    if (folder / RUN_FILE).exists():
-        record = read_record(folder)
-    else:
-        for verdict in () if judged else observers.verdicts(accounts.last):
-            accounts(verdict)
-        record = accounts.record(status_of(ending), ending.get("reason", "") or reading.lost)
+        if (folder / RUN_FILE).exists():
+            record = read_record(folder)
+            for event in reading.events(Digest.listens):
+                digest(event)
+        else:
+            record = _account(reading, (digest, *taps))
     return Material(record, digest.data(record.sim_s), reading.lost)
+
+
+def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
+    accounts = Accounts(reading.setup)
+    observers = Observers(bounds_of(reading.setup), reading.setup)
+    everybody: tuple[Record, ...] = (accounts, observers, *taps)
+    judged = False
+    for event in reading.events():
+        judged = judged or isinstance(event, Verdict)
+        for tap in everybody:
+            tap(event)
+    for verdict in () if judged else observers.verdicts(accounts.last):
+        accounts(verdict)
+    ending = reading.metadata.get(OUTCOME, {})
+    return accounts.record(status_of(ending), ending.get("reason", "") or reading.lost)
 
 
 def status_of(ending: Mapping[str, str]) -> Status:

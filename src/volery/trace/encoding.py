@@ -29,6 +29,11 @@ OWN_EVENTS: tuple[type[Any], ...] = tuple(kind for kind in get_args(Event) if ki
 """The events that become messages of ``volery_msgs``; ``Published`` is a message already."""
 
 
+_make: Callable[[type[Any], tuple[Any, ...]], Any] = (
+    tuple.__new__
+)  # as a named tuple makes itself, at less cost
+
+
 def type_name(kind: type[Any]) -> str:
     """``volery_msgs/msg/Slice``."""
     return f"{PACKAGE}/msg/{kind.__name__}"
@@ -102,7 +107,7 @@ class Codec:
             if len(self._said) >= _REMEMBERED:
                 self._said.clear()
             said = self._said[tail] = _decode_words(tail)
-        return self.kind._make(self._in_order((*numbers, *said)))
+        return _make(self.kind, self._in_order((*numbers, *said)))
 
 
 def _encode_words(words: tuple[str, ...]) -> bytes:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from mcap import records
 from mcap.data_stream import ReadDataStream
@@ -25,6 +25,8 @@ from volery.trace.events import Event, Published
 from volery.trace.mcap_writer import MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
 from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_from_json
 
+_Decoder = Callable[[Ns, bytes], Event | None]
+_MESSAGE = int(Opcode.MESSAGE)
 _HEAD = struct.Struct("<BQ")
 _FRAME = struct.Struct(f"<{MESSAGE_FRAME[2:]}")
 # start, end, uncompressed size, checksum, length of the name of the compression
@@ -77,7 +79,8 @@ class Reading:
         self.lost = ""
         self._codecs = {type_name(kind): Codec(kind) for kind in OWN_EVENTS}
         self._schemas: dict[int, str] = {}
-        self._channels: dict[int, tuple[str, str, str]] = {}
+        self._decoders: dict[int, _Decoder | None] = {}
+        self._wanted: Callable[[type[Any]], bool] = lambda kind: True
         self._last: Ns = 0
         try:
             self._file: BinaryIO = path.open("rb")
@@ -96,8 +99,10 @@ class Reading:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    def events(self) -> Iterator[Event]:
-        """All events, in the order in which they were told."""
+    def events(self, only: Collection[type[Any]] | None = None) -> Iterator[Event]:
+        """All events, or those of the kinds in *only*, in the order in which they were told."""
+        if only is not None:
+            self._wanted = only.__contains__
         record = self._pending
         while record is not None:
             if record.opcode == Opcode.CHUNK:
@@ -172,44 +177,51 @@ class Reading:
         yield from self._events_of_body(body)
 
     def _events_of_body(self, body: bytes) -> Iterator[Event]:
-        at = 0
-        while at + _HEAD.size <= len(body):
+        at, size = 0, len(body)
+        while at + _HEAD.size <= size:
             opcode, length = _HEAD.unpack_from(body, at)
             at += _HEAD.size
-            if at + length > len(body):
+            if at + length > size:
                 return
-            if opcode == Opcode.MESSAGE:
-                event = self._event(body, at, at + length)
-                if event is not None:
-                    yield event
+            if opcode == _MESSAGE:
+                channel, _, log, _ = _FRAME.unpack_from(body, at)
+                self._last = max(self._last, log)
+                decode = self._decoders.get(channel, self._unknown_channel)
+                if decode is not None:
+                    event = decode(log, body[at + _FRAME.size : at + length])
+                    if event is not None:
+                        yield event
             elif opcode == Opcode.SCHEMA:
                 schema = records.Schema.read(_stream(body[at : at + length]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
                 channel = records.Channel.read(_stream(body[at : at + length]))
-                publisher = channel.metadata.get("publisher", "")
-                self._channels[channel.id] = (self._schemas[channel.schema_id], channel.topic, publisher)
+                self._decoders[channel.id] = self._decoder(channel)
             at += length
 
-    def _event(self, body: bytes, start: int, end: int) -> Event | None:
-        channel, _, log, _ = _FRAME.unpack_from(body, start)
-        described = self._channels.get(channel)
-        if described is None:
-            self._lose("what a channel carries stood in a damaged part: its events are missing")
-            return None
-        schema, topic, publisher = described
-        data = body[start + _FRAME.size : end]
-        self._last = max(self._last, log)
+    def _decoder(self, channel: records.Channel) -> _Decoder | None:
+        """What makes events of the messages of *channel*; ``None`` if nobody wants them."""
+        schema, topic = self._schemas[channel.schema_id], channel.topic
         codec = self._codecs.get(schema)
+        if not self._wanted(Published if codec is None else codec.kind):
+            return None
         if codec is None:
-            return Published(log, topic, schema, publisher, data)
-        try:
-            event: Event = codec.decode(data)
-        except (ValueError, struct.error) as error:
-            raise UsageError(
-                f"{self.path} holds a {schema} that this version cannot read: {error}"
-            ) from error
-        return event
+            publisher = channel.metadata.get("publisher", "")
+            return lambda log, data: Published(log, topic, schema, publisher, data)
+        decode = codec.decode
+
+        def read_own(_: Ns, data: bytes) -> Event:
+            try:
+                event: Event = decode(data)
+            except (ValueError, struct.error) as error:
+                what = f"holds a {schema} that this version cannot read: {error}"
+                raise UsageError(f"{self.path} {what}") from error
+            return event
+
+        return read_own
+
+    def _unknown_channel(self, _: Ns, __: bytes) -> None:
+        self._lose("what a channel carries stood in a damaged part: its events are missing")
 
 
 def _stream(content: bytes) -> ReadDataStream:

@@ -99,6 +99,16 @@ def test_an_attachment_may_come_late(tmp_path: Path) -> None:
     assert len(trace.events) == 2
 
 
+def test_one_may_read_some_kinds_only(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path)
+    for kinds in ({Text, Slice}, {Published}, set()):
+        with Reading(path) as reading:
+            found = list(reading.events(kinds))
+        assert found == [event for event in events if type(event) in kinds]
+        assert reading.complete
+
+
 def test_two_publishers_of_one_topic_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "trace.mcap"
     writer = McapWriter(path, RunSetup())
