@@ -87,57 +87,6 @@ def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
 
 
 @njit(cache=False)
-def _feet(row: Array, ground: float) -> None:
-    """Add what the ground does to four feet to force (east, north, up) and torque (body)."""
-    for foot in range(4):
-        x = row[P_FEET] if foot < 2 else -row[P_FEET]
-        left = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
-        up = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
-        height = (
-            row[W_Y + S_POSITION + 2]
-            + row[W_ROTATION + 6] * x
-            + row[W_ROTATION + 7] * left
-            + row[W_ROTATION + 8] * up
-        )
-        depth = ground - height
-        if depth <= 0.0:
-            continue
-        spin_x = row[W_Y + S_RATES + 1] * up - row[W_Y + S_RATES + 2] * left
-        spin_y = row[W_Y + S_RATES + 2] * x - row[W_Y + S_RATES] * up
-        spin_z = row[W_Y + S_RATES] * left - row[W_Y + S_RATES + 1] * x
-        ve = (
-            row[W_Y + S_VELOCITY]
-            + row[W_ROTATION] * spin_x
-            + row[W_ROTATION + 1] * spin_y
-            + row[W_ROTATION + 2] * spin_z
-        )
-        vn = (
-            row[W_Y + S_VELOCITY + 1]
-            + row[W_ROTATION + 3] * spin_x
-            + row[W_ROTATION + 4] * spin_y
-            + row[W_ROTATION + 5] * spin_z
-        )
-        vu = (
-            row[W_Y + S_VELOCITY + 2]
-            + row[W_ROTATION + 6] * spin_x
-            + row[W_ROTATION + 7] * spin_y
-            + row[W_ROTATION + 8] * spin_z
-        )
-        normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * vu)
-        grip = row[P_FRICTION] * normal / max(sqrt(ve * ve + vn * vn), _SLIP)
-        fe, fn = -grip * ve, -grip * vn
-        row[W_FORCE] += fe
-        row[W_FORCE + 1] += fn
-        row[W_FORCE + 2] += normal
-        bx = row[W_ROTATION] * fe + row[W_ROTATION + 3] * fn + row[W_ROTATION + 6] * normal
-        by = row[W_ROTATION + 1] * fe + row[W_ROTATION + 4] * fn + row[W_ROTATION + 7] * normal
-        bz = row[W_ROTATION + 2] * fe + row[W_ROTATION + 5] * fn + row[W_ROTATION + 8] * normal
-        row[W_TORQUE] += left * bz - up * by
-        row[W_TORQUE + 1] += up * bx - x * bz
-        row[W_TORQUE + 2] += x * by - left * bx
-
-
-@njit(cache=False)
 def rotation_matrix(row: Array, at: int) -> None:
     """The attitude of the state from column *at* as a matrix: body axes to east, north, up."""
     w, x = row[at + S_ATTITUDE], row[at + S_ATTITUDE + 1]
@@ -151,6 +100,59 @@ def rotation_matrix(row: Array, at: int) -> None:
     row[W_ROTATION + 6] = 2.0 * (x * z - w * y)
     row[W_ROTATION + 7] = 2.0 * (y * z + w * x)
     row[W_ROTATION + 8] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=False)
+def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector in body axes as east, north, up."""
+    return (
+        row[W_ROTATION] * x + row[W_ROTATION + 1] * y + row[W_ROTATION + 2] * z,
+        row[W_ROTATION + 3] * x + row[W_ROTATION + 4] * y + row[W_ROTATION + 5] * z,
+        row[W_ROTATION + 6] * x + row[W_ROTATION + 7] * y + row[W_ROTATION + 8] * z,
+    )
+
+
+@njit(cache=False)
+def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, float, float]:
+    """A vector east, north, up in body axes."""
+    return (
+        row[W_ROTATION] * east + row[W_ROTATION + 3] * north + row[W_ROTATION + 6] * up,
+        row[W_ROTATION + 1] * east + row[W_ROTATION + 4] * north + row[W_ROTATION + 7] * up,
+        row[W_ROTATION + 2] * east + row[W_ROTATION + 5] * north + row[W_ROTATION + 8] * up,
+    )
+
+
+@njit(cache=False)
+def _tread(row: Array, x: float, y: float, z: float) -> None:
+    """Add to force and torque what the ground does to a foot at x, y, z in body axes."""
+    _, _, height = _to_world(row, x, y, z)
+    depth = row[W_GROUND] - row[W_Y + S_POSITION + 2] - height
+    if depth <= 0.0:
+        return
+    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    east, north, up = _to_world(row, q * z - r * y, r * x - p * z, p * y - q * x)
+    east += row[W_Y + S_VELOCITY]
+    north += row[W_Y + S_VELOCITY + 1]
+    up += row[W_Y + S_VELOCITY + 2]
+    normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * up)
+    grip = row[P_FRICTION] * normal / max(sqrt(east * east + north * north), _SLIP)
+    row[W_FORCE] -= grip * east
+    row[W_FORCE + 1] -= grip * north
+    row[W_FORCE + 2] += normal
+    fx, fy, fz = _to_body(row, -grip * east, -grip * north, normal)
+    row[W_TORQUE] += y * fz - z * fy
+    row[W_TORQUE + 1] += z * fx - x * fz
+    row[W_TORQUE + 2] += x * fy - y * fx
+
+
+@njit(cache=False)
+def _stand(row: Array) -> None:
+    """Add what the ground does to the four feet, or to as many points above when upside down."""
+    depth = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
+    for foot in range(4):
+        x = row[P_FEET] if foot < 2 else -row[P_FEET]
+        y = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
+        _tread(row, x, y, depth)
 
 
 @njit(cache=False)
@@ -190,6 +192,22 @@ def _loads(row: Array) -> None:
 
 
 @njit(cache=False)
+def _turn(row: Array) -> None:
+    """Rates of change of the attitude quaternion and of the body rates, by Euler's equations."""
+    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    w, x = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 1]
+    y, z = row[W_Y + S_ATTITUDE + 2], row[W_Y + S_ATTITUDE + 3]
+    row[W_SLOPE + S_ATTITUDE] = 0.5 * (-x * p - y * q - z * r)
+    row[W_SLOPE + S_ATTITUDE + 1] = 0.5 * (w * p + y * r - z * q)
+    row[W_SLOPE + S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
+    row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * (w * r + x * q - y * p)
+    ix, iy, iz = row[P_INERTIA], row[P_INERTIA + 1], row[P_INERTIA + 2]
+    row[W_SLOPE + S_RATES] = (row[W_TORQUE] + (iy - iz) * q * r) / ix
+    row[W_SLOPE + S_RATES + 1] = (row[W_TORQUE + 1] + (iz - ix) * r * p) / iy
+    row[W_SLOPE + S_RATES + 2] = (row[W_TORQUE + 2] + (ix - iy) * p * q) / iz
+
+
+@njit(cache=False)
 def multirotor_slope(row: Array, resting: bool) -> None:
     """The state's rate of change. A resting body keeps its place; its rotors may spin."""
     _spin_up(row)
@@ -199,25 +217,14 @@ def multirotor_slope(row: Array, resting: bool) -> None:
         return
     rotation_matrix(row, W_Y)
     _loads(row)
-    ground = row[W_GROUND]
     reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
-    if row[W_Y + S_POSITION + 2] - ground < reach:
-        _feet(row, ground)
+    if row[W_Y + S_POSITION + 2] - row[W_GROUND] < reach:
+        _stand(row)
     for axis in range(3):
         row[W_SLOPE + S_POSITION + axis] = row[W_Y + S_VELOCITY + axis]
         row[W_SLOPE + S_VELOCITY + axis] = row[W_FORCE + axis] / row[P_MASS]
     row[W_SLOPE + S_VELOCITY + 2] -= row[P_GRAVITY]
-    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
-    w, x, z = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 1], row[W_Y + S_ATTITUDE + 3]
-    left = row[W_Y + S_ATTITUDE + 2]
-    row[W_SLOPE + S_ATTITUDE] = 0.5 * (-x * p - left * q - z * r)
-    row[W_SLOPE + S_ATTITUDE + 1] = 0.5 * (w * p + left * r - z * q)
-    row[W_SLOPE + S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
-    row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * (w * r + x * q - left * p)
-    ix, iy, iz = row[P_INERTIA], row[P_INERTIA + 1], row[P_INERTIA + 2]
-    row[W_SLOPE + S_RATES] = (row[W_TORQUE] + (iy - iz) * q * r) / ix
-    row[W_SLOPE + S_RATES + 1] = (row[W_TORQUE + 1] + (iz - ix) * r * p) / iy
-    row[W_SLOPE + S_RATES + 2] = (row[W_TORQUE + 2] + (ix - iy) * p * q) / iz
+    _turn(row)
 
 
 @njit(cache=False)

@@ -42,6 +42,7 @@ from volery.world.columns import (
     U_WIND,
     WORLD,
     Advance,
+    Array,
     Bodies,
 )
 from volery.world.specs import BodySpec, fill_parameters, fill_state
@@ -89,6 +90,28 @@ class _Dated(NamedTuple):
     values: tuple[float, ...]
 
 
+def _furnish(
+    specs: Sequence[BodySpec], seed: int, frame: LocalFrame, air: Wind, ground: Terrain, own: int
+) -> Bodies:
+    """The arrays of a world at its first moment; *own* is how many columns its composer adds."""
+    heights, grid = ground.arrays()
+    rows: Array = np.zeros((len(specs), WORLD + own))
+    for row, spec in zip(rows, specs, strict=True):
+        fill_parameters(row, spec, frame, air)
+        fill_state(row, spec, ground)
+        row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
+        row[U_WIND : U_WIND + 3] = air.east, air.north, air.up
+        row[U_GUST] = air.gust
+    keys = [key(seed, f"world/body/{index}") for index in range(len(specs))]
+    return Bodies(
+        rows=rows,
+        keys=np.array(keys, dtype=np.uint64),
+        reached=np.zeros(len(specs), dtype=np.int64),
+        heights=heights,
+        grid=grid,
+    )
+
+
 class World:
     """All bodies of a run. Rows of its arrays are in the order of *bodies*.
 
@@ -115,21 +138,7 @@ class World:
         count = len(self.specs)
         if not count:
             raise UsageError("a world without bodies; give at least one")
-        wind, terrain = wind or Wind(), terrain or Terrain()
-        heights, grid = terrain.arrays()
-        self.arrays = Bodies(
-            rows=np.zeros((count, WORLD + columns)),
-            keys=np.array([key(seed, f"world/body/{index}") for index in range(count)], dtype=np.uint64),
-            reached=np.zeros(count, dtype=np.int64),
-            heights=heights,
-            grid=grid,
-        )
-        for row, spec in zip(self.arrays.rows, self.specs, strict=True):
-            fill_parameters(row, spec, frame, wind)
-            fill_state(row, spec, terrain)
-            row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
-            row[U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
-            row[U_GUST] = wind.gust
+        self.arrays = _furnish(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
         self._dated: list[deque[_Dated]] = [deque() for _ in self.specs]
         self._looked = [-_WATCHED] * count
         self._goals = np.zeros(count, dtype=np.int64)

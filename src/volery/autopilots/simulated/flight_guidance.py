@@ -73,7 +73,8 @@ _JERK = 5.0  # PSC_JERK_XY, PSC_JERK_Z [m/s^3]
 _SHAPING_GAIN = 2.5  # [1/s] of target speed
 _BRAKE_SHARE = 0.5  # of the acceleration limit: how a height is approached
 _PLANE_SHARE = 0.39  # the same for a point in the plane
-_LEASH = 4.0  # [m] that the target may be ahead
+_LEASH = 4.0  # [m] that the target may be ahead in the plane: in wind it waits
+_HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground it waits
 _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
 _TC = 0.15  # [s] ATC_INPUT_TC
@@ -170,6 +171,11 @@ def _shape_plane(row: Array, control: int) -> None:
     scale = push / gap if gap > 1e-9 else 0.0
     _move_target(row, 0, north, dn * scale)
     _move_target(row, 1, east, de * scale)
+    ahead_n, ahead_e = shorten(
+        row[K_TARGET] - row[K_POSITION], row[K_TARGET + 1] - row[K_POSITION + 1], _LEASH
+    )
+    row[K_TARGET] = row[K_POSITION] + ahead_n
+    row[K_TARGET + 1] = row[K_POSITION + 1] + ahead_e
 
 
 @njit(cache=False)
@@ -185,18 +191,8 @@ def _shape_height(row: Array, control: int) -> None:
     down = clip(down, -row[C_SPEED_UP], row[C_SPEED_DOWN])
     push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, _JERK)
     _move_target(row, 2, down, clip(push, -limit, limit))
-
-
-@njit(cache=False)
-def _leash(row: Array) -> None:
-    """A target that ran ahead (wind, a blocked motor) waits."""
-    dn = row[K_TARGET] - row[K_POSITION]
-    de = row[K_TARGET + 1] - row[K_POSITION + 1]
-    sn, se = shorten(dn, de, _LEASH)
-    row[K_TARGET] = row[K_POSITION] + sn
-    row[K_TARGET + 1] = row[K_POSITION + 1] + se
-    dd = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_LEASH, _LEASH)
-    row[K_TARGET + 2] = row[K_POSITION + 2] + dd
+    ahead = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_HEIGHT_LEASH, _HEIGHT_LEASH)
+    row[K_TARGET + 2] = row[K_POSITION + 2] + ahead
 
 
 @njit(cache=False)
@@ -264,12 +260,6 @@ def _lean(row: Array, north: float, east: float, lift: float) -> None:
 
 
 @njit(cache=False)
-def _collective(row: Array, lift: float) -> None:
-    """Collective for a vertical acceleration *lift* [m/s^2 up, gravity included] at the present tilt."""
-    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
-
-
-@njit(cache=False)
 def _learn_hover(row: Array) -> None:
     """Learn the collective that carries the weight, while the vehicle hardly accelerates."""
     steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
@@ -282,6 +272,45 @@ def _learn_hover(row: Array) -> None:
 
 
 @njit(cache=False)
+def _rest(row: Array) -> None:
+    """Nothing is held: the vehicle stands or falls."""
+    _stay(row)
+    row[K_THROTTLE] = 0.0
+    row[K_YAW_TARGET] = row[K_EULER + 2]
+    _demand_angles(row, 0.0, 0.0)
+
+
+@njit(cache=False)
+def _follow_angles(row: Array) -> None:
+    """Roll and pitch as told, smoothed."""
+    share = GUIDE_S / _TC
+    roll = row[K_TARGET_EULER] + share * (row[C_ROLL] - row[K_TARGET_EULER])
+    pitch = row[K_TARGET_EULER + 1] + share * (row[C_PITCH] - row[K_TARGET_EULER + 1])
+    _demand_angles(row, roll, pitch)
+
+
+@njit(cache=False)
+def _follow_plane(row: Array, control: int) -> None:
+    """Lean so that the vehicle follows the target in the plane."""
+    _shape_plane(row, control)
+    landed = row[K_LANDED] > 0.5
+    north = _wanted_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+    east = _wanted_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+    _lean(row, north, east, _GRAVITY)
+
+
+@njit(cache=False)
+def _follow_height(row: Array, control: int) -> None:
+    """Lift so that the vehicle follows the target in height."""
+    _shape_height(row, control)
+    lower = row[K_LOWER_LIMIT] > 0.5
+    down = _wanted_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
+    lift = clip(_GRAVITY - down, 0.0, _MOST_LIFT * _GRAVITY)
+    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
+    _learn_hover(row)
+
+
+@njit(cache=False)
 def guide(row: Array) -> None:
     """One guidance period."""
     control = int(row[C_CONTROL])
@@ -290,32 +319,16 @@ def guide(row: Array) -> None:
         _enter(row, control, before)
         row[K_CONTROL] = control
     if control in (OFF, IDLE):
-        _stay(row)
-        row[K_THROTTLE] = 0.0
-        row[K_YAW_TARGET] = row[K_EULER + 2]
-        _demand_angles(row, 0.0, 0.0)
+        _rest(row)
         return
     _turn(row)
     if row[K_SPOOL] < 1.0 and row[K_LANDED] > 0.5:
         _stay(row)
-    if control in (ATTITUDE, CLIMB):
-        share = GUIDE_S / _TC
-        roll = row[K_TARGET_EULER] + share * (row[C_ROLL] - row[K_TARGET_EULER])
-        pitch = row[K_TARGET_EULER + 1] + share * (row[C_PITCH] - row[K_TARGET_EULER + 1])
-        _demand_angles(row, roll, pitch)
+    if in_plane(control):
+        _follow_plane(row, control)
+    else:
+        _follow_angles(row)
     if control == ATTITUDE:
         row[K_THROTTLE] = clip(row[C_THROTTLE] / _upright(row), 0.0, 1.0)
-        return
-    _shape_height(row, control)
-    lower = row[K_LOWER_LIMIT] > 0.5
-    down = _wanted_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
-    lift = clip(_GRAVITY - down, 0.0, _MOST_LIFT * _GRAVITY)
-    if in_plane(control):
-        _shape_plane(row, control)
-        _leash(row)
-        landed = row[K_LANDED] > 0.5
-        north = _wanted_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-        east = _wanted_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-        _lean(row, north, east, _GRAVITY)
-    _collective(row, lift)
-    _learn_hover(row)
+    else:
+        _follow_height(row, control)
