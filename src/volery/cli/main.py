@@ -49,13 +49,9 @@ Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a mo
 def version(wanted: bool) -> None:
     """Print the version and stop."""
     if wanted:
-        from importlib.metadata import PackageNotFoundError
-        from importlib.metadata import version as installed
+        from volery.run.circumstances import own_version
 
-        try:
-            typer.echo(f"volery {installed('volery')}")
-        except PackageNotFoundError:
-            typer.echo("volery, run from its source without being installed")
+        typer.echo(f"volery {own_version()}")
         raise typer.Exit
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from rich.text import Text
 
 from volery.base.time import clock, to_seconds
 from volery.cli.console import Output
+from volery.run.circumstances import Stopwatch
 
 if TYPE_CHECKING:
     from volery.run.progress import Progress
@@ -29,15 +29,15 @@ class Display:
     def __init__(self, title: str, live: Live) -> None:
         self._title = title
         self._live = live
-        self._started = time.monotonic()
-        self._drawn = 0.0
+        self._watch = Stopwatch()
+        self._drawn = -BETWEEN_S
 
     def __call__(self, progress: Progress) -> None:
         """Draw, unless it was drawn a moment ago."""
-        now = time.monotonic()
+        now = self._watch.seconds()
         if now - self._drawn >= BETWEEN_S:
             self._drawn = now
-            self._live.update(picture(self._title, progress, now - self._started))
+            self._live.update(picture(self._title, progress, now))
 
 
 def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
