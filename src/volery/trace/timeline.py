@@ -52,6 +52,7 @@ class TimelineWriter:
         self._processes: dict[str, int] = {}
         self._threads: dict[tuple[str, str], str] = {}
         self._spans = 0
+        self._running: dict[tuple[str, int], Slice] = {}
         self._states: dict[tuple[str, str], Milestone] = {}
         self._last: Ns = 0
         self._writers: dict[type[Any], Callable[[Any], None]] = {
@@ -80,6 +81,8 @@ class TimelineWriter:
         """Let what is still under way end with the run, and close the file. A second call does nothing."""
         if self._output.closed:
             return
+        for running in self._running.values():
+            self._ran(running)
         for state in self._states.values():
             self._state_until(state, max(self._last, state.at))
         self._write_out()
@@ -87,9 +90,18 @@ class TimelineWriter:
         self._output.close()
 
     def _slice(self, event: Slice) -> None:
-        where = self._threads.get((event.processor, str(event.core)))
-        if where is None:
-            where = self._thread(event.processor, str(event.core), f"core {event.core}")
+        """Slices of one task that follow each other without a gap become one."""
+        core = (event.processor, event.core)
+        before = self._running.get(core)
+        if before is None or before.end != event.start or before[4:] != event[4:]:
+            if before is not None:
+                self._ran(before)
+            self._running[core] = event
+        else:
+            self._running[core] = event._replace(start=before.start)
+
+    def _ran(self, event: Slice) -> None:
+        where = self._thread(event.processor, str(event.core), f"core {event.core}")
         name = event.component if event.task == event.component else f"{event.component}/{event.task}"
         self._complete(name, event.start, event.end, where)
 

@@ -34,6 +34,19 @@ def test_a_slice_is_an_event_of_a_core_of_a_processor(tmp_path: Path) -> None:
     assert (found["pid"], found["tid"]) == (thread["pid"], thread["tid"])
 
 
+def test_slices_without_a_gap_are_one(tmp_path: Path) -> None:
+    found = timeline(
+        tmp_path / "t",
+        Slice(0, 1000, "p", 0, "t", "c"),
+        Slice(1000, 3000, "p", 0, "t", "c"),
+        Slice(0, 9000, "p", 1, "t", "c"),
+        Slice(3000, 4000, "p", 0, "u", "c"),
+        Slice(5000, 6000, "p", 0, "u", "c"),
+    )
+    spans = [(event["name"], event["ts"], event["dur"]) for event in found if event["ph"] == "X"]
+    assert sorted(spans) == [("c/t", 0, 3), ("c/t", 0, 9), ("c/u", 3, 1), ("c/u", 5, 1)]
+
+
 def test_calls_that_overlap_stay_apart(tmp_path: Path) -> None:
     found = timeline(
         tmp_path / "t",
