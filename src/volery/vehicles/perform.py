@@ -115,6 +115,7 @@ class _Attempt:
         self._mode_before = self._seen.mode
         self._was_armed = self._seen.armed
         self._changed = ""  # what somebody else did
+        self._repeated = False
 
     def run(self) -> str:
         """Why it was undone before lift-off; empty if it is done."""
@@ -173,6 +174,7 @@ class _Attempt:
 
     def _ask_again(self) -> None:
         if self._step.answer not in self._seen.answers and not self._over():
+            self._repeated = bool(self._step.answer)
             self._step.send()
 
     def _over(self) -> bool:
@@ -180,11 +182,15 @@ class _Attempt:
         step, seen = self._step, self._seen
         if step.done(seen):
             return True
-        answer = seen.answers.get(step.answer)
-        if answer is not None and not answer.accepted:
+        if self._is_refused() and not self._repeated:
             return True
         self._notice_changes()
         return bool(self._changed)
+
+    def _is_refused(self) -> bool:
+        """Of what was asked twice it proves nothing: the first may have been obeyed, and its answer lost."""
+        answer = self._seen.answers.get(self._step.answer)
+        return answer is not None and not answer.accepted
 
     def _notice_changes(self) -> None:
         step, seen = self._step, self._seen
@@ -203,7 +209,7 @@ class _Attempt:
             raise self._lost()
         left = self._began + self._step.within - self._kernel.now()
         if left <= 0:
-            raise self._late()
+            raise self._refused(self._began) if self._is_refused() else self._late()
         return min(left, self._owner.patience())
 
     # -- the end

@@ -18,7 +18,7 @@ __all__ = ["ArduPilot", "open_driver", "open_mavros"]
 def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> ArduPilot:
     """An ArduPilot behind a MAVLink *link*. It begins to listen and to send heartbeats at once.
 
-    Options: ``rate`` of the position and ``attitude`` in Hz, ``system`` id of the autopilot; ``texts=unrecorded``
+    Options: ``rate`` of the position and ``attitude`` in Hz, ``system`` id; and ``texts=unrecorded``
     where the autopilot records its texts itself, as a simulated one does.
     """
     check_options(options, *OPTIONS)

@@ -73,8 +73,8 @@ def stream_periods(rate: float, attitude: float) -> dict[str, Ns]:
 class MavlinkCommands:
     """See ``Commands``. ``system`` is the autopilot's id; ``None`` takes the first ArduPilot that speaks.
 
-    Options: ``rate`` of the position and ``attitude`` in Hz, ``system``; ``texts=unrecorded`` where the autopilot
-    records its texts itself, as a simulated one does.
+    Options: ``rate`` of the position and ``attitude`` in Hz, ``system``; and ``texts=unrecorded`` where the
+    autopilot records its texts itself, as a simulated one does.
     """
 
     cycle: Action | None = None

@@ -1,0 +1,305 @@
+"""The driver against the simulated ArduPilot, in virtual time: whole flights, on good wires and bad ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from volery.autopilots.simulated.autopilot import Autopilot
+from volery.autopilots.simulated.flight import make_world
+from volery.base.errors import Failsafe, NotArrived, Overridden, Refused
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.registry import Registry
+from volery.base.seeds import stream
+from volery.base.time import HOUR, MS, S
+from volery.bridge import serve_vehicle
+from volery.drivers.ardupilot import open_driver, open_mavros
+from volery.graph import Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.links.in_process import in_process
+from volery.links.link import Frame, Link
+from volery.links.wire import WireFaults, wire
+from volery.trace.events import LinkState, Operation, Text
+from volery.vehicles import Drone, Land, Rover, TakeOff, Vehicle, Waypoint
+from volery.world.specs import Multirotor
+from volery.world.specs import Rover as RoverBody
+
+FRAME = LocalFrame(46.0825, -103.8995, 900.0)
+dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")
+
+
+class Free:
+    """A ROS call that costs nothing."""
+
+    caller = 0
+    background = 0
+
+
+def at(east: float, north: float, height: float = 10.0) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
+    return Position(latitude, longitude, AboveHome(height))
+
+
+class Field:
+    """One simulated vehicle, its driver, and a second station that plays the pilot."""
+
+    def __init__(
+        self,
+        kind: type[Vehicle] = Drone,
+        *,
+        warm: bool = True,
+        faults: WireFaults | None = None,
+        mavros: bool = False,
+        parameters: dict[str, float] | None = None,
+    ) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(record=self.events.append)
+        body = Multirotor() if kind is Drone else RoverBody()
+        _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
+        self.autopilot = Autopilot(
+            self.kernel,
+            self.flight,
+            dialects.load("ardupilot"),
+            warm=warm,
+            name="craft_1",
+            parameters=parameters,
+        )
+        self._link = self._connect(faults)
+        self._pilot, theirs = in_process(self.kernel, name="pilot")
+        self.autopilot.connect(theirs)
+        self._kind, self._mavros = kind, mavros
+        self.vehicle: Any = None if mavros else self._vehicle(self._link)
+
+    def _connect(self, faults: WireFaults | None) -> Link:
+        if faults is None:
+            ours, theirs = in_process(self.kernel, 2 * MS)
+            self.autopilot.connect(theirs)
+            return ours
+        end, other = wire(self.kernel, "radio", faults, stream(7, "radio"))
+        self.autopilot.connect(other)
+        return end
+
+    def _vehicle(self, link: Link) -> Vehicle:
+        driver = open_driver(self.kernel, link, "craft_1", {"texts": "unrecorded"})
+        return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
+
+    def _over_mavros(self) -> Vehicle:
+        def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+            self.kernel.call_at(self.kernel.now(), deliver)
+
+        graph = Graph(self.kernel, lambda node, call, x: Free(), carry)
+        serve_vehicle(graph, self._link, "craft_1", Place("vehicle node"))
+        driver = open_mavros(self.kernel, graph.node("control"), "craft_1", {})
+        return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
+
+    def truth(self) -> Position:
+        latitude, longitude, amsl = FRAME.from_enu(self.flight.truth().position)
+        return Position(latitude, longitude, AMSL(amsl))
+
+    def fly(self, mission: Callable[[Any], Any]) -> Any:
+        outcome: list[Any] = []
+
+        def body() -> None:
+            try:
+                self.vehicle = self.vehicle or self._over_mavros()
+                outcome.append(mission(self.vehicle))
+            except Exception as error:
+                outcome.append(error)
+
+        self.kernel.spawn(body, "mission", Place("mission"))
+        while not outcome and self.kernel.now() < HOUR:
+            self.kernel.run(self.kernel.now() + S)
+        (found,) = outcome
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def pilot_chooses(self, number: int, after_s: float) -> None:
+        fields = {"target_system": 1, "target_component": 1, "command": 176, "param1": 1.0, "param2": number}
+        frame = Frame("COMMAND_LONG", fields, 254, 190)
+        self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
+
+    def operations(self) -> list[Operation]:
+        return [event for event in self.events if isinstance(event, Operation)]
+
+    def told(self, kind: type) -> Iterator[Any]:
+        return (event for event in self.events if isinstance(event, kind))
+
+
+def square(drone: Any) -> None:
+    drone.takeoff(10)
+    drone.goto(at(0, 50))
+    drone.goto(at(50, 50, 15), speed=5.0)
+    drone.land()
+
+
+@pytest.mark.parametrize("mavros", [False, True])
+def test_a_square_by_either_carrier(mavros: bool) -> None:
+    field = Field(mavros=mavros)
+    field.fly(square)
+    done = field.operations()
+    assert [(one.operation, one.outcome) for one in done] == [
+        ("takeoff", "ok"),
+        ("goto", "ok"),
+        ("goto", "ok"),
+        ("land", "ok"),
+    ]
+    for goto in done[1:3]:
+        assert goto.estimate_horizontal < 1.0
+        assert goto.estimate_vertical < 0.5
+        assert goto.true_horizontal < 9.0  # three sigma of a consumer GPS
+    assert not field.vehicle.telemetry.armed
+
+
+def test_from_switching_on_it_waits_for_a_position() -> None:
+    field = Field(warm=False)
+    field.fly(square)
+    takeoff = field.operations()[0]
+    assert takeoff.outcome == "ok"
+    assert takeoff.end > 45 * S
+
+
+def test_arming_too_early_is_refused_in_its_own_words() -> None:
+    field = Field(warm=False)
+    with pytest.raises(Refused, match="Arm: "):
+        field.fly(lambda drone: drone.arm())
+
+
+def test_one_that_does_not_become_ready_in_time() -> None:
+    field = Field(warm=False)
+    with pytest.raises(NotArrived, match="ready to arm and to go by position was not seen within 15 s"):
+        field.fly(lambda drone: drone.wait_ready(within=15))
+
+
+def test_returning_home_and_a_mission_on_board() -> None:
+    field = Field()
+    field.fly(lambda drone: (drone.takeoff(10), drone.goto(at(0, 30)), drone.return_home()))
+    assert field.operations()[-1].estimate_horizontal < 1.0
+    items = [TakeOff(10), Waypoint(at(20, 20)), Land()]
+    field.fly(lambda drone: (drone.wait_ready(), drone.upload_mission(items), drone.start_mission()))
+    assert [one.outcome for one in field.operations()] == ["ok"] * 6
+    assert not field.vehicle.telemetry.armed
+
+
+def test_velocity_hold_and_heading() -> None:
+    field = Field()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        before = drone.position
+        drone.set_velocity(north=3.0, lasting=4.0)
+        sleep(field.kernel, 4 * S)
+        drone.hold()
+        after = drone.position
+        assert LocalFrame(before.latitude, before.longitude, 0.0).to_enu(
+            after.latitude, after.longitude, 0.0
+        )[1] == pytest.approx(12.0, abs=4.0)
+        drone.set_heading(90.0)
+        assert drone.attitude.heading == pytest.approx(90.0, abs=4.0)
+        drone.land()
+
+    field.fly(mission)
+
+
+def test_sticks_in_stabilize_and_altitude_hold() -> None:
+    field = Field()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.manual_control(0, 0, 0.5, 0)
+        drone.altitude_hold()
+        sleep(field.kernel, 10 * S)
+        assert drone.altitude.metres == pytest.approx(
+            10.0, abs=1.0
+        )  # longer than an override lasts unrefreshed
+        drone.manual_control(0, 0, 0.8, 0)
+        sleep(field.kernel, 4 * S)
+        assert drone.altitude.metres > 11.0
+        drone.manual_control(0, 0, 0.5, 0)
+        drone.stabilize()
+        drone.goto(at(0, 0, 10))
+        drone.land()
+
+    field.fly(mission)
+    assert [one.outcome for one in field.operations()] == ["ok"] * 5
+
+
+def test_a_pilot_takes_over_and_hands_back() -> None:
+    field = Field()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        field.pilot_chooses(5, after_s=2.0)
+        with pytest.raises(Overridden, match="from GUIDED to LOITER"):
+            drone.goto(at(0, 200))
+        assert "LOITER" in drone.come_to_rest()
+        field.pilot_chooses(4, after_s=0.0)
+        sleep(field.kernel, 2 * S)
+        drone.goto(at(0, 20))
+        drone.land()
+
+    field.fly(mission)
+
+
+def test_a_failsafe_of_the_autopilot_is_not_fought() -> None:
+    """With the failsafe of the ground station switched on, a link that is cut for 8 s ends the call."""
+    field = Field(faults=WireFaults(cuts=((20 * S, 28 * S),)), parameters={"FS_GCS_ENABLE": 1.0})
+    field.vehicle._performer._silence = 20 * S
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        with pytest.raises(Overridden, match="from GUIDED to RTL") as caught:
+            drone.goto(at(0, 300), speed=2.0)
+        assert "GCS Failsafe" in str(caught.value) or isinstance(caught.value, Failsafe)
+        with pytest.raises(Overridden):
+            drone.goto(at(0, 20))
+
+    field.fly(mission)
+
+
+def test_a_link_that_drops_in_flight_and_returns() -> None:
+    field = Field(faults=WireFaults(cuts=((14 * S, 18 * S),)))
+    field.fly(square)
+    assert [one.outcome for one in field.operations()] == ["ok"] * 4
+    assert [state.state for state in field.told(LinkState)] == ["silent", "back"]
+
+
+def test_a_bad_wire() -> None:
+    field = Field(faults=WireFaults(drop=0.1, flip=1e-4, burst=0.005, jitter=30 * MS))
+    field.fly(square)
+    assert [one.outcome for one in field.operations()] == ["ok"] * 4
+
+
+def test_a_rover_drives_there_and_back() -> None:
+    field = Field(Rover)
+
+    def mission(rover: Any) -> str:
+        rover.drive(at(30, 40))
+        rover.drive(at(0, 40), speed=1.5)
+        rover.return_home()
+        return str(rover.come_to_rest())
+
+    assert field.fly(mission) == "stopped and was disarmed"
+    drives = [one for one in field.operations() if one.operation == "drive"]
+    assert all(one.estimate_horizontal < 3.0 for one in drives)
+
+
+def test_each_text_stands_in_the_trace_once() -> None:
+    field = Field()
+    field.fly(lambda drone: (drone.takeoff(5), drone.land()))
+    texts = [event.text for event in field.told(Text)]
+    assert texts.count("Arming motors") == 1
+
+
+def test_the_same_flight_twice() -> None:
+    def events() -> list[Any]:
+        field = Field(faults=WireFaults(drop=0.05))
+        field.fly(square)
+        return field.events
+
+    assert repr(events()) == repr(events())
