@@ -111,13 +111,13 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
 
 
 def look_before_arming(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]]) -> None:
-    """Once a second: whether it could be armed; every half minute it says why not."""
+    """Once a second: whether it could be armed; each half minute it says why not."""
     if vehicle.armed:
         vehicle.prearm_ok = True
         return
     found = problems(vehicle)
     vehicle.prearm_ok = not found
-    if found and vehicle.uptime() - vehicle.displayed_at >= DISPLAY_EVERY:
+    if vehicle.uptime() - vehicle.displayed_at >= DISPLAY_EVERY:
         vehicle.displayed_at = vehicle.uptime()
         for text in found:
             vehicle.say(CRITICAL, f"PreArm: {text}")

@@ -244,7 +244,7 @@ def parameters() -> tuple[Parameter, ...]:
 
 def own_parameters(system: int, flight: Flight) -> dict[str, float]:
     """What follows from the vehicle."""
-    return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.capacity_as / 3.6}
+    return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.spec.battery.capacity_ah * 1000.0}
 
 
 def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
@@ -284,6 +284,7 @@ COPTER = Dialect(
     motors_rest=2 * S,
     spool_time=500 * MS,
     takeoff_slew=100 * MS,
+    resigns_after=1500 * MS,
     watches=_FAILSAFES.watches(),
     on_step=on_step,
     on_disarmed=on_disarmed,

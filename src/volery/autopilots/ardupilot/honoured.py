@@ -41,7 +41,7 @@ _SHARED = {
     "FS_THR_ENABLE": "what happens when the throttle channel falls below FS_THR_VALUE",
     "FS_THR_VALUE": "pulse width of a lost transmitter",
     "INITIAL_MODE": "mode after boot",
-    "RC_OVERRIDE_TIME": "overrides fall back to the transmitter after that; 0 refuses them, below 0 they stay",
+    "RC_OVERRIDE_TIME": "overrides end after that; 0 refuses them, less lets them stay",
     "RNGFND1_TYPE": "any type but 0 sends RANGEFINDER and DISTANCE_SENSOR",
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
     "SYSID_MYGCS": "the system id whose heartbeats and sticks count",

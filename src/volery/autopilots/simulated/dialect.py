@@ -99,6 +99,8 @@ class Dialect:
     motors_rest: Ns = 0
     spool_time: Ns = 0
     takeoff_slew: Ns = 0
+    resigns_after: Ns = 0
+    """A vehicle that has not left the ground and no longer wants to counts as standing after that."""
     watches: tuple[Watch, ...] = ()
     on_step: Act
     """At each tick, after the manoeuvre."""

@@ -99,6 +99,7 @@ class Vehicle:
         """When the ground station that counts was last heard."""
         self._wanted_at: Ns = NEVER
         self._lifted = False
+        self._resigned_at: Ns = NEVER
         self.speed: float | None = None
         """Speed in the plane that was commanded [m/s]; ``None``: the parameters'. Likewise up and down."""
         self.speed_up: float | None = None
@@ -240,6 +241,8 @@ class Vehicle:
             self.drive(OFF)
         elif self.dialect.stands and self.landed:
             self._stand()
+        elif self.dialect.stands and not self._lifted and not self.manoeuvre.wants_to_fly():
+            self.drive(IDLE)  # the wish to fly went before it had left the ground
         else:
             self.manoeuvre.step()
 
@@ -260,22 +263,29 @@ class Vehicle:
             return
         if self._wanted_at == NEVER:
             self._wanted_at = now
-        ready = max(self._wanted_at, self.armed_at + dialect.motors_rest + dialect.spool_time)
-        if now < ready + (dialect.takeoff_slew if self.manoeuvre.slow_start else 0):
+        ready = self._wanted_at
+        if self.manoeuvre.slow_start:
+            idling = self.armed_at + dialect.motors_rest + dialect.spool_time
+            ready = max(ready, idling) + dialect.takeoff_slew
+        if now < ready:
             self.drive(IDLE)
             return
         self.landed = self._lifted = False
+        self._resigned_at = now
         self.manoeuvre.step()
 
     def watch_ground(self) -> None:
         """Notice that it has left the ground, come down, or given up the wish to fly."""
         if not self.armed or self.landed or not self.dialect.stands:
             return
+        now = self.kernel.now()
         on_ground = self.estimate.landed
         self._lifted = self._lifted or not on_ground
-        if on_ground and (self._lifted or not self.manoeuvre.wants_to_fly()):
+        if not on_ground or self.manoeuvre.wants_to_fly():
+            self._resigned_at = now
+        if on_ground and (self._lifted or now - self._resigned_at >= self.dialect.resigns_after):
             self.landed = True
-            self.landed_at = self.idle_since = self.kernel.now()
+            self.landed_at = self.idle_since = now
             self._wanted_at = NEVER
 
     def seconds_parameter(self, name: str) -> Ns:
