@@ -192,14 +192,17 @@ class Vehicle(ABC):
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:
         """Until it could arm and go by position, in at most *within* seconds; the error says what lacks."""
+        self._hear()
         self._operate("wait_ready", "be ready", lambda: self._driver.ready(from_seconds(within)))
 
     def arm(self) -> None:
         """Arm in the mode it is in. ``Refused`` quotes the checks that failed."""
+        self._hear()
         self._operate("arm", "arm", self._driver.arm)
 
     def disarm(self, *, force: bool = False) -> None:
         """Disarm. In the air the autopilot refuses, unless *force*: then the motors stop and it falls."""
+        self._hear()
         self._operate("disarm", "disarm", lambda: self._driver.disarm(force), ours=False)
 
     def hold(self) -> None:
@@ -213,7 +216,6 @@ class Vehicle(ABC):
         items = list(mission)
         if not items:
             raise UsageError(f"{self.name}: an empty mission; give at least one item")
-        self._hear()
         self._check_mission(items)
         asked = f"upload a mission of {len(items)} items"
         self._operate("upload_mission", asked, lambda: self._driver.upload(items), ours=False)
@@ -236,6 +238,8 @@ class Vehicle(ABC):
     # -- how an operation is carried out
 
     def _hear(self) -> None:
+        """What comes before every operation: take in what has arrived, and wait if nothing ever has."""
+        self._look()
         if self._driver.telemetry.heard < 0 or self._driver.telemetry.kind != self.kind:
             self.wait_heard()
 
@@ -260,7 +264,6 @@ class Vehicle(ABC):
 
         *noted* False: record it only if it fails; a loop of set-points is no list of operations.
         """
-        self._hear()
         with self._kernel as kernel:
             self._take(kernel.current(), operation)
             start = kernel.now()
