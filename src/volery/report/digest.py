@@ -33,7 +33,7 @@ from volery.trace.events import (
 from volery.trace.scenery import Scenery
 from volery.trace.setup import RunSetup
 
-_BIN: Ns = 250 * MS
+_BIN: Ns = 500 * MS  # holds as many activations of the usual periods each time
 _MOST_BINS = 300
 _TRACK_TOLERANCE_M = 0.15
 _CURVE_STRETCHES = 350

@@ -204,7 +204,7 @@ def _facts(record: RunRecord) -> list[Fact]:
     if record.vehicles:
         flown = sum(one.distance_m for one in record.vehicles.values())
         facts.append(
-            Fact("driven and flown", number(flown / 1000.0, 2, "km"), f"{len(record.vehicles)} vehicles")
+            Fact("driven and flown", number(flown / 1000.0, 2, "km"), _many(len(record.vehicles), "vehicle"))
         )
     computers = total([one.energy_j for one in record.processors.values()])
     vehicles = total([one.energy_j for one in record.vehicles.values()])
@@ -216,6 +216,10 @@ def _facts(record: RunRecord) -> list[Fact]:
     if any(one.activations for one in record.components.values()):
         facts.append(Fact("missed deadlines", str(misses), status="bad" if misses else ""))
     return facts
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _troubles(record: RunRecord, lost: str) -> list[str]:

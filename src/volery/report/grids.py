@@ -76,9 +76,11 @@ def figure(value: float | None, unit: str = "") -> str:
 
 
 def energy(joules: float | None) -> str:
-    """Joules, kilojoules or megajoules, by size."""
+    """Millijoules to megajoules, by size."""
     if joules is None:
         return NOTHING
+    if 0.0 < abs(joules) < 0.1:
+        return figure(joules * 1e3, "mJ")
     if abs(joules) >= 1e7:
         return number(joules / 1e6, 1, "MJ")
     return number(joules / 1e3, 1, "kJ") if abs(joules) >= 1e4 else figure(joules, "J")
@@ -159,8 +161,8 @@ def cost_grid(record: RunRecord) -> Grid:
         Column("component"),
         Column("processor"),
         Column("language", essential=False),
-        Column("execution s", True, "time executed on the processor"),
-        Column("of it ROS", True, "share of the execution time that was owed to ROS calls"),
+        Column("exec s", True, "time executed on the processor"),
+        Column("of it\nROS", True, "share of the execution time that was owed to ROS calls"),
         Column("ROS calls", True, essential=False),
         Column("activations", True, essential=False),
         Column("misses", True, "activations that ended after their deadline"),
@@ -239,16 +241,16 @@ def vehicles_grid(record: RunRecord) -> Grid:
         Column("vehicle"),
         Column("kind", essential=False),
         Column("autopilot", essential=False),
-        Column("distance m", True),
-        Column("armed s", True, essential=False),
-        Column("airborne s", True),
+        Column("distance\nm", True),
+        Column("armed\ns", True, essential=False),
+        Column("airborne\ns", True),
         Column("energy", True),
-        Column("battery left", True, essential=False),
+        Column("battery\nleft", True, essential=False),
         Column("at the end"),
         Column(
-            "error by estimate m", True, "largest of all operations that succeeded: horizontal / vertical"
+            "error m\nby estimate", True, "largest of all operations that succeeded: horizontal / vertical"
         ),
-        Column("error by truth m", True, "the same, by where the vehicle really was"),
+        Column("error m\nby truth", True, "the same, by where the vehicle really was"),
     )
     return Grid("Vehicles", columns, rows)
 
@@ -296,8 +298,8 @@ def operations_grid(record: RunRecord) -> Grid:
         Column("asked"),
         Column("took s", True),
         Column("outcome"),
-        Column("error by estimate m", True, "horizontal / vertical"),
-        Column("error by truth m", True, "horizontal / vertical"),
+        Column("error m\nby estimate", True, "horizontal / vertical"),
+        Column("error m\nby truth", True, "horizontal / vertical"),
     )
     return Grid("Vehicle operations", columns, rows)
 

@@ -39,7 +39,12 @@ class GridTable:
 
 def _table(grid: Grid, essential: bool) -> Table:
     made = Table(
-        title=grid.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
+        title=grid.title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
     )
     shown = [index for index, column in enumerate(grid.columns) if column.essential or not essential]
     for index in shown:
