@@ -18,13 +18,12 @@ from volery.base.errors import (
     Refused,
     UsageError,
     VehicleError,
-    VoleryError,
 )
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import Ns, from_seconds
 from volery.kernel.api import Kernel
-from volery.kernel.task import Cancelled, Task
+from volery.kernel.task import Task
 from volery.trace.events import Operation
 from volery.vehicles.driver import Capability, Driver, Step
 from volery.vehicles.limits import Fence, Home, Limits, violation
@@ -272,7 +271,7 @@ class Vehicle(ABC):
             if ours:
                 self._performer.check_ours(asked)
             self._performer.perform(asked, plan, restarts=restarts)
-        except (VoleryError, Cancelled) as error:
+        except BaseException as error:
             outcome, said = type(error).__name__, str(error)
             raise
         finally:
