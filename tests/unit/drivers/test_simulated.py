@@ -9,7 +9,7 @@ import pytest
 
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import make_world
-from volery.base.errors import Failsafe, NotArrived, Overridden, Refused
+from volery.base.errors import Failsafe, LinkLost, LinkSilent, NotArrived, Overridden, Refused
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.registry import Registry
@@ -164,8 +164,9 @@ def test_from_switching_on_it_waits_for_a_position() -> None:
     assert takeoff.end > 45 * S
 
 
-def test_arming_too_early_is_refused_in_its_own_words() -> None:
-    field = Field(warm=False)
+@pytest.mark.parametrize("mavros", [False, True])
+def test_arming_too_early_is_refused_in_its_own_words(mavros: bool) -> None:
+    field = Field(warm=False, mavros=mavros)
     with pytest.raises(Refused, match="Arm: "):
         field.fly(lambda drone: drone.arm())
 
@@ -176,8 +177,9 @@ def test_one_that_does_not_become_ready_in_time() -> None:
         field.fly(lambda drone: drone.wait_ready(within=15))
 
 
-def test_returning_home_and_a_mission_on_board() -> None:
-    field = Field()
+@pytest.mark.parametrize("mavros", [False, True])
+def test_returning_home_and_a_mission_on_board(mavros: bool) -> None:
+    field = Field(mavros=mavros)
     field.fly(lambda drone: (drone.takeoff(10), drone.goto(at(0, 30)), drone.return_home()))
     assert field.operations()[-1].estimate_horizontal < 1.0
     items = [TakeOff(10), Waypoint(at(20, 20)), Land()]
@@ -229,8 +231,9 @@ def test_sticks_in_stabilize_and_altitude_hold() -> None:
     assert [one.outcome for one in field.operations()] == ["ok"] * 5
 
 
-def test_a_pilot_takes_over_and_hands_back() -> None:
-    field = Field()
+@pytest.mark.parametrize("mavros", [False, True])
+def test_a_pilot_takes_over_and_hands_back(mavros: bool) -> None:
+    field = Field(mavros=mavros)
 
     def mission(drone: Any) -> None:
         drone.takeoff(10)
@@ -267,6 +270,47 @@ def test_a_link_that_drops_in_flight_and_returns() -> None:
     field.fly(square)
     assert [one.outcome for one in field.operations()] == ["ok"] * 4
     assert [state.state for state in field.told(LinkState)] == ["silent", "back"]
+
+
+def test_a_vehicle_node_that_hears_its_autopilot_no_more() -> None:
+    field = Field(mavros=True, faults=WireFaults(cuts=((15 * S, HOUR),)))
+    with pytest.raises(LinkLost, match="nothing was heard for 5"):
+        field.fly(square)
+
+
+def test_a_vehicle_node_that_is_not_there() -> None:
+    field = Field(mavros=True)
+    graph = Graph(field.kernel, lambda node, call, x: Free(), lambda *carried: None)
+
+    def nobody(drone: Any) -> None:
+        driver = open_mavros(field.kernel, graph.node("control"), "craft_2", {})
+        Drone(field.kernel, "craft_2", driver).wait_heard(3.0)
+
+    with pytest.raises(LinkSilent, match="no vehicle node publishes /craft_2/state"):
+        field.fly(nobody)
+
+
+def test_a_rover_over_mavros() -> None:
+    field = Field(Rover, mavros=True)
+    field.fly(lambda rover: (rover.drive(at(20, 10)), rover.come_to_rest()))
+    assert field.operations()[0].outcome == "ok"
+
+
+def test_sticks_over_mavros_are_repeated_by_the_caller() -> None:
+    field = Field(mavros=True)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.manual_control(0, 0, 0.5, 0)
+        drone.altitude_hold()
+        for _ in range(50):
+            drone.manual_control(0, 0, 0.5, 0)
+            sleep(field.kernel, 200 * MS)
+        assert drone.altitude.metres == pytest.approx(10.0, abs=1.0)
+        drone.goto(at(0, 10))
+        drone.land()
+
+    field.fly(mission)
 
 
 def test_a_bad_wire() -> None:
