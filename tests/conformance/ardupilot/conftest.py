@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+
 from volery.autopilots.ardupilot import DIALECT
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import make_world
@@ -158,7 +159,7 @@ def facts() -> dict[str, Any]:
     return found
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def bench() -> type[Bench]:
     """Makes vehicles: ``bench()`` a warm copter, ``bench("rover", warm=False)`` a rover that boots."""
     return Bench

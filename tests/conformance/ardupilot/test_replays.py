@@ -1,7 +1,9 @@
-"""Every recorded session with the real firmware, sent again to the simulated one: the same answers, words, states.
+"""Every recorded session with the real firmware, sent again to the simulated one: the same answers, words,
+states.
 
-What a station sends is taken from the recording, at the recorded times after boot. Words and states must come in
-the same number; on the ground at the recorded times, in the air within a fifth of the time since take-off.
+What a station sends is taken from the recording, at the recorded times after boot. Words and states must
+come in the same number; on the ground at the recorded times, in the air within a fifth of the time since
+take-off.
 """
 
 from __future__ import annotations

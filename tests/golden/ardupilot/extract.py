@@ -2,8 +2,9 @@
 
     python tests/golden/ardupilot/extract.py FOLDER
 
-FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes ``facts.json`` beside
-this file. Times are seconds after the autopilot's boot, worked out from the messages that carry it.
+FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
+``facts.json`` beside this file. Times are seconds after the autopilot's boot, worked out from the messages that
+carry it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import json
 import struct
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -116,7 +118,7 @@ def boot(rows: list[Row]) -> dict[str, Any]:
 
 
 def streams(rows: list[Row]) -> dict[str, Any]:
-    late = [row for row in rows if row.system == 1 and 45.0 < row.at]
+    late = [row for row in rows if row.system == 1 and row.at > 45.0]
     names = list(dict.fromkeys(row.name for row in late))
     rates = {}
     for name in names:
@@ -258,7 +260,7 @@ def sticks(rows: list[Row]) -> dict[str, Any]:
     overrides = [row for row in rows if row.system == STATION and row.name == "RC_CHANNELS_OVERRIDE"]
     gaps = [
         (before, after)
-        for before, after in zip(overrides, overrides[1:], strict=False)
+        for before, after in pairwise(overrides)
         if after.at - before.at > 3.0 and before.fields["chan1_raw"] == 1600
     ]
     last = gaps[0][0].at
@@ -411,7 +413,6 @@ def main(folder: Path) -> None:
         f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in facts.items()
     )
     target.write_text("{\n" + lines + "\n}\n", encoding="utf-8")
-    print(f"{target}: {target.stat().st_size} bytes")
 
 
 if __name__ == "__main__":

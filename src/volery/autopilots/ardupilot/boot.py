@@ -180,10 +180,12 @@ def rover_events(ready: Act) -> tuple[Event, ...]:
         *(words(6.06, text) for text in both("EKF3 IMU{unit} MAG0 initial yaw alignment complete")),
         words(9.67, "GPS 1: detected as u-blox at 230400 baud"),
         at(10.34, origin_set),
+        measured(10.345, (("BARO1_GND_PRESS", 94504.55), ("BARO2_GND_PRESS", 94503.32))),
         at(10.36, home_set),
         words(19.86, *both("EKF3 IMU{unit} origin set")),
         at(19.94, field_elevation),
         measured(21.34, (("BARO1_GND_PRESS", 101020.25), ("BARO2_GND_PRESS", 101018.77))),
+        measured(32.34, (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))),
         at(42.08, partial(using_gps, units=(0, 1))),
         words(42.085, "AHRS: EKF3 active"),
     )

@@ -151,9 +151,8 @@ def ready(vehicle: Vehicle) -> None:
         vehicle.enter(initial)
 
 
-def on_warm(vehicle: Vehicle) -> None:
-    """As after a complete boot."""
-    ready(vehicle)
+def on_position(vehicle: Vehicle) -> None:
+    """There is a home, and nothing speaks against arming."""
     boot.home_set(vehicle)
     vehicle.prearm_ok = not before_arming(vehicle)
 
@@ -271,7 +270,8 @@ COPTER = Dialect(
     origin_after=ORIGIN,
     position_after=POSITION,
     local_position_after=POSITION,
-    on_warm=on_warm,
+    on_warm=ready,
+    on_warm_position=on_position,
     heartbeat_first=(round(1.05 * S),),
     heartbeat_from=round(2.037 * S),
     deaf_until=100 * MS,

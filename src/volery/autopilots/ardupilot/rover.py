@@ -123,9 +123,8 @@ def ready(vehicle: Vehicle) -> None:
     vehicle.enter(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
 
 
-def on_warm(vehicle: Vehicle) -> None:
-    """As after a complete boot."""
-    ready(vehicle)
+def on_position(vehicle: Vehicle) -> None:
+    """There is a home, and nothing speaks against arming."""
     boot.home_set(vehicle)
     vehicle.prearm_ok = not before_arming(vehicle)
 
@@ -208,7 +207,8 @@ ROVER = Dialect(
     origin_after=HOME,
     position_after=POSITION,
     local_position_after=HOME,
-    on_warm=on_warm,
+    on_warm=ready,
+    on_warm_position=on_position,
     heartbeat_first=(round(1.025 * S),),
     heartbeat_from=round(3.04 * S),
     deaf_until=100 * MS,

@@ -274,11 +274,6 @@ def meminfo(_vehicle: Vehicle) -> Fields:
     return {"brkval": 0, "freemem": 65_535, "freemem32": 131_072}
 
 
-def protocol_version(_vehicle: Vehicle) -> Fields:
-    """PROTOCOL_VERSION."""
-    return {"version": 200, "min_version": 100, "max_version": 200}
-
-
 FLIGHT_SW_VERSION = 67_438_335
 """4.5.6, an official release, as recorded."""
 

@@ -38,7 +38,6 @@ BUILDERS: Mapping[str, Builder] = {
     "POSITION_TARGET_GLOBAL_INT": motion.position_target,
     "POSITION_TARGET_LOCAL_NED": motion.local_target,
     "POWER_STATUS": status.power_status,
-    "PROTOCOL_VERSION": status.protocol_version,
     "RANGEFINDER": motion.rangefinder,
     "RAW_IMU": motion.raw_imu,
     "RC_CHANNELS": status.rc_channels,

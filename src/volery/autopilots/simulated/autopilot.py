@@ -107,7 +107,8 @@ class Autopilot:
         self._ticks = 0
         if age:
             self._flight.set_origin()
-            self._at(age + WARM_UP, lambda: dialect.on_warm(vehicle))
+            dialect.on_warm(vehicle)
+            self._at(age + WARM_UP, lambda: dialect.on_warm_position(vehicle))
         else:
             for event in dialect.boot_events:
                 self._at(event.after, lambda act=event.act: act(vehicle))  # type: ignore[misc]

@@ -74,7 +74,9 @@ class Dialect:
     warm_age: Ns = 60 * S
     """How long ago a vehicle that starts warm was switched on."""
     on_warm: Act
-    """Bring a vehicle to the state in which its boot leaves it."""
+    """Bring a vehicle to the state in which its boot leaves it, but for its position."""
+    on_warm_position: Act
+    """A moment later there is a position."""
 
     # -- time
     tick: Ns = 100 * MS

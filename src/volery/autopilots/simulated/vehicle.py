@@ -109,9 +109,9 @@ class Vehicle:
         self.flight_time: Ns = 0
         self.said: set[str] = set()
         """Words that are said once after a boot."""
-        self.displayed_at: Ns = 0
+        self.displayed_at: Ns = self.uptime()
         """Uptime at which it was last said why it cannot be armed."""
-        self.counted_at: Ns = 0
+        self.counted_at: Ns = self.uptime()
         """Uptime at which the counters of hours were last stored."""
         self.sagging: dict[str, Ns] = {}
         """Since when the battery has been below a voltage, by the parameter that holds it."""

@@ -20,7 +20,7 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 """MAV_RESULT."""
 
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
-REQUEST_PROTOCOL_VERSION, REQUEST_CAPABILITIES = 519, 520
+REQUEST_CAPABILITIES = 520
 
 SHORTEST_PERIOD_US = 2_500
 
@@ -85,7 +85,6 @@ class CommandService:
             GET_MESSAGE_INTERVAL: self._get_interval,
             SET_MESSAGE_INTERVAL: self._set_interval,
             REQUEST_MESSAGE: self._request_message,
-            REQUEST_PROTOCOL_VERSION: lambda peer, _: self._send(peer, "PROTOCOL_VERSION"),
             REQUEST_CAPABILITIES: lambda peer, _: self._send(peer, "AUTOPILOT_VERSION"),
         }
 
