@@ -36,7 +36,7 @@ from volery.trace.events import Text
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
 EXTENDED_SYS_STATE, GET_HOME_POSITION, SET_MESSAGE_INTERVAL = 245, 410, 511
 
-STREAMS: Mapping[int, int] = {1: 2, 2: 2, 3: 2, 6: 10, 10: 10, 11: 2}
+STREAMS: Mapping[int, int] = {1: 1, 2: 2, 3: 1, 6: 10, 10: 4, 11: 1}
 """Hertz by MAV_DATA_STREAM: raw sensors, extended status, RC channels, position, attitude, VFR_HUD."""
 
 

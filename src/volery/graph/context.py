@@ -48,6 +48,11 @@ class Context:
         return self.epoch + self.kernel.now()
 
 
+_CALLS = ("publish", "sleep", "spin_once")
+_KINDS = {call: f"ros:{call}" for call in _CALLS}
+"""What is charged often, so that its text is made once."""
+
+
 class Member:
     """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
 
@@ -75,7 +80,7 @@ class Member:
         who = self.id
         cost = context.price(who, call, x)
         caller, background = cost.caller, cost.background
-        kind = f"ros:{call}"
+        kind = _KINDS.get(call) or f"ros:{call}"
         kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
         if kernel.current() is None:
             background += caller

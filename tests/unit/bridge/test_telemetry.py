@@ -207,7 +207,7 @@ def test_streams_are_asked_for_until_they_come(aviary: Any) -> None:
     asked = {
         fields["req_stream_id"]: fields["req_message_rate"] for fields in aviary.asked("REQUEST_DATA_STREAM")
     }
-    assert asked == {1: 2, 2: 2, 3: 2, 6: 10, 10: 10, 11: 2}
+    assert asked == {1: 1, 2: 2, 3: 1, 6: 10, 10: 4, 11: 1}
     assert {fields["command"] for fields in aviary.asked("COMMAND_LONG")} == {410, 511}
     for name in ("RAW_IMU", "SYS_STATUS", "RC_CHANNELS", "GLOBAL_POSITION_INT", "ATTITUDE", "VFR_HUD"):
         aviary.say(name)
