@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from functools import partial
 
 from rich.console import Group, RenderableType
 from rich.live import Live
@@ -15,29 +15,42 @@ from rich.text import Text
 from volery.base.time import clock, to_seconds
 from volery.cli.console import Output
 from volery.run.circumstances import Stopwatch
-
-if TYPE_CHECKING:
-    from volery.run.progress import Progress
+from volery.run.progress import Progress
 
 BETWEEN_S = 0.1
 """Wall seconds between two pictures: drawing takes longer than a simulated second."""
 
+Show = Callable[[Progress], None]
 
-class Display:
-    """The picture of a run under way."""
 
-    def __init__(self, title: str, live: Live) -> None:
-        self._title = title
-        self._live = live
+class Seldom:
+    """Passes on what it is shown, unless it did so a moment ago."""
+
+    def __init__(self, show: Show) -> None:
+        self._show = show
         self._watch = Stopwatch()
-        self._drawn = -BETWEEN_S
+        self._next = 0.0
 
     def __call__(self, progress: Progress) -> None:
-        """Draw, unless it was drawn a moment ago."""
+        """Show it, or not."""
         now = self._watch.seconds()
-        if now - self._drawn >= BETWEEN_S:
-            self._drawn = now
-            self._live.update(picture(self._title, progress, now))
+        if now >= self._next:
+            self._next = now + BETWEEN_S
+            self._show(progress)
+
+
+class Pictures:
+    """The pictures of the runs under way, one below the other."""
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+        self._watch = Stopwatch()
+        self._drawn: dict[str, RenderableType] = {}
+
+    def show(self, title: str, progress: Progress) -> None:
+        """Draw the run called *title* anew."""
+        self._drawn[title] = picture(title, progress, self._watch.seconds())
+        self._live.update(Group(*self._drawn.values()))
 
 
 def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
@@ -64,10 +77,17 @@ def _vehicles(progress: Progress) -> Table:
 
 
 @contextmanager
-def shown(output: Output, title: str) -> Iterator[Callable[[Progress], None] | None]:
-    """What a run is to call; ``None`` where nobody watches."""
+def drawn(output: Output) -> Iterator[Pictures | None]:
+    """Pictures on the terminal for as long as the context lasts; ``None`` where nobody watches."""
     if not output.shows_progress:
         yield None
         return
     with Live(console=output.notes, transient=True, refresh_per_second=8) as live:
-        yield Display(title, live)
+        yield Pictures(live)
+
+
+@contextmanager
+def shown(output: Output, title: str) -> Iterator[Show | None]:
+    """What one run is to call; ``None`` where nobody watches."""
+    with drawn(output) as pictures:
+        yield None if pictures is None else Seldom(partial(pictures.show, title))

@@ -26,6 +26,10 @@ class CollectedModelError(ModelError):
         listed = "\n".join(str(error) for error in self.errors)
         super().__init__(f"{len(self.errors)} things are wrong with this model:\n{listed}")
 
+    def __reduce__(self) -> tuple[type[CollectedModelError], tuple[tuple[ModelError, ...]]]:
+        """So that it can be sent from process to process."""
+        return type(self), (self.errors,)
+
 
 class Problems:
     """What was found so far."""
