@@ -217,13 +217,13 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
 
 
 @njit(cache=False)
-def wake_body(row: Array, key: np.uint64) -> None:
-    """What the instruments show at grid step 0, before anything moved."""
+def wake_body(bodies: Bodies, body: int, row: Array) -> None:
+    """What the instruments show at the first grid step, before anything moved."""
     rotation_matrix(row, 0)
     for axis in range(3):
         row[S_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
     _power(row, row[P_KIND] == MULTIROTOR)
-    sense(row, key, 0)
+    sense(row, bodies.keys[body], bodies.reached[body])
     row[S_AWAKE] = 1.0
 
 
@@ -235,7 +235,7 @@ def _compose(sources: str) -> Advance:
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
             if row[S_AWAKE] == 0.0:
-                wake_body(row, bodies.keys[body])
+                wake_body(bodies, body, row)
             while bodies.reached[body] < goals[body]:
                 for i in range(4):
                     row[W_THROTTLE + i] = row[U_THROTTLE + i]

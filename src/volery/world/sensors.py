@@ -65,6 +65,7 @@ from volery.world.columns import (
 )
 from volery.world.noise import gaussian
 
+RTK_FIX = 6  # MAVLink's GPS_FIX_TYPE_RTK_FIXED
 SLOW_EVERY = 50  # steps: slow errors and the field instruments move at 10 Hz
 AIR_EVERY = 25  # barometer, magnetometer and range-finder: 20 Hz
 _GYRO, _ACCEL, _MAG, _BARO, _GPS, _SPEED, _RANGE, _SLOW = 1, 4, 7, 10, 11, 14, 17, 20
@@ -76,6 +77,11 @@ class Noise(NamedTuple):
     white: float
     slow: float
     time: float
+
+    @property
+    def variance(self) -> float:
+        """Of both parts together."""
+        return self.white * self.white + self.slow * self.slow
 
 
 @dataclass(frozen=True)
@@ -126,9 +132,9 @@ SENSOR_SETS: dict[str, SensorSet] = {
             _RANGE_NOISE,
         ),
         gps_rate=10.0,
-        gps_fix=6,
+        gps_fix=RTK_FIX,
     ),
-    "perfect": SensorSet("perfect", (_QUIET,) * 8, gps_rate=10.0, gps_fix=6, perfect=True),
+    "perfect": SensorSet("perfect", (_QUIET,) * 8, gps_rate=10.0, gps_fix=RTK_FIX, perfect=True),
 }
 
 
@@ -151,12 +157,12 @@ def declared_sigma(name: str) -> Sigma:
     """How far a position from the set's receiver is from the truth, one standard deviation.
 
     Horizontal: root of the sum of both axes' variances (the "drms" of receivers' data sheets). Vertical: the
-    receiver's height and the barometer's drift since.
+    receiver's height, and where that is not a real-time kinematic fix the barometer's error beside it.
     """
-    noises = sensor_set(name).noises
-    level = noises[GPS_LEVEL].white ** 2 + noises[GPS_LEVEL].slow ** 2
-    height = noises[GPS_HEIGHT].white ** 2 + noises[GPS_HEIGHT].slow ** 2
-    air = noises[BARO].white ** 2 + noises[BARO].slow ** 2
+    chosen = sensor_set(name)
+    level = chosen.noises[GPS_LEVEL].variance
+    height = chosen.noises[GPS_HEIGHT].variance
+    air = 0.0 if chosen.gps_fix >= RTK_FIX else chosen.noises[BARO].variance
     return Sigma(horizontal=sqrt(2.0 * level), vertical=sqrt(height + air))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, inf
+from math import inf, sqrt
 
 from volery.autopilots.simulated.flight_columns import (
     K_ACCEL,
@@ -93,9 +93,9 @@ def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
         longitude=longitude,
         amsl=amsl,
         velocity=(velocity[0], velocity[1], velocity[2]),
-        h_acc=hypot(level.white, level.slow) if kind else inf,
-        v_acc=hypot(height.white, height.slow) if kind else inf,
-        speed_acc=hypot(speed.white, speed.slow) if kind else inf,
+        h_acc=sqrt(level.variance) if kind else inf,
+        v_acc=sqrt(height.variance) if kind else inf,
+        speed_acc=sqrt(speed.variance) if kind else inf,
         eph=1.21 if kind else inf,
         epv=2.0 if kind else inf,
         satellites=10 if kind else 0,

@@ -69,6 +69,7 @@ from volery.world.columns import (
     W_TURN,
     Array,
 )
+from volery.world.sensors import RTK_FIX
 
 FUSE_EVERY = 25  # steps: 20 Hz, where the barometer's, the compass' and the receiver's samples fall
 _FUSE_S = FUSE_EVERY * STEP_S
@@ -81,7 +82,6 @@ _HEADING_GAIN = 0.4  # [1/s]
 _HEADING_INTEGRAL = 0.01  # [1/s^2]
 _GRAVITY_GAIN = 0.3  # [1/s] while nothing better is known
 _STALE = 1.0  # [s] after which a fix no longer holds the tilt
-_RTK = 5.5  # fix types above this are better in height than a barometer
 
 
 @njit(cache=False)
@@ -286,7 +286,7 @@ def _hear_satellites(row: Array) -> None:
         worst = max(worst, _fuse_position(row, axis, missed, level))
         _fuse_velocity(row, axis, row[M_GPS_VELOCITY + axis] - row[K_VELOCITY + axis], speed)
     row[K_GPS_LEVEL] = worst
-    if row[M_GPS_FIX] > _RTK:
+    if row[M_GPS_FIX] >= RTK_FIX:
         _fuse_position(row, 2, row[M_GPS + 2] - row[K_POSITION + 2], _variance(row, GPS_HEIGHT))
         row[K_HEIGHT_ZERO] = row[M_BARO] + row[K_POSITION + 2]
     _fuse_velocity(row, 2, row[M_GPS_VELOCITY + 2] - row[K_VELOCITY + 2], 4.0 * speed)
@@ -339,7 +339,7 @@ def _fuse(row: Array) -> None:
             _spread(row, axis)
     if row[M_BARO_COUNT] != row[K_SEEN_BARO]:
         row[K_SEEN_BARO] = row[M_BARO_COUNT]
-        if not (row[M_GPS_FIX] > _RTK and row[K_AIDED] > 0.5):
+        if not (row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5):
             missed = row[K_HEIGHT_ZERO] - row[M_BARO] - row[K_POSITION + 2]
             _fuse_position(row, 2, missed, _variance(row, BARO))
     if row[M_MAG_COUNT] != row[K_SEEN_MAG]:

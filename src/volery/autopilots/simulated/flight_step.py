@@ -60,7 +60,7 @@ def _compose(sources: str) -> Advance:
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
             if row[S_AWAKE] == 0.0:
-                wake_body(row, bodies.keys[body])
+                wake_body(bodies, body, row)
                 _boot(row)
             while bodies.reached[body] < goals[body]:
                 _control(row, bodies.reached[body])
