@@ -19,7 +19,7 @@ from volery import VoleryError
 GAIN = 0.7
 """m/s of horizontal velocity for each metre of offset."""
 MOST_SIDEWAYS = 2.0
-DESCENT_GAIN = 0.25
+DESCENT_GAIN = 0.35
 """m/s of descent for each metre of height."""
 FASTEST_DESCENT = 2.0
 SLOWEST_DESCENT = 0.4
@@ -78,7 +78,7 @@ class PrecisionLanding:
         rate = rospy.Rate(10)
         seen = None
         last_seen = volery.now()
-        while not rospy.is_shutdown():
+        while not rospy.is_shutdown() and self._drone.flying:
             picture = self._look()
             if picture is not None:
                 seen, last_seen = _smoothed(seen, picture), volery.now()
