@@ -15,7 +15,7 @@ from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.link import Frame, Link, Receiver
 from volery.links.mavlink import encode
-from volery.links.parser import Parser, whole_frame
+from volery.links.parser import Heard, Parser, whole_frame
 
 _STAMP = struct.Struct(">Q")
 
@@ -31,6 +31,12 @@ class TlogTap:
         self._file = path.open("wb")
         self._sequences: dict[tuple[int, int], int] = {}
         self._flushed: Ns = 0
+
+    @property
+    def heard(self) -> Heard | None:
+        """What the link has heard so far, if it is one of bytes."""
+        heard: Heard | None = getattr(self._link, "heard", None)
+        return heard
 
     def send(self, frame: Frame) -> None:
         """Send and write down."""

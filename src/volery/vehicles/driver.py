@@ -93,6 +93,7 @@ class Driver(Protocol):
     """Talks to one autopilot. Each operation answers with the steps to perform, in order.
 
     ``handover`` is the mode in which the autopilot obeys a computer: a pilot hands over by choosing it.
+    ``comes_down`` are the modes in which a drone is on its way to the ground by itself.
     ``cycle`` is for carriers that are nodes of a graph: one round of the node's own loop, which takes in what
     has arrived and sleeps for its period. Whoever waits goes round in its own task, which pays for it.
     """
@@ -100,6 +101,7 @@ class Driver(Protocol):
     name: str
     telemetry: Telemetry
     handover: str
+    comes_down: frozenset[str]
 
     @property
     def capabilities(self) -> frozenset[Capability]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from math import isfinite, nan
 
-from volery.base.errors import LinkError, OutOfBounds, Refused, UsageError
+from volery.base.errors import OutOfBounds, Refused, UsageError
+from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, from_seconds
 from volery.vehicles.driver import Capability, Sticks
 from volery.vehicles.limits import too_high
 from volery.vehicles.perform import RESTARTS
 from volery.vehicles.telemetry import Velocity
-from volery.vehicles.vehicle import NOWHERE, RETURN_OF_LINK_S, Goal, Vehicle, travel_within
+from volery.vehicles.vehicle import NOWHERE, Goal, Vehicle, travel_within
 
 VELOCITY_LASTS_S = 3.0
 RETURN_CLIMB = 30.0
@@ -56,6 +57,11 @@ class Drone(Vehicle):
         found = too_high(height, self.limits, self._driver.telemetry.home)
         if found:
             raise OutOfBounds(self.name, asked, found)
+        if self.fence is not None:
+            if self._driver.telemetry.home is None:
+                self.wait_ready()
+            ground = self.position
+            self._check_path(asked, ground, Position(ground.latitude, ground.longitude, AboveHome(height)))
         here = self._driver.telemetry.position
         within = from_seconds(travel_within(0.0, height, None))
         self._operate(
@@ -110,7 +116,8 @@ class Drone(Vehicle):
         """Fly at this velocity, m/s and degrees per second clockwise. Returns as soon as it is under way.
 
         It stands for *lasting* seconds or until the next operation, then the drone stops: a program that
-        hangs does not fly away. A loop that controls calls it each time round.
+        hangs does not fly away. A loop that controls calls it each time round. Raises ``OutOfBounds`` if it
+        would leave limits or fence in that time.
         """
         self._require(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
@@ -118,6 +125,7 @@ class Drone(Vehicle):
         if not all(isfinite(part) for part in (*velocity, yaw_rate)):
             raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
         self._not_on_ground(asked)
+        self._check_path(asked, self.position, self._after(velocity, lasting))
         self._operate(
             "set_velocity",
             asked,
@@ -189,29 +197,43 @@ class Drone(Vehicle):
     def come_to_rest(self) -> str:
         """Land it if it is armed and nobody else has it; says what was done. For the end of a program.
 
-        It waits half a minute for a link that is lost at that moment.
+        One that its autopilot already brings down is watched until it is down. It waits half a minute for a
+        link that is lost at that moment; ``LinkLost`` if that does not return.
         """
-        seen = self._driver.telemetry
+        seen = self._look()
         if seen.heard < 0:
             return "was never heard"
+        self._wait_for_link()
+        if seen.flying and self._performer.is_ours():
+            self.land()  # the sticks are held until the autopilot lands: it must not fall
+            return "landed"
         with self._kernel:
             self._driver.stop()
-        if self._performer.silent():
-            self._wait_for_return()
-        if not seen.armed:
-            return "is disarmed"
-        if seen.flying and seen.mode not in {self._performer.commanded, self._driver.handover}:
-            return f"is left to whoever flies it in {seen.mode}"
-        if not seen.flying:
+        if seen.flying:
+            return self._watch_down()
+        if seen.armed:
             self.disarm()
             return "was disarmed on the ground"
-        self.land()
-        return "landed"
+        return "is disarmed"
 
-    def _wait_for_return(self) -> None:
-        back = self._performer.wait(lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S))
-        if not back:
-            raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has landed")
+    def _watch_down(self) -> str:
+        seen, mode = self._driver.telemetry, self._driver.telemetry.mode
+        if mode in self._driver.comes_down:
+            home = seen.home
+            within = self._landing_within(RETURN_CLIMB) + (self._within(home, None) if home else 0)
+            self._performer.wait(lambda: not seen.armed or seen.mode not in self._driver.comes_down, within)
+            if not seen.armed:
+                return f"came down by itself in {mode}"
+        return f"is left to whoever flies it in {seen.mode}"
+
+    def _after(self, velocity: Velocity, seconds: float) -> Position:
+        """Where it will be after so many *seconds*. Downwards the ground stops it: that is no offence."""
+        here = self.position
+        frame = LocalFrame(here.latitude, here.longitude, here.altitude.metres)
+        moved = velocity.east * seconds, velocity.north * seconds, velocity.up * seconds
+        latitude, longitude, _ = frame.from_enu(moved)
+        height = self._driver.telemetry.above_home + velocity.up * seconds
+        return Position(latitude, longitude, AboveHome(max(height, self.limits.lowest)))
 
     def _landing_within(self, climb: float) -> Ns:
         """ArduPilot lands at 0.5 m/s; from an unknown height, allow for the highest."""

@@ -54,10 +54,14 @@ class Performer:
         times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
         raise Overridden(self._driver.name, asked, undone + times + self._last_text())
 
+    def is_ours(self) -> bool:
+        """It is in the mode that was commanded last, or in the one in which it obeys a computer."""
+        return self._driver.telemetry.mode in {self.commanded, self._driver.handover}
+
     def check_ours(self, asked: str) -> None:
         """Raise ``Overridden`` if it flies in a mode that this program did not command."""
         seen = self._driver.telemetry
-        if not seen.flying or seen.mode in {self.commanded, self._driver.handover}:
+        if not seen.flying or self.is_ours():
             return
         self.commanded = ""
         kind = Failsafe if seen.failsafe else Overridden

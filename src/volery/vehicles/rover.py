@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import nan
 
-from volery.base.errors import LinkError, UsageError
+from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
-from volery.base.time import from_seconds
 from volery.vehicles.driver import Capability, Sticks
-from volery.vehicles.vehicle import RETURN_OF_LINK_S, Goal, Vehicle
+from volery.vehicles.vehicle import Goal, Vehicle
 
 
 class Rover(Vehicle):
@@ -78,19 +77,19 @@ class Rover(Vehicle):
             self._driver.sticks(Sticks(roll=steering, throttle=throttle))
 
     def come_to_rest(self) -> str:
-        """Stop and disarm it if nobody else has it; says what was done. For the end of a program."""
-        seen = self._driver.telemetry
+        """Stop and disarm it if nobody else has it; says what was done. For the end of a program.
+
+        It waits half a minute for a link that is lost at that moment; ``LinkLost`` if that does not return.
+        """
+        seen = self._look()
         if seen.heard < 0:
             return "was never heard"
+        self._wait_for_link()
         with self._kernel:
             self._driver.stop()
-        if self._performer.silent() and not self._performer.wait(
-            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)
-        ):
-            raise LinkError(f"{self.name}: the link did not return; nobody knows whether it has stopped")
         if not seen.armed:
             return "is disarmed"
-        if seen.mode not in {self._performer.commanded, self._driver.handover}:
+        if not self._performer.is_ours():
             return f"is left to whoever drives it in {seen.mode}"
         self.hold()
         self.disarm()

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from volery.base.errors import (
     CapabilityError,
+    LinkLost,
     LinkSilent,
     OutOfBounds,
     Refused,
@@ -27,7 +28,7 @@ from volery.kernel.task import Task
 from volery.trace.events import Operation
 from volery.vehicles.driver import Capability, Driver, Step
 from volery.vehicles.limits import Fence, Home, Limits, violation
-from volery.vehicles.mission import MissionItem, TakeOff, Waypoint
+from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.perform import SILENCE, Performer
 from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
 
@@ -264,7 +265,7 @@ class Vehicle(ABC):
         *noted* False: record it only if it fails; a loop of set-points is no list of operations.
         """
         with self._kernel as kernel:
-            self._take(kernel.current(), operation)
+            mine = self._take(kernel.current(), operation)
             start = kernel.now()
         outcome, said = "ok", ""
         try:
@@ -276,16 +277,20 @@ class Vehicle(ABC):
             raise
         finally:
             with self._kernel.guard:
-                self._busy = None
+                if self._busy is mine:
+                    self._busy = None
                 if noted or outcome != "ok":
                     self._record(start, operation, asked, (outcome, said), goal())
 
-    def _take(self, task: Task | None, operation: str) -> None:
+    def _take(self, task: Task | None, operation: str) -> tuple[Task | None, str]:
         """One operation at a time: two tasks that command one vehicle is a fault of the program."""
-        if self._busy is not None and not (self._busy[0] is not None and self._busy[0].done):
-            holder = self._busy[0].name if self._busy[0] is not None else "house code"
-            raise UsageError(f"{self.name}: {operation}: {holder} has {self._busy[1]} under way")
-        self._busy = (task, operation)
+        if self._busy is not None:
+            holder, under_way = self._busy
+            if holder is None or not (holder.done or holder.scope.cancelled):
+                name = holder.name if holder is not None else "house code"
+                raise UsageError(f"{self.name}: {operation}: {name} has {under_way} under way")
+        mine = self._busy = (task, operation)
+        return mine
 
     def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
         estimate = _offset(self._driver.telemetry.position, goal)
@@ -293,6 +298,13 @@ class Vehicle(ABC):
         self._kernel.record(
             Operation(start, self._kernel.now(), self.name, operation, asked, *end, *estimate, *truth)
         )
+
+    def _wait_for_link(self) -> None:
+        """If it is lost at this moment, give it time to return."""
+        if self._performer.silent() and not self._performer.wait(
+            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)
+        ):
+            raise LinkLost(f"{self.name}: the link did not return; nobody knows whether it has come to rest")
 
     # -- bounds
 
@@ -319,10 +331,15 @@ class Vehicle(ABC):
             if isinstance(item, TakeOff):
                 start = Position(start.latitude, start.longitude, AboveHome(item.height))
                 self._check_path(asked, self._amsl(start), start)
-            elif isinstance(item, Waypoint):
+            elif isinstance(item, Waypoint | Land) and item.position is not None:
                 self._check_altitude(item.position)
                 self._check_path(asked, self._amsl(start), item.position)
                 start = item.position
+            elif isinstance(item, ReturnHome):
+                home = self._known("its home", self._driver.telemetry.home)
+                goal = Position(home.latitude, home.longitude, self._amsl(start).altitude)
+                self._check_path(asked, self._amsl(start), goal)
+                start = home
 
     def _amsl(self, position: Position) -> Position:
         """The same place with an AMSL altitude; above ground is taken as above home."""

@@ -376,6 +376,27 @@ def test_goals_out_of_bounds_are_refused_before_anything_moves(
     at.fly(mission)
 
 
+def test_a_velocity_that_would_leave_the_fence(bench: Make) -> None:
+    at = bench(fence=Fence(ceiling=AboveHome(12)))
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.set_velocity(up=0.5)
+        with pytest.raises(OutOfBounds, match="above the fence's ceiling"):
+            drone.set_velocity(up=1.0)
+        drone.set_velocity(up=-5.0)  # the ground stops it
+
+    at.fly(mission)
+
+
+def test_a_takeoff_into_a_no_fly_zone(bench: Make) -> None:
+    over = Zone("balloon", ((-36, 149), (-36, 150), (-35, 150), (-35, 149)), floor=AboveHome(5))
+    at = bench(fence=Fence(no_fly=(over,)))
+    with pytest.raises(OutOfBounds, match="no-fly zone 'balloon'"):
+        at.fly(up)
+    assert not at.craft.armed
+
+
 def test_a_takeoff_higher_than_the_limit(bench: Make) -> None:
     with pytest.raises(OutOfBounds, match="130 m above home asked, but the limit is 120"):
         bench().fly(lambda drone: drone.takeoff(130))
@@ -597,6 +618,34 @@ def test_the_end_of_a_program_disarms_it_on_the_ground(bench: Make) -> None:
     at = bench()
     assert at.fly(lambda drone: (drone.arm(), drone.come_to_rest())[1]) == "was disarmed on the ground"
     assert not at.craft.armed
+
+
+def test_at_the_end_of_a_program_sticks_are_held_until_it_lands(bench: Make) -> None:
+    at = bench()
+
+    def mission(drone: Any) -> str:
+        drone.takeoff(10)
+        drone.manual_control(0, 0, 0.5, 0)
+        drone.stabilize()
+        at.autopilot.heard.clear()
+        return str(drone.come_to_rest())
+
+    assert at.fly(mission) == "landed"
+    order = [f.name if f.name != "COMMAND_LONG" else str(f.fields["command"]) for f in at.autopilot.heard]
+    released = [n for n, f in enumerate(at.autopilot.heard) if f.fields.get("chan3_raw") == 0]
+    assert order.index(str(SET_MODE)) < released[0]
+
+
+def test_the_end_of_a_program_whose_task_has_not_gone_yet(bench: Make) -> None:
+    """The safety task may land it although the operation that is being ended has not unwound."""
+    at = bench()
+    scope = at.kernel.root.child("users")
+    at.kernel.spawn(lambda: (at.vehicle.takeoff(10), at.vehicle.goto(NEAR)), "user", Place("user"), scope)
+    at.craft.velocity = (5.0, 0.0, 0.0)
+    at.kernel.run(20 * S)
+    at.kernel.cancel(scope, "end")
+    assert at.fly(lambda drone: drone.come_to_rest()) == "landed"
+    assert [one.outcome for one in at.told(Operation)][-2:] == ["Cancelled", "ok"]
 
 
 def test_true_errors_are_recorded_where_the_truth_is_known(bench: Make) -> None:

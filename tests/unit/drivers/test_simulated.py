@@ -261,6 +261,7 @@ def test_a_failsafe_of_the_autopilot_is_not_fought() -> None:
         assert "GCS Failsafe" in str(caught.value) or isinstance(caught.value, Failsafe)
         with pytest.raises(Overridden):
             drone.goto(at(0, 20))
+        assert drone.come_to_rest() == "came down by itself in RTL"
 
     field.fly(mission)
 

@@ -61,6 +61,7 @@ class ArduPilot:
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     handover = GUIDED
+    comes_down = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
 
     def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
         self.name = name
