@@ -57,7 +57,8 @@ class Codec:
     """How events of one kind become CDR bytes and back.
 
     ``codes`` are the ``struct`` codes of the encapsulation header and the numbers, ``fixed`` their size in
-    bytes; the words follow as ``tail``. ``numbers`` and ``words`` take them out of an event.
+    bytes; the words follow as ``tail``, of which ``tails`` are those that are remembered. ``numbers`` and
+    ``words`` take them out of an event.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -79,16 +80,16 @@ class Codec:
         )
         self._unpack = struct.Struct(f"<{self.codes}").unpack_from
         self._in_order = _getter(tuple(order.index(index) for index in range(len(order))))
-        self._tails: dict[tuple[str, ...], bytes] = {}
+        self.tails: dict[tuple[str, ...], bytes] = {}
         self._said: dict[bytes, tuple[str, ...]] = {}
 
     def tail(self, words: tuple[str, ...]) -> bytes:
         """The CDR bytes of *words*."""
-        known = self._tails.get(words)
+        known = self.tails.get(words)
         if known is None:
-            if len(self._tails) >= _REMEMBERED:
-                self._tails.clear()
-            known = self._tails[words] = _encode_words(words)
+            if len(self.tails) >= _REMEMBERED:
+                self.tails.clear()
+            known = self.tails[words] = _encode_words(words)
         return known
 
     def encode(self, event: Any) -> bytes:

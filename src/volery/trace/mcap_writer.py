@@ -13,8 +13,9 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
+from collections import defaultdict
 from collections.abc import Callable, Iterable
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,7 @@ from mcap.opcode import Opcode
 
 from volery.base.time import Ns, S
 from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
-from volery.trace.events import NONE, Event, Message, Published, VehicleState
+from volery.trace.events import NONE, Event, Message, Published, Record, VehicleState
 from volery.trace.output import Output
 from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_to_json
 
@@ -91,7 +92,7 @@ class McapWriter:
         self._definitions = definitions
         self._summary = _Summary()
         self._body = bytearray()
-        self._indexes: dict[int, array[int]] = {}
+        self._indexes = _empty_indexes()
         self._chunk_ends: Ns = S
         self._schemas: dict[str, int] = {}
         self._published: dict[tuple[str, str, str], int] = {}
@@ -111,6 +112,10 @@ class McapWriter:
     def __call__(self, event: Event) -> None:
         """Write one event."""
         self._writers[type(event)](event)
+
+    def listener(self, kind: type[Any]) -> Record:
+        """What writes events of *kind*."""
+        return self._writers[kind]
 
     def attach(self, attachment: Attachment) -> None:
         """Add a file to the trace; it carries no time."""
@@ -140,7 +145,7 @@ class McapWriter:
         body = bytes(self._body)
         indexes = self._indexes
         self._body = bytearray()
-        self._indexes = {}
+        self._indexes = _empty_indexes()
         first = min(min(index[::2]) for index in indexes.values())
         last = max(max(index[::2]) for index in indexes.values())
         chunk = _record(records.Chunk("", body, last, first, zlib.crc32(body), len(body)))
@@ -193,32 +198,30 @@ class McapWriter:
         codec = Codec(kind)
         pack = struct.Struct(f"<{MESSAGE_FRAME}{codec.codes}").pack
         overhead = MESSAGE_OVERHEAD + codec.fixed
-        times, numbers, words, tail_of = _times(kind), codec.numbers, codec.words, codec.tail
+        times, numbers, words = _times(kind), codec.numbers, codec.words
+        tails, new_tail = codec.tails, codec.tail
         channels: dict[str, int] = {}
-        topic = f"/volery/{kind.__name__.lower()}"
-        of_vehicle = kind is VehicleState
+        subject_of = attrgetter("vehicle") if kind is VehicleState else None
 
         def write(event: Any) -> None:
             log, publish = times(event)
             if publish >= self._chunk_ends:
                 self._end_second(publish)
-            subject = event.vehicle if of_vehicle else ""
+            subject = subject_of(event) if subject_of else ""
             channel = channels.get(subject)
             if channel is None:
+                topic = f"/volery/{subject}/state" if subject_of else f"/volery/{kind.__name__.lower()}"
                 schema = self._schema(type_name(kind), codec.definition)
-                name = f"/volery/{subject}/state" if of_vehicle else topic
-                channel = channels[subject] = self._channel(name, schema, {})
-            tail = tail_of(words(event))
+                channel = channels[subject] = self._channel(topic, schema, {})
+            said = words(event)
+            tail = tails.get(said) or new_tail(said)
             body = self._body
-            index = self._indexes.get(channel)
-            if index is None:
-                index = self._indexes[channel] = array("Q")
-            index.append(log)
-            index.append(len(body))
+            mark = self._indexes[channel].append
+            mark(log)
+            mark(len(body))
             length = overhead + len(tail)
-            body += (
-                pack(_MESSAGE, length, channel, 0, log, publish, LITTLE_ENDIAN_CDR, *numbers(event)) + tail
-            )
+            body += pack(_MESSAGE, length, channel, 0, log, publish, LITTLE_ENDIAN_CDR, *numbers(event))
+            body += tail
 
         return write
 
@@ -231,8 +234,7 @@ class McapWriter:
             schema = self._schema(event.type, self._definitions(event.type))
             channel = self._channel(event.topic, schema, {"publisher": event.publisher})
             self._published[key] = channel
-        index = self._indexes.setdefault(channel, array("Q"))
-        index.extend((event.at, len(self._body)))
+        self._indexes[channel].extend((event.at, len(self._body)))
         length = MESSAGE_OVERHEAD + len(event.data)
         self._body += struct.pack(f"<{MESSAGE_FRAME}", _MESSAGE, length, channel, 0, event.at, event.at)
         self._body += event.data
@@ -240,6 +242,11 @@ class McapWriter:
     def _end_second(self, now: Ns) -> None:
         self.flush()
         self._chunk_ends = (now // S + 1) * S
+
+
+def _empty_indexes() -> defaultdict[int, array[int]]:
+    """Channel -> log time and place within the chunk of each of its messages, by turns."""
+    return defaultdict(lambda: array("Q"))
 
 
 def _index_record(channel: int, index: array[int]) -> bytes:

@@ -23,6 +23,7 @@ from volery.trace.events import (
     LinkState,
     Milestone,
     Operation,
+    Record,
     Slice,
     Verdict,
 )
@@ -52,7 +53,9 @@ class TimelineWriter:
         self._processes: dict[str, int] = {}
         self._threads: dict[tuple[str, str], str] = {}
         self._spans = 0
-        self._running: dict[tuple[str, int], Slice] = {}
+        self._running: dict[tuple[Any, ...], tuple[Ns, Slice]] = {}
+        self._cores: dict[tuple[Any, ...], str] = {}
+        self._names: dict[tuple[Any, ...], str] = {}
         self._states: dict[tuple[str, str], Milestone] = {}
         self._last: Ns = 0
         self._writers: dict[type[Any], Callable[[Any], None]] = {
@@ -71,6 +74,10 @@ class TimelineWriter:
         """Why the timeline is not whole; empty if it is."""
         return self._output.problem
 
+    def listener(self, kind: type[Any]) -> Record | None:
+        """What writes events of *kind*, if the timeline shows them."""
+        return self._writers.get(kind)
+
     def __call__(self, event: Event) -> None:
         """Write one event, if the timeline shows its kind."""
         writer = self._writers.get(type(event))
@@ -82,7 +89,7 @@ class TimelineWriter:
         if self._output.closed:
             return
         for running in self._running.values():
-            self._ran(running)
+            self._ran(*running)
         for state in self._states.values():
             self._state_until(state, max(self._last, state.at))
         self._write_out()
@@ -91,32 +98,40 @@ class TimelineWriter:
 
     def _slice(self, event: Slice) -> None:
         """Slices of one task that follow each other without a gap become one."""
-        core = (event.processor, event.core)
-        before = self._running.get(core)
-        if before is None or before.end != event.start or before[4:] != event[4:]:
-            if before is not None:
-                self._ran(before)
-            self._running[core] = event
+        core = event[2:4]
+        running = self._running.get(core)
+        if running is None:
+            self._running[core] = (event.start, event)
+        elif running[1].end == event.start and running[1][4:] == event[4:]:
+            self._running[core] = (running[0], event)
         else:
-            self._running[core] = event._replace(start=before.start)
+            self._ran(*running)
+            self._running[core] = (event.start, event)
 
-    def _ran(self, event: Slice) -> None:
-        where = self._thread(event.processor, str(event.core), f"core {event.core}")
-        name = event.component if event.task == event.component else f"{event.component}/{event.task}"
-        self._complete(name, event.start, event.end, where)
+    def _ran(self, start: Ns, event: Slice) -> None:
+        where = self._cores.get(event[2:4])
+        if where is None:
+            where = self._thread(event.processor, str(event.core), f"core {event.core}")
+            self._cores[event[2:4]] = where
+        name = self._names.get(event[4:])
+        if name is None:
+            whole = event.component if event.task == event.component else f"{event.component}/{event.task}"
+            name = self._names[event[4:]] = _quote(whole)
+        self._complete(name, start, event.end, where)
 
     def _activation(self, event: Activation) -> None:
-        self._span(
-            _ACTIVATIONS, event.component, event.released, event.finished, {"deadline": event.deadline}
-        )
+        details = f'{{"deadline": {event.deadline}}}'
+        self._span(_ACTIVATIONS, _quote(event.component), event.released, event.finished, details)
 
     def _call(self, event: Call) -> None:
         name = f"{event.callee}.{event.operation}"
-        self._span(_CALLS, name, event.start, event.end, {"caller": event.caller, "outcome": event.outcome})
+        details = {"caller": event.caller, "outcome": event.outcome}
+        self._span(_CALLS, _quote(name), event.start, event.end, _quote(details))
 
     def _operation(self, event: Operation) -> None:
         details = {"asked": event.asked, "outcome": event.outcome, "said": event.said}
-        self._span(_OPERATIONS, f"{event.vehicle}.{event.operation}", event.start, event.end, details)
+        name = _quote(f"{event.vehicle}.{event.operation}")
+        self._span(_OPERATIONS, name, event.start, event.end, _quote(details))
 
     def _milestone(self, event: Milestone) -> None:
         key = (event.kind, event.subject)
@@ -128,7 +143,7 @@ class TimelineWriter:
 
     def _state_until(self, state: Milestone, end: Ns) -> None:
         track = f"{state.kind} {state.subject}"
-        self._complete(state.state, state.at, end, self._thread(_FOLLOWED, track, track))
+        self._complete(_quote(state.state), state.at, end, self._thread(_FOLLOWED, track, track))
 
     def _link_state(self, event: LinkState) -> None:
         self._instant(event.at, f"{event.link}: {event.state}", event.detail)
@@ -140,18 +155,18 @@ class TimelineWriter:
         self._instant(event.at, f"{event.requirement} {'met' if event.met else 'NOT met'}", event.observable)
 
     def _complete(self, name: str, start: Ns, end: Ns, where: str) -> None:
+        """A span of a track whose spans do not overlap; *name* is JSON already."""
         self._last = max(self._last, end)
         times = f'"ts":{_microseconds(start)},"dur":{_microseconds(end - start)}'
-        self._line(f'{{"name":{_quote(name)},"ph":"X",{times},{where}}}')
+        self._line(f'{{"name":{name},"ph":"X",{times},{where}}}')
 
-    def _span(self, process: str, name: str, start: Ns, end: Ns, details: dict[str, Any]) -> None:
-        """Something that may overlap with its like: a pair of asynchronous events of its own."""
+    def _span(self, process: str, name: str, start: Ns, end: Ns, details: str) -> None:
+        """Something that may overlap with its like: an asynchronous pair; *name* and *details* are JSON."""
         self._last = max(self._last, end)
         self._spans += 1
         common = f'"cat":{_quote(process)},"id":{self._spans},{self._thread(process, "", process)}'
-        named = f'"name":{_quote(name)}'
-        arguments = _quote(details)
-        self._line(f'{{{named},"ph":"b","ts":{_microseconds(start)},{common},"args":{arguments}}}')
+        named = f'"name":{name}'
+        self._line(f'{{{named},"ph":"b","ts":{_microseconds(start)},{common},"args":{details}}}')
         self._line(f'{{{named},"ph":"e","ts":{_microseconds(end)},{common}}}')
 
     def _instant(self, at: Ns, name: str, detail: str) -> None:
