@@ -32,7 +32,7 @@ class FakeVehicle:
         self.velocity, self.since = (0.0, 0.0, 0.0), 0
         self.done = []
         self.battery = SimpleNamespace(remaining=nan)
-        self.flying = False
+        self.flying = up > 0.0
 
     @property
     def position(self):
