@@ -11,10 +11,15 @@ from numba import njit
 from volery.base.errors import UsageError
 from volery.world.columns import Array
 
+_HALF_CURVATURE = 0.5 / 6_371_008.8  # of the earth's mean radius (IUGG) [1/m]
+
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights in metres up about the world's origin.
+    """Heights in metres above the level of the world's origin (AMSL less the frame's).
+
+    The ground follows the globe: seen from the plane that touches it at the origin it falls by d^2 / 2 R (8 m
+    in 10 km), so that ground at one level has one altitude AMSL.
 
     ``heights[row][column]`` is the height at north ``south_edge + row * spacing`` and east ``west_edge +
     column * spacing``. One post alone is level ground everywhere.
@@ -33,7 +38,7 @@ class Terrain:
             raise UsageError(f"terrain: a spacing of {self.spacing} m between posts; give more than 0")
 
     def height(self, east: float, north: float) -> float:
-        """Metres up of the ground at a point."""
+        """Metres up of the ground at a point: its ``up`` in the world's frame."""
         heights, grid = self.arrays()
         return float(ground_height(heights, grid, east, north))
 
@@ -46,11 +51,9 @@ class Terrain:
 
 
 @njit(cache=True)
-def ground_height(heights: Array, grid: Array, east: float, north: float) -> float:
-    """Bilinear interpolation between the four posts around a point [m up]."""
+def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
+    """Bilinear interpolation between the four posts around a point."""
     rows, columns = heights.shape
-    if rows == 1 and columns == 1:
-        return heights[0, 0]  # type: ignore[no-any-return]  # numpy's element is a float
     x = min(max((east - grid[0]) / grid[2], 0.0), columns - 1.0)
     y = min(max((north - grid[1]) / grid[2], 0.0), rows - 1.0)
     column = min(int(x), max(columns - 2, 0))
@@ -59,6 +62,17 @@ def ground_height(heights: Array, grid: Array, east: float, north: float) -> flo
     above = min(row + 1, rows - 1)
     fx = x - column
     fy = y - row
-    south = heights[row, column] * (1.0 - fx) + heights[row, right] * fx
+    south_side = heights[row, column] * (1.0 - fx) + heights[row, right] * fx
     north_side = heights[above, column] * (1.0 - fx) + heights[above, right] * fx
-    return south * (1.0 - fy) + north_side * fy  # type: ignore[no-any-return]
+    height: float = south_side * (1.0 - fy) + north_side * fy
+    return height
+
+
+@njit(cache=True)
+def ground_height(heights: Array, grid: Array, east: float, north: float) -> float:
+    """Metres up of the ground, over the plane that touches the globe at the world's origin."""
+    drop = (east * east + north * north) * _HALF_CURVATURE
+    if heights.size == 1:
+        level: float = heights[0, 0] - drop
+        return level
+    return _relief(heights, grid, east, north) - drop

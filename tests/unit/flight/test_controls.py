@@ -130,6 +130,30 @@ def test_it_holds_its_place_in_gusty_wind(drone):
     assert max(errors) < 1.0
 
 
+def test_the_landed_detector_is_silent_in_the_air_and_sure_on_the_ground(drone):
+    flown = drone("consumer").hover(20.0)
+    flown.drive(Control.VELOCITY, velocity=(3.0, 0.0, 1.5))
+    seen = flown.wait(8)
+    flown.drive(Control.POSITION, position=(0.0, 0.0, -15.0))
+    seen += flown.wait(10)
+    assert not any(estimate.landed for _, estimate, _ in seen)
+    flown.drive(Control.POSITION_CLIMB, climb=-0.5)
+    seen = flown.wait(60, until=lambda estimate, truth: estimate.landed)
+    assert seen[-1][2].on_ground
+    touched = next(after for after, _, truth in seen if truth.on_ground)
+    assert 1.0 <= seen[-1][0] - touched < 5.0
+
+
+def test_it_takes_off_again_after_a_landing(drone):
+    flown = drone("consumer").hover(5.0)
+    flown.drive(Control.POSITION_CLIMB, climb=-0.5)
+    flown.wait(30, until=lambda estimate, truth: estimate.landed)
+    flown.drive(Control.POSITION, position=(0.0, 0.0, -5.0))
+    flown.wait(15)
+    assert flown.flight.look().position[2] == pytest.approx(-5.0, abs=0.3)
+    assert not flown.flight.look().landed
+
+
 def test_the_tilt_limit_holds(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.POSITION, position=(200.0, 0.0, -10.0), accel=9.0, speed=20.0, tilt=radians(15.0))

@@ -2,12 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.world.columns import S_POSITION, S_RESTING, S_ROTORS, U_PAYLOAD, U_THROTTLE
+from volery.world.columns import S_GUST, S_POSITION, S_RESTING, S_ROTORS, U_PAYLOAD, U_THROTTLE, U_WIND
 from volery.world.compiled import digest_of
 from volery.world.magnetism import magnetic_field
 from volery.world.sensors import declared_sigma, sensor_set
@@ -102,7 +103,7 @@ def test_a_resting_body_does_not_move_or_turn(clock, frame):
     assert after.on_ground
 
 
-def test_wind_carries_what_has_drag_and_gusts_have_their_deviation(clock, frame, ideal_battery):
+def test_wind_carries_what_has_drag(clock, frame, ideal_battery):
     spec = Multirotor(sensors="perfect", battery=ideal_battery)
     world = World(clock, [spec], frame=frame, wind=Wind(east=5.0, north=-2.0))
     row = world.arrays.rows[0]
@@ -118,15 +119,54 @@ def test_wind_carries_what_has_drag_and_gusts_have_their_deviation(clock, frame,
 
 def test_terrain_is_bilinear_between_its_posts_and_level_beyond(clock, frame):
     terrain = Terrain(heights=((0.0, 10.0), (20.0, 30.0)), spacing=10.0)
-    assert terrain.height(5.0, 5.0) == pytest.approx(15.0)
-    assert terrain.height(-50.0, 0.0) == pytest.approx(0.0)
-    assert terrain.height(50.0, 50.0) == pytest.approx(30.0)
+    assert terrain.height(5.0, 5.0) == pytest.approx(15.0, abs=1e-5)
+    assert terrain.height(-50.0, 0.0) == pytest.approx(0.0, abs=1e-3)
+    assert terrain.height(50.0, 50.0) == pytest.approx(30.0, abs=1e-3)
     world = World(clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, terrain=terrain)
     world.drive(0, U_THROTTLE, 0.0, 0.1)
     clock.wait(4)
     east, _, up = world.truth(0).position
-    assert up == pytest.approx(10.0 + min(east, 10.0), abs=1e-6)
+    assert up == pytest.approx(10.0 + min(east, 10.0), abs=1e-3)
     assert east > 2.0
+
+
+def test_level_ground_has_one_altitude_far_from_the_origin(clock, frame):
+    for east, north in ((0.0, 0.0), (8_000.0, 0.0), (-3_000.0, 7_000.0)):
+        _, _, amsl = frame.from_enu((east, north, Terrain().height(east, north)))
+        assert amsl == pytest.approx(frame.amsl, abs=0.05)
+
+
+def test_gusts_have_their_deviation_and_their_correlation_time(clock, frame):
+    wind = Wind(east=6.0, gust=1.5, gust_length=12.0)
+    world = World(clock, [Multirotor(sensors="perfect")] * 10, frame=frame, wind=wind)
+    samples = []
+    for _ in range(1500):
+        clock.wait(0.2)
+        for body in range(10):
+            world.look(body)
+        samples.append(world.arrays.rows[:, S_GUST : S_GUST + 3].copy())
+    gusts = np.array(samples)
+    assert gusts[..., :2].std() == pytest.approx(1.5, rel=0.08)
+    assert gusts[..., 2].std() == pytest.approx(0.75, rel=0.1)
+    north = gusts[..., 1]
+    later = (north[10:] * north[:-10]).mean() / north.var()  # two seconds apart, with T = 12 / 6 s
+    assert later == pytest.approx(math.exp(-1.0), abs=0.08)
+
+
+def test_two_bodies_feel_gusts_of_their_own(clock, frame):
+    world = World(clock, [Multirotor(), Multirotor()], frame=frame, wind=Wind(east=6.0, gust=1.5))
+    clock.wait(5)
+    world.look(0)
+    world.look(1)
+    assert world.arrays.rows[0, S_GUST] != world.arrays.rows[1, S_GUST]
+
+
+def test_the_wind_can_change(clock, frame):
+    world = World(clock, [Multirotor()], frame=frame)
+    world.set_wind(Wind(east=3.0))
+    clock.now = STEP
+    world.look(0)
+    assert world.arrays.rows[0, U_WIND] == 3.0
 
 
 @pytest.mark.parametrize("terrain", [{"heights": ((1.0,), (1.0, 2.0))}, {"heights": ((),)}, {"spacing": 0.0}])
