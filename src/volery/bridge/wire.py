@@ -36,13 +36,15 @@ class Ear:
         self._filled = Signal(wire.kernel, f"{wire.name} ({', '.join(names)})")
 
     def __enter__(self) -> Self:
-        self._wire.ears.append(self)
+        with self._wire.kernel.guard:
+            self._wire.ears.append(self)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._wire.ears.remove(self)
+        with self._wire.kernel.guard:
+            self._wire.ears.remove(self)
 
     def hear(self, frame: Frame) -> None:
         """House code."""
@@ -111,7 +113,8 @@ class Wire:
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
         """Send to nobody in particular."""
-        self._link.send(Frame(name, fields, self._system, self._component))
+        with self.kernel.guard:
+            self._link.send(Frame(name, fields, self._system, self._component))
 
     def send_to(self, name: str, fields: dict[str, Any]) -> None:
         """Send to the autopilot."""

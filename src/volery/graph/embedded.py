@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
@@ -11,11 +11,17 @@ from volery.graph import names
 from volery.graph.clock import CLOCK
 from volery.graph.context import Context, Member
 from volery.graph.group import CallbackGroup, Work
-from volery.graph.node import AS_OFFERED, DEFAULT, Callback, Group, Handler, QoS
+from volery.graph.node import AS_OFFERED, DEFAULT, Callback, Group, Handler, Node, QoS
 from volery.graph.services import EmbeddedClient, EmbeddedService
 from volery.graph.timing import NodeRate, NodeTimer, sleep
 from volery.graph.topics import EmbeddedPublisher, EmbeddedSubscription, topic
 from volery.kernel.task import Place
+
+if TYPE_CHECKING:
+
+    def _is_a(node: EmbeddedNode) -> Node:
+        """Checked by the type checker: it has all that a node has."""
+        return node
 
 
 class _Closes(Protocol):
