@@ -21,8 +21,8 @@ RESTARTS = 3
 TEXT_GRACE: Ns = 500 * MS
 """The autopilot's reason often comes just after its refusal; so long it is waited for."""
 
-TEXT_BEFORE: Ns = 2 * S
-"""A text that explains a change of mode may come so much before the change is seen."""
+RECENT_S = 3.0
+"""A text that is older is quoted with its age."""
 
 SILENCE: Ns = 5 * S
 """A link that says nothing for so long is lost: five missed heartbeats."""
@@ -52,7 +52,7 @@ class Performer:
             if not undone:
                 return
         times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
-        raise Overridden(self._driver.name, asked, undone + times + self._last_text())
+        raise Overridden(self._driver.name, asked, undone + times + self.last_words())
 
     def is_ours(self) -> bool:
         """It is in the mode that was commanded last, or in the one in which it obeys a computer."""
@@ -69,7 +69,7 @@ class Performer:
             self._driver.name,
             asked,
             f"is in {seen.mode} (status {seen.status}), which this program did not command"
-            f"{self._last_text()}; to hand it over, switch the vehicle to {self._driver.handover}",
+            f"{self.last_words()}; to hand it over, switch the vehicle to {self._driver.handover}",
         )
 
     def _sequence(self, asked: str, steps: Sequence[Step]) -> str:
@@ -100,9 +100,13 @@ class Performer:
         """How much longer it may be silent."""
         return self._driver.telemetry.heard + self._silence - self._kernel.now()
 
-    def _last_text(self) -> str:
-        texts = self._driver.telemetry.texts_since(0)
-        return f"; it said {texts[-1]!r}" if texts else ""
+    def last_words(self) -> str:
+        """What the autopilot said last, and how long ago if that is long."""
+        texts = self._driver.telemetry.texts
+        if not texts:
+            return ""
+        ago = to_seconds(self._kernel.now() - texts[-1].at)
+        return f"; it last said {texts[-1].text!r}" + (f" ({ago:.0f} s before)" if ago > RECENT_S else "")
 
 
 class _Attempt:
@@ -213,7 +217,7 @@ class _Attempt:
             raise self._lost()
         left = self._began + self._step.within - self._kernel.now()
         if left <= 0:
-            raise self._refused(self._began) if self._is_refused() else self._late()
+            raise self._refused() if self._is_refused() else self._late()
         return min(left, self._owner.patience())
 
     # -- the end
@@ -221,14 +225,12 @@ class _Attempt:
     def _judge(self) -> str:
         if self._step.done(self._seen):
             return ""
-        since = self._began
-        if self._changed:
-            since = max(self._began, self._kernel.now() - TEXT_BEFORE)
         self._hear_reasons()
         if not self._changed:
-            raise self._refused(since)
+            raise self._refused()
         if self._seen.flying or self._seen.failsafe:
-            raise self._taken(self._changed, since)
+            self._owner.commanded = ""
+            raise self._taken(self._changed)
         return self._changed
 
     def _hear_reasons(self) -> None:
@@ -239,20 +241,17 @@ class _Attempt:
         while self._kernel.now() < until:
             self._driver.cycle()
 
-    def _refused(self, since: Ns) -> Refused:
-        texts = self._seen.texts_since(since, severity=5)
+    def _refused(self) -> Refused:
+        texts = self._seen.texts_since(self._began, severity=5)
         answer = self._seen.answers[self._step.answer]
         said = "; ".join(dict.fromkeys(texts)) or "gave no reason"
         what = f"the autopilot refused to {self._step.ask} ({answer.result}): {said}"
         return Refused(self._driver.name, self._asked, what + self._advice())
 
-    def _taken(self, what: str, since: Ns | None = None) -> Overridden:
+    def _taken(self, what: str) -> Overridden:
         seen = self._seen
-        self._owner.commanded = ""
-        self._driver.stop()
-        texts = seen.texts_since(self._began if since is None else since)
-        said = f"; it said {texts[-1]!r}" if texts else ""
         kind = Failsafe if seen.failsafe else Overridden
+        said = self._owner.last_words()
         back = f"; to hand it back, switch the vehicle to {self._driver.handover}"
         return kind(self._driver.name, self._asked, f"{what} (status {seen.status}){said}{back}")
 

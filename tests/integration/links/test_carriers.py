@@ -23,6 +23,8 @@ from volery.links.serial_line import SerialLine
 from volery.links.tcp import TcpClient, TcpServer
 from volery.links.udp import UdpLink
 from volery.trace.events import LinkState
+from volery.vehicles.address import parse, parse_listen
+from volery.vehicles.carriers import listen, open_link
 
 pytestmark = pytest.mark.integration
 
@@ -141,7 +143,7 @@ def test_a_connection_that_breaks_comes_back(bench: Bench) -> None:
     client = bench.add(TcpClient(bench.kernel, HERE, port, "client"))
     bench.until(lambda: not client.problem())
     server.close()
-    bench.until(lambda: client.problem())
+    bench.until(client.problem)
     again = bench.add(TcpServer(bench.kernel, HERE, port))
     bench.until(lambda: not client.problem())
     client.send(ASK)
@@ -214,3 +216,34 @@ def test_a_serial_line_both_ways_and_its_end(bench: Bench) -> None:
 def test_a_serial_device_that_is_not_there(bench: Bench) -> None:
     line = bench.add(SerialLine(bench.kernel, "/dev/ttyNONE0", 57600))
     bench.until(lambda: "no device /dev/ttyNONE0" in line.problem())
+
+
+def test_links_from_addresses(bench: Bench) -> None:
+    port = free_port()
+    joined: list[str] = []
+    server = bench.add(
+        listen(bench.kernel, parse_listen(f"tcp://{HERE}:{port}"), joined=lambda: joined.append("one"))
+    )
+    client = bench.add(open_link(bench.kernel, parse(f"ardupilot+tcp://{HERE}:{port}")))
+    bench.until(lambda: joined)
+    server.send(BEAT)
+    bench.until(lambda: bench.heard[client])
+    bound = UdpLink(bench.kernel, "", 0)
+    bench.add(bound)
+    for sender in (
+        open_link(bench.kernel, parse(f"ardupilot+udp://{HERE}:{bound.port}")),
+        listen(bench.kernel, parse_listen(f"udp://{HERE}:{bound.port}")),
+    ):
+        bench.add(sender)
+    sender.send(BEAT)
+    bench.until(lambda: bench.heard[bound])
+
+
+def test_a_link_that_is_closed_says_so_and_drops_what_is_sent(bench: Bench) -> None:
+    client = bench.add(TcpClient(bench.kernel, HERE, free_port()))
+    client.close()
+    client.send(BEAT)
+    client.send_bytes(b"text")
+    client.arrived(encode(BEAT, 0))
+    assert bench.heard[client] == []
+    assert client.problem() == "the link was closed"

@@ -273,6 +273,9 @@ def test_guided_is_not_commanded_over_a_failsafe_that_took_our_own_mode(bench: M
         sleep(at.kernel, S)
         with pytest.raises(Failsafe, match="is in a failsafe, in ALT_HOLD"):
             drone.goto(NEAR)
+        at.autopilot.heard.clear()
+        sleep(at.kernel, S)
+        assert at.autopilot.sent("RC_CHANNELS_OVERRIDE")[-1]["chan3_raw"] == 1500  # else it would sink
 
     at.fly(mission)
     assert at.craft.mode == "ALT_HOLD"
