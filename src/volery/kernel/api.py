@@ -77,8 +77,8 @@ class Kernel(Protocol):
     def park(self, deadline: Ns | None, waiting_for: str) -> bool:
         """Block the current task until it is woken (True) or *deadline* has passed (False).
 
-        *waiting_for* names what, for the message of a deadlock. Whoever looks whether it has to wait does both
-        within one ``with kernel:``, lest it be woken in between.
+        *waiting_for* names what, for the message of a deadlock. Whoever looks whether it has to wait looks
+        and parks within one ``with kernel:``, lest it be woken in between.
         """
 
     def wake(self, task: Task) -> None:

@@ -57,6 +57,12 @@ def users_line(frame: FrameType | None) -> str:
     return f"{found.f_code.co_filename}:{found.f_lineno}" if found is not None else "an unknown line"
 
 
+LONGEST_WAIT_S = 0.25
+"""The main thread waits for nothing longer than this at a stretch: it does not see a signal that arrives just
+as it falls asleep (Python runs handlers between two bytecodes, and a lock that is being waited for is one of
+them)."""
+
+
 class Accusation(NamedTuple):
     """It was this task, at this virtual time, that would not let go."""
 

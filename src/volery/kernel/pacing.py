@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.base.time import to_seconds
+from volery.kernel.interrupt import LONGEST_WAIT_S
 
 if TYPE_CHECKING:
     from volery.base.time import Ns
-
-LONGEST_WAIT_S = 3600.0
 
 
 class Pacer:

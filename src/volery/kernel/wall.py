@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Self
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
-from volery.kernel.interrupt import Interrupts
+from volery.kernel.interrupt import LONGEST_WAIT_S, Interrupts
 from volery.kernel.task import STUBBORN, Cancelled, Place, Scope, Task
 from volery.kernel.timer import Every
 from volery.trace.events import Record, ignore
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from volery.kernel.api import Action
 
 FOREVER: Ns = 2**63 - 1
-LONGEST_WAIT_S = 3600.0
 GRACE_S = 2.0
 
 
@@ -196,17 +195,21 @@ class WallKernel:
         with self:
             task.woken = False
             task.waiting_for = waiting_for
-            while not task.woken:
-                left = None if deadline is None else self._wall_seconds(deadline)
-                if left is not None and left <= 0.0:
-                    break
-                task.flow.woken.wait(left)
+            while not task.woken and (deadline is None or self.now() < deadline):
+                task.flow.woken.wait(self._patience(task, deadline))
             if task.summons is not None:
                 self._answer(task)
             return task.woken
 
+    def _patience(self, task: Task, deadline: Ns | None) -> float | None:
+        """How long *task* may wait at a stretch, in seconds on the wall."""
+        if deadline is None:
+            return LONGEST_WAIT_S if task.adopted else None
+        left = self._wall_seconds(deadline)
+        return min(left, LONGEST_WAIT_S) if task.adopted else left
+
     def _wall_seconds(self, until: Ns) -> float:
-        return min(to_seconds(until - self.now()) / self._speed, LONGEST_WAIT_S)
+        return min(to_seconds(until - self.now()) / self._speed, threading.TIMEOUT_MAX)
 
     def wake(self, task: Task) -> None:
         """End the wait that *task* is in."""
@@ -280,7 +283,7 @@ class WallKernel:
 
     def _wait(self, due: Ns) -> None:
         with suppress(Empty):
-            self._bell.get(timeout=max(0.0, self._wall_seconds(due)))
+            self._bell.get(timeout=max(0.0, min(self._wall_seconds(due), LONGEST_WAIT_S)))
 
     def _begin(self) -> None:
         with self._monitor:
