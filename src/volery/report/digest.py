@@ -188,7 +188,7 @@ class Digest:
 
     def _steps(self, steps: list[Milestone]) -> list[Json]:
         vehicles = self._names_of_vehicles()
-        places = {place.name: place.name for place in self._scenery.places} if self._scenery else {}
+        places = {place.name: place.kind for place in self._scenery.places} if self._scenery else {}
         return [
             {
                 "t": _seconds(step.at),
@@ -196,7 +196,7 @@ class Digest:
                 "by": step.component,
                 "detail": step.detail,
                 "vehicle": _mentioned(step, vehicles),
-                "place": _mentioned(step, places),
+                "place": _place(step, places, first=step is steps[0]),
             }
             for step in steps
         ]
@@ -214,7 +214,7 @@ class Digest:
             "components": [
                 {
                     "name": component,
-                    "share": [round(100.0 * ns / whole, 2) for ns in _merge(bins, together, count)],
+                    "share": [round(100.0 * ns / whole, 3) for ns in _merge(bins, together, count)],
                 }
                 for component, bins in self._load[name].items()
             ],
@@ -228,12 +228,26 @@ def _merge(bins: list[int], together: int, count: int) -> list[int]:
 
 
 def _mentioned(step: Milestone, names: dict[str, str]) -> str:
-    """Which of *names* the state, else the detail, speaks of; the longest: drone_11 contains drone_1."""
+    """Whom of *names* the state, else the detail, speaks of; the longest, since drone_11 contains drone_1."""
     for words in (step.state, step.detail):
         found = [name for name in names if name in words]
         if found:
             return names[max(found, key=len)]
     return ""
+
+
+def _place(step: Milestone, kinds: dict[str, str], first: bool) -> str:
+    """The place that the state speaks of or that the detail is; what was only ordered is in the store.
+
+    A place that a detail merely mentions may be where the parcel is to go.
+    """
+    said = [name for name in kinds if name in step.state]
+    if said:
+        return max(said, key=len)
+    if step.detail in kinds:
+        return step.detail
+    stores = [name for name, kind in kinds.items() if kind == "store"]
+    return stores[0] if first and len(stores) == 1 else ""
 
 
 def _seconds(at: Ns) -> float:

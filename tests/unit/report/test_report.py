@@ -198,6 +198,22 @@ def test_a_parcel_is_drawn_with_the_vehicle_of_the_component_that_has_it(tmp_pat
     assert [step["vehicle"] for step in parcel["steps"]] == ["rover_7", "", "rover_8"]
 
 
+def test_a_parcel_is_in_the_store_then_where_it_is_said_to_be(tmp_path: Path) -> None:
+    folder = tmp_path / "placed"
+    folder.mkdir()
+    writer = McapWriter(folder / "trace.mcap", RunSetup(), [_MAP])
+    for at, state, detail in (
+        (0, "ordered", "blood for san_rafael"),
+        (1, "planned", "blood for san_rafael"),
+        (2, "at port_north", ""),
+        (3, "delivered", "san_rafael"),
+    ):
+        writer(Milestone(at, "central", "parcel", "p", state, detail))
+    writer.close()
+    (parcel,) = embedded(render(gather(folder)))["parcels"]  # type: ignore[misc]
+    assert [step["place"] for step in parcel["steps"]] == ["store", "", "port_north", "san_rafael"]
+
+
 def test_more_words_than_fit_are_counted(tmp_path: Path) -> None:
     html = render(gather(small_run(tmp_path / "talk", *(Text(n, "d", 6, f"line {n}") for n in range(1000)))))
     assert "600 more stand in the trace alone" in html

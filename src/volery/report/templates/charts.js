@@ -44,7 +44,7 @@
         context.moveTo(margin.left, y);
         context.lineTo(width - margin.right, y);
         context.stroke();
-        context.fillText((Math.abs(value) < 1e-9 ? 0 : value).toFixed(decimals) + unit, margin.left - 6, y);
+        context.fillText((Math.abs(value) < 1e-9 ? 0 : value).toFixed(Math.min(decimals, 3)) + unit, margin.left - 6, y);
       }
       context.textAlign = "center";
       context.textBaseline = "top";
@@ -115,6 +115,8 @@
     }, values);
   }
 
+  const percent = (share) => share.toFixed(share && share < 0.95 ? 2 : 1) + " %";
+
   function load(processor) {
     const holder = document.getElementById("processors");
     const figure = make("figure");
@@ -134,7 +136,7 @@
     const peak = top.reduce((a, b) => Math.max(a, b), 0);
     const usual = [...top].sort((a, b) => a - b)[Math.floor(0.98 * (bins - 1))] || 0;
     const cut = peak > 4 * usual && usual > 0; // a rare peak must not flatten everything else
-    const high = Math.min(100, Math.max(cut ? 0.1 : 1, cut ? 2 * usual : 1.15 * peak));
+    const high = Math.min(100, Math.max(0.05, cut ? 2 * usual : 1.15 * peak));
     const caption = make("figcaption");
     const title = make("h3", "", processor.name);
     const cores = processor.cores === 1 ? "1 core" : processor.cores + " cores";
@@ -170,7 +172,7 @@
     }, shown.map((component, index) => ({
       label: component.name,
       ink: series(index),
-      value: (time) => (component.share[binAt(time)] || 0).toFixed(1) + " %",
+      value: (time) => percent(component.share[binAt(time)] || 0),
     })));
   }
 

@@ -83,6 +83,8 @@
       }
       const x = outline.reduce((sum, [value]) => sum + value, 0) / outline.length;
       const y = outline.reduce((sum, [, value]) => sum + value, 0) / outline.length;
+      const xs = outline.map(([value]) => value * view.scale);
+      if (Math.max(...xs) - Math.min(...xs) < 36) continue; // its name would hide it
       label(context, name, toX(x), toY(y) - 6, colour(kind === "no-fly" ? "noflight" : "soft"), taken, 0);
     }
   }
@@ -106,8 +108,19 @@
   const signs = { hospital: "+", store: "▤", port: "H", home: "⌂" };
 
   function drawPlaces(context, taken) {
-    for (const [name, px, py, kind] of scenery.places) {
+    for (const [, px, py] of scenery.places.filter((place) => !signs[place[3]])) {
+      context.beginPath();
+      context.arc(toX(px), toY(py), 3, 0, 2 * Math.PI);
+      context.fillStyle = colour("faint");
+      context.fill();
+    }
+    const important = [...scenery.places].sort((one, other) => !signs[one[3]] - !signs[other[3]]);
+    for (const [name, px, py, kind] of important) {
       const x = toX(px), y = toY(py);
+      if (!signs[kind]) {
+        label(context, name.replaceAll("_", " "), x, y, colour("faint"), taken, 6);
+        continue;
+      }
       context.beginPath();
       if (kind === "port") context.arc(x, y, 11, 0, 2 * Math.PI); else context.roundRect(x - 10, y - 10, 20, 20, 5);
       context.fillStyle = colour("surface");
@@ -119,7 +132,7 @@
       context.font = "700 14px " + getComputedStyle(document.body).fontFamily;
       context.textAlign = "center";
       context.textBaseline = "middle";
-      context.fillText(signs[kind] || "•", x, y + 0.5);
+      context.fillText(signs[kind], x, y + 0.5);
       label(context, name.replaceAll("_", " "), x, y, colour("soft"), taken, 13);
     }
   }
