@@ -1,0 +1,130 @@
+"""What a message costs the simulation itself: publish to callback on the embedded graph, and a vehicle node.
+
+Times are CPU time of this machine, medians over rounds that take turns; the ratio is to encoding the same
+message to CDR (by rosbags), which recording does anyway. Nothing is written to disk.
+
+    python bench/graph.py [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from statistics import median
+from time import process_time
+from typing import Any, NamedTuple
+
+from volery import messages
+from volery.base.time import MS, S
+from volery.bridge import serve_vehicle
+from volery.cost import catalogue
+from volery.graph import Graph
+from volery.kernel.processor import Processor
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.links.in_process import in_process
+from volery.links.link import Frame
+from volery.messages.cdr import copied_to_cdr
+
+POSE = "geometry_msgs/msg/PoseStamped"
+
+
+class Free(NamedTuple):
+    caller: int = 0
+    background: int = 0
+
+
+def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> Graph:
+    tariff = catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
+    free = Free()
+
+    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+        kernel.call_at(kernel.now(), deliver)
+
+    price = (lambda node, call, x: tariff(call, x)) if priced else (lambda node, call, x: free)
+    return Graph(kernel, price, carry, records=lambda topic: recorded)
+
+
+def publishing(count: int, priced: bool, recorded: bool) -> float:
+    """Microseconds from publish to the end of the callback, one subscriber."""
+    kernel = VirtualKernel()
+    graph = graph_on(kernel, priced, recorded)
+    place = Place("both", Processor(kernel, "cpu", cores=4) if priced else None)
+    took = [0.0]
+
+    def both() -> None:
+        node = graph.node("both")
+        node.subscribe("pose", POSE, lambda message: None)
+        publisher = node.advertise("pose", POSE)
+        message = messages.new(POSE)
+        start = process_time()
+        for _ in range(count):
+            publisher.publish(message)
+            node.spin_once()
+        took[0] = process_time() - start
+
+    kernel.spawn(both, "both", place)
+    kernel.run(10**15)
+    return took[0] / count * 1e6
+
+
+def encoding(count: int) -> float:
+    """Microseconds to encode the message alone."""
+    message = messages.new(POSE)
+    start = process_time()
+    for _ in range(count):
+        copied_to_cdr(message)
+    return (process_time() - start) / count * 1e6
+
+
+def serving(seconds: int) -> float:
+    """CPU milliseconds per simulated second of a vehicle node with an autopilot that streams at 10 Hz."""
+    kernel = VirtualKernel()
+    graph = graph_on(kernel, priced=True, recorded=True)
+    ours, theirs = in_process(kernel)
+
+    def say(name: str, **fields: Any) -> None:
+        theirs.send(Frame(name, fields, 1, 1))
+
+    def stream() -> None:
+        say("GLOBAL_POSITION_INT", hdg=9000)
+        say("LOCAL_POSITION_NED")
+
+    def instruments() -> None:
+        say("HEARTBEAT", type=2, autopilot=3)
+        for name in ("ATTITUDE", "SYS_STATUS", "VFR_HUD", "GPS_RAW_INT", "RAW_IMU", "EXTENDED_SYS_STATE"):
+            say(name)
+
+    kernel.every(100 * MS, stream)
+    kernel.every(S, instruments)
+    serve_vehicle(graph, ours, "drone_1", Place("mavros", Processor(kernel, "cpu", cores=4)))
+    kernel.run(5 * S)
+    start = process_time()
+    kernel.run(kernel.now() + seconds * S)
+    return (process_time() - start) / seconds * 1e3
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    quick = parser.parse_args().quick
+    count, rounds = (2_000, 3) if quick else (10_000, 7)
+    what: dict[str, Callable[[], float]] = {
+        "encode to CDR alone": lambda: encoding(count),
+        "publish to callback": lambda: publishing(count, priced=False, recorded=False),
+        "publish to callback, content recorded": lambda: publishing(count, priced=False, recorded=True),
+        "publish to callback, recorded and executed on a processor": lambda: publishing(count, True, True),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in what}
+    for _ in range(rounds):
+        for name, measure in what.items():
+            taken[name].append(measure())
+    reference = median(taken["encode to CDR alone"])
+    for name, values in taken.items():
+        print(f"{name:<60}{median(values):>8.2f} us{median(values) / reference:>8.1f} x")
+    served = median(serving(20 if quick else 60) for _ in range(3))
+    print(f"{'a vehicle node, per simulated second':<60}{served:>8.2f} ms")
+
+
+if __name__ == "__main__":
+    main()
