@@ -20,7 +20,7 @@ CELL_FULL_VOLTS = 4.2
 
 @njit(cache=False)
 def cell_voltage(left: float) -> float:
-    """Open-circuit volts of one cell with the fraction *left* of its charge; 3.0 V when none is left."""
+    """Open-circuit volts of one cell with the fraction *left* of its charge; past 0 it breaks down."""
     if left >= 0.9:
         return 4.06 + (min(left, 1.0) - 0.9) * 1.4
     if left >= 0.5:
@@ -29,7 +29,9 @@ def cell_voltage(left: float) -> float:
         return 3.73 + (left - 0.2) * (11.0 / 30.0)
     if left >= 0.1:
         return 3.61 + (left - 0.1) * 1.2
-    return 3.0 + max(left, 0.0) * 6.1
+    if left >= 0.0:
+        return 3.0 + left * 6.1
+    return max(0.0, 3.0 + left * 60.0)
 
 
 @njit(cache=False)

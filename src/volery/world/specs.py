@@ -76,6 +76,38 @@ AIR_DENSITY = 1.225  # [kg/m^3], ISA at sea level
 STANDARD_GRAVITY = 9.80665  # [m/s^2], CGPM 1901
 
 
+_MULTIROTOR_POSITIVE = (
+    "mass",
+    "inertia",
+    "thrust_coefficient",
+    "propeller_diameter",
+    "figure_of_merit",
+    "efficiency",
+    "top_speed",
+    "rotor_lag",
+    "feet",
+)
+_ROVER_POSITIVE = (
+    "mass",
+    "wheelbase",
+    "steer_top_deg",
+    "steer_lag",
+    "speed_top",
+    "speed_lag",
+    "efficiency",
+    "grip",
+    "turn_top_deg",
+)
+
+
+def _above_zero(noun: str, spec: object, names: tuple[str, ...]) -> None:
+    """Refuse a body whose figures would divide by zero or turn a law round."""
+    for name in names:
+        value = getattr(spec, name)
+        if not all(figure > 0.0 for figure in (value if isinstance(value, tuple) else (value,))):
+            raise UsageError(f"{noun}: {name} is {value}; give more than 0")
+
+
 @dataclass(frozen=True)
 class Battery:
     """A lithium-polymer pack: capacity in ampere-hours, cells in series, resistance of the pack, fraction
@@ -139,6 +171,9 @@ class Multirotor:
     friction: float = 0.6
     idle_power: float = 3.0
 
+    def __post_init__(self) -> None:
+        _above_zero("multirotor", self, _MULTIROTOR_POSITIVE)
+
     @property
     def torque_coefficient(self) -> float:
         """k_Q = k_T^1.5 / (FM sqrt(2 rho A)): see ``multirotor``."""
@@ -177,6 +212,9 @@ class Rover:
     skid: bool = False
     turn_top_deg: float = 120.0
     idle_power: float = 5.0
+
+    def __post_init__(self) -> None:
+        _above_zero("rover", self, _ROVER_POSITIVE)
 
 
 BodySpec = Multirotor | Rover

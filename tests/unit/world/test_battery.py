@@ -103,6 +103,37 @@ def test_an_impossible_battery_is_refused(values):
         Battery(**values)
 
 
+def test_a_cell_breaks_down_once_it_is_empty():
+    assert cell_voltage(-0.01) < 2.5
+    assert cell_voltage(-1.0) == 0.0
+    assert current(0.0, 0.01, 50.0) == 0.0
+
+
+def test_an_empty_battery_stops_the_rotors(clock, frame):
+    world = World(clock, [Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.02))], frame=frame)
+    world.drive(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
+    clock.wait(3)
+    assert world.truth(0).position[2] > 2.0
+    clock.wait(30)
+    truth = world.truth(0)
+    assert truth.battery_left == 0.0
+    assert truth.on_ground
+    assert max(truth.rotors) < 20.0
+
+
+@pytest.mark.parametrize(
+    ("spec", "values", "name"),
+    [
+        (Multirotor, {"mass": 0.0}, "multirotor: mass"),
+        (Multirotor, {"inertia": (0.02, 0.0, 0.04)}, "multirotor: inertia"),
+        (Rover, {"wheelbase": -1.0}, "rover: wheelbase"),
+    ],
+)
+def test_an_impossible_body_is_refused(spec, values, name):
+    with pytest.raises(UsageError, match=name):
+        spec(**values)
+
+
 def test_a_payload_cannot_give_power(clock, frame):
     world = World(clock, [Multirotor()], frame=frame)
     with pytest.raises(UsageError, match="payload"):
