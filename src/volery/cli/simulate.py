@@ -14,6 +14,7 @@ from volery.cli.folders import next_folder
 from volery.cli.progress import shown
 from volery.model.reader import load
 from volery.report.terminal import summary_table
+from volery.run.recording import make_folder
 from volery.run.result import Run
 from volery.run.simulate import Options
 from volery.run.simulate import simulate as run_simulation
@@ -38,7 +39,7 @@ def simulate(output: Output, wanted: Wanted) -> int:
     """Run it, show the result; the exit status."""
     pace = pace_of(wanted.speed)
     system = load(wanted.model, vocabulary(), wanted.scenario, wanted.allocation, wanted.overrides)
-    folder = wanted.out or next_folder(system.name)
+    folder = make_folder(wanted.out or next_folder(system.name))  # before anything that takes time
     with shown(output, " · ".join(filter(None, (system.name, system.allocation, system.scenario)))) as show:
         run = run_simulation(system, Options(wanted.fidelity, wanted.seed, pace, folder, show))
     return tell(output, run)
