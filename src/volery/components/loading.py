@@ -204,10 +204,16 @@ class _Import:
     def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
         """``from package import module``: the module has to be loaded before the name is looked up."""
         for attribute in wanted:
-            if not hasattr(package, attribute):
-                module = self._find(f"{name}.{attribute}")
-                if module is not None:
-                    setattr(package, attribute, module)
+            if attribute == "*" or attribute in vars(package):
+                continue
+            module = self._find(f"{name}.{attribute}")
+            if module is not None:
+                setattr(package, attribute, module)
+                continue
+            try:
+                getattr(package, attribute)
+            except AttributeError as error:
+                raise ImportError(str(error)) from None
 
     def _top_of(self, name: str, found: ModuleType) -> ModuleType:
         """``import a.b.c`` binds ``a``, through which ``a.b.c`` is reached."""
@@ -220,21 +226,16 @@ class _Import:
         return module
 
     def _relative(self, name: str, fromlist: tuple[str, ...], level: int) -> ModuleType:
+        """``from .name import a`` and ``from . import a``: beside the file, or *level* - 1 folders above."""
         folder = self._folder
         for _ in range(level - 1):
             folder = folder.parent
-        importer = _Import(self._loader, folder)
-        if name:
-            found = self._loader.sibling(name, folder)
-        else:
-            found = self._loader.sibling("__init__", folder) or ModuleType(folder.name)
-        if found is None:
+        package = self._loader.sibling(name or "__init__", folder)
+        if package is None and name:
             raise ImportError(f"no module {'.' * level}{name} in {folder}")
-        if not name:
-            for attribute in fromlist:
-                module = self._loader.sibling(attribute, folder)
-                if module is not None and not hasattr(found, attribute):
-                    setattr(found, attribute, module)
-        else:
-            importer._submodules(found, name, fromlist)
+        found = package or ModuleType(folder.name)
+        for attribute in fromlist:
+            module = self._loader.sibling(f"{name}.{attribute}" if name else attribute, folder)
+            if module is not None and attribute not in vars(found):
+                setattr(found, attribute, module)
         return found

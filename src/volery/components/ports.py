@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
 from functools import partial
-from typing import Any, NoReturn, overload
+from typing import Any, NoReturn, TypeVar, overload
 
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.components.instance import Instance
@@ -22,6 +22,8 @@ from volery.trace.events import Call
 
 Travel = Callable[[int], None]
 """Blocks the current task until so many bytes are at the other end; raises if they do not get there."""
+
+Sent = TypeVar("Sent")
 
 HEADER_BYTES = 64
 """Added to each direction of a call: TCP/IP headers (40) and the operation's name with framing."""
@@ -87,14 +89,23 @@ class Port:
         callee = self._callee
         far = task.place.processor is not callee.place.processor
         if far:
-            args, kwargs = deepcopy((args, kwargs))
+            args, kwargs = self._copied((args, kwargs), f"the arguments of {callee.name}.{operation}")
         self._move(self._there, (args, kwargs))
         with callee.visited(task, operation) as thing:
             result = _serve(callee, thing, operation, args, kwargs)
             if far:
-                result = deepcopy(result)
+                result = self._copied(result, f"the result of {callee.name}.{operation}")
         self._move(self._back, result)
         return result
+
+    def _copied(self, content: Sent, what: str) -> Sent:
+        """What arrives at another processor."""
+        try:
+            return deepcopy(content)
+        except VoleryError:
+            raise
+        except Exception as error:
+            raise UsageError(f"{what} cannot be copied to another processor: {error}") from error
 
     def _move(self, travel: Travel | None, content: object) -> None:
         if travel is not None:

@@ -359,3 +359,45 @@ def test_an_error_is_placed_in_the_users_file_and_libraries_are_noted(desk):
     desk.kernel.run(S)
     assert str(desk.failures[0][1]).endswith("(user.py:5)")
     assert desk.loader.libraries == {"networkx"}
+
+
+def test_packages_import_as_they_do_elsewhere(desk):
+    desk.write("pkg/__init__.py", "")
+    desk.write("pkg/one.py", "from . import two\nfrom .two import NAME\nfrom .sub import three\n")
+    desk.write("pkg/two.py", "NAME = 'two'\n__all__ = ['NAME']\n")
+    desk.write("pkg/sub/__init__.py", "")
+    desk.write("pkg/sub/three.py", "from ..two import NAME as OTHER\nfrom .. import two\n")
+    path = desk.write(
+        "user.py",
+        """
+        import pkg.sub.three as three
+        from log import tell
+        from pkg import one
+        from pkg.two import *
+        import pkg.two
+
+        class User:
+            def run(self):
+                tell((NAME, one.two is three.two is pkg.two, one.three is three, three.OTHER))
+        """,
+    )
+    desk.start(path, "User")
+    desk.kernel.run(S)
+    assert desk.log == [("two", True, True, "two")]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("from pkg import nothing", "no module|cannot import|has no attribute 'nothing'"),
+        ("from .absent import x", "no module .absent"),
+        ("from threading import Barrier", "threading.Barrier is not available in the files of components"),
+        ("from asyncio import run", "asyncio.run is not available in the files of components"),
+        ("import nowhere_to_be_found", "No module named 'nowhere_to_be_found'"),
+    ],
+)
+def test_imports_that_fail_say_why(desk, line, words):
+    desk.write("pkg/__init__.py", "")
+    path = desk.write("user.py", f"{line}\nclass User: pass\n")
+    with pytest.raises(ComponentError, match=words):
+        desk.start(path, "User")

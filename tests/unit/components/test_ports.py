@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 
 import pytest
@@ -210,6 +211,28 @@ def test_arguments_and_results_are_copied_between_processors_only(far):
     assert keeper.kept == mine == returned[0]
     assert (keeper.kept is mine) is not far
     assert (returned[0] is keeper.kept) is not far
+
+
+def test_what_cannot_be_copied_cannot_go_to_another_processor():
+    house = House()
+    kernel = house.kernel
+    keeper = house.instance("keeper", Keeper(), Seat(house.ground), free(keep=0), ("keep",))
+    port = Port(kernel, "caller", keeper, None, None)
+    said = []
+
+    def attempt(thing):
+        try:
+            port.keep(thing)
+        except UsageError as error:
+            said.append(str(error))
+
+    steps = [lambda: attempt(threading.Lock()), lambda: attempt(port)]
+    house.instance("caller", Doing(kernel, steps), Seat(house.onboard, priority=0), free())
+    house.run()
+    assert said[0].startswith(
+        "the arguments of keeper.keep cannot be copied to another processor: cannot pickle"
+    )
+    assert said[1] == "a port (here: to keeper) cannot be sent to another processor"
 
 
 class Faulty:

@@ -11,15 +11,24 @@ from types import ModuleType
 
 from volery.base.time import Ns, S
 from volery.components.stand_ins import chance, clock, flows, queues, words
+from volery.components.stand_ins.module import make_module
 from volery.kernel.api import Kernel
 
 EPOCH: Ns = 1_700_000_000 * S
 """What ``time.time()`` says at the start of a run in virtual time: 2023-11-14 22:13:20 UTC."""
 
 
+REFUSED = ("asyncio", "concurrent.futures", "multiprocessing", "sched", "selectors", "signal")
+"""They wait for the machine's clock or its events, which a run does not pass with: nothing is offered of
+them.
+"""
+
+
 def stand_ins(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, ModuleType]:
     """By name, for ``Loader``. *epoch*: ``time.time_ns()`` at the start of the run."""
+    refused = {name: make_module(name, {}) for name in REFUSED}
     return {
+        **refused,
         "builtins": words.builtins_module(kernel),
         "time": clock.time_module(kernel, epoch),
         "datetime": clock.datetime_module(kernel, epoch),
