@@ -1,7 +1,7 @@
 """MAVLink 2 as bytes: a ``Frame`` to its wire form and back.
 
 Dialect ``ardupilotmega``, which holds ``common``. The message definitions are pymavlink's; packing uses them
-directly instead of pymavlink's message objects, which cost ten times as much. Arrays are tuples of numbers,
+directly instead of pymavlink's message objects, which cost three times as much. Arrays are tuples of numbers,
 ``char[]`` fields are ``str``. A field that is not given is zero or empty, as the protocol says of fields that
 an older sender does not know. Signatures are neither written nor checked.
 """
