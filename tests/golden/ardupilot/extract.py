@@ -3,7 +3,7 @@
     python tests/golden/ardupilot/extract.py FOLDER
 
 FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
-``facts.json`` beside this file. Times are seconds after the autopilot's boot, worked out from the messages that
+``facts.json`` beside this file. Times are seconds after the boot, worked out from the messages that
 carry it.
 """
 

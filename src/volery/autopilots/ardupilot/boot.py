@@ -118,6 +118,22 @@ def _gyros(first: tuple[float, float, float], second: tuple[float, float, float]
     ]
 
 
+COPTER_GYROS = _gyros(
+    (3.5415786e-05, 3.0671483e-05, 2.865993e-05), (1.474886e-05, 6.246919e-07, -3.2503358e-06)
+)
+ROVER_GYROS = _gyros(
+    (2.1818953e-05, -4.2986367e-06, -3.8552480e-07), (6.7699526e-05, 1.7263334e-06, -1.9344696e-05)
+)
+COPTER_PRESSURE = (("BARO1_GND_PRESS", 101079.71), ("BARO2_GND_PRESS", 101081.83))
+ROVER_PRESSURE = (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))
+
+
+def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
+    """Store what a boot measured, without a word."""
+    for name, value in values:
+        vehicle.parameters.set(name, value)
+
+
 def copter_events(ready: Act) -> tuple[Event, ...]:
     """A copter's. *ready* is done when the set-up has ended."""
     return (
@@ -132,12 +148,7 @@ def copter_events(ready: Act) -> tuple[Event, ...]:
         announced(1.75, *_IDS),
         at(2.28, ready),
         words(2.28, "ArduPilot Ready", "AHRS: DCM active"),
-        measured(
-            2.28,
-            _gyros(
-                (3.5415786e-05, 3.0671483e-05, 2.865993e-05), (1.474886e-05, 6.246919e-07, -3.2503358e-06)
-            ),
-        ),
+        measured(2.28, COPTER_GYROS),
         words(2.58, "RC7: SaveWaypoint LOW"),
         announced(3.28, "EK3_SRC1_POSXY"),
         words(4.28, *both("EKF3 IMU{unit} initialised"), "AHRS: EKF3 active"),
@@ -145,7 +156,7 @@ def copter_events(ready: Act) -> tuple[Event, ...]:
         at(19.84, origin_set),
         at(19.852, home_set),
         words(19.852, "EKF3 IMU0 origin set"),
-        measured(19.885, (("BARO1_GND_PRESS", 101079.71), ("BARO2_GND_PRESS", 101081.83))),
+        measured(19.885, COPTER_PRESSURE),
         at(19.885, field_elevation),
         words(20.05, "EKF3 IMU1 origin set"),
         at(41.45, partial(using_gps, units=(0,))),
@@ -167,13 +178,7 @@ def rover_events(ready: Act) -> tuple[Event, ...]:
         words(2.35, "INS: alloc 6144 bytes for ISB (free=131072)", severity=DEBUG),
         at(2.355, ready),
         words(2.355, "ArduPilot Ready", "AHRS: DCM active"),
-        measured(
-            2.355,
-            _gyros(
-                (2.1818953e-05, -4.2986367e-06, -3.8552480e-07),
-                (6.7699526e-05, 1.7263334e-06, -1.9344696e-05),
-            ),
-        ),
+        measured(2.355, ROVER_GYROS),
         announced(3.37, "EK3_SRC1_POSXY"),
         words(4.38, *both("EKF3 IMU{unit} initialised")),
         *(words(5.98, text) for text in both("EKF3 IMU{unit} tilt alignment complete")),
@@ -185,7 +190,7 @@ def rover_events(ready: Act) -> tuple[Event, ...]:
         words(19.86, *both("EKF3 IMU{unit} origin set")),
         at(19.94, field_elevation),
         measured(21.34, (("BARO1_GND_PRESS", 101020.25), ("BARO2_GND_PRESS", 101018.77))),
-        measured(32.34, (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))),
+        measured(32.34, ROVER_PRESSURE),
         at(42.08, partial(using_gps, units=(0, 1))),
         words(42.085, "AHRS: EKF3 active"),
     )

@@ -68,7 +68,7 @@ MODES = {
             3,
             "AUTO",
             BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, copter_leg),
+            lambda vehicle: FlyMission(vehicle, copter_leg, missions.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
             armable=False,
@@ -149,6 +149,12 @@ def ready(vehicle: Vehicle) -> None:
     initial = MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
     if initial is not vehicle.mode:
         vehicle.enter(initial)
+
+
+def warm(vehicle: Vehicle) -> None:
+    """As its boot leaves it, but for the position."""
+    boot.keep(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
+    ready(vehicle)
 
 
 def on_position(vehicle: Vehicle) -> None:
@@ -270,7 +276,7 @@ COPTER = Dialect(
     origin_after=ORIGIN,
     position_after=POSITION,
     local_position_after=POSITION,
-    on_warm=ready,
+    on_warm=warm,
     on_warm_position=on_position,
     heartbeat_first=(round(1.05 * S),),
     heartbeat_from=round(2.037 * S),

@@ -154,6 +154,12 @@ def act(vehicle: Vehicle, item: Item) -> None:
             vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
 
 
+def leaves_ground(vehicle: Vehicle) -> bool:
+    """Whether AUTO takes off without a MISSION_START: the throttle is raised, or AUTO_OPTIONS allows it."""
+    raised = vehicle.tuning.sticks.read(vehicle.sticks).throttle > 0.0
+    return raised or bool(round(vehicle.parameters["AUTO_OPTIONS"]) & 2)
+
+
 def copter_ended(vehicle: Vehicle) -> None:
     """On the ground it disarms; in the air it stays where it is."""
     if vehicle.landed and vehicle.armed:

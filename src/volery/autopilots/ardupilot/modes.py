@@ -6,7 +6,7 @@ from volery.autopilots.ardupilot.arming import CRITICAL, WARNING
 from volery.autopilots.simulated.manoeuvres.pilot import Stabilize
 from volery.autopilots.simulated.mavlink.command_service import ACCEPTED, DENIED, FAILED
 from volery.autopilots.simulated.mode import Mode
-from volery.autopilots.simulated.plan import TAKEOFF
+from volery.autopilots.simulated.plan import DELAY, TAKEOFF
 from volery.autopilots.simulated.vehicle import Vehicle
 
 CUSTOM_MODE_ENABLED = 1
@@ -55,9 +55,17 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
 
 
 def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
-    if mode.name == "AUTO" and vehicle.plan[1].command != TAKEOFF:
+    if mode.name == "AUTO" and not _takes_off_first(vehicle):
         vehicle.say(CRITICAL, "Auto: Missing Takeoff Cmd")
         return "init failed"
     if mode.manual_throttle and not vehicle.mode.manual_throttle and Stabilize(vehicle).pilot.throttle > 0.5:
         return "throttle too high"
     return ""
+
+
+def _takes_off_first(vehicle: Vehicle) -> bool:
+    """Whether the first item that navigates, but for waiting, is a take-off."""
+    plan = vehicle.plan
+    ahead = (item for item in plan.items[max(1, plan.current) :] if item.navigates and item.command != DELAY)
+    first = next(ahead, None)
+    return first is not None and first.command == TAKEOFF

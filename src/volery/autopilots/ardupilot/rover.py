@@ -123,6 +123,12 @@ def ready(vehicle: Vehicle) -> None:
     vehicle.enter(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
 
 
+def warm(vehicle: Vehicle) -> None:
+    """As its boot leaves it, but for the position."""
+    boot.keep(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
+    ready(vehicle)
+
+
 def on_position(vehicle: Vehicle) -> None:
     """There is a home, and nothing speaks against arming."""
     boot.home_set(vehicle)
@@ -207,7 +213,7 @@ ROVER = Dialect(
     origin_after=HOME,
     position_after=POSITION,
     local_position_after=HOME,
-    on_warm=ready,
+    on_warm=warm,
     on_warm_position=on_position,
     heartbeat_first=(round(1.025 * S),),
     heartbeat_from=round(3.04 * S),

@@ -11,6 +11,7 @@ autopilot.connect(theirs)
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from math import nan
 
 from volery.autopilots.simulated.dialect import Dialect, Family
@@ -111,9 +112,9 @@ class Autopilot:
             self._at(age + WARM_UP, lambda: dialect.on_warm_position(vehicle))
         else:
             for event in dialect.boot_events:
-                self._at(event.after, lambda act=event.act: act(vehicle))  # type: ignore[misc]
+                self._at(event.after, partial(event.act, vehicle))
             for words in dialect.boot_bytes[1:]:  # the banner is sent by whoever accepts a client
-                self._at(words.after, lambda data=words.data: self.face.send_bytes(data))  # type: ignore[misc]
+                self._at(words.after, partial(self.face.send_bytes, words.data))
         self.face.start()
         self._clocks.append(self._kernel.every(dialect.tick, self._tick))
         phase = (dialect.each_second_from - age) % S

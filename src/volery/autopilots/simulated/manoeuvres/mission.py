@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, sin, sqrt
 
 from volery.autopilots.simulated.flight import Control, Setpoint
 from volery.autopilots.simulated.manoeuvres.points import Land, Return, TakeOff, ToPoint, bearing
@@ -55,16 +55,19 @@ class FlyMission(Manoeuvre):
 
     slow_start = True
 
-    def __init__(self, vehicle: Vehicle, make_leg: MakeLeg) -> None:
+    def __init__(
+        self, vehicle: Vehicle, make_leg: MakeLeg, leaves_ground: Callable[[Vehicle], bool] | None = None
+    ) -> None:
         super().__init__(vehicle)
         self._make_leg = make_leg
+        self._leaves_ground = leaves_ground
         self._leg: Leg | None = None
         self._reached_at: Ns | None = None
         self._jumps: dict[int, int] = {}
         self._held: deque[Item] = deque()
         self._condition_since: Ns = 0
         self.started = False
-        """Whether it may leave the ground: a station started the mission, or the throttle was raised."""
+        """Whether it may leave the ground: a station started the mission, or *leaves_ground* said so."""
 
     def enter(self) -> None:
         """Wait for the next step: the mission begins once the vehicle is armed."""
@@ -79,6 +82,8 @@ class FlyMission(Manoeuvre):
 
     def wants_to_fly(self) -> bool:
         """If its leg does and it may."""
+        if not self.started and self._leaves_ground is not None:
+            self.started = self._leaves_ground(self.vehicle)
         if self._leg is None:
             self._begin_current()
         return self.started and self._leg is not None and self._leg.manoeuvre.wants_to_fly()
@@ -230,7 +235,8 @@ class Circle(Manoeuvre):
         pull = self._radius - away
         if abs(pull) < 0.5 * self._radius:
             self.turned += abs(passed)
-        along = self._rate * self._radius
+        fastest = sqrt(tuning.accel * self._radius)  # faster, and it could not stay on the circle
+        along = max(-fastest, min(fastest, self._rate * self._radius))
         velocity = (pull * cos(angle) - along * sin(angle), pull * sin(angle) + along * cos(angle), 0.0)
         vehicle.drive(
             Setpoint(

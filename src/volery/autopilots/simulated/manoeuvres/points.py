@@ -13,6 +13,9 @@ from volery.base.time import Ns
 CLOSE = 0.1
 """Metres within which a height or a shaped target counts as there."""
 
+SLOW = 0.05
+"""Metres per second below which it counts as standing still."""
+
 
 def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
     """The speed [m/s] from which one can stop within *distance* [m] at *accel* [m/s^2].
@@ -26,15 +29,23 @@ def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
     return sqrt(2.0 * accel * (distance - bend / 2.0))
 
 
-def stopping_point(position: Vector, velocity: Vector, accel: float, gain: float = 1.0) -> Vector:
-    """Where a vehicle that brakes at *accel* comes to rest in the plane: the inverse of ``root_speed``."""
-    north, east, _ = velocity
-    speed = hypot(north, east)
-    if speed < 0.05:
-        return position
+def stopping_distance(speed: float, accel: float, gain: float = 1.0) -> float:
+    """Metres [m] in which it comes to rest: the inverse of ``root_speed``."""
     bend = accel / gain
-    length = speed / gain if speed <= bend else speed**2 / (2.0 * accel) + bend / (2.0 * gain)
-    return position[0] + north / speed * length, position[1] + east / speed * length, position[2]
+    return speed / gain if speed <= bend else speed**2 / (2.0 * accel) + bend / (2.0 * gain)
+
+
+def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: float) -> Vector:
+    """Where a vehicle comes to rest that brakes at *accel* in the plane and *accel_z* [m/s^2] up and down."""
+    north, east, down = velocity
+    speed = hypot(north, east)
+    share = stopping_distance(speed, accel) / speed if speed > SLOW else 0.0
+    fall = stopping_distance(abs(down), accel_z) if abs(down) > SLOW else 0.0
+    return (
+        position[0] + north * share,
+        position[1] + east * share,
+        position[2] + (fall if down > 0.0 else -fall),
+    )
 
 
 def bearing(start: Vector, end: Vector) -> float:
@@ -55,7 +66,8 @@ class ToPoint(Manoeuvre):
         """Where no point was given it is where the vehicle can stop."""
         if self.point is None:
             estimate = self.vehicle.estimate
-            self.point = stopping_point(estimate.position, estimate.velocity, self.vehicle.tuning.accel)
+            tuning = self.vehicle.tuning
+            self.point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
         else:
             self.target = self.point
 
@@ -126,7 +138,8 @@ class Land(Manoeuvre):
         """Above the point, or where the vehicle can stop."""
         if self.point is None:
             estimate = self.vehicle.estimate
-            self.point = stopping_point(estimate.position, estimate.velocity, self.vehicle.tuning.accel)
+            tuning = self.vehicle.tuning
+            self.point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
 
     def sink(self) -> float:
         """Metres per second down at the present height."""
@@ -170,7 +183,7 @@ class Return(Manoeuvre):
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         ground = vehicle.home.ned if vehicle.home else (0.0, 0.0, 0.0)
         estimate = vehicle.estimate
-        here = stopping_point(estimate.position, estimate.velocity, tuning.accel)
+        here = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
         away = hypot(ground[0] - here[0], ground[1] - here[1])
         height = max(vehicle.height + tuning.return_climb_min, self._climb(vehicle.height, away))
         self._home = (ground[0], ground[1], ground[2] - height)
@@ -217,20 +230,30 @@ class Return(Manoeuvre):
             self._to("land", Land(self.vehicle, (north, east, down)))
 
 
-class Brake(ToPoint):
-    """Stop as fast as it may, and stay."""
+class Brake(Manoeuvre):
+    """Stop as fast as it may, and stay there."""
 
     ACCEL = 7.5
     """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
+    STANDS = 0.3
+    """Speed [m/s] below which it holds its place."""
 
-    def enter(self) -> None:
-        """Where hard braking ends."""
-        estimate = self.vehicle.estimate
-        self.point = stopping_point(estimate.position, estimate.velocity, self.ACCEL)
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._held: Vector | None = None
 
-    def towards(self, point: Vector) -> Setpoint:
-        """With the hard limits of braking."""
-        tuning = self.vehicle.tuning
-        return Setpoint(
-            Control.POSITION, position=point, accel=self.ACCEL, accel_z=tuning.pilot_accel_z, tilt=tuning.tilt
+    def step(self) -> None:
+        """No speed, then a place."""
+        estimate, tuning = self.vehicle.estimate, self.vehicle.tuning
+        north, east, _ = estimate.velocity
+        if self._held is None and hypot(north, east) < self.STANDS:
+            self._held = estimate.target
+        self.vehicle.drive(
+            Setpoint(
+                Control.VELOCITY if self._held is None else Control.POSITION,
+                position=self._held or (0.0, 0.0, 0.0),
+                accel=self.ACCEL,
+                accel_z=tuning.pilot_accel_z,
+                tilt=tuning.tilt,
+            )
         )

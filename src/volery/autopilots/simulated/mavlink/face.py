@@ -134,8 +134,7 @@ class Face:
         age = self._vehicle.uptime()
         if age > first:
             first += -(-(age - first) // period) * period
-        begin = lambda: self._clocks.append(self._kernel.every(period, action))  # noqa: E731
-        self._at_uptime(first, begin)
+        self._at_uptime(first, lambda: self._clocks.append(self._kernel.every(period, action)))
 
     def _ask_time(self) -> None:
         fields = {"tc1": 0, "ts1": self._vehicle.uptime() // 1000 * 1000 + self._vehicle.system}

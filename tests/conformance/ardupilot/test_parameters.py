@@ -1,0 +1,158 @@
+"""Parameters: listed, read, set, kept; and which of them change what the vehicle does."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import volery.autopilots
+from volery.autopilots.ardupilot import DIALECT
+from volery.base.errors import UsageError
+
+REAL32, INT8 = 9, 2
+
+
+def listed(rig: Any) -> list[dict[str, Any]]:
+    rig.send("PARAM_REQUEST_LIST", target_system=1, target_component=1)
+    rig.run(3.0)
+    return [one.fields for one in rig.of("PARAM_VALUE") if one.fields["param_index"] != 65535]
+
+
+@pytest.mark.parametrize(("kind", "count"), [("copter", 1390), ("rover", 1281)])
+def test_the_whole_list_comes_in_order_within_a_second(kind: str, count: int, bench: Any) -> None:
+    rig = bench(kind)
+    rig.run(0.5)
+    begun = rig.now
+    found = listed(rig)
+    assert [fields["param_index"] for fields in found] == list(range(count))
+    assert {fields["param_count"] for fields in found} == {count}
+    assert len({fields["param_id"] for fields in found}) == count
+    assert rig.of("PARAM_VALUE")[-1].at - begun < 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "value"),
+    [
+        ("FORMAT_VERSION", 4, 120.0),
+        ("FS_GCS_ENABLE", 2, 0.0),
+        ("FS_GCS_TIMEOUT", 9, 5.0),
+        ("SYSID_MYGCS", 4, 255.0),
+        ("RC_OVERRIDE_TIME", 9, 3.0),
+        ("INS_GYR_ID", 6, 2752772.0),
+        ("ATC_INPUT_TC", 9, 0.15000000596046448),
+    ],
+)
+def test_values_and_types_are_the_recorded_ones(name: str, kind: int, value: float, bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    begun = rig.now
+    rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_id=name, param_index=-1)
+    rig.run(0.2)
+    answer = rig.of("PARAM_VALUE")[-1]
+    assert answer.fields["param_id"] == name
+    assert answer.fields["param_type"] == kind
+    assert answer.fields["param_value"] == value
+    assert answer.fields["param_index"] == 65535
+    assert answer.at - begun < 0.11
+
+
+def test_reading_by_index_answers_with_the_index(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_index=2)
+    rig.run(0.2)
+    assert rig.latest["PARAM_VALUE"]["param_id"] == "SYSID_MYGCS"
+    assert rig.latest["PARAM_VALUE"]["param_index"] == 2
+
+
+def test_an_unknown_parameter_is_not_answered(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    rig.heard.clear()
+    rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_id="NO_SUCH", param_index=-1)
+    rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_index=5000)
+    rig.send(
+        "PARAM_SET",
+        target_system=1,
+        target_component=1,
+        param_id="NO_SUCH",
+        param_value=1.0,
+        param_type=REAL32,
+    )
+    rig.run(0.3)
+    assert not rig.of("PARAM_VALUE")
+
+
+@pytest.mark.parametrize(("given", "kept"), [(3.0, 3.0), (3.4, 3.0), (700.0, 127.0), (-700.0, -128.0)])
+def test_a_value_is_kept_in_the_parameters_own_type(given: float, kept: float, bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    rig.send(
+        "PARAM_SET",
+        target_system=1,
+        target_component=1,
+        param_id="FS_GCS_ENABLE",
+        param_value=given,
+        param_type=INT8,
+    )
+    rig.run(0.05)
+    assert rig.latest["PARAM_VALUE"]["param_value"] == kept
+
+
+def test_numbers_that_are_none_are_not_taken(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    rig.heard.clear()
+    rig.send(
+        "PARAM_SET",
+        target_system=1,
+        target_component=1,
+        param_id="WPNAV_SPEED",
+        param_value=float("nan"),
+        param_type=REAL32,
+    )
+    rig.run(0.1)
+    assert not rig.of("PARAM_VALUE")
+
+
+def test_listing_says_who_it_is(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    listed(rig)
+    assert rig.texts()[0] == "ArduCopter V4.5.6 (7ce11b41)"
+    assert rig.texts()[2] == "Frame: QUAD/PLUS"
+
+
+def test_a_parameter_that_does_not_exist_is_an_error_with_a_hint(bench: Any) -> None:
+    with pytest.raises(UsageError, match=r"WPNAV_SPED.*WPNAV_SPEED"):
+        bench(parameters={"WPNAV_SPED": 500})
+
+
+def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> None:
+    """What is listed as honoured is what the code of the dialect reads."""
+    room = Path(volery.autopilots.__file__).parent
+    source = "".join(
+        path.read_text(encoding="utf-8") for path in sorted(room.rglob("*.py")) if path.name != "honoured.py"
+    )
+    read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
+    read |= set(re.findall(r'"(BATT_(?:LOW|CRT)_(?:VOLT|MAH)|BATT_FS_(?:LOW|CRT)_ACT)"', source))
+    read |= {
+        "RCMAP_ROLL",
+        "RCMAP_PITCH",
+        "RCMAP_THROTTLE",
+        "RCMAP_YAW",
+        "DISARM_DELAY",
+        "GUID_TIMEOUT",
+        "LOIT_BRK_DELAY",
+    }
+    read |= {
+        f"RC{channel}_{part}" for channel in range(1, 17) for part in ("MIN", "TRIM", "MAX", "DZ", "REVERSED")
+    }
+    stated = set(DIALECT.kinds["multirotor"].honoured) | set(DIALECT.kinds["rover"].honoured)
+    assert stated == read
+    for dialect in DIALECT.kinds.values():
+        names = {parameter.name for parameter in dialect.parameters()}
+        assert set(dialect.honoured) <= names
