@@ -26,7 +26,7 @@ class VoleryError(Exception):
 
 
 class Location(NamedTuple):
-    """Where in a file something stands. Lines count from 1; 0 stands for no line (an option, a missing file)."""
+    """Where in a file something stands. Lines count from 1; 0 is no line (an option, a missing file)."""
 
     file: str
     line: int

@@ -1,7 +1,7 @@
 """Places on the globe. Latitude and longitude are WGS-84 degrees; an altitude always says what it is above.
 
-The worst accidents users report come from mixing altitudes, so the four kinds are four types and none converts
-into another without the reference that this takes.
+The worst accidents users report come from mixing altitudes, so the four kinds are four types and none
+converts into another without the reference that this takes.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ Altitude = AMSL | Ellipsoidal | AboveHome | AboveGround
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A point: WGS-84 latitude (north positive) and longitude (east positive) in degrees, and a typed altitude."""
+    """A point: WGS-84 degrees, north and east positive, and a typed altitude."""
 
     latitude: float
     longitude: float
@@ -68,7 +68,9 @@ class Position:
         if not -90.0 <= self.latitude <= 90.0:
             raise UsageError(f"latitude {self.latitude} is off the globe: -90 to 90 degrees, north positive")
         if not -180.0 <= self.longitude <= 180.0:
-            raise UsageError(f"longitude {self.longitude} is off the globe: -180 to 180 degrees, east positive")
+            raise UsageError(
+                f"longitude {self.longitude} is off the globe: -180 to 180 degrees, east positive"
+            )
 
     def __str__(self) -> str:
         return f"{self.latitude:.7f}, {self.longitude:.7f}, {self.altitude}"

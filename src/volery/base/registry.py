@@ -24,20 +24,37 @@ class Registry(Generic[T]):
         """Register *thing* for this process."""
         self._added[name] = thing
 
-    def _installed(self) -> dict[str, EntryPoint]:
-        return {point.name: point for point in entry_points(group=self.group)}
+    def _installed(self) -> dict[str, dict[str, EntryPoint]]:
+        """By name, what goes by it: more than one thing only if packages disagree."""
+        found: dict[str, dict[str, EntryPoint]] = {}
+        for point in entry_points(group=self.group):
+            found.setdefault(point.name, {})[point.value] = point
+        return found
 
     def names(self) -> list[str]:
         """All names, sorted, without importing anything."""
         return sorted(self._added.keys() | self._installed().keys())
 
     def load(self, name: str) -> T:
-        """Import and return what goes by *name*; a ``UsageError`` lists the valid names."""
+        """Import and return what goes by *name*.
+
+        Raises:
+            UsageError: nothing goes by it (lists the valid names), more than one thing does, or it cannot be
+                imported.
+        """
         if name in self._added:
             return self._added[name]
         installed = self._installed()
         if name not in installed:
             hint = did_you_mean(name, self.names())
             raise UsageError(f"no {self.noun} named {name!r}{hint}; there is {choices(self.names())}")
-        loaded: T = installed[name].load()
+        if len(installed[name]) > 1:
+            raise UsageError(
+                f"two packages provide the {self.noun} {name!r}: {' and '.join(sorted(installed[name]))}"
+            )
+        (point,) = installed[name].values()
+        try:
+            loaded: T = point.load()
+        except (ImportError, AttributeError) as error:
+            raise UsageError(f"the {self.noun} {name!r} cannot be loaded: {error}") from error
         return loaded

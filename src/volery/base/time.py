@@ -18,7 +18,7 @@ def from_seconds(seconds: float) -> Ns:
 
 
 def to_seconds(ns: Ns) -> float:
-    """Seconds as a float; exact to a nanosecond for runs of up to 104 days."""
+    """Seconds as a float. ``from_seconds`` gives the same nanosecond back up to 2**51 ns, 26 days."""
     return ns / S
 
 

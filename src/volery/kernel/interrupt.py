@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from volery.kernel.api import Kernel
     from volery.kernel.task import Task
 
+LONGEST_WAIT_S = 0.25
+"""The main thread waits for nothing longer than this at a stretch: Python runs handlers between bytecodes,
+and a signal that arrives just before the thread falls asleep does not wake it."""
+
 _HOUSE = f"{Path(__file__).parents[1]}{os.sep}"
 _EXAMPLES = f"{_HOUSE}examples{os.sep}"
 _LIBRARIES = (
@@ -55,12 +59,6 @@ def users_line(frame: FrameType | None) -> str:
     """``file:line`` of the innermost line of user code; of a house that is all alone, its own."""
     found = next((each for each in _outwards(frame) if not _is_house(each)), frame)
     return f"{found.f_code.co_filename}:{found.f_lineno}" if found is not None else "an unknown line"
-
-
-LONGEST_WAIT_S = 0.25
-"""The main thread waits for nothing longer than this at a stretch: it does not see a signal that arrives just
-as it falls asleep (Python runs handlers between two bytecodes, and a lock that is being waited for is one of
-them)."""
 
 
 class Accusation(NamedTuple):

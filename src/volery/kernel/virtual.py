@@ -383,24 +383,36 @@ class VirtualKernel:
     # -- the end
 
     def close(self, why: str = "end of run") -> list[str]:
-        """Unwind every task; returns the names of those that would not go."""
+        """Unwind every task; returns the names of those that would not go.
+
+        What escapes from one of them meanwhile is raised when all are unwound.
+        """
         if self._current is not None:
             raise UsageError("close() from inside a task: leave it first")
         self.cancel(self.root, why)
         if self._watchdog is not None:
             self._watchdog.stop()
         hub, self._hub = self._hub, getcurrent()
-        for task in list(self.root.all_tasks()):
-            if task.flow is None:
-                self._bury(task)
-            else:
-                task.flow.parent = self._hub
-                self._resume(task)
+        faults = [self._unwind(task) for task in list(self.root.all_tasks())]
         if hub is not None:
             hub.parent = self._hub
             hub.throw()
         self._hub = self._current = None
+        for fault in faults:
+            if fault is not None:
+                raise fault
         return [task.name for task in self.root.all_tasks()]
+
+    def _unwind(self, task: Task) -> BaseException | None:
+        try:
+            if task.flow is None:
+                self._bury(task)
+            else:
+                task.flow.parent = self._hub  # where it ends
+                self._resume(task)
+        except BaseException as fault:
+            return fault
+        return None
 
 
 def _house_blocks(waiting_for: str) -> UsageError:

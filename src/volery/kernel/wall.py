@@ -157,6 +157,11 @@ class WallKernel:
                 self._fault = self._fault or error
                 self._bell.put(None)
 
+    def _raise_fault(self) -> None:
+        fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
+
     # -- interaction points
 
     def __enter__(self) -> Self:
@@ -250,9 +255,7 @@ class WallKernel:
     def _goes_on(self, until: Ns) -> bool:
         """Do one thing that is due, or wait for it; False if there will be none."""
         with self._monitor:
-            fault, self._fault = self._fault, None
-            if fault is not None:
-                raise fault
+            self._raise_fault()
             if self.root.cancelled:
                 return False
             if self._do_next(until):
@@ -351,7 +354,10 @@ class WallKernel:
         return all(task.refusals > STUBBORN for task in self.root.all_tasks())
 
     def close(self, why: str = "end of run", grace_s: float = GRACE_S) -> list[str]:
-        """Unwind every task; returns the names of those that would not go within *grace_s* in all."""
+        """Unwind every task; returns the names of those that would not go within *grace_s* in all.
+
+        What escapes from one of them meanwhile is raised when all are unwound.
+        """
         if self.current() is not None:
             raise UsageError("close() from inside a task: leave it first")
         self.cancel(self.root, why)
@@ -361,4 +367,5 @@ class WallKernel:
                     self._bury(task)
             self._gone.wait_for(self._is_unwound, grace_s)
         self._stop()
+        self._raise_fault()
         return [task.name for task in self.root.all_tasks()]

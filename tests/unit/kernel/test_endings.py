@@ -162,6 +162,42 @@ def test_close_unwinds_every_task(kernel: Kernel, spawn: Spawn) -> None:
     assert kernel.root.tasks == []
 
 
+def test_what_escapes_while_closing_is_raised_when_all_are_unwound(kernel: Kernel, spawn: Spawn) -> None:
+    seen: list[str] = []
+    begun: Queue[str] = Queue(kernel, "begun")
+
+    def clumsy() -> None:
+        try:
+            begun.put("clumsy")
+            sleep(kernel, 3600 * S)
+        finally:
+            raise ZeroDivisionError
+
+    def tidy() -> None:
+        try:
+            begun.put("tidy")
+            sleep(kernel, 3600 * S)
+        finally:
+            seen.append("unwound")
+
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    def supervisor() -> None:
+        for _ in range(2):
+            begun.get()
+        kernel.post(interrupted)
+
+    for body in (clumsy, tidy, supervisor):
+        spawn(body)
+    with pytest.raises(KeyboardInterrupt):
+        kernel.run(LONG)
+    with pytest.raises(ZeroDivisionError):
+        kernel.close()
+    assert seen == ["unwound"]
+    assert kernel.close() == []
+
+
 def test_close_without_a_run_begins_nothing(kernel: Kernel, spawn: Spawn) -> None:
     seen: list[str] = []
     spawn(lambda: seen.append("begun"))
