@@ -8,6 +8,7 @@ import typer
 
 from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
 from volery.cli.console import Output
+from volery.cli.interrupts import insisted_on
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -23,7 +24,8 @@ def run_command(output: Output, command: Callable[[], int]) -> None:
 def status_of(output: Output, command: Callable[[], int]) -> int:
     """The exit status of *command*; what it raises is told."""
     try:
-        return command()
+        with insisted_on():
+            return command()
     except VoleryError as error:
         if output.debug:
             output.notes.print_exception()

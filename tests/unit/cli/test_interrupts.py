@@ -1,0 +1,40 @@
+"""A Ctrl-C that strikes where nothing can be raised is not lost."""
+
+import signal
+import sys
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from volery.cli.interrupts import insisted_on
+
+
+@pytest.fixture
+def struck():
+    """Set when SIGINT arrives."""
+    event = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda number, frame: event.set())
+    yield event
+    signal.signal(signal.SIGINT, before)
+
+
+def lost(error):
+    return SimpleNamespace(exc_type=error, exc_value=None, exc_traceback=None, err_msg=None, object=None)
+
+
+def test_a_lost_interrupt_comes_again(struck):
+    with insisted_on():
+        sys.unraisablehook(lost(KeyboardInterrupt))
+    assert struck.wait(30)
+
+
+def test_other_errors_are_told_as_ever(monkeypatch, struck):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    fault = lost(ValueError)
+    with insisted_on():
+        sys.unraisablehook(fault)
+    assert told == [fault]
+    assert sys.unraisablehook == told.append
+    assert not struck.is_set()
