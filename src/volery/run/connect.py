@@ -24,6 +24,8 @@ V = TypeVar("V", bound=Vehicle)
 
 GRAPHS = ("graph", "ros1", "ros2")
 SCRIPT = "script"
+SIMULATED = {"texts": "unrecorded"}
+"""Options of the driver of a simulated vehicle: its autopilot records its texts itself."""
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
 
 
@@ -95,7 +97,7 @@ def _simulated_vehicle(
     kernel: Kernel, fleet: Fleet, wanted: Simulated, kind: type[Vehicle], seed: int
 ) -> Vehicle:
     name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-    driver = drivers.load(autopilot)(kernel, link_to(kernel, fleet, wanted, seed), name, {})
+    driver = drivers.load(autopilot)(kernel, link_to(kernel, fleet, wanted, seed), name, SIMULATED)
     return kind(kernel, name, driver, truth=fleet.truth(name))
 
 

@@ -86,13 +86,13 @@ class Ending:
             self.failed("run", error)
             self._kernel.run(FOREVER)
         except KeyboardInterrupt:
-            self.stop_hard("stopped at once by a second signal")
+            self.stop_hard("interrupted", "stopped at once by a second signal")
         return self._kernel.close(self.reason)
 
-    def stop_hard(self, reason: str) -> None:
+    def stop_hard(self, status: Status, reason: str) -> None:
         """Nothing more happens; vehicles stay where they are."""
         self.begun = True
-        self.status, self.reason = "interrupted", reason
+        self.status, self.reason = status, reason
 
     @contextmanager
     def signals(self) -> Iterator[None]:

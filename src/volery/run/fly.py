@@ -65,7 +65,7 @@ class _Flight:
         self._ending.vehicles = self._opened.vehicles
         setup, attachments = setup_of_flight(self._path, urls, self._opened, options.seed)
         self._recording = Recording(setup, options.out, attachments)
-        kernel.record = self._recording
+        kernel.record = self._recording.stream
         fleet = self._opened.fleet
         if fleet is not None:
             fleet.sample()
@@ -93,7 +93,7 @@ class _Flight:
             with ending.signals():
                 left = ending.pass_time()
         except BaseException as fault:
-            ending.stop_hard(f"{type(fault).__name__}: {fault}")
+            ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
             raise
         finally:
             for vehicle in self._opened.vehicles:

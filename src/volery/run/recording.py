@@ -14,9 +14,9 @@ from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.messages.store import definition
 from volery.requirements.accounts import Accounts
-from volery.requirements.record import RunRecord, Status, write_record
+from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
 from volery.run.circumstances import Stopwatch, circumstances
-from volery.trace.events import Event, Verdict
+from volery.trace.events import Verdict
 from volery.trace.mcap_writer import Attachment, McapWriter
 from volery.trace.setup import RunSetup
 from volery.trace.stream import Stream
@@ -24,6 +24,7 @@ from volery.trace.timeline import TimelineWriter
 
 TRACE_FILE = "trace.mcap"
 TIMELINE_FILE = "timeline.json"
+REPORT_FILE = "report.html"
 
 Reporter = Callable[[Path], Path]
 """Makes a document out of a finished run folder and says where it is."""
@@ -54,26 +55,26 @@ class Recording:
         self.folder = make_folder(out) if out is not None else None
         self.problems: list[str] = []
         self._watch = Stopwatch()
-        self._writers: tuple[McapWriter | TimelineWriter, ...] = ()
+        self._trace: McapWriter | None = None
+        self._timeline: TimelineWriter | None = None
         self.stream.tap(self.accounts)
         if self.folder is not None:
-            trace = McapWriter(self.folder / TRACE_FILE, setup, attachments, definition)
-            self._writers = (trace, TimelineWriter(self.folder / TIMELINE_FILE))
-            for writer in self._writers:
-                self.stream.tap(writer)
-
-    def __call__(self, event: Event) -> None:
-        """Record one event."""
-        self.stream(event)
+            _forget_earlier_run(self.folder)
+            self._trace = McapWriter(self.folder / TRACE_FILE, setup, attachments, definition)
+            self._timeline = TimelineWriter(self.folder / TIMELINE_FILE)
+            self.stream.tap(self._trace)
+            self.stream.tap(self._timeline)
 
     def finish(self, status: Status, reason: str, ended: Ns, verdicts: Iterable[Verdict]) -> RunRecord:
         """Close the books and the files. What could not be written stands in ``problems``."""
         for verdict in verdicts:
             self.stream(verdict)
-        for writer in self._writers:
-            writer.close()
-            if writer.problem:
-                self.problems.append(writer.problem)
+        if self._trace is not None:
+            self._trace.outcome(status, reason)
+        for writer in (self._trace, self._timeline):
+            if writer is not None:
+                writer.close()
+                self.problems += [writer.problem] if writer.problem else []
         record = self.accounts.record(status, reason, ended, circumstances(self._watch))
         if self.folder is not None:
             self._write_documents(record, self.folder)
@@ -86,3 +87,9 @@ class Recording:
                 reporters.load(name)(folder)
         except (UsageError, OSError) as error:
             self.problems.append(str(error))
+
+
+def _forget_earlier_run(folder: Path) -> None:
+    """What an earlier run came to must not be taken for this one's, should this one be killed."""
+    for name in (RUN_FILE, REPORT_FILE):
+        (folder / name).unlink(missing_ok=True)

@@ -25,6 +25,9 @@ from volery.run.vocabulary import vocabulary
 
 FIDELITIES = ("times", "code")
 LATER = ("firmware", "hardware")
+PATIENCE_S = 20.0
+"""Seconds on the wall that a component may compute without letting virtual time go on."""
+
 GOAL_PERIOD: Ns = 100 * MS
 """How often it is looked whether the model's ``until`` holds."""
 
@@ -79,8 +82,9 @@ class _Simulation:
 
     def __init__(self, system: System, options: Options) -> None:
         self._system = system
-        self._kernel = kernel = VirtualKernel(pace=options.pace)
+        self._kernel = kernel = VirtualKernel(pace=options.pace, watchdog_s=PATIENCE_S)
         platform = Platform(system, kernel, options.seed, options.fidelity)
+        platform.foresee()
         setup = setup_of(system, platform, options.seed, options.fidelity)
         self._ending = Ending(kernel)
         surroundings = system.environment
@@ -88,7 +92,7 @@ class _Simulation:
         builder = Builder(system, kernel, platform, self._fleet, self._ending)
         self._built = builder.build(options.fidelity, options.seed)
         self._recording = Recording(setup, options.out, attachments_of(system))
-        kernel.record = self._recording
+        kernel.record = self._recording.stream
         self._observers = Observers(system.requirements, setup)
         self._recording.stream.tap(self._observers)
         if system.limits.until is not None:
@@ -114,7 +118,7 @@ class _Simulation:
                 self._built.start()
                 left = ending.pass_time()
         except BaseException as fault:
-            ending.stop_hard(f"{type(fault).__name__}: {fault}")
+            ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
             self._close(())
             raise
         return self._close(left)
