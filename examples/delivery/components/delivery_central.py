@@ -1,7 +1,7 @@
 """Delivery_Central: takes orders, picks rovers and drones, asks for routes, follows every parcel to its end.
 
 A parcel goes over *legs*: by rover from the store to the drone port, by drone to the port of its district, by
-rover to the requester. Each leg has a carrier of its own. Once a second the central asks every vehicle how it
+rover to the requester. Each leg has a carrier of its own. Step by step the central asks every vehicle how it
 stands and moves on what can be moved on; nothing it calls waits for a vehicle.
 """
 
@@ -35,6 +35,9 @@ MOVES = {0: "to_port", 1: "in_flight", LAST: "last_mile"}
 
 NEAR_M = {ROVER: 6.0, DRONE: 12.0}
 """A vehicle that stands this close to a place is there."""
+
+LEAST_CHARGE = 0.3
+"""Share of its battery that a vehicle needs to be sent out."""
 
 SILENT_POLLS = 3
 """After so many questions without an answer a vehicle counts as failed."""
@@ -92,13 +95,13 @@ class Vehicle:
 class DeliveryCentral:
     """``order`` is called by requesters, ``run`` follows the parcels."""
 
-    def __init__(self, routes, rovers, drones, provider, city, *, stock, handling_s=5.0, least_charge=0.3):
+    def __init__(self, routes, rovers, drones, provider, city, *, stock, poll_s=1.0, handling_s=3.0):
         self._routes = routes
         self._provider = provider
         self._city = city
         self._stock = dict(stock)
+        self._poll_s = poll_s
         self._handling_s = handling_s
-        self._least_charge = least_charge
         self._vehicles = [Vehicle(port.component, ROVER, port) for port in rovers]
         self._vehicles += [Vehicle(port.component, DRONE, port) for port in drones]
         self._parcels = []
@@ -150,10 +153,10 @@ class DeliveryCentral:
     # -- the loop
 
     def run(self):
-        """Once a second."""
+        """Step by step, with a pause between."""
         while True:
             self.step()
-            volery.sleep(1.0)
+            volery.sleep(self._poll_s)
 
     def step(self):
         """Ask every vehicle, then move every parcel on as far as it goes now."""
@@ -281,7 +284,12 @@ class DeliveryCentral:
 
         A rover is fetched from another district only if the nearest one is out of service.
         """
-        able = [vehicle for vehicle in self._vehicles if vehicle.kind == leg.kind and self._is_able(vehicle)]
+        in_service = [
+            vehicle for vehicle in self._vehicles if vehicle.kind == leg.kind and not vehicle.failed
+        ]
+        if any(vehicle.base is None for vehicle in in_service):
+            return None  # it has not said yet where it is
+        able = [vehicle for vehicle in in_service if vehicle.status.battery >= LEAST_CHARGE]
         if not able and leg is parcel.legs[0]:
             self._without(parcel, leg)
         if leg.kind == ROVER and able:
@@ -289,16 +297,8 @@ class DeliveryCentral:
         idle = [vehicle for vehicle in able if vehicle.idle]
         return min(idle, key=lambda vehicle: self._distance(vehicle.status.position, leg.start), default=None)
 
-    def _is_able(self, vehicle):
-        """Heard, in service and charged."""
-        return (
-            vehicle.base is not None and not vehicle.failed and vehicle.status.battery >= self._least_charge
-        )
-
     def _without(self, parcel, leg):
         """No vehicle of the kind that *leg* needs is left: go by road, or give up."""
-        if any(vehicle.base is None and not vehicle.failed for vehicle in self._vehicles):
-            return  # it may yet answer
         if leg.kind == DRONE:
             goal = parcel.legs[-1].goal
             for later in parcel.legs:

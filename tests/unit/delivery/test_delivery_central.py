@@ -27,9 +27,13 @@ NEXT = {
 class Controller:
     """A vehicle's controller whose jobs take a while and whose vehicle may fail at a given time."""
 
-    def __init__(self, bench, name, at, *, takes=20.0, fails_at=None, battery=1.0, answers=True):
+    def __init__(self, bench, name, at, **faults):
         self.bench, self.component, self.position = bench, name, at
-        self.takes, self.fails_at, self.battery, self.answers = takes, fails_at, battery, answers
+        self.takes = faults.get("takes", 20.0)
+        self.fails_at = faults.get("fails_at")
+        self.battery = faults.get("battery", 1.0)
+        self.answers = faults.get("answers", True)
+        self.knows_itself_at = faults.get("knows_itself_at", 0.0)
         self.job, self.goal, self.until, self.jobs = "", None, 0.0, []
 
     @property
@@ -57,8 +61,9 @@ class Controller:
             self.position = self.goal
         state = "failed" if self.failed else "busy" if busy else "idle"
         outcome = "motor stopped" if self.failed else "" if busy or not self.job else "done"
+        position = self.position if self.now >= self.knows_itself_at else None
         return self.bench.types.VehicleStatus(
-            self.component, state, self.job, outcome, self.position, self.battery
+            self.component, state, self.job, outcome, position, self.battery
         )
 
 
@@ -173,6 +178,14 @@ def test_three_parcels_share_two_drones(service):
     for at in (1, 2, 3):
         running.order_at(at)
     assert list(running.run(1200).values()) == [THE_WAY] * 3
+
+
+def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for(service):
+    running = service(rover_a={"knows_itself_at": 6.0})
+    running.order_at(1)
+    assert running.run() == {"parcel-1": THE_WAY}
+    assert running.vehicles["rover_a"].jobs
+    assert len(running.vehicles["rover_b"].jobs) == 2  # the last mile, and home again
 
 
 @pytest.mark.parametrize(
