@@ -94,4 +94,6 @@ def test_a_slow_computer_on_board_is_late_for_its_pictures():
     assert states(run) == {"parcel-1": THE_WAY}
     assert [name for name, one in run.record.requirements.items() if not one.met] == ["landing_in_time_1"]
     landing = run.record.components["landing_1"]
-    assert landing.deadline_misses > 0.5 * landing.activations
+    assert (
+        landing.deadline_misses > 20
+    )  # each of its pictures; the rest of its activations wait for the ground
