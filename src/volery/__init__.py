@@ -1,4 +1,4 @@
-"""volery: model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers.
+"""volery: model a drone-and-rover service once, simulate it, fly it, know what it costs the computers.
 
 What most programs need is here; it is imported when it is first used, so that ``import volery`` costs nothing.
 """
