@@ -70,7 +70,6 @@ class VirtualKernel:
         self.record = record
         self.root = Scope("run")
         self.guard: AbstractContextManager[object] = nullcontext()
-        self.events = 0
         self._now: Ns = 0
         self._until: Ns = 0
         self._horizon: Ns = NEVER  # up to here tasks may hand over without the hub
@@ -189,7 +188,6 @@ class VirtualKernel:
         due, due_ticket, target = self._heap[0]
         if when < due and when <= self._horizon:
             self._now = when
-            self.events += 1
             return
         task.woken = False
         task.waiting_for = "a time"
@@ -197,7 +195,6 @@ class VirtualKernel:
         if due <= self._horizon and target.ticket == due_ticket and type(target) is Task:
             heapreplace(self._heap, (when, ticket, task))
             self._now = due
-            self.events += 1
             self._current = target
             target.flow.switch()
         else:
@@ -211,7 +208,6 @@ class VirtualKernel:
         if to > self._horizon or self._heap[0][0] <= to:
             return False
         self._now = to
-        self.events += 1
         return True
 
     def park(self, deadline: Ns | None = None, waiting_for: str = "") -> bool:
@@ -252,7 +248,6 @@ class VirtualKernel:
         if due <= self._horizon and target.ticket == ticket and type(target) is Task:
             heappop(self._heap)
             self._now = due
-            self.events += 1
             if target is not task:
                 self._current = target
                 target.flow.switch()
@@ -338,7 +333,6 @@ class VirtualKernel:
             _, ticket, target = heappop(heap)
             if target.ticket == ticket:
                 self._now = due
-                self.events += 1
                 if type(target) is Task:
                     self._resume(target)
                 else:

@@ -65,7 +65,6 @@ class WallKernel:
         self.root = Scope("run")
         self._monitor = threading.RLock()
         self.guard: AbstractContextManager[object] = self._monitor
-        self.events = 0
         self._speed = speed
         self._began: int | None = None
         self._gone = threading.Condition(self._monitor)  # a task has ended, or never will
@@ -277,7 +276,6 @@ class WallKernel:
             return False
         action = heappop(heap)[2].action
         if action is not None:
-            self.events += 1
             action()
         return True
 
