@@ -1,6 +1,6 @@
 """volery: model a drone-and-rover service once, simulate it, fly it, know what it costs the computers.
 
-What most programs need is here; it is imported when it is first used, so that ``import volery`` costs nothing.
+What most programs need is here, imported when it is first used: ``import volery`` itself costs nothing.
 """
 
 from __future__ import annotations

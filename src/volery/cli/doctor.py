@@ -86,7 +86,6 @@ PARTS: tuple[Part, ...] = (
     _needed("mcap", "traces that Foxglove opens"),
     _needed("pydantic", "models and run records"),
     _needed("ruamel.yaml", "models with line numbers"),
-    _needed("matplotlib", "plots"),
     _needed("jinja2", "reports"),
     Part(
         "mavsdk", distribution("mavsdk"), "flying `volery vehicle` with MAVSDK", "pip install 'mavsdk>=3,<4'"

@@ -63,11 +63,21 @@ class Built:
     """Components that are ready to start. ``start`` starts them in the order of the model."""
 
     starters: tuple[Callable[[], object], ...]
+    loader: Loader
 
     def start(self) -> None:
         """Every check comes first: nothing has started when something is missing."""
         for starter in self.starters:
             starter()
+
+    def warnings(self) -> list[str]:
+        """What the counting of code has left out."""
+        if self.loader.steps is None or not self.loader.libraries:
+            return []
+        names = ", ".join(sorted(self.loader.libraries))
+        return [
+            f"what components computed inside libraries was not counted: {names}; state it with volery.add_time()"
+        ]
 
 
 class Builder:
@@ -93,7 +103,8 @@ class Builder:
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         models = self._system.instances
         self._instances = {model.name: self._instance(model, steps) for model in models}
-        return Built((*self._vehicle_nodes(), *(self._starter(model, loader) for model in models)))
+        starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in models))
+        return Built(starters, loader)
 
     def _launches(self) -> dict[str, rospy.Launch]:
         return {

@@ -76,9 +76,10 @@ class Fleet:
 
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
         """Record the state of every vehicle now and then each *period*."""
-        self._kernel.every(period, self._record_states)
+        self._kernel.every(period, self.record_states)
 
-    def _record_states(self) -> None:
+    def record_states(self) -> None:
+        """Record the state of every vehicle now."""
         for autopilot in self.autopilots.values():
             self._kernel.record(autopilot.state())
 

@@ -98,6 +98,8 @@ class _Flight:
         finally:
             for vehicle in self._opened.vehicles:
                 vehicle.close()
+            if self._opened.fleet is not None:
+                self._opened.fleet.record_states()
             record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
         return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
 

@@ -14,6 +14,7 @@ from volery.model.system import System
 from volery.requirements.observables import Observers
 from volery.run.build import Builder
 from volery.run.ending import Ending
+from volery.run.faults import inject
 from volery.run.fleet import Fleet
 from volery.run.platform import Platform
 from volery.run.power import PowerFeed
@@ -22,9 +23,13 @@ from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import attachments_of, setup_of
 from volery.run.vocabulary import vocabulary
+from volery.trace.events import Text
 
 FIDELITIES = ("times", "code")
 LATER = ("firmware", "hardware")
+WHO, WARNING = "volery", 4
+"""Under this name and severity a run says what is doubtful about it."""
+
 PATIENCE_S = 20.0
 """Seconds on the wall that a component may compute without letting virtual time go on."""
 
@@ -104,6 +109,7 @@ class _Simulation:
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._fleet)
         self._fleet.sample()
+        inject(kernel, self._fleet, surroundings.faults)
 
     def _look_at_goal(self) -> None:
         if self._goal.all_hold(self._kernel.now()):
@@ -125,6 +131,9 @@ class _Simulation:
 
     def _close(self, left: Sequence[str]) -> Run:
         now, ending = self._kernel.now(), self._ending
+        self._fleet.record_states()
+        for warning in self._built.warnings():
+            self._recording.stream(Text(now, WHO, WARNING, warning))
         verdicts = self._observers.verdicts(now)
         record = self._recording.finish(ending.status, ending.reason, now, verdicts)
         return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))

@@ -6,12 +6,10 @@ from volery.autopilots.simulated.dialect import dialects
 from volery.cost import catalogue
 from volery.model.system import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
+from volery.run.faults import KINDS
 
 LANGUAGES = frozenset({"python", "rospy"})
 """Languages of components that run today."""
-
-FAULTS: frozenset[str] = frozenset()
-"""Kinds of faults that a scenario may inject."""
 
 
 def vocabulary() -> Vocabulary:
@@ -20,4 +18,4 @@ def vocabulary() -> Vocabulary:
         name: ProcessorKind(entry.cores, entry.least_mhz * 1e6, entry.greatest_mhz * 1e6)
         for name, entry in catalogue().processors.items()
     }
-    return Vocabulary(kinds, LANGUAGES, frozenset(dialects.names()), OBSERVABLES, FAULTS)
+    return Vocabulary(kinds, LANGUAGES, frozenset(dialects.names()), OBSERVABLES, frozenset(KINDS))

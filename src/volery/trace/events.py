@@ -29,10 +29,10 @@ class Slice(NamedTuple):
 class Charge(NamedTuple):
     """Computing was added to what a component owes its processor.
 
-    ``kind`` is ``code``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is what the
-    calling task pays before it goes on, ``background`` what its process pays beside it, both target time at
-    the processor's frequency; ``energy`` in joules is given only where the model states it for the operation,
-    else 0.0.
+    ``kind`` is ``code``, ``stated``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is
+    what the calling task pays before it goes on, ``background`` what its process pays beside it, both target
+    time at the processor's frequency; ``energy`` in joules is given only where the model states it for the
+    operation, else 0.0.
     """
 
     at: Ns
