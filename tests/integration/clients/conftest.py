@@ -30,7 +30,7 @@ class Served(NamedTuple):
     port: int
 
 
-def free_port(kind: int = socket.SOCK_STREAM) -> int:
+def a_free_port(kind: int = socket.SOCK_STREAM) -> int:
     with closing(socket.socket(socket.AF_INET, kind)) as free:
         free.bind((HERE, 0))
         return int(free.getsockname()[1])
@@ -38,7 +38,7 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 
 def served(carrier: str, speed: float, *options: str) -> Served:
     """Start ``volery vehicle`` and wait for the line that says it can be reached."""
-    port = free_port(socket.SOCK_DGRAM if carrier == "udp" else socket.SOCK_STREAM)
+    port = a_free_port(socket.SOCK_DGRAM if carrier == "udp" else socket.SOCK_STREAM)
     where = ("--listen", f"{carrier}://{HERE}:{port}", "--speed", str(speed))
     command = [*COMMAND, "vehicle", "ardupilot", *where, *options]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
@@ -77,6 +77,12 @@ def serve() -> Iterator[Callable[..., Served]]:
     finally:
         statuses = [ended(one.process) for one in running]
     assert statuses == [0] * len(running), "a server had ended, or did not end well"
+
+
+@pytest.fixture(scope="session")
+def free_port() -> Callable[..., int]:
+    """``free_port(kind=SOCK_STREAM)``: one that nobody uses now."""
+    return a_free_port
 
 
 @pytest.fixture(scope="session")
