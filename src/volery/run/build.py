@@ -75,9 +75,8 @@ class Built:
         if self.loader.steps is None or not self.loader.libraries:
             return []
         names = ", ".join(sorted(self.loader.libraries))
-        return [
-            f"what components computed inside libraries was not counted: {names}; state it with volery.add_time()"
-        ]
+        what = f"what components computed inside libraries was not counted: {names}"
+        return [f"{what}; state it with volery.add_time()"]
 
 
 class Builder:
