@@ -30,7 +30,7 @@ LATER = ("firmware", "hardware")
 WHO, WARNING = "volery", 4
 """Under this name and severity a run says what is doubtful about it."""
 
-PATIENCE_S = 20.0
+PATIENCE_S = 30.0
 """Seconds on the wall that a component may compute without letting virtual time go on."""
 
 GOAL_PERIOD: Ns = 100 * MS
