@@ -23,6 +23,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.run.ending import Ending
+from volery.run.fences import fence_of
 from volery.run.fleet import Fleet
 from volery.run.platform import Platform, commanded_by, is_node
 from volery.run.setup import node_name
@@ -90,6 +91,7 @@ class Builder:
         self._platform = platform
         self._fleet = fleet
         self._ending = ending
+        self._fence = fence_of(system.environment)
         self._graph = Graph(kernel, platform.price, platform.carry)
         self._nodes: dict[str, EmbeddedNode] = {}
         self._vehicles: dict[str, Vehicle] = {}
@@ -193,8 +195,12 @@ class Builder:
 
     def _vehicle(self, node: EmbeddedNode, name: str, interface: str) -> Drone | Rover:
         driver = drivers.load(GRAPH_DRIVER)(self._kernel, node, name, {"namespace": f"/{name}"})
-        kind = Drone if interface == "Drone" else Rover
-        vehicle = kind(self._kernel, name, driver, truth=self._fleet.truth(name))
+        truth = self._fleet.truth(name)
+        vehicle = (
+            Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
+            if interface == "Drone"
+            else Rover(self._kernel, name, driver, truth=truth)
+        )
         self._vehicles.setdefault(name, vehicle)  # one of its commanders brings it down in the end
         self._ending.vehicles = tuple(self._vehicles.values())
         return vehicle
