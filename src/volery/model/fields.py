@@ -26,8 +26,34 @@ class Form(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+class _Reader:
+    """What stands in the text becomes what ``read`` makes of it."""
+
+    def read(self, written: object) -> object:
+        """The value; ``NotAQuantity`` if it is none."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+class _Rewriter:
+    """What may be written shorter: it is validated as what ``meant`` makes of it."""
+
+    def meant(self, written: object) -> object:
+        """The longer form."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self.meant, handler(source))
+
+
 @dataclass(frozen=True)
-class Written:
+class Written(_Reader):
     """A quantity as people write it. ``least`` and ``most`` are in the unit of its kind."""
 
     kind: Kind
@@ -47,11 +73,6 @@ class Written:
             raise NotAQuantity(f"{written} is too much: at most {self.most:g}{unit}")
         return value
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
@@ -70,7 +91,7 @@ class WrittenTime(Written):
 
 
 @dataclass(frozen=True)
-class Degrees:
+class Degrees(_Reader):
     """An angle in degrees: a bare number, or one with a unit."""
 
     most: float
@@ -83,11 +104,6 @@ class Degrees:
             raise NotAQuantity(f"{written} is off the globe: {-self.most:g} to {self.most:g} degrees")
         return value
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
@@ -99,17 +115,12 @@ SHORT = "x-short"
 
 
 @dataclass(frozen=True)
-class Short:
+class Short(_Rewriter):
     """A mapping that may be written as the value of its main key alone: ``battery: 5 Ah``."""
 
     key: str
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(self.lengthen, handler(source))
-
-    def lengthen(self, written: object) -> object:
+    def meant(self, written: object) -> object:
         """The mapping that is meant."""
         return written if isinstance(written, dict) or written is None else {self.key: written}
 
@@ -120,16 +131,10 @@ class Short:
 
 
 @dataclass(frozen=True)
-class Listed:
+class Listed(_Rewriter):
     """A list that may be written without brackets if it has one item."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(self.list_of, handler(source))
-
-    @staticmethod
-    def list_of(written: object) -> object:
+    def meant(self, written: object) -> object:
         """The list that is meant."""
         return written if isinstance(written, list) else [written]
 
@@ -141,15 +146,12 @@ class Listed:
 
 
 @dataclass(frozen=True)
-class OrNothing:
+class OrNothing(_Rewriter):
     """A mapping whose key may stand with nothing behind it."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(
-            lambda written: {} if written is None else written, handler(source)
-        )
+    def meant(self, written: object) -> object:
+        """The mapping that is meant."""
+        return {} if written is None else written
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -158,16 +160,10 @@ class OrNothing:
 
 
 @dataclass(frozen=True)
-class Switch:
+class Switch(_Rewriter):
     """A mapping that may be written ``true`` (all by default) or ``false`` (as if it were not there)."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(self.switched, handler(source))
-
-    @staticmethod
-    def switched(written: object) -> object:
+    def meant(self, written: object) -> object:
         """The mapping that is meant, or nothing."""
         return ({} if written else None) if isinstance(written, bool) else written
 
@@ -177,13 +173,12 @@ class Switch:
         return {"anyOf": [{"type": "boolean"}, handler(schema)]}
 
 
-class _Parameter:
+class _Parameter(_Reader):
     """Whatever YAML can say; an unquoted number with a unit becomes a number in SI units."""
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(parameter)
+    def read(self, written: object) -> object:
+        """See ``parameter``."""
+        return parameter(written)
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
