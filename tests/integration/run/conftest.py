@@ -17,6 +17,63 @@ WITHIN_S = 150
 """Wall seconds: far more than anything here takes, so that a hang ends as a failure."""
 
 
+ONE_DRONE = """
+volery: 1
+name: one-drone
+components:
+  Pilot:
+    language: python
+    path: pilot.py
+    requires: {drone: Drone}
+    active: true
+    at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}
+    activation: {time: 1 ms}
+application:
+  pilot: {is: Pilot, drone: drone_1}
+platform:
+  processors:
+    onboard: {is: rpi4-cortex-a72, frequency: 1500 MHz, carried_by: drone_1}
+allocations:
+  only: {pilot: onboard}
+environment:
+  origin: {latitude: 43.4717, longitude: -3.7997, amsl: 12 m}
+  places:
+    pad: {east: 0 m, north: 0 m}
+  vehicles:
+    drone_1: {kind: multirotor, autopilot: ardupilot, at: pad, battery: 5 Ah}
+run:
+  duration: 30 min
+"""
+
+PILOT = """
+import volery
+
+class Pilot:
+    def __init__(self, drone):
+        self._drone = drone
+
+    def run(self):
+        self._drone.takeoff(8)
+        volery.log("up")
+"""
+
+
+@pytest.fixture(scope="session")
+def one_drone() -> Callable[..., Path]:
+    """Writes a model of one drone into a folder: it takes off, and then what a test wants it to do."""
+
+    def write(folder: Path, then: str, *changes: tuple[str, str]) -> Path:
+        text = ONE_DRONE
+        for old, new in changes:
+            assert old in text, old
+            text = text.replace(old, new, 1)
+        (folder / "model.yaml").write_text(text)
+        (folder / "pilot.py").write_text(PILOT + then)
+        return folder
+
+    return write
+
+
 @pytest.fixture(scope="session")
 def delivery(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy: the runs of a comparison read the same files, also while somebody edits the example."""

@@ -15,55 +15,10 @@ from volery.trace.reader import read
 
 pytestmark = pytest.mark.integration
 
-MODEL = """
-volery: 1
-name: one-drone
-components:
-  Pilot:
-    language: python
-    path: pilot.py
-    requires: {drone: Drone}
-    active: true
-    at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}
-    activation: {time: 1 ms}
-application:
-  pilot: {is: Pilot, drone: drone_1}
-platform:
-  processors:
-    onboard: {is: rpi4-cortex-a72, frequency: 1500 MHz, carried_by: drone_1}
-allocations:
-  only: {pilot: onboard}
-environment:
-  origin: {latitude: 43.4717, longitude: -3.7997, amsl: 12 m}
-  places:
-    pad: {east: 0 m, north: 0 m}
-  vehicles:
-    drone_1: {kind: multirotor, autopilot: ardupilot, at: pad, battery: 5 Ah}
-run:
-  duration: 30 min
-"""
-
-PILOT = """
-import volery
-
-class Pilot:
-    def __init__(self, drone):
-        self._drone = drone
-
-    def run(self):
-        self._drone.takeoff(8)
-        volery.log("up")
-"""
-
+LAND = "        self._drone.land()\n"
 HOVER = "        volery.sleep(1500)\n"
 RAISE = "        raise ValueError('the camera fell off')\n"
 FREEZE = "        while True:\n            pass\n"
-
-
-def model(folder, then):
-    (folder / "model.yaml").write_text(MODEL)
-    (folder / "pilot.py").write_text(PILOT + then)
-    return folder
 
 
 def record(folder):
@@ -89,9 +44,9 @@ def assert_brought_down(folder):
 
 
 @pytest.fixture
-def in_the_air(commands):
+def in_the_air(commands, one_drone):
     """A run of a drone that hovers, five times as fast as real time, once it has recorded a while of it."""
-    folder = model(commands.folder, HOVER)
+    folder = one_drone(commands.folder, HOVER)
 
     def begin(pace=5):
         process = commands.start("simulate", folder, "--speed", pace, "--out", "out")
@@ -150,8 +105,8 @@ def test_after_a_kill_the_report_recovers_the_run(commands, in_the_air):
     assert recovered["vehicles"]["drone_1"]["airborne_s"] > 0.0
 
 
-def test_a_component_that_raises_in_the_air(tmp_path):
-    run = simulate(model(tmp_path, RAISE), Options(out=tmp_path / "out"))
+def test_a_component_that_raises_in_the_air(tmp_path, one_drone):
+    run = simulate(one_drone(tmp_path, RAISE), Options(out=tmp_path / "out"))
     outcome = record(run.folder)["outcome"]
     assert outcome["status"] == "failed"
     assert "pilot" in outcome["reason"]
@@ -160,9 +115,9 @@ def test_a_component_that_raises_in_the_air(tmp_path):
 
 
 @pytest.mark.parametrize("fidelity", ["times", "code"])
-def test_an_endless_loop_is_named_with_its_line(tmp_path, monkeypatch, fidelity):
+def test_an_endless_loop_is_named_with_its_line(tmp_path, monkeypatch, fidelity, one_drone):
     monkeypatch.setattr(simulation, "PATIENCE_S", 2.0)
-    run = simulate(model(tmp_path, FREEZE), Options(fidelity, out=tmp_path / "out"))
+    run = simulate(one_drone(tmp_path, FREEZE), Options(fidelity, out=tmp_path / "out"))
     outcome = record(run.folder)["outcome"]
     assert outcome["status"] == "failed"
     assert "pilot: virtual time is frozen" in outcome["reason"]
@@ -174,8 +129,8 @@ FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400
 """A file that reaches this size cannot be written on: as on a full disk, but for the words."""
 
 
-def test_a_folder_that_is_full_is_told_and_the_flight_goes_on(commands):
-    folder = model(commands.folder, "        self._drone.land()\n")
+def test_a_folder_that_is_full_is_told_and_the_flight_goes_on(commands, one_drone):
+    folder = one_drone(commands.folder, LAND)
     until = ("--set", "run.until={observe: drone_1.landing_offset, min: 0 m}")
     done = commands.run("simulate", folder, *until, "--out", "out", prelude=FULL)
     assert done.returncode == 1
@@ -186,19 +141,18 @@ def test_a_folder_that_is_full_is_told_and_the_flight_goes_on(commands):
     assert kept["vehicles"]["drone_1"]["landed"]
 
 
-def test_a_folder_that_is_not_writable(commands):
-    folder = model(commands.folder, HOVER)
+def test_a_folder_that_is_not_writable(commands, one_drone):
+    folder = one_drone(commands.folder, HOVER)
     done = commands.run("simulate", folder, "--out", "/proc/volery")
     assert done.returncode == 2
     assert "cannot write into /proc/volery" in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
 
 
-def test_a_folder_is_used_again_without_a_trace_of_the_earlier_run(tmp_path):
+def test_a_folder_is_used_again_without_a_trace_of_the_earlier_run(tmp_path, one_drone):
     out = tmp_path / "out"
-    simulate(model(tmp_path, RAISE), Options(out=out))
-    (tmp_path / "pilot.py").write_text(PILOT + "        self._drone.land()\n")
-    run = simulate(tmp_path, replace(Options(), out=out), overrides=["run.duration=2 min"])
+    simulate(one_drone(tmp_path, RAISE), Options(out=out))
+    run = simulate(one_drone(tmp_path, LAND), replace(Options(), out=out), overrides=["run.duration=2 min"])
     assert run.completed
     assert record(out)["failures"] == []
     assert read(out / "trace.mcap").complete
