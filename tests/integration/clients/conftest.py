@@ -150,6 +150,7 @@ class Station:
         beat = self.wait("HEARTBEAT", lambda message: message.get_srcComponent() == 1)
         self.connection.target_system, self.connection.target_component = 1, 1
         self.connection.mav.request_data_stream_send(1, 1, 0, 4, 1)
+        self.connection.param_set_send("DISARM_DELAY", 0)  # a busy client is no idle pilot
         return beat
 
     def command(self, number: int, *values: float) -> int:

@@ -139,6 +139,7 @@ def test_sticks_over_the_link_climb_and_are_released(tower: Any) -> None:
     tower.meet()
     tower.wait_ready()
     assert tower.mode("LOITER") == 0
+    tower.connection.param_set_send("RC_OVERRIDE_TIME", 60)  # three real seconds
     override = tower.connection.mav.rc_channels_override_send
 
     def hold(throttle: int, until: Callable[[Any], bool]) -> Any:

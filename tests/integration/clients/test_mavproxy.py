@@ -1,0 +1,75 @@
+"""MAVProxy at a served vehicle: its console flies, and what it forwards is heard."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.integration
+
+GUIDED = 4
+WITHIN_S = 30.0
+SCRIPT = Path(sys.executable).with_name("mavproxy.py")
+
+
+@pytest.fixture
+def proxied(
+    require: Callable[[str, str], None],
+    serve: Callable[..., Any],
+    station: Callable[..., Any],
+    free_port: Callable[..., int],
+    udp: int,
+    tmp_path: Path,
+) -> Any:
+    """MAVProxy between a vehicle and a UDP port; its standard input is its console."""
+    require("MAVProxy", "MAVProxy")
+    vehicle = serve("tcp", 10.0)
+    onward = free_port(udp)
+    hearer = station(f"udpin:127.0.0.1:{onward}", 254)
+    command = [sys.executable, str(SCRIPT), "--master", f"tcp:127.0.0.1:{vehicle.port}"]
+    command += ["--out", f"udp:127.0.0.1:{onward}", "--state-basedir", str(tmp_path), "--streamrate", "4"]
+    environment = {**os.environ, "HOME": str(tmp_path), "PYTHONUNBUFFERED": "1"}
+    with (tmp_path / "said").open("wb") as said:
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=said, stderr=said, cwd=tmp_path, env=environment
+        )
+        try:
+            yield process, hearer, tmp_path
+        finally:
+            process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def udp() -> int:
+    import socket
+
+    return int(socket.SOCK_DGRAM)
+
+
+def test_its_console_flies_and_it_forwards(proxied: Any) -> None:
+    process, hearer, folder = proxied
+
+    def order(line: str) -> None:
+        process.stdin.write(f"{line}\n".encode())
+        process.stdin.flush()
+
+    hearer.meet()
+    last = hearer.wait("PARAM_VALUE", lambda value: value.param_index == value.param_count - 1)
+    assert last.param_count == 1390
+    hearer.wait_ready()
+    order("mode GUIDED")
+    hearer.wait("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and beat.custom_mode == GUIDED)
+    order("arm throttle")
+    hearer.wait_armed()
+    order("takeoff 10")
+    hearer.wait_height(10.0)
+    order("mode LAND")
+    hearer.wait_armed(False)
+    assert "Got COMMAND_ACK" in (folder / "said").read_text(errors="replace")
