@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import hypot, inf
 from typing import NamedTuple
+
+from shapely import LineString, Point, Polygon, get_parts, make_valid
+from shapely.geometry.base import BaseGeometry
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
 
 Corner = tuple[float, float]
-"""Latitude and longitude in degrees, or east and north in metres."""
+"""Latitude and longitude in degrees."""
 
 
 @dataclass(frozen=True)
@@ -159,17 +161,17 @@ def _home_hint(goal: Position, home: Home, limits: Limits) -> str:
     return ""
 
 
-# -- polygons, in metres about home
+# -- areas, in metres about home
 
 Segment = tuple[Vector, Vector]
 
 
 def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
     if fence.polygon:
-        corners = [home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in fence.polygon]
-        if not _inside(path[1][:2], corners):
+        area, (start, goal) = _area(fence.polygon, home), path
+        if not area.covers(Point(goal[:2])):
             return "the goal is outside the fence"
-        if _inside(path[0][:2], corners) and not all(_parts_inside(path, corners)):
+        if area.covers(Point(start[:2])) and not area.covers(_track(path)):
             return "the straight way there leaves the fence"
     low, high = _band(fence.floor, fence.ceiling, home)
     if path[1][2] < low:
@@ -189,16 +191,31 @@ def _band(floor: Altitude | None, ceiling: Altitude | None, home: Home) -> tuple
     return (-inf if low is None else low, inf if high is None else high)
 
 
+def _area(corners: Sequence[Corner], home: Home) -> BaseGeometry:
+    """What the corners enclose; both halves of an outline that crosses itself."""
+    outline = Polygon([home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in corners])
+    return make_valid(outline, method="structure", keep_collapsed=False)
+
+
+def _track(path: Segment) -> BaseGeometry:
+    """The path seen from above."""
+    start, end = path[0][:2], path[1][:2]
+    return Point(start) if start == end else LineString([start, end])
+
+
 def _passes(path: Segment, zone: Zone, home: Home) -> bool:
     """The path leads through the zone. Straight out of one in which it starts, it may go."""
-    corners = [home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in zone.corners]
     part = _clipped(path, *_band(zone.floor, zone.ceiling, home))
     if part is None:
         return False
-    inside = _parts_inside(part, corners)
-    if part[0] == path[0] and inside[0] and not inside[-1]:
-        inside = inside[1:]
-    return any(inside)
+    area, track = _area(zone.corners, home), _track(part)
+    if not area.intersects(track) or area.touches(track):
+        return False
+    starts_inside = part[0] == path[0] and area.contains(Point(part[0][:2]))
+    if not starts_inside or area.contains(Point(part[1][:2])):
+        return True
+    stretches = [piece for piece in get_parts(area.intersection(track)) if piece.length > 0.0]
+    return len(stretches) > 1
 
 
 def _clipped(path: Segment, low: float, high: float) -> Segment | None:
@@ -219,38 +236,3 @@ def _along(path: Segment, share: float) -> Vector:
         return path[int(share)]
     (x0, y0, z0), (x1, y1, z1) = path
     return x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0)
-
-
-def _inside(point: Corner, corners: Sequence[Corner]) -> bool:
-    """Even-odd rule: a ray to the east crosses the outline an odd number of times."""
-    x, y = point
-    inside = False
-    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
-            inside = not inside
-    return inside
-
-
-def _parts_inside(path: Segment, corners: Sequence[Corner]) -> list[bool]:
-    """The path cut where it meets the outline: whether each part, from its start to its end, is inside."""
-    cuts = [0.0, *sorted(_meetings(path, corners)), 1.0]
-    return [
-        _inside(_along(path, (first + last) / 2.0)[:2], corners)
-        for first, last in pairwise(cuts)
-        if last - first > 1e-12 or len(cuts) == 2
-    ]
-
-
-def _meetings(path: Segment, corners: Sequence[Corner]) -> list[float]:
-    """How far along the path, 0 to 1, it meets the outline. Along an edge only its corners count."""
-    (x0, y0), (x1, y1) = path[0][:2], path[1][:2]
-    found = []
-    for (cx, cy), (dx, dy) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        turn = (x1 - x0) * (dy - cy) - (y1 - y0) * (dx - cx)
-        if abs(turn) < 1e-12:
-            continue
-        share = ((cx - x0) * (dy - cy) - (cy - y0) * (dx - cx)) / turn
-        along_edge = ((cx - x0) * (y1 - y0) - (cy - y0) * (x1 - x0)) / turn
-        if 0.0 < share < 1.0 and -1e-9 <= along_edge <= 1.0 + 1e-9:
-            found.append(share)
-    return found

@@ -81,6 +81,27 @@ def test_a_zone_may_be_passed_above_and_left() -> None:
     assert "school" in check(at(0, 60, 40), at(0, 60, 10), fence)
 
 
+def test_a_zone_that_is_left_is_not_entered_again() -> None:
+    outline = corners((0, 0), (30, 0), (30, 40), (20, 40), (20, 10), (10, 10), (10, 40), (0, 40))
+    fence = Fence(no_fly=(Zone("school", outline),))  # a horseshoe
+    assert check(at(5, 30), at(15, 30), fence) == ""
+    assert "school" in check(at(5, 30), at(40, 30), fence)
+
+
+def test_straight_up_in_a_zone_that_begins_higher() -> None:
+    fence = Fence(no_fly=(Zone("glide path", SQUARE, floor=AboveHome(30)),))
+    assert check(at(0, 60, 10), at(0, 60, 20), fence) == ""
+    assert "glide path" in check(at(0, 60, 10), at(0, 60, 40), fence)
+
+
+def test_both_halves_of_an_outline_that_crosses_itself_are_inside() -> None:
+    bow = Fence(polygon=corners((-20, -10), (20, 10), (20, -10), (-20, 10)))
+    assert check(at(-19, 0), at(-10, 2), bow) == ""
+    assert check(at(19, 0), at(10, 2), bow) == ""
+    assert "outside the fence" in check(at(-15, 0), at(0, 8), bow)
+    assert "leaves the fence" in check(at(-18, 8), at(18, 8), bow)
+
+
 def test_what_makes_no_sense_as_a_fence() -> None:
     with pytest.raises(UsageError, match="zone 'x' has 2 corners"):
         Zone("x", SQUARE[:2])
