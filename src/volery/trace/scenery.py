@@ -6,13 +6,11 @@ physics use; it is what a reader needs to understand where a vehicle is.
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from volery.base.errors import UsageError
+from volery.trace import attachments
 
 Point = tuple[float, float]
 Line = tuple[Point, ...]
@@ -66,16 +64,9 @@ _ADAPTER = TypeAdapter(Scenery)
 
 def scenery_to_json(scenery: Scenery) -> bytes:
     """The scenery as UTF-8 JSON, the same bytes for the same scenery."""
-    return json.dumps(asdict(scenery), ensure_ascii=False, separators=(",", ":")).encode()
+    return attachments.to_json(scenery)
 
 
 def scenery_from_json(data: bytes) -> Scenery:
     """The scenery that ``scenery_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
-    try:
-        raw: Any = json.loads(data)
-        version = raw.get("schema") if isinstance(raw, dict) else None
-        if version != SCENERY_SCHEMA:
-            raise UsageError(f"the trace's map has schema {version!r}; this version reads {SCENERY_SCHEMA!r}")
-        return _ADAPTER.validate_python(raw)
-    except (ValueError, ValidationError) as error:
-        raise UsageError(f"the trace's map cannot be read: {error}") from error
+    return attachments.from_json(data, _ADAPTER, SCENERY_SCHEMA, "map")

@@ -8,14 +8,12 @@ here.
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from volery.base.errors import UsageError
 from volery.base.time import Ns
+from volery.trace import attachments
 from volery.trace.events import NONE
 
 SETUP_SCHEMA = "volery-setup/1"
@@ -122,17 +120,9 @@ _ADAPTER = TypeAdapter(RunSetup)
 
 def setup_to_json(setup: RunSetup) -> bytes:
     """The setup as UTF-8 JSON, the same bytes for the same setup."""
-    return json.dumps(asdict(setup), ensure_ascii=False, separators=(",", ":")).encode()
+    return attachments.to_json(setup)
 
 
 def setup_from_json(data: bytes) -> RunSetup:
     """The setup that ``setup_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
-    try:
-        raw: Any = json.loads(data)
-        version = raw.get("schema") if isinstance(raw, dict) else None
-        if version != SETUP_SCHEMA:
-            what = f"has schema {version!r}; this version reads {SETUP_SCHEMA!r}"
-            raise UsageError(f"the trace's {SETUP_ATTACHMENT} {what}")
-        return _ADAPTER.validate_python(raw)
-    except (ValueError, ValidationError) as error:
-        raise UsageError(f"the trace's {SETUP_ATTACHMENT} cannot be read: {error}") from error
+    return attachments.from_json(data, _ADAPTER, SETUP_SCHEMA, SETUP_ATTACHMENT)
