@@ -109,7 +109,22 @@ class Timer(Thread):
             super().run()
 
 
-class Lock(Bound):
+class Held(Bound):
+    """What a ``with`` statement takes and gives back."""
+
+    acquire: Callable[..., bool]
+    release: Callable[..., None]
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.release()
+
+
+class Lock(Held):
     """Held by at most one task."""
 
     def __init__(self) -> None:
@@ -139,14 +154,6 @@ class Lock(Bound):
         """Whether somebody holds it."""
         with self.kernel:
             return self._owner is not None
-
-    def __enter__(self) -> bool:
-        return self.acquire()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.release()
 
 
 class RLock(Lock):
@@ -187,7 +194,7 @@ class Event(Bound):
         return self._event.wait(within(True, timeout))
 
 
-class Semaphore(Bound):
+class Semaphore(Held):
     """Counts what is free."""
 
     def __init__(self, value: int = 1) -> None:
@@ -210,14 +217,6 @@ class Semaphore(Bound):
         self._value += n
         self._free.notify()
 
-    def __enter__(self) -> bool:
-        return self.acquire()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.release()
-
 
 class BoundedSemaphore(Semaphore):
     """A semaphore that no more can be given back to than it began with."""
@@ -233,7 +232,7 @@ class BoundedSemaphore(Semaphore):
         super().release(n)
 
 
-class Condition(Bound):
+class Condition(Held):
     """A lock to wait under until somebody notifies."""
 
     def __init__(self, lock: Lock | None = None) -> None:
@@ -242,14 +241,6 @@ class Condition(Bound):
         self.release = self._lock.release
         self._told = waiting.Signal(self.kernel, "Condition")
         self._waiting: list[list[bool]] = []
-
-    def __enter__(self) -> bool:
-        return self._lock.acquire()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._lock.release()
 
     def wait(self, timeout: float | None = None) -> bool:
         """Let go of the lock until notified; False if that did not happen in time."""
