@@ -6,6 +6,7 @@ Each says in the JSON Schema what an editor may offer.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -26,12 +27,12 @@ class Form(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class _Reader:
+class _Reader(ABC):
     """What stands in the text becomes what ``read`` makes of it."""
 
+    @abstractmethod
     def read(self, written: object) -> object:
         """The value; ``NotAQuantity`` if it is none."""
-        raise NotImplementedError
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -39,12 +40,12 @@ class _Reader:
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-class _Rewriter:
+class _Rewriter(ABC):
     """What may be written shorter: it is validated as what ``meant`` makes of it."""
 
+    @abstractmethod
     def meant(self, written: object) -> object:
         """The longer form."""
-        raise NotImplementedError
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
