@@ -1,0 +1,215 @@
+"""MAVSDK for Python at a served vehicle: what works, and what fails as at an ArduPilot of its own."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from math import nan
+from typing import Any
+
+import pytest
+
+pytestmark = [
+    pytest.mark.integration,
+    pytest.mark.filterwarnings("ignore:The 'mavsdk' package has been renamed:FutureWarning"),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning:mavsdk"),
+]
+
+WITHIN_S = 30.0
+ASKED = ("battery", "gps_info", "health", "home", "in_air", "position")
+"""An ArduPilot streams nothing unasked over TCP, and MAVSDK does not ask by itself."""
+
+NORTH, HOME_LATITUDE, HOME_LONGITUDE = 0.0002, 46.0825, -103.8995
+
+
+@pytest.fixture(autouse=True)
+def _installed(require: Callable[[str, str], None]) -> None:
+    require("mavsdk", "mavsdk")
+
+
+async def soon(awaited: Awaitable[Any]) -> Any:
+    return await asyncio.wait_for(awaited, WITHIN_S)
+
+
+async def first(stream: AsyncIterator[Any], holds: Callable[[Any], bool] = lambda value: True) -> Any:
+    """The next value of the stream for which *holds*."""
+
+    async def look() -> Any:
+        async for value in stream:
+            if holds(value):
+                return value
+        raise AssertionError("the stream has ended")
+
+    return await soon(look())
+
+
+@asynccontextmanager
+async def connected(address: str, port: int) -> AsyncIterator[Any]:
+    """A ``System`` that has found the vehicle; its server is a child, which ends here whatever happens."""
+    from mavsdk import System
+
+    drone = System(port=port)
+    try:
+        await soon(drone.connect(system_address=address))
+        await first(drone.core.connection_state(), lambda state: state.is_connected)
+        for rate in ASKED:
+            await soon(getattr(drone.telemetry, f"set_rate_{rate}")(5.0))
+        await soon(drone.param.set_param_int("DISARM_DELAY", 0))  # a busy client is no idle pilot
+        yield drone
+    finally:
+        server = drone._server_process  # it has no public name, and outlives a test that fails
+        drone._stop_mavsdk_server()
+        if server is not None:
+            server.wait(WITHIN_S)
+
+
+async def until_ready(drone: Any) -> None:
+    await first(
+        drone.telemetry.health(),
+        lambda health: health.is_global_position_ok and health.is_home_position_ok and health.is_armable,
+    )
+
+
+async def until_armed(drone: Any) -> None:
+    """In a mode that needs a position, asked at each news of its health. All is healthy, to MAVSDK, before
+    the autopilot knows where it is: those are the checks of STABILIZE, in which it boots.
+    """
+    from mavsdk.action import ActionError
+
+    await until_ready(drone)
+
+    async def tried() -> None:
+        async for _ in drone.telemetry.health():
+            with suppress(ActionError):
+                await drone.action.hold()
+                await drone.action.arm()
+                return
+
+    await soon(tried())
+
+
+async def refused(awaited: Awaitable[Any], error: type[Exception]) -> str:
+    """The name of the result with which MAVSDK reports that it did not work."""
+    with pytest.raises(error) as caught:
+        await soon(awaited)
+    return str(caught.value._result.result.name)
+
+
+async def flies(address: str, port: int) -> None:
+    async with connected(address, port) as drone:
+        telemetry, action = drone.telemetry, drone.action
+        await until_ready(drone)
+        assert not await first(telemetry.armed())
+        assert not await first(telemetry.in_air())
+        battery = await first(telemetry.battery())
+        assert 11.0 < battery.voltage_v < 13.0
+        home = await first(telemetry.home())
+        assert abs(home.latitude_deg - HOME_LATITUDE) < 1e-4
+        await soon(action.set_takeoff_altitude(8.0))
+        assert await soon(action.get_takeoff_altitude()) == 8.0
+        await until_armed(drone)
+        await first(telemetry.armed(), bool)
+        await soon(action.takeoff())
+        start = await first(telemetry.position(), lambda position: position.relative_altitude_m > 7.5)
+        assert await first(telemetry.in_air())
+        goal = HOME_LATITUDE + NORTH
+        await soon(action.goto_location(goal, HOME_LONGITUDE, start.absolute_altitude_m + 4.0, 0.0))
+        there = await first(telemetry.position(), lambda position: abs(position.latitude_deg - goal) < 1e-5)
+        assert abs(there.longitude_deg - HOME_LONGITUDE) < 3e-5
+        assert str(await first(telemetry.flight_mode())) in {"HOLD", "OFFBOARD", "UNKNOWN"}
+        await soon(action.return_to_launch())
+        await first(telemetry.flight_mode(), lambda mode: str(mode) == "RETURN_TO_LAUNCH")
+        await soon(action.land())
+        await first(telemetry.flight_mode(), lambda mode: str(mode) == "LAND")
+        await first(telemetry.armed(), lambda armed: not armed)
+        assert not await first(telemetry.in_air(), lambda flying: not flying)
+
+
+def test_a_flight_over_tcp(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(flies(f"tcpout://127.0.0.1:{serve('tcp', 15.0).port}", free_port()))
+
+
+def test_a_flight_over_udp(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(flies(f"udpin://127.0.0.1:{serve('udp', 15.0).port}", free_port()))
+
+
+async def plans(address: str, port: int) -> None:
+    from mavsdk.mission_raw import MissionItem
+
+    latitude, longitude = round((HOME_LATITUDE + NORTH) * 1e7), round(HOME_LONGITUDE * 1e7)
+    items = [
+        MissionItem(0, 0, 16, 1, 1, 0, 0, 0, 0, round(HOME_LATITUDE * 1e7), longitude, 900, 0),
+        MissionItem(1, 3, 22, 0, 1, 0, 0, 0, 0, 0, 0, 8, 0),
+        MissionItem(2, 3, 16, 0, 1, 0, 0, 0, 0, latitude, longitude, 8, 0),
+        MissionItem(3, 3, 21, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0),
+    ]
+    async with connected(address, port) as drone:
+        await soon(drone.mission_raw.upload_mission(items))
+        kept = await soon(drone.mission_raw.download_mission())
+        assert [(one.seq, one.command) for one in kept] == [(one.seq, one.command) for one in items]
+        assert (kept[2].x, kept[2].y, kept[2].z) == (latitude, longitude, 8.0)
+        await until_armed(drone)
+        await soon(drone.action.set_takeoff_altitude(5.0))
+        await soon(drone.action.takeoff())  # MAVSDK starts by the mode alone: AUTO stays on the ground then
+        await first(drone.telemetry.position(), lambda position: position.relative_altitude_m > 4.5)
+        await soon(drone.mission_raw.start_mission())
+        there = HOME_LATITUDE + NORTH
+        await first(drone.telemetry.position(), lambda position: abs(position.latitude_deg - there) < 2e-5)
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+
+def test_a_raw_mission(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(plans(f"tcpout://127.0.0.1:{serve('tcp', 15.0).port}", free_port()))
+
+
+async def asks(address: str, port: int) -> None:
+    from mavsdk.param import ParamError
+
+    async with connected(address, port) as drone:
+        assert await soon(drone.param.get_param_int("FRAME_CLASS")) == 1
+        assert await soon(drone.param.get_param_float("WPNAV_SPEED")) == 1000.0
+        await soon(drone.param.set_param_float("WPNAV_SPEED", 700.0))
+        assert await soon(drone.param.get_param_float("WPNAV_SPEED")) == 700.0
+        await refused(drone.param.get_param_float("NO_SUCH_NAME"), ParamError)
+        version = await soon(drone.info.get_version())
+        assert (version.flight_sw_major, version.flight_sw_minor, version.flight_sw_patch) == (4, 5, 6)
+
+
+def test_parameters_and_version(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(asks(f"tcpout://127.0.0.1:{serve('tcp', 15.0).port}", free_port()))
+
+
+async def fails(address: str, port: int) -> dict[str, str]:
+    from mavsdk.action import ActionError, OrbitYawBehavior
+    from mavsdk.mission import MissionError, MissionItem, MissionPlan
+    from mavsdk.offboard import OffboardError, PositionNedYaw
+
+    async with connected(address, port) as drone:
+        action, found = drone.action, {}
+        found["arm while it boots"] = await refused(action.arm(), ActionError)
+        await until_ready(drone)
+        found["take off unarmed"] = await refused(action.takeoff(), ActionError)
+        circle = (9.0, 2.0, OrbitYawBehavior.HOLD_INITIAL_HEADING, HOME_LATITUDE, HOME_LONGITUDE, 910.0)
+        found["orbit"] = await refused(action.do_orbit(*circle), ActionError)
+        none, still = (nan,) * 5, (MissionItem.CameraAction.NONE, MissionItem.VehicleAction.NONE)
+        point = (HOME_LATITUDE + NORTH, HOME_LONGITUDE, 10.0, 5.0, True, nan, nan)
+        plan = MissionPlan([MissionItem(*point, still[0], *none, still[1])] * 2)
+        await soon(drone.mission.upload_mission(plan))
+        found["mission"] = await refused(drone.mission.download_mission(), MissionError)
+        await soon(drone.offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -5.0, 0.0)))
+        with suppress(OffboardError):
+            await soon(drone.offboard.start())
+            found["offboard"] = "accepted"
+    return found
+
+
+def test_what_fails_as_at_a_real_ardupilot(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    results = asyncio.run(fails(f"tcpout://127.0.0.1:{serve('tcp', 8.0).port}", free_port()))
+    assert results == {
+        "arm while it boots": "FAILED",
+        "take off unarmed": "FAILED",
+        "orbit": "UNSUPPORTED",
+        "mission": "UNSUPPORTED",
+        "offboard": "accepted",
+    }
