@@ -90,7 +90,7 @@ def execute(load: Workload) -> Outcome:
         kernel.spawn(body(name, priority, bursts), name, Place(name, processor, priority))
     node = Place("node", processor, 2)
     for when, amount in load.background:
-        kernel.call_at(when, lambda amount=amount: processor.load(node, amount))  # type: ignore[misc]
+        kernel.call_at(when, lambda amount=amount: processor.load(node, amount))
     kernel.run(FAR)
     busy = processor.busy_ns(kernel.now())
     assert kernel.close() == []

@@ -31,7 +31,7 @@ def values(kind: str, length: int) -> st.SearchStrategy[Any]:
     if kind == "char":
         return TEXT.map(lambda text: text[: max(length, 1)])
     if kind in WIDTHS:
-        one: st.SearchStrategy[Any] = st.floats(width=WIDTHS[kind], allow_nan=False)  # type: ignore[arg-type]
+        one: st.SearchStrategy[Any] = st.floats(width=WIDTHS[kind], allow_nan=False)
     else:
         one = st.integers(*RANGES[kind])
     return st.lists(one, min_size=length, max_size=length).map(tuple) if length else one

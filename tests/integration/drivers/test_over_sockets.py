@@ -73,7 +73,7 @@ def flown(kernel: WallKernel, link: CodedLink) -> None:
 def test_tcp() -> None:
     with served(lambda kernel: TcpServer(kernel, HERE, 0)) as server:
         kernel = WallKernel(speed=PACE)
-        address = parse(f"ardupilot+tcp://{HERE}:{server.port}")  # type: ignore[attr-defined]
+        address = parse(f"ardupilot+tcp://{HERE}:{server.port}")
         flown(kernel, open_link(kernel, address))
 
 

@@ -100,7 +100,7 @@ def free_port() -> int:
 
 def test_a_client_and_a_server_talk_both_ways(bench: Bench) -> None:
     server = bench.add(TcpServer(bench.kernel, HERE, 0))
-    client = bench.add(TcpClient(bench.kernel, HERE, server.port))  # type: ignore[attr-defined]
+    client = bench.add(TcpClient(bench.kernel, HERE, server.port))
     bench.until(lambda: not client.problem())
     client.send(ASK)
     bench.until(lambda: bench.heard[server])

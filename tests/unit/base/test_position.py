@@ -43,6 +43,6 @@ def test_a_position_reads_well() -> None:
 def test_values_do_not_change() -> None:
     altitude = AMSL(1.0)
     with pytest.raises(AttributeError):
-        altitude.metres = 5.0  # type: ignore[misc]
+        altitude.metres = 5.0
     with pytest.raises(AttributeError):
-        Position(1.0, 2.0, altitude).latitude = 5.0  # type: ignore[misc]
+        Position(1.0, 2.0, altitude).latitude = 5.0

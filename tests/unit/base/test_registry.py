@@ -31,7 +31,7 @@ def test_an_entry_point_is_loaded_when_asked_for(installed: list[EntryPoint]) ->
     installed.append(EntryPoint("other", "math:sin", "other things"))
     things: Registry[object] = Registry("things", "thing")
     assert things.names() == ["square_root"]
-    assert things.load("square_root")(16.0) == 4.0  # type: ignore[operator]
+    assert things.load("square_root")(16.0) == 4.0
 
 
 def test_what_a_script_adds_comes_before_what_is_installed(installed: list[EntryPoint]) -> None:

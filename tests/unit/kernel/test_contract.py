@@ -23,7 +23,7 @@ LONG = 1000 * S  # of the kernel's time: a second on the wall at most
 def test_actions_of_one_instant_run_in_the_order_of_the_calls(kernel: Kernel) -> None:
     seen: list[int] = []
     for i in range(5):
-        kernel.call_at(10 * MS, lambda i=i: seen.append(i))  # type: ignore[misc]
+        kernel.call_at(10 * MS, lambda i=i: seen.append(i))
     kernel.call_at(0, lambda: seen.append(-1))
     kernel.run(LONG)
     assert seen == [-1, 0, 1, 2, 3, 4]

@@ -41,7 +41,7 @@ def test_one_sender_at_a_time_then_latency(virtual: VirtualKernel) -> None:
     def send(name: str, size: int) -> None:
         radio.send(size, lambda: arrived.append((name, virtual.now() / MS)))
 
-    virtual.call_at(0, lambda: (send("a", 10), send("b", 2)))  # type: ignore[arg-type, return-value]
+    virtual.call_at(0, lambda: (send("a", 10), send("b", 2)))
     virtual.call_at(11 * MS, lambda: send("c", 1))
     virtual.call_at(50 * MS, lambda: send("d", 1))
     virtual.run(S)
@@ -54,8 +54,8 @@ def test_best_effort_is_lost_and_takes_the_medium_all_the_same(virtual: VirtualK
     for name in "abc":
         radio.send(
             10,
-            lambda name=name: seen.append((name, virtual.now() / MS)),  # type: ignore[misc]
-            lambda name=name: seen.append((f"{name} lost", virtual.now() / MS)),  # type: ignore[misc]
+            lambda name=name: seen.append((name, virtual.now() / MS)),
+            lambda name=name: seen.append((f"{name} lost", virtual.now() / MS)),
         )
     virtual.run(S)
     assert seen == [("a lost", 15), ("b", 25), ("c lost", 35)]
@@ -74,7 +74,7 @@ def test_a_stream_is_delivered_in_order_and_does_not_hold_up_others(virtual: Vir
     radio = network(virtual, "100")
     arrived: list[tuple[str, float]] = []
     for name, one in (("a1", "a"), ("a2", "a"), ("b1", "b")):
-        radio.send_reliable(10, lambda name=name: arrived.append((name, virtual.now() / MS)), one)  # type: ignore[misc]
+        radio.send_reliable(10, lambda name=name: arrived.append((name, virtual.now() / MS)), one)
     virtual.run(S)
     # a1 is lost and would be sent again at 20, but the medium is taken until 30 by a2 and b1
     assert arrived == [("b1", 35), ("a1", 45), ("a2", 45)]
@@ -133,7 +133,7 @@ def test_losses_are_as_frequent_as_stated_and_depend_on_the_stream_alone(virtual
         )
         seen: list[int] = []
         for number in range(5000):
-            radio.send(1, lambda: None, lambda number=number: seen.append(number))  # type: ignore[misc]
+            radio.send(1, lambda: None, lambda number=number: seen.append(number))
         virtual.run(virtual.now() + 10 * S)
         return seen
 
@@ -159,4 +159,4 @@ def test_serialisation_is_rounded_up(
 def test_a_network_that_cannot_be_is_refused(virtual: VirtualKernel, wrong: dict[str, float]) -> None:
     stated = {"bandwidth_bit_s": 1000, "latency": 0, "loss": 0.0, **wrong}
     with pytest.raises(UsageError, match="radio: bandwidth"):
-        Network(virtual, "radio", stream=Random(1), **stated)  # type: ignore[arg-type]
+        Network(virtual, "radio", stream=Random(1), **stated)

@@ -321,4 +321,4 @@ def test_a_processor_that_cannot_be_is_refused(
     virtual: VirtualKernel, wrong: dict[str, int], said: str
 ) -> None:
     with pytest.raises(UsageError, match=said):
-        Processor(virtual, "cpu", **wrong)  # type: ignore[arg-type]
+        Processor(virtual, "cpu", **wrong)

@@ -35,7 +35,7 @@ def test_time_jumps_from_event_to_event(virtual: VirtualKernel, spawn: Spawn) ->
 def test_what_is_due_at_the_end_of_the_run_still_happens_and_nothing_after_it(virtual: VirtualKernel) -> None:
     seen: list[int] = []
     for when in (10, 20, 21):
-        virtual.call_at(when, lambda when=when: seen.append(when))  # type: ignore[misc]
+        virtual.call_at(when, lambda when=when: seen.append(when))
     virtual.run(20)
     assert seen == [10, 20]
     assert virtual.now() == 20
@@ -137,7 +137,7 @@ def test_waking_twice_or_a_task_that_is_gone_changes_nothing(virtual: VirtualKer
 
     task = spawn(body)
     virtual.wake(task)  # it has not begun
-    virtual.call_at(10, lambda: (virtual.wake(task), virtual.wake(task)))  # type: ignore[arg-type, return-value]
+    virtual.call_at(10, lambda: (virtual.wake(task), virtual.wake(task)))
     virtual.run(S)
     virtual.wake(task)
     assert seen == [10, 100]
@@ -258,7 +258,7 @@ def test_with_a_pace_a_post_ends_the_wait_for_the_wall() -> None:
 
     def visitor() -> None:
         for _ in range(200):  # some of them while the kernel waits
-            kernel.post(heard.release)  # type: ignore[arg-type]
+            kernel.post(heard.release)
             heard.acquire()
         kernel.post(lambda: kernel.cancel(kernel.root, "served"))
 
@@ -351,7 +351,7 @@ class Still:
 
 def test_the_watchdog_accuses_who_does_not_move_and_nobody_else() -> None:
     kernel, accused = Still(), Accused()
-    dog = Watchdog(kernel, accused, patience_s=10.0)  # type: ignore[arg-type]
+    dog = Watchdog(kernel, accused, patience_s=10.0)
     a, b = (Task(name, Place(name), Scope("run")) for name in "ab")
 
     def look(moment: float, task: Task | None, time: int) -> None:

@@ -157,7 +157,7 @@ def test_a_queue_is_first_in_first_out(kernel: Kernel, spawn: Spawn) -> None:
 
     spawn(consumer)
     for i in range(10):
-        kernel.call_at(i * MS, lambda i=i: queue.put(i))  # type: ignore[misc]
+        kernel.call_at(i * MS, lambda i=i: queue.put(i))
     kernel.run(LONG)
     assert got == list(range(10))
 
@@ -184,7 +184,7 @@ def test_one_item_goes_to_one_of_those_who_wait(virtual: VirtualKernel, spawn: S
     got: list[tuple[str, str | None]] = []
     for name in "ab":
         spawn(lambda name=name: got.append((name, queue.get(within=100))))
-    virtual.call_at(10, lambda: queue.put("x"))  # type: ignore[arg-type, return-value]
+    virtual.call_at(10, lambda: queue.put("x"))
     virtual.run(S)
     assert got == [("a", "x"), ("b", None)]
 
@@ -355,7 +355,7 @@ def test_a_message_releases_and_one_that_is_there_already_does_not_end_the_activ
 
     virtual.spawn(body, "reader", Place("reader"))
     for when in (10, 20, 20):
-        virtual.call_at(when * MS, lambda: queue.put(0))  # type: ignore[arg-type, return-value]
+        virtual.call_at(when * MS, lambda: queue.put(0))
     virtual.run(S)
     assert [(released, finished) for released, finished, *_ in activations()] == [
         (0, 0), (10, 10), (20, 20), (120, 120)

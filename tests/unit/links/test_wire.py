@@ -42,7 +42,7 @@ def test_frames_are_dropped_as_often_as_stated_and_the_same_ones_for_the_same_se
 def test_turned_bits_are_caught_by_the_checksum() -> None:
     seen, heard = arrivals(WireFaults(flip=0.01))
     assert len(seen) < COUNT
-    assert heard.corrupt > 0  # type: ignore[attr-defined]
+    assert heard.corrupt > 0
     assert [number for _, number in seen] == sorted(number for _, number in seen)
 
 

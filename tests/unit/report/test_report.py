@@ -127,7 +127,7 @@ def test_says_what_was_asked_of_it(runs: tuple[Path, Path]) -> None:
         assert words in html
     data = embedded(html)
     assert data["end"] == pytest.approx(120.0, abs=0.2)
-    assert len(data["vehicles"]) == 4  # type: ignore[arg-type]
+    assert len(data["vehicles"]) == 4
 
 
 def test_a_run_of_fifteen_minutes_stays_small(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_a_real_vehicle_whose_truth_nobody_knows(tmp_path: Path) -> None:
     ]
     folder = small_run(tmp_path / "real", *events)
     html = render(gather(folder))
-    (vehicle,) = embedded(html)["vehicles"]  # type: ignore[misc]
+    (vehicle,) = embedded(html)["vehicles"]
     assert vehicle["x"] == [2.0, 6.0]
     assert vehicle["speed"] == {"t": [], "v": []}
     recover(folder)
@@ -194,7 +194,7 @@ def test_a_parcel_is_drawn_with_the_vehicle_of_the_component_that_has_it(tmp_pat
         Milestone(2, "central", "parcel", "p", "seen", "watcher"),
         Milestone(3, "central", "parcel", "p", "on rover_8", "driver"),
     )
-    (parcel,) = embedded(render(gather(folder)))["parcels"]  # type: ignore[misc]
+    (parcel,) = embedded(render(gather(folder)))["parcels"]
     assert [step["vehicle"] for step in parcel["steps"]] == ["rover_7", "", "rover_8"]
 
 
@@ -210,7 +210,7 @@ def test_a_parcel_is_in_the_store_then_where_it_is_said_to_be(tmp_path: Path) ->
     ):
         writer(Milestone(at, "central", "parcel", "p", state, detail))
     writer.close()
-    (parcel,) = embedded(render(gather(folder)))["parcels"]  # type: ignore[misc]
+    (parcel,) = embedded(render(gather(folder)))["parcels"]
     assert [step["place"] for step in parcel["steps"]] == ["store", "", "port_north", "san_rafael"]
 
 

@@ -196,7 +196,7 @@ def test_a_full_disk_leaves_a_readable_trace_and_a_problem(tmp_path: Path) -> No
     begun = path.stat().st_size
     disk = _FullDisk(100_000)
     writer._output._file.close()
-    writer._output._file = disk  # type: ignore[assignment]
+    writer._output._file = disk
     disk.content.write(path.read_bytes())
     for event in sample_events(seconds=20.0):
         writer(event)
@@ -244,8 +244,5 @@ def test_rosbags_reads_the_file_as_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "trace.mcap"
     events = write_sample(path)
     with AnyReader([path]) as reader:
-        found = [
-            reader.deserialize(raw, connection.msgtype)  # type: ignore[no-untyped-call]
-            for connection, _, raw in reader.messages()
-        ]
+        found = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
     assert len(found) == len(events)
