@@ -58,15 +58,15 @@ def flight(drones: int) -> tuple[float, float, float]:
 
     def counted(self: in_process.InProcess, frame: object, send: object = in_process.InProcess.send) -> None:
         stretch.frames += 1
-        send(self, frame)  # type: ignore[operator]
+        send(self, frame)
 
-    in_process.InProcess.send, original = counted, in_process.InProcess.send  # type: ignore[method-assign]
+    in_process.InProcess.send, original = counted, in_process.InProcess.send
     try:
         with tempfile.TemporaryDirectory() as folder:
             run = volery.fly(stretch.fly, urls, volery.Options(seed=1, out=Path(folder)))
             size = (Path(folder) / "trace.mcap").stat().st_size / 1e6
     finally:
-        in_process.InProcess.send = original  # type: ignore[method-assign]
+        in_process.InProcess.send = original
     assert run.completed, run.record.outcome.reason
     computing = max(stretch.computing) - min(stretch.computing)
     return stretch.factor(), stretch.frames / computing, size / run.record.sim_s * 3600

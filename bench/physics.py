@@ -45,7 +45,7 @@ def rotorpy_steps(steps: int) -> float:
     """Steps a second of RotorPy's Hummingbird hovering on constant motor speeds."""
     import numpy as np  # noqa: PLC0415  # only this bench needs it
     from rotorpy.vehicles.hummingbird_params import quad_params  # noqa: PLC0415  # in the bench group alone
-    from rotorpy.vehicles.multirotor import Multirotor as Theirs  # noqa: PLC0415
+    from rotorpy.vehicles.multirotor import Multirotor as Theirs  # noqa: PLC0415  # the same
 
     vehicle = Theirs(quad_params, control_abstraction="cmd_motor_speeds")
     hover = float(np.sqrt(quad_params["mass"] * 9.81 / (4 * quad_params["k_eta"])))
