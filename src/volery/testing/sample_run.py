@@ -83,6 +83,22 @@ _ROUTES: dict[str, tuple[tuple[float, float, float], tuple[_Leg, ...]]] = {
 }
 _STARTS = {"drone_1": 75.0, "drone_2": 0.0, "rover_north": 5.0, "rover_south": 190.0}
 
+_REQUIREMENTS = (
+    RequirementSetup("landing", "drone_1.landing_offset", "max", 0.3, "m"),
+    RequirementSetup("control", "drone_control.deadline_misses", "max", 0.0),
+    RequirementSetup("delivered", "parcels.delivered", "min", 1.0),
+)
+_LAWS = (
+    LawSetup("ROS calls of roscpp", "the paper's Table II", "measured", "600 to 1500 MHz"),
+    LawSetup(
+        "ROS calls of rospy",
+        "the paper's Table II",
+        "estimated",
+        "measured for C++ nodes",
+        "drone_control is a Python node charged with figures of roscpp",
+    ),
+)
+
 
 def sample_setup(seed: int = 7, onboard_mhz: float = 1500.0) -> RunSetup:
     """The set-up of the made-up run."""
@@ -108,21 +124,8 @@ def sample_setup(seed: int = 7, onboard_mhz: float = 1500.0) -> RunSetup:
             VehicleSetup(name, "ardupilot", "rover" if name.startswith("rover") else "multirotor")
             for name in _ROUTES
         ),
-        requirements=(
-            RequirementSetup("landing", "drone_1.landing_offset", "max", 0.3, "m"),
-            RequirementSetup("control", "drone_control.deadline_misses", "max", 0.0),
-            RequirementSetup("delivered", "parcels.delivered", "min", 1.0),
-        ),
-        laws=(
-            LawSetup("ROS calls of roscpp", "the paper's Table II", "measured", "600 to 1500 MHz"),
-            LawSetup(
-                "ROS calls of rospy",
-                "the paper's Table II",
-                "estimated",
-                "measured for C++ nodes",
-                "drone_control is a Python node charged with figures of roscpp",
-            ),
-        ),
+        requirements=_REQUIREMENTS,
+        laws=_LAWS,
         not_counted=("operating system and ROS master",),
         warnings=("wind: none was stated",),
     )
