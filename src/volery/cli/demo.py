@@ -8,7 +8,9 @@ from volery.cli.console import Output
 from volery.cli.endings import FAILED, OK
 from volery.cli.folders import example
 from volery.cli.side_by_side import Job, Outcome, run_all
+from volery.cli.simulate import unmet
 from volery.model.reader import load
+from volery.report.comparison import write_comparison
 from volery.report.terminal import short_comparison
 from volery.requirements.record import RunRecord
 from volery.run.recording import make_folder
@@ -27,6 +29,8 @@ def demo(output: Output, out: Path, seed: int) -> int:
     output.give(f"[{', '.join(record.model_dump_json(by_alias=True) for record in records)}]")
     for name, outcome in outcomes.items():
         _say(output, name, outcome)
+    beside = write_comparison([outcome.folder for outcome in outcomes.values()], out)
+    output.note(f"side by side: {beside}")
     return OK if all(outcome.completed for outcome in outcomes.values()) else FAILED
 
 
@@ -41,7 +45,7 @@ def _parcels(record: RunRecord) -> list[str]:
 def _say(output: Output, name: str, outcome: Outcome) -> None:
     for requirement, found in outcome.record.requirements.items():
         if found.met is False:
-            output.note(f"{name}: the requirement {requirement!r} ({found.observable}) is not met")
+            output.note(f"{name}: {unmet(requirement, found)}")
     for complaint in outcome.complaints:
         output.complain(f"volery: {name}: {complaint}")
     output.note(f"report: {outcome.folder / 'report.html'}")

@@ -14,6 +14,7 @@ from volery.cli.folders import next_folder
 from volery.cli.progress import shown
 from volery.model.reader import load
 from volery.report.terminal import summary_table
+from volery.requirements.record import RequirementRecord
 from volery.run.recording import make_folder
 from volery.run.result import Run
 from volery.run.simulate import Options
@@ -71,6 +72,9 @@ def tell(output: Output, run: Run) -> int:
         output.complain(f"volery: {run.error}")
     elif not run.completed:
         output.complain(f"volery: {run.record.outcome.status}: {run.record.outcome.reason}")
+    for name, found in run.record.requirements.items():
+        if found.met is False:
+            output.complain(f"volery: {unmet(name, found)}")
     for problem in run.problems:
         output.complain(f"volery: {problem}")
     for name in run.left:
@@ -78,3 +82,14 @@ def tell(output: Output, run: Run) -> int:
     if isinstance(run.error, BAD_INPUTS):
         return BAD_INPUT
     return OK if run.ok else FAILED
+
+
+def unmet(name: str, found: RequirementRecord) -> str:
+    """A requirement that was not met, in one sentence."""
+    seen = (
+        "nothing was there to observe"
+        if found.observed is None
+        else f"{found.observed:g} {found.unit}".strip()
+    )
+    bound = f"{found.relation} {found.bound:g} {found.unit}".strip()
+    return f"the requirement {name!r} is not met: {found.observable} is {seen}, {bound} was asked"

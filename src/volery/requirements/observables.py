@@ -15,7 +15,7 @@ from volery.base.time import Ns
 from volery.model.system import Bound, Observable
 from volery.requirements import observers
 from volery.requirements.observers import Make, Observer
-from volery.trace.events import Event, Verdict
+from volery.trace.events import Event, Record, Verdict
 from volery.trace.setup import RunSetup
 
 _DESCRIBED: dict[str, dict[str, tuple[str, str]]] = {
@@ -123,9 +123,10 @@ class Observers:
         for take in self._listening.get(type(event), ()):
             take(event)
 
-    def listens_to(self, event: Event) -> bool:
-        """True if this kind of event can change a verdict."""
-        return type(event) in self._listening
+    def listener(self, kind: type[Any]) -> Record | None:
+        """Who is to be told events of *kind*; ``None`` if they change no verdict."""
+        takers = self._listening.get(kind, [])
+        return takers[0] if len(takers) == 1 else self if takers else None
 
     def values(self, at: Ns) -> Iterator[tuple[Bound, float]]:
         """Each bound and what was observed until *at*; NaN where nothing was there to observe."""

@@ -129,7 +129,9 @@ def too_high(height: float, limits: Limits, home: Position | None = None) -> str
     if height <= limits.highest:
         return ""
     hint = ""
-    if home is not None and limits.lowest <= height - home.altitude.metres <= limits.highest:
+    if home is None:
+        hint = "; heights count from home, not from the sea"
+    elif limits.lowest <= height - home.altitude.metres <= limits.highest:
         hint = f"; did you mean AMSL({height:g})? Home is {home.altitude.metres:g} m AMSL"
     return f"{height:g} m above home asked, but the limit is {limits.highest:g} m (Limits.highest){hint}"
 

@@ -192,8 +192,8 @@ def test_verdicts():
     assert [(one.requirement, one.met) for one in verdicts] == [("r", True), ("fast", False), ("many", True)]
     assert verdicts[1].observed == 0.03
     assert not watching.all_hold(5 * S)
-    assert watching.listens_to(activations((0, 1))[0])
-    assert not watching.listens_to(Failure(0, "loop", "x"))
+    assert watching.listener(Activation) is not None
+    assert watching.listener(Failure) is None
 
 
 def test_what_could_not_be_observed_is_not_met():
