@@ -41,7 +41,12 @@ class Opened:
 
 
 @contextmanager
-def connect(url: str, kind: type[V] = Drone, *, seed: int = 1) -> Iterator[V]:  # type: ignore[assignment]
+def connect(
+    url: str,
+    kind: type[V] = Drone,  # type: ignore[assignment]  # type variables have no defaults before Python 3.13
+    *,
+    seed: int = 1,
+) -> Iterator[V]:
     """The vehicle at *url*, heard of, for as long as the context lasts: a ``Drone``, or *kind*.
 
     Works in a plain script and in a REPL. A simulated vehicle (``sim:ardupilot``) lives in virtual time: that

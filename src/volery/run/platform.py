@@ -161,6 +161,7 @@ class Platform:
         start.
         """
         for instance in self._system.instances:
+            self.pricing(instance)
             if instance.processor is not None and is_node(instance):
                 self._tariff(instance.processor, instance.component.language)
         for vehicle in self._system.vehicles:

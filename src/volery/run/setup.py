@@ -51,7 +51,7 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
             RequirementSetup(one.name, one.observe, one.relation, one.bound, one.unit)
             for one in system.requirements
         ),
-        laws=tuple(_laws(system, platform)),
+        laws=tuple(_laws(system, platform, fidelity)),
         not_counted=(*NOT_COUNTED, *ALWAYS_LEFT_OUT, *_missing_networks(system)),
         warnings=tuple(platform.warnings),
     )
@@ -99,7 +99,7 @@ def _processor(model: Processor, entry: ProcessorEntry) -> ProcessorSetup:
     )
 
 
-def _laws(system: System, platform: Platform) -> Iterable[LawSetup]:
+def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetup]:
     """One entry per kind of processor and law, whatever the number of computers of that kind."""
     seen: set[str] = set()
     for model in system.processors:
@@ -114,6 +114,10 @@ def _laws(system: System, platform: Platform) -> Iterable[LawSetup]:
             yield LawSetup(
                 f"{law.client} calls on {model.kind}", law.source, law.provenance, law.validity, warning
             )
+        for code in entry.code.values() if fidelity == "code" else ():
+            warning = "; ".join(code.model_copy(update={"processor": model.kind}).warnings())
+            name = f"counted {code.language} code on {model.kind}"
+            yield LawSetup(name, code.source, code.provenance, code.validity, warning)
         if entry.power is not None:
             name = f"power of {model.kind}"
             yield LawSetup(name, entry.power.source, entry.power.provenance, entry.power.validity)
