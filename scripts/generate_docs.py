@@ -7,6 +7,7 @@ With --check nothing is written; the exit status says whether they are up to dat
 
 from __future__ import annotations
 
+import ast
 import json
 import sys
 from pathlib import Path
@@ -14,12 +15,15 @@ from typing import Any
 
 from typer.main import get_command
 
+from volery.autopilots.ardupilot import DIALECT
 from volery.cli.main import app
 from volery.cost import catalogue
 from volery.model.schema import schema
 from volery.requirements.observables import OBSERVABLES
 
-REFERENCE = Path(__file__).parent.parent / "docs" / "reference"
+ROOT = Path(__file__).parent.parent
+REFERENCE = ROOT / "docs" / "reference"
+CONFORMANCE = ROOT / "tests" / "conformance" / "ardupilot"
 MADE = "<!-- made by scripts/generate_docs.py; do not edit -->\n\n"
 
 
@@ -84,12 +88,47 @@ def command_line() -> str:
     return "\n".join(lines) + "\n"
 
 
+def ardupilot_parameters() -> str:
+    """Which parameters of the simulated ArduPilot change what it does."""
+    lines = [
+        "# Parameters of the simulated ArduPilot\n",
+        "All parameters of ArduCopter and ArduRover 4.5.6 are there, with the names, types and values of the recordings:",
+        "they are listed, read, set and kept. Those in the tables change what the vehicle does; the others change nothing.",
+    ]
+    for kind, dialect in DIALECT.kinds.items():
+        every = [one.name for one in dialect.parameters()]
+        kept = [name for name in every if name not in dialect.honoured]
+        lines += [f"\n## {dialect.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
+        lines += [f"| `{name}` | {what} |" for name, what in sorted(dialect.honoured.items())]
+        lines += [
+            f"\nKept and not honoured, {len(kept)} of {len(every)}:\n",
+            ", ".join(f"`{one}`" for one in kept),
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def ardupilot_checks() -> str:
+    """What is checked against the recordings: the names of the conformance tests."""
+    lines = [
+        "# What is checked of the simulated ArduPilot\n",
+        "Each line is a test against facts that were read off recordings of ArduCopter and ArduRover 4.5.6.",
+    ]
+    for file in sorted(CONFORMANCE.glob("test_*.py")):
+        tests = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.FunctionDef)]
+        names = [node.name.removeprefix("test_") for node in tests if node.name.startswith("test_")]
+        lines += [f"\n## {file.stem.removeprefix('test_').capitalize()}\n"]
+        lines += [f"- {name.replace('_', ' ')}" for name in names]
+    return "\n".join(lines) + "\n"
+
+
 def pages() -> dict[str, str]:
     """File name and content."""
     return {
         "observables.md": MADE + observables(),
         "processors.md": MADE + processors(),
         "command-line.md": MADE + command_line(),
+        "ardupilot-parameters.md": MADE + ardupilot_parameters(),
+        "ardupilot-checks.md": MADE + ardupilot_checks(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
 
