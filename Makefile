@@ -14,11 +14,12 @@ demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by sid
 test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
 	$(BIN)/pytest --durations=10 $(TESTS)
 
-check: $(VENV)/dev.stamp ## style, types, and the direction of imports
+check: $(VENV)/dev.stamp ## style, types, the direction of imports, and generated pages that are up to date
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	PYTHONPATH=src $(BIN)/lint-imports
+	$(BIN)/python scripts/generate_docs.py --check
 
 bench: $(VENV)/bench.stamp ## every figure that the README and the docs claim
 	@set -e; for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script; done
