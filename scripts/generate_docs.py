@@ -93,8 +93,8 @@ def ardupilot_parameters() -> str:
     lines = [
         "# Parameters of the simulated ArduPilot\n",
         "All parameters of ArduCopter and ArduRover 4.5.6 are there, with the names, types and values of the",
-        "recordings: they are listed, read, set and kept. Those in the tables change what the vehicle does; the",
-        "others change nothing.",
+        "recordings: they are listed, read, set and kept. Those in the tables change what the vehicle does;",
+        "the others change nothing.",
     ]
     for kind, dialect in DIALECT.kinds.items():
         every = [one.name for one in dialect.parameters()]
