@@ -20,6 +20,7 @@ from volery.autopilots.simulated.mavlink.command_service import (
     Command,
     Handler,
 )
+from volery.autopilots.simulated.mavlink.numbers import FARTHEST, sound
 from volery.autopilots.simulated.plan import GLOBAL, GLOBAL_RELATIVE, Item
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.frames import wrap
@@ -28,6 +29,9 @@ LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
+
+HIGHEST = 83_000.0
+"""Metres up or down that a location can hold (LOCATION_ALT_MAX_M)."""
 
 Problems = Callable[[Vehicle], list[str]]
 
@@ -68,7 +72,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
         not vehicle.armed
         or not vehicle.landed
         or not vehicle.mode.user_takeoff
-        or command.z <= vehicle.height
+        or not vehicle.height < command.z < HIGHEST
     ):
         return FAILED
     manoeuvre = vehicle.manoeuvre
@@ -133,7 +137,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
             return FAILED
         vehicle.home_is_here()
     else:
-        if not _on_globe(command.x, command.y) or (command.x == 0.0 and command.y == 0.0):
+        if not _is_place(command) or (command.x == 0.0 and command.y == 0.0):
             return DENIED
         relative = command.is_int and command.frame not in (GLOBAL, 5)
         base = vehicle.home.amsl if relative and vehicle.home else 0.0
@@ -142,15 +146,15 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def _on_globe(latitude: float, longitude: float) -> bool:
-    return abs(latitude) <= 90.0 and abs(longitude) <= 180.0
+def _is_place(command: Command) -> bool:
+    return abs(command.x) <= 90.0 and abs(command.y) <= 180.0 and abs(command.z) < HIGHEST
 
 
 def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
     """DO_REPOSITION: only as COMMAND_INT; into GUIDED if the first flag says so."""
     if not command.is_int:
         return UNSUPPORTED
-    if not _on_globe(command.x, command.y):
+    if not _is_place(command):
         return DENIED
     if vehicle.mode.number != guided:
         if not round(command.param2) & 1:
@@ -166,6 +170,8 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
 def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: float | None = None) -> bool:
     """In GUIDED: go to latitude, longitude [degrees] and altitude [m] in a MAVLink frame."""
     point = vehicle.point(frame, *place)
+    if not sound(point, FARTHEST):
+        return False
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, Guided):
         manoeuvre.go_to(point, Turn(yaw))

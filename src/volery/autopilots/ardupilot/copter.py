@@ -129,7 +129,7 @@ def problems(vehicle: Vehicle) -> list[str]:
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
     if not may_arm_auto:
         found += not_armable(vehicle)
-    throttle = round(vehicle.parameters["RCMAP_THROTTLE"])
+    throttle = vehicle.tuning.sticks.throttle
     if vehicle.parameters["FS_THR_ENABLE"] and vehicle.sticks[throttle] < vehicle.parameters["FS_THR_VALUE"]:
         found.append("Throttle below failsafe")
     elif not vehicle.mode.starts_high and _throttle_is_high(vehicle):
@@ -329,6 +329,7 @@ COPTER = Dialect(
     set_mode=set_mode,
     set_mode_ack=11,
     on_parameter_list=greet,
+    mission_runs=missions.runs,
     stored_item=missions.stored_item,
     home_item=missions.home_item,
     go_to_item=commands.go_to_item,

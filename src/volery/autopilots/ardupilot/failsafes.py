@@ -34,7 +34,7 @@ def radio_lost(vehicle: Vehicle) -> bool:
     """The throttle channel is below FS_THR_VALUE."""
     if vehicle.parameters["FS_THR_ENABLE"] == 0.0:
         return False
-    return vehicle.sticks[round(vehicle.parameters["RCMAP_THROTTLE"])] < vehicle.parameters["FS_THR_VALUE"]
+    return vehicle.sticks[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
 
 def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:

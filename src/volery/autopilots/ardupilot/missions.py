@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import isinf, isnan
 
 from volery.autopilots.ardupilot.arming import INFO, disarm
-from volery.autopilots.ardupilot.commands import change_speed, turn_to
+from volery.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
 from volery.autopilots.simulated.manoeuvres.points import ToPoint
+from volery.autopilots.simulated.mavlink.numbers import number
 from volery.autopilots.simulated.plan import (
     CHANGE_SPEED,
     CONDITION_DELAY,
@@ -35,7 +36,7 @@ from volery.autopilots.simulated.plan import (
 )
 from volery.autopilots.simulated.vehicle import Vehicle
 
-UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_X, INVALID_Y = 2, 3, 10, 11
+UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
 """MAV_MISSION_RESULT."""
 
 NAMES = {
@@ -98,22 +99,35 @@ def stored_item(item: Item) -> Item | int:
         return UNSUPPORTED
     if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
         return UNSUPPORTED_FRAME
+    wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
+    if wrong:
+        return wrong
+    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in PLACED else GLOBAL
+    return item._replace(
+        frame=frame,
+        param1=number(item.param1),
+        param2=number(item.param2),
+        param3=number(item.param3),
+        param4=number(item.param4),
+        z=number(item.z),
+    )
+
+
+def _wrong_parameter(item: Item) -> int:
+    """The result that names the parameter that is no number; a heading of three commands need not be one."""
+    for place, value in enumerate((item.param1, item.param2, item.param3, item.param4)):
+        may_be_none = place == 3 and item.command in (WAYPOINT, LAND, TAKEOFF)
+        if isinf(value) or (isnan(value) and not may_be_none):
+            return INVALID_PARAM1 + place
+    return 0
+
+
+def _wrong_place(item: Item) -> int:
     if abs(item.x) > 900_000_000:
         return INVALID_X
     if abs(item.y) > 1_800_000_000:
         return INVALID_Y
-    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in PLACED else GLOBAL
-    return item._replace(
-        frame=frame,
-        param1=_number(item.param1),
-        param2=_number(item.param2),
-        param3=_number(item.param3),
-        param4=_number(item.param4),
-    )
-
-
-def _number(value: float) -> float:
-    return 0.0 if isnan(value) else value
+    return 0 if abs(item.z) < HIGHEST else INVALID_Z  # a NaN is not less
 
 
 def home_item(vehicle: Vehicle) -> Item | None:
@@ -158,6 +172,12 @@ def leaves_ground(vehicle: Vehicle) -> bool:
     """Whether AUTO takes off without a MISSION_START: the throttle is raised, or AUTO_OPTIONS allows it."""
     raised = vehicle.tuning.sticks.read(vehicle.sticks).throttle > 0.0
     return raised or bool(round(vehicle.parameters["AUTO_OPTIONS"]) & 2)
+
+
+def runs(vehicle: Vehicle) -> bool:
+    """Whether the mission is being flown."""
+    plan = vehicle.plan
+    return vehicle.armed and vehicle.mode.name == "AUTO" and plan.current > 0 and not plan.complete
 
 
 def copter_ended(vehicle: Vehicle) -> None:

@@ -74,7 +74,7 @@ def _share(axis: int) -> float | None:
 
 
 def _give(vehicle: Vehicle, channel: int, travel: Travel, share: float | None) -> None:
-    pulse = 0 if share is None else travel.pulse(share)
+    pulse = 0 if share is None else max(0, travel.pulse(share))
     vehicle.sticks.override(channel, pulse, vehicle.kernel.now())
 
 
@@ -97,6 +97,6 @@ def fail(vehicle: Vehicle) -> None:
 
     Both look the same to the firmware: a throttle of 950.
     """
-    throttle = round(vehicle.parameters["RCMAP_THROTTLE"])
+    throttle = vehicle.tuning.sticks.throttle
     healthy = vehicle.dialect.transmitter[throttle - 1]
     vehicle.sticks.transmitter[throttle - 1] = 950 if vehicle.parameters["SIM_RC_FAIL"] else healthy

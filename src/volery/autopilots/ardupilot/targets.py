@@ -6,11 +6,12 @@ A group of three (position, velocity, acceleration) counts only whole. Outside G
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
 from volery.autopilots.simulated.manoeuvres.guided import Guided, Turn
 from volery.autopilots.simulated.manoeuvres.rover import GuidedRover
+from volery.autopilots.simulated.mavlink.numbers import FARTHEST, sound
 from volery.autopilots.simulated.plan import (
     BODY_NED,
     BODY_OFFSET_NED,
@@ -70,10 +71,13 @@ def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
 
 def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:
     mask = fields["type_mask"]
-    yaw = fields["yaw"] if _given(mask, YAW) else None
+    yaw = fields["yaw"] if _given(mask, YAW) and isfinite(fields["yaw"]) else None
     if yaw is not None and body:
         yaw += vehicle.estimate.attitude[2]
-    rate = fields["yaw_rate"] if _given(mask, YAW_RATE) else None
+    rate = None
+    if _given(mask, YAW_RATE) and isfinite(fields["yaw_rate"]):
+        fastest = vehicle.tuning.pilot_yaw_rate
+        rate = min(fastest, max(-fastest, fields["yaw_rate"]))
     return Turn(None if rate is not None else yaw, rate)
 
 
@@ -93,8 +97,11 @@ def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
     return _target(mask, (place, velocity, push), _turn(vehicle, fields, body))
 
 
-def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target:
+def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target | None:
     place, velocity, push = groups
+    for group, values in ((POSITION, place), (VELOCITY, velocity), (ACCELERATION, push)):
+        if _given(mask, group) and not sound(values, FARTHEST):
+            return None
     return Target(
         place if _given(mask, POSITION) else None,
         velocity if _given(mask, VELOCITY) else None,
@@ -141,11 +148,13 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
     guided, mask = vehicle.manoeuvre, fields["type_mask"]
     if not isinstance(guided, Guided) or mask & THROTTLE_IGNORED:
         return
-    w, x, y, z = fields["q"][:4]
-    size = (w * w + x * x + y * y + z * z) ** 0.5
+    if not sound((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+        return
+    w, x, y, z = fields["q"]
+    size = hypot(w, x, y, z)
     attitude = None if mask & ATTITUDE_IGNORED or size < 0.5 else (w / size, x / size, y / size, z / size)
     rate = None if mask & YAW_RATE_IGNORED else fields["body_yaw_rate"]
-    guided.follow_attitude(attitude, rate, fields["thrust"])
+    guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])))
 
 
 def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:

@@ -90,14 +90,18 @@ class Autopilot:
         self.face.disconnect(link)
 
     def close(self) -> None:
-        """Stop all clocks and fall silent."""
+        """Stop all clocks and serve no link any more."""
+        self._halt()
+        self.face.hang_up()
+
+    def _halt(self) -> None:
         for clock in self._clocks:
             clock.cancel()
         self._clocks.clear()
         self.face.stop()
 
     def _restart(self) -> None:
-        self.close()
+        self._halt()
         self._flight.forget_origin()
         self._boot(0)
         self.on_reboot()

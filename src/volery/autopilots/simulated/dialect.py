@@ -89,6 +89,8 @@ class Dialect:
     answer_delay: Ns = 5 * MS
     deaf_until: Ns = 0
     """Before that, message intervals are acknowledged and forgotten."""
+    least_period: Ns = 3 * MS
+    """No message is streamed more often."""
     each_second: Act
     each_second_from: Ns = 0
 
@@ -136,6 +138,8 @@ class Dialect:
     """SET_MODE: base mode, custom mode; returns a MAV_RESULT."""
     set_mode_ack: int
     on_parameter_list: Act
+    mission_runs: Callable[[Vehicle], bool]
+    """Whether it may not be cleared now."""
     stored_item: Callable[[Item], Item | int]
     """An uploaded item as it is kept, or the MAV_MISSION_RESULT that refuses it."""
     home_item: Callable[[Vehicle], Item | None]

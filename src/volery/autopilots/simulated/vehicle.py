@@ -148,8 +148,9 @@ class Vehicle:
         return self.uptime() >= self.dialect.position_after and self.estimate.position_ok
 
     def set_home(self, latitude: float, longitude: float, amsl: float) -> None:
-        """From now on home is there."""
-        self.home = Home(latitude, longitude, amsl, self.flight.to_ned(latitude, longitude, amsl))
+        """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
+        north, east, _ = self.flight.to_ned(latitude, longitude, amsl)
+        self.home = Home(latitude, longitude, amsl, (north, east, self.estimate.origin[2] - amsl))
         self.outlet.announce("GPS_GLOBAL_ORIGIN")
         self.outlet.announce("HOME_POSITION")
 

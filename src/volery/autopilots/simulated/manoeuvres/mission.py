@@ -62,6 +62,8 @@ class FlyMission(Manoeuvre):
         self._make_leg = make_leg
         self._leaves_ground = leaves_ground
         self._leg: Leg | None = None
+        self._flown = (0, Item(WAYPOINT))
+        """Index and item of the leg: an upload may replace the plan meanwhile."""
         self._reached_at: Ns | None = None
         self._jumps: dict[int, int] = {}
         self._held: deque[Item] = deque()
@@ -126,9 +128,8 @@ class FlyMission(Manoeuvre):
             self._advance_to(max(1, plan.current))
 
     def _finish(self) -> None:
-        vehicle, plan = self.vehicle, self.vehicle.plan
-        index = plan.current
-        vehicle.dialect.mission_item_done(vehicle, index, plan[index])
+        index, item = self._flown
+        self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
         self._advance_to(index + 1)
 
     def _advance_to(self, index: int) -> None:
@@ -151,6 +152,7 @@ class FlyMission(Manoeuvre):
         vehicle = self.vehicle
         vehicle.plan.current = index
         vehicle.dialect.mission_item_begins(vehicle, index, item)
+        self._flown = index, item
         self._leg = self._make_leg(vehicle, item, self._goes_on(index))
         self._reached_at = None
         self._leg.manoeuvre.enter()

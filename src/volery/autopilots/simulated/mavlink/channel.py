@@ -12,22 +12,29 @@ AUTOPILOT = 1
 
 
 class Channel:
-    """A link with its streams. ``index`` counts the links in the order in which they were connected."""
+    """A link with its streams. ``index`` numbers the links that are open at once."""
 
     def __init__(self, link: Link, index: int, system: int) -> None:
         self.link = link
         self.index = index
         self.streams: Streams
+        self.open = True
         self._system = system
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
-        """Send a message as the autopilot."""
-        self.link.send(Frame(name, fields, self._system, AUTOPILOT))
+        """Send a message as the autopilot; nothing once it has hung up."""
+        if self.open:
+            self.link.send(Frame(name, fields, self._system, AUTOPILOT))
 
     def send_bytes(self, data: bytes) -> None:
         """Bytes that are no message, where the link carries bytes; else nothing."""
-        if isinstance(self.link, ByteLink):
+        if self.open and isinstance(self.link, ByteLink):
             self.link.send_bytes(data)
+
+    def hang_up(self) -> None:
+        """Neither speak nor listen any more."""
+        self.open = False
+        self.streams.stop()
 
 
 class Peer(NamedTuple):

@@ -6,9 +6,11 @@ What concerns the link itself (message intervals, single messages) is answered h
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from volery.autopilots.simulated.mavlink.channel import Peer
+from volery.autopilots.simulated.mavlink.numbers import number
 from volery.autopilots.simulated.plan import GLOBAL_RELATIVE
 from volery.base.time import MS, US
 from volery.links.mavlink import message_type_of
@@ -22,11 +24,12 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
 REQUEST_CAPABILITIES = 520
 
-SHORTEST_PERIOD_US = 2_500
-
 
 class Command(NamedTuple):
-    """A command, whichever form it came in. ``x`` and ``y`` are degrees where they are a place."""
+    """A command, whichever form it came in. ``x`` and ``y`` are degrees where they are a place.
+
+    All are numbers, but ``param4``, where a NaN may mean: leave the heading alone.
+    """
 
     number: int
     param1: float
@@ -48,13 +51,13 @@ def from_long(fields: dict[str, Any]) -> Command:
     """COMMAND_LONG."""
     return Command(
         fields["command"],
-        fields["param1"],
-        fields["param2"],
-        fields["param3"],
-        fields["param4"],
-        fields["param5"],
-        fields["param6"],
-        fields["param7"],
+        number(fields["param1"]),
+        number(fields["param2"]),
+        number(fields["param3"]),
+        _heading(fields["param4"]),
+        number(fields["param5"]),
+        number(fields["param6"]),
+        number(fields["param7"]),
         GLOBAL_RELATIVE,
         is_int=False,
     )
@@ -64,16 +67,20 @@ def from_int(fields: dict[str, Any]) -> Command:
     """COMMAND_INT."""
     return Command(
         fields["command"],
-        fields["param1"],
-        fields["param2"],
-        fields["param3"],
-        fields["param4"],
+        number(fields["param1"]),
+        number(fields["param2"]),
+        number(fields["param3"]),
+        _heading(fields["param4"]),
         fields["x"] / 1e7,
         fields["y"] / 1e7,
-        fields["z"],
+        number(fields["z"]),
         fields["frame"],
         is_int=True,
     )
+
+
+def _heading(value: float) -> float:
+    return number(value) if isfinite(value) else nan
 
 
 class CommandService:
@@ -127,11 +134,11 @@ class CommandService:
             return self._vehicle.dialect.refuse_interval(self._vehicle, number)
         if self._vehicle.uptime() < self._vehicle.dialect.deaf_until:
             return ACCEPTED
-        if interval == 0:
+        if interval == 0.0:
             period = self._vehicle.dialect.usual_period(name)
         else:
-            period = max(SHORTEST_PERIOD_US, round(interval)) * US if interval > 0 else 0
-        peer.channel.streams.set((name,), period // MS * MS if period > MS else period)
+            period = max(MS, round(interval) * US // MS * MS) if interval > 0 else 0
+        peer.channel.streams.set((name,), period)
         return ACCEPTED
 
     def _request_message(self, peer: Peer, command: Command) -> int:

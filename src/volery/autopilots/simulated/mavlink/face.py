@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import count
 from typing import Any
 
 from volery.autopilots.simulated.mavlink.channel import Channel, Peer
@@ -68,9 +69,14 @@ class Face:
     def connect(self, link: Link) -> None:
         """Listen to and speak on this link, too."""
         vehicle = self._vehicle
-        channel = Channel(link, len(self.channels), vehicle.system)
+        taken = {channel.index for channel in self.channels}
+        index = next(index for index in count() if index not in taken)
+        channel = Channel(link, index, vehicle.system)
         channel.streams = Streams(
-            self._kernel, vehicle.dialect.message_order, lambda names: self._burst(channel, names)
+            self._kernel,
+            vehicle.dialect.message_order,
+            lambda names: self._burst(channel, names),
+            least=vehicle.dialect.least_period,
         )
         self.channels.append(channel)
         if vehicle.uptime() >= vehicle.dialect.ready_after:
@@ -80,8 +86,19 @@ class Face:
     def disconnect(self, link: Link) -> None:
         """Nobody is there any more."""
         for channel in [channel for channel in self.channels if channel.link is link]:
-            channel.streams.stop()
+            channel.hang_up()
             self.channels.remove(channel)
+
+    def hang_up(self) -> None:
+        """Stop serving all of them."""
+        for channel in self.channels:
+            channel.hang_up()
+        self.channels.clear()
+
+    @property
+    def listens_to(self) -> frozenset[str]:
+        """The messages that change something or are answered."""
+        return frozenset(self._handlers) | frozenset(self._vehicle.dialect.handlers)
 
     def _burst(self, channel: Channel, names: Sequence[str]) -> None:
         messages, vehicle = self._vehicle.dialect.messages, self._vehicle
@@ -189,6 +206,8 @@ class Face:
     # -- hearing
 
     def _hear(self, channel: Channel, frame: Frame) -> None:
+        if not channel.open:
+            return
         self._arrived.append((channel, frame))
         self._kernel.call_at(self._kernel.now() + self._vehicle.dialect.answer_delay, self._handle)
 

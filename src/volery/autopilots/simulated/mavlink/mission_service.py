@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.autopilots.simulated.mavlink.channel import Peer
+from volery.autopilots.simulated.mavlink.numbers import number
 from volery.autopilots.simulated.plan import Item
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import Ns, S
@@ -81,7 +82,7 @@ class MissionService:
 
     def on_item(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_ITEM: coordinates in degrees."""
-        self._on_item(peer, fields, round(fields["x"] * 1e7), round(fields["y"] * 1e7))
+        self._on_item(peer, fields, round(number(fields["x"]) * 1e7), round(number(fields["y"]) * 1e7))
 
     def _on_item(self, peer: Peer, fields: dict[str, Any], x: int, y: int) -> None:
         item = Item(
@@ -182,7 +183,10 @@ class MissionService:
     # -- the rest
 
     def on_clear(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_CLEAR_ALL."""
+        """MISSION_CLEAR_ALL: not while the mission is flown."""
+        if self._vehicle.dialect.mission_runs(self._vehicle):
+            self._acknowledge(peer, ERROR, fields["mission_type"])
+            return
         if fields["mission_type"] in (MISSION, 255):
             self._drop_upload()
             self._vehicle.plan.clear()

@@ -16,10 +16,13 @@ Burst = Callable[[Sequence[str]], None]
 
 
 class Streams:
-    """The streams of one link. ``order`` is the order of messages within a burst."""
+    """The streams of one link. ``order`` is the order of messages within a burst; no period is shorter than
+    ``least``.
+    """
 
-    def __init__(self, kernel: Kernel, order: Sequence[str], burst: Burst) -> None:
+    def __init__(self, kernel: Kernel, order: Sequence[str], burst: Burst, *, least: Ns = 1) -> None:
         self._kernel = kernel
+        self._least = least
         self._rank = {name: rank for rank, name in enumerate(order)}
         self._burst = burst
         self._periods: dict[str, Ns] = {}
@@ -39,7 +42,7 @@ class Streams:
         for name in names:
             self._periods.pop(name, None)
             if period > 0:
-                self._periods[name] = period
+                self._periods[name] = max(period, self._least)
         self._regroup()
 
     def start(self) -> None:

@@ -1,0 +1,160 @@
+"""The autopilot as its users see it: making one, its state, several links, an end."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import Any
+
+import pytest
+
+from volery.autopilots.ardupilot import DIALECT
+from volery.autopilots.simulated.autopilot import Autopilot
+from volery.autopilots.simulated.dialect import dialects
+from volery.autopilots.simulated.flight import make_world
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame
+from volery.base.time import MS, S
+from volery.kernel.virtual import VirtualKernel
+from volery.links.in_process import in_process
+from volery.links.link import Frame
+from volery.world.specs import Multirotor, Rover
+
+FRAME = LocalFrame(48.0, 11.0, 500.0)
+
+
+class Yard:
+    """A kernel and a world with the bodies given."""
+
+    def __init__(self, *bodies: Any) -> None:
+        self.kernel = VirtualKernel()
+        _, self.flights = make_world(self.kernel.now, list(bodies), seed=5, frame=FRAME)
+
+    def autopilot(self, index: int = 0, **options: Any) -> Autopilot:
+        return Autopilot(self.kernel, self.flights[index], DIALECT, **options)
+
+    def listen(self, autopilot: Autopilot) -> tuple[Any, list[Frame]]:
+        ours, theirs = in_process(self.kernel, MS, "station")
+        heard: list[Frame] = []
+        ours.receive(heard.append)
+        autopilot.connect(theirs)
+        return ours, heard
+
+    def run(self, seconds: float) -> None:
+        end = self.kernel.now() + round(seconds * S)
+        self.kernel.call_at(end, lambda: None)  # time stands still where nothing happens
+        self.kernel.run(end)
+
+
+@pytest.fixture
+def yard() -> Yard:
+    return Yard(Multirotor(sensors="rtk", at=(3.0, 4.0, 0.0)))
+
+
+def test_the_dialect_is_found_by_its_name() -> None:
+    assert dialects.load("ardupilot") is DIALECT
+
+
+def test_the_body_chooses_the_kind() -> None:
+    yard = Yard(Multirotor(), Rover(at=(5.0, 0.0, 0.0)))
+    assert yard.autopilot(0).dialect.kind == "multirotor"
+    assert yard.autopilot(1, system=2).dialect.kind == "rover"
+
+
+def test_a_dialect_of_another_kind_is_refused(yard: Yard) -> None:
+    with pytest.raises(UsageError, match=r"rover.*multirotor"):
+        Autopilot(yard.kernel, yard.flights[0], DIALECT.kinds["rover"])
+
+
+def test_a_warm_vehicle_has_its_position_soon(yard: Yard) -> None:
+    autopilot = yard.autopilot(warm=True, name="drone_1")
+    yard.run(0.5)
+    state = autopilot.state()
+    assert (state.x, state.y) == pytest.approx((3.0, 4.0), abs=0.01)
+    assert (state.estimated_x, state.estimated_y) == pytest.approx((3.0, 4.0), abs=0.3)
+    assert (state.vehicle, state.armed, state.mode) == ("drone_1", False, "STABILIZE")
+
+
+def test_a_cold_vehicle_sleeps_until_it_is_connected(yard: Yard) -> None:
+    autopilot = yard.autopilot()
+    yard.run(5.0)
+    assert isnan(autopilot.state().estimated_x)
+    _, heard = yard.listen(autopilot)
+    yard.run(3.0)
+    assert heard
+    assert heard[0].system == 1
+
+
+def test_connecting_need_not_switch_it_on(yard: Yard) -> None:
+    autopilot = yard.autopilot()
+    ours, theirs = in_process(yard.kernel, MS, "station")
+    heard: list[Frame] = []
+    ours.receive(heard.append)
+    autopilot.connect(theirs, switch_on=False)
+    yard.run(3.0)
+    assert not heard
+    autopilot.switch_on()
+    yard.run(3.0)
+    assert heard
+
+
+def test_the_banner_is_text_and_no_message(yard: Yard) -> None:
+    assert b"Init ArduCopter V4.5.6" in yard.autopilot().banner
+
+
+def test_each_vehicle_answers_to_its_own_number() -> None:
+    yard = Yard(Multirotor(), Multirotor(at=(5.0, 0.0, 0.0)))
+    stations = [yard.listen(yard.autopilot(index, system=index + 1, warm=True)) for index in range(2)]
+    yard.run(0.5)
+    for station, _ in stations:
+        station.send(Frame("PARAM_REQUEST_READ", _reading(2), 255, 190))
+    yard.run(0.2)
+    answered = [[one.system for one in heard if one.name == "PARAM_VALUE"] for _, heard in stations]
+    assert answered == [[], [2]]
+
+
+def _reading(system: int) -> dict[str, Any]:
+    return {
+        "target_system": system,
+        "target_component": 1,
+        "param_id": "SYSID_THISMAV",
+        "param_index": -1,
+    }
+
+
+def test_a_link_that_is_disconnected_hears_nothing_more(yard: Yard) -> None:
+    autopilot = yard.autopilot(warm=True)
+    ours, theirs = in_process(yard.kernel, MS, "station")
+    heard: list[Frame] = []
+    ours.receive(heard.append)
+    autopilot.connect(theirs)
+    yard.run(2.5)
+    assert heard
+    autopilot.disconnect(theirs)
+    yard.run(0.1)
+    heard.clear()
+    ours.send(Frame("PARAM_REQUEST_READ", _reading(1), 255, 190))
+    yard.run(3.0)
+    assert not heard
+
+
+def test_a_closed_autopilot_is_silent(yard: Yard) -> None:
+    autopilot = yard.autopilot(warm=True)
+    _, heard = yard.listen(autopilot)
+    yard.run(2.5)
+    autopilot.close()
+    yard.run(0.1)
+    heard.clear()
+    yard.run(5.0)
+    assert not heard
+
+
+def test_the_same_seed_says_the_same_words_at_the_same_time() -> None:
+    def story() -> list[tuple[str, str]]:
+        yard = Yard(Multirotor(sensors="consumer"))
+        station, heard = yard.listen(yard.autopilot(warm=True))
+        asked = {"target_system": 1, "target_component": 1, "req_message_rate": 10, "start_stop": 1}
+        station.send(Frame("REQUEST_DATA_STREAM", {**asked, "req_stream_id": 0}, 255, 190))
+        yard.run(5.0)
+        return [(frame.name, repr(frame.fields)) for frame in heard]
+
+    assert story() == story()

@@ -1,0 +1,88 @@
+"""The parameter store: order, types, overrides."""
+
+from __future__ import annotations
+
+import pytest
+
+from volery.autopilots.simulated.parameters import (
+    INT8,
+    INT16,
+    INT32,
+    REAL32,
+    Parameter,
+    Parameters,
+    quantised,
+    single,
+)
+from volery.base.errors import UsageError
+
+LISTED = (
+    Parameter("B_FIRST", INT8, 1.0),
+    Parameter("A_SECOND", REAL32, 0.5),
+    Parameter("C_THIRD", INT16, 7.0),
+)
+
+
+def test_parameters_keep_their_order_and_index() -> None:
+    store = Parameters(LISTED)
+    assert [one.name for one in store] == ["B_FIRST", "A_SECOND", "C_THIRD"]
+    assert store.at(1) == LISTED[1]
+    assert len(store) == 3
+
+
+def test_a_change_is_seen_by_name_and_by_index() -> None:
+    store = Parameters(LISTED)
+    assert store.set("C_THIRD", 12.0) == Parameter("C_THIRD", INT16, 12.0)
+    assert store["C_THIRD"] == 12.0
+    assert store.at(2).value == 12.0
+    assert store.find("C_THIRD") == Parameter("C_THIRD", INT16, 12.0)
+
+
+def test_two_vehicles_do_not_share_values() -> None:
+    first, second = Parameters(LISTED), Parameters(LISTED)
+    first.set("C_THIRD", 99.0)
+    assert second["C_THIRD"] == 7.0
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_what_is_no_number_changes_nothing(value: float) -> None:
+    store = Parameters(LISTED)
+    assert store.set("A_SECOND", value) is None
+    assert store["A_SECOND"] == 0.5
+
+
+def test_unknown_names_are_none() -> None:
+    store = Parameters(LISTED)
+    assert store.find("D_FOURTH") is None
+    assert store.set("D_FOURTH", 1.0) is None
+    assert "D_FOURTH" not in store
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "kept"),
+    [
+        (INT8, 1.4, 1.0),
+        (INT8, 1000.0, 127.0),
+        (INT16, -40_000.0, -32_768.0),
+        (INT32, 3e9, 2_147_483_647.0),
+        (REAL32, 0.1, single(0.1)),
+    ],
+)
+def test_values_fit_their_types(kind: int, given: float, kept: float) -> None:
+    assert quantised(kind, given) == kept
+
+
+def test_an_override_takes_the_place_of_the_firmwares_value() -> None:
+    assert Parameters(LISTED, {"A_SECOND": 2.0})["A_SECOND"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"A_SECONT": 1.0}, "no parameter 'A_SECONT'.*A_SECOND"),
+        ({"A_SECOND": float("nan")}, "A_SECOND cannot be nan"),
+    ],
+)
+def test_a_wrong_override_is_explained(overrides: dict[str, float], words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        Parameters(LISTED, overrides)
