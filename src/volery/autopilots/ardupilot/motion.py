@@ -9,6 +9,7 @@ from math import atan2, degrees, hypot, nan, pi
 from typing import Any
 
 from volery.autopilots.simulated.manoeuvres.points import bearing
+from volery.autopilots.simulated.mavlink.numbers import short, word
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import MS, US, S
@@ -93,7 +94,7 @@ def global_position(vehicle: Vehicle) -> Fields:
     north, east, down = estimate.velocity
     fields["lat"], fields["lon"] = round(latitude * 1e7), round(longitude * 1e7)
     fields["alt"], fields["relative_alt"] = _cm(amsl), round(vehicle.height * 1000.0)
-    fields["vx"], fields["vy"], fields["vz"] = round(north * 100.0), round(east * 100.0), round(down * 100.0)
+    fields["vx"], fields["vy"], fields["vz"] = (short(speed * 100.0) for speed in (north, east, down))
     return fields
 
 
@@ -127,12 +128,12 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
 def _imu(vehicle: Vehicle) -> Fields:
     estimate = vehicle.estimate
     return {
-        "xacc": round(estimate.accel[0] * GRAVITY_MILLI),
-        "yacc": round(estimate.accel[1] * GRAVITY_MILLI),
-        "zacc": round(estimate.accel[2] * GRAVITY_MILLI),
-        "xgyro": round(estimate.gyro[0] * 1000.0),
-        "ygyro": round(estimate.gyro[1] * 1000.0),
-        "zgyro": round(estimate.gyro[2] * 1000.0),
+        "xacc": short(estimate.accel[0] * GRAVITY_MILLI),
+        "yacc": short(estimate.accel[1] * GRAVITY_MILLI),
+        "zacc": short(estimate.accel[2] * GRAVITY_MILLI),
+        "xgyro": short(estimate.gyro[0] * 1000.0),
+        "ygyro": short(estimate.gyro[1] * 1000.0),
+        "zgyro": short(estimate.gyro[2] * 1000.0),
         **_compass(vehicle),
         "temperature": ZERO_CELSIUS_RISE,
     }
@@ -142,7 +143,7 @@ def _compass(vehicle: Vehicle) -> Fields:
     if vehicle.uptime() < vehicle.dialect.ready_after:
         return {}
     x, y, z = vehicle.estimate.mag
-    return {"xmag": round(x * 1000.0), "ymag": round(y * 1000.0), "zmag": round(z * 1000.0)}
+    return {"xmag": short(x * 1000.0), "ymag": short(y * 1000.0), "zmag": short(z * 1000.0)}
 
 
 def raw_imu(vehicle: Vehicle) -> Fields:
@@ -191,9 +192,9 @@ def gps_raw(vehicle: Vehicle) -> Fields:
         "lat": round(fix.latitude * 1e7),
         "lon": round(fix.longitude * 1e7),
         "alt": _cm(fix.amsl),
-        "eph": round(fix.eph * 100.0),
-        "epv": round(fix.epv * 100.0),
-        "vel": round(speed * 100.0),
+        "eph": word(fix.eph * 100.0),
+        "epv": word(fix.epv * 100.0),
+        "vel": word(speed * 100.0),
         "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
         "satellites_visible": fix.satellites,
         "alt_ellipsoid": _cm(fix.amsl),
@@ -344,6 +345,6 @@ def distance_sensor(vehicle: Vehicle) -> Fields | None:
         "time_boot_ms": boot_ms(vehicle),
         "min_distance": 20,
         "max_distance": 3000,
-        "current_distance": round(distance * 100.0),
+        "current_distance": word(distance * 100.0),
         "orientation": 25,
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from volery.autopilots.ardupilot.motion import FIX_AFTER, NO_FIX_AFTER, boot_ms, boot_us
+from volery.autopilots.simulated.mavlink.numbers import short, word
 from volery.autopilots.simulated.plan import Plan
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import S
@@ -94,8 +95,8 @@ def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
     capacity = vehicle.parameters["BATT_CAPACITY"]
     left = 1.0 - estimate.battery_used_mah / capacity if capacity > 0.0 else 0.0
     return (
-        round(estimate.battery_volts * 1000.0),
-        round(estimate.battery_amps * 100.0),
+        word(estimate.battery_volts * 1000.0),
+        short(estimate.battery_amps * 100.0),
         int(max(0.0, left) * 100.0),
     )
 

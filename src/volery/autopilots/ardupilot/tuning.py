@@ -13,6 +13,7 @@ from volery.autopilots.simulated.tuning import StickMap, Tuning
 from volery.base.time import MS, from_seconds
 
 CHANNELS = 16
+FASTEST = 1000.0
 SLOWEST = 0.1
 """Speed [m/s] where a parameter asks for less than none; the firmware's own least values are of that size."""
 
@@ -56,7 +57,7 @@ def stick_map(parameters: Parameters) -> StickMap:
 
 def _moving(value: float, instead: float = SLOWEST) -> float:
     """A speed or an acceleration that moves; *instead* where it is none."""
-    return value if value > 0.0 else instead
+    return min(value, FASTEST) if value > 0.0 else instead
 
 
 def copter(parameters: Parameters) -> Tuning:

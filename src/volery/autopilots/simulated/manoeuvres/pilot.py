@@ -159,10 +159,11 @@ class Loiter(ByPilot):
         heading = self.vehicle.estimate.attitude[2]
         c, s = cos(heading), sin(heading)
         drag = tuning.loiter_accel / tuning.loiter_speed
+        kept = 1.0 / (1.0 + drag * passed)  # the drag at the end of the step: it cannot overshoot
         north, east = self._velocity
-        north += (forward * c - right * s - drag * north) * passed
-        east += (forward * s + right * c - drag * east) * passed
-        self._velocity = (north, east)
+        north += (forward * c - right * s) * passed
+        east += (forward * s + right * c) * passed
+        self._velocity = (north * kept, east * kept)
 
     def _let_go(self, now: Ns, passed: float) -> None:
         """Glide at first, then brake to a stand."""

@@ -1,4 +1,6 @@
-"""Numbers as stations send them, made fit for use: a float of the wire need not be a number at all."""
+"""Numbers between the wire and the vehicle: a float of the wire need not be a number at all, and a field of
+16 bits does not hold everything.
+"""
 
 from __future__ import annotations
 
@@ -18,3 +20,13 @@ def number(value: float) -> float:
 def sound(values: Iterable[float], most: float = LARGEST) -> bool:
     """Whether all of them are numbers no larger than *most*."""
     return all(abs(value) <= most for value in values)  # false for NaN
+
+
+def short(value: float) -> int:
+    """The nearest signed 16-bit number: a field shows its end where the value lies beyond."""
+    return min(32_767, max(-32_768, round(value)))
+
+
+def word(value: float) -> int:
+    """The nearest unsigned 16-bit number."""
+    return min(65_535, max(0, round(value)))
