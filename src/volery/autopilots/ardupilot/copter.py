@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache, partial
 
-from volery.autopilots.ardupilot import boot, commands, missions, radio, status, tuning
+from volery.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
 from volery.autopilots.ardupilot.arming import (
     INFO,
     Check,
@@ -12,7 +12,6 @@ from volery.autopilots.ardupilot.arming import (
     disarm,
     failing,
     flies_by_position,
-    look_before_arming,
     lost_position,
     low_battery,
     needs_no_position,
@@ -55,7 +54,6 @@ EACH_SECOND = round(0.285 * S)
 ARMED_WORDS = ("Arming motors", "Disarming motors")
 LANDED_TO_DISARM = 200 * MS
 """Recorded: disarmed 2.07 s after touch-down. The landed detector takes most of it."""
-STORE_COUNTERS_EVERY = 30 * S
 ALIGNS_ABOVE = 2.5
 """Height [m] at which the compass is trusted anew."""
 
@@ -155,24 +153,6 @@ def warm(vehicle: Vehicle) -> None:
     """As its boot leaves it, but for the position."""
     boot.keep(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
     ready(vehicle)
-
-
-def on_position(vehicle: Vehicle) -> None:
-    """There is a home, and nothing speaks against arming."""
-    boot.home_set(vehicle)
-    vehicle.prearm_ok = not before_arming(vehicle)
-
-
-def each_second(vehicle: Vehicle) -> None:
-    """Readiness, and the counters of hours."""
-    if vehicle.uptime() < READY:
-        return
-    look_before_arming(vehicle, before_arming)
-    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
-        vehicle.counted_at = vehicle.uptime()
-        if vehicle.flight_time:
-            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
-        vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)
 
 
 def on_step(vehicle: Vehicle) -> None:
@@ -277,11 +257,11 @@ COPTER = Dialect(
     position_after=POSITION,
     local_position_after=POSITION,
     on_warm=warm,
-    on_warm_position=on_position,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
     heartbeat_first=(round(1.05 * S),),
     heartbeat_from=round(2.037 * S),
     deaf_until=100 * MS,
-    each_second=each_second,
+    each_second=partial(routine.each_second, before_arming=before_arming),
     each_second_from=EACH_SECOND,
     modes=MODES,
     tuning=tuning.copter,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import cache, partial
 
-from volery.autopilots.ardupilot import boot, commands, missions, radio, status, tuning
+from volery.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
 from volery.autopilots.ardupilot.arming import (
     INFO,
     WARNING,
     Check,
     between,
     failing,
-    look_before_arming,
     lost_position,
     low_battery,
     no_mission,
@@ -58,7 +57,6 @@ HOME = round(10.36 * S)
 POSITION = round(42.08 * S)
 
 ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
-STORE_COUNTERS_EVERY = 30 * S
 
 MODES = {
     mode.number: mode
@@ -129,24 +127,6 @@ def warm(vehicle: Vehicle) -> None:
     ready(vehicle)
 
 
-def on_position(vehicle: Vehicle) -> None:
-    """There is a home, and nothing speaks against arming."""
-    boot.home_set(vehicle)
-    vehicle.prearm_ok = not before_arming(vehicle)
-
-
-def each_second(vehicle: Vehicle) -> None:
-    """Readiness, and the counters of hours."""
-    if vehicle.uptime() < READY:
-        return
-    look_before_arming(vehicle, before_arming)
-    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
-        vehicle.counted_at = vehicle.uptime()
-        if vehicle.flight_time:
-            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
-        vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)
-
-
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire."""
     if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(ROVER.transmitter):
@@ -214,12 +194,12 @@ ROVER = Dialect(
     position_after=POSITION,
     local_position_after=HOME,
     on_warm=warm,
-    on_warm_position=on_position,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
     heartbeat_first=(round(1.025 * S),),
     heartbeat_from=round(3.04 * S),
     deaf_until=100 * MS,
     least_period=25 * MS,
-    each_second=each_second,
+    each_second=partial(routine.each_second, before_arming=before_arming),
     each_second_from=round(0.345 * S),
     modes=MODES,
     tuning=tuning.rover,
