@@ -115,6 +115,9 @@ def test_the_old_form_of_items_is_understood_and_answered_in_degrees(bench: Any)
 
 
 BAD = [
+    ("a radius that is no number", item(18, 5.0, param3=float("nan")), 8),
+    ("a hold without end", item(WAYPOINT, 5.0, param1=float("inf")), 6),
+    ("an altitude beyond the air", item(WAYPOINT, 5.0, height=90_000.0), 12),
     ("a command that is none", item(9999, 5.0), UNSUPPORTED),
     ("a frame that is none", item(WAYPOINT, 5.0, frame=77), UNSUPPORTED_FRAME),
     ("a latitude off the globe", item(WAYPOINT, x=910_000_000), 10),
@@ -225,6 +228,49 @@ def test_actions_conditions_and_jumps(bench: Any) -> None:
     rig.run(0.5)
     reached = [one.fields["seq"] for one in rig.of("MISSION_ITEM_REACHED")]
     assert reached == [1, 3, 4, 3, 4, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("condition", "earliest"),
+    [(item(112, param1=4.0), 4.0), (item(114, param1=10.0), 4.5)],
+    ids=["a time", "a distance"],
+)
+def test_a_condition_holds_the_action_after_it_not_the_leg(
+    condition: dict[str, Any], earliest: float, bench: Any
+) -> None:
+    rig = bench()
+    rig.run(0.5)
+    action = item(115, param1=90.0)
+    upload(
+        rig,
+        [HOME, item(TAKEOFF, height=5.0), condition, action, item(WAYPOINT, 40.0, height=5.0), item(LAND)],
+    )
+    start(rig)
+    rig.run_until(lambda: rig.vehicle.plan.current == 4)
+    assert rig.vehicle.yaw_target is None
+    begun = rig.now
+    rig.run_until(lambda: rig.vehicle.yaw_target is not None)
+    assert rig.vehicle.plan.current == 4
+    assert earliest <= rig.now - begun < 12.0
+    rig.run_until(lambda: not rig.vehicle.armed)
+
+
+def test_a_mission_that_is_flown_is_not_cleared_but_may_be_replaced(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    upload(rig, [HOME, item(TAKEOFF, height=5.0), item(WAYPOINT, 30.0, height=5.0), item(LAND)])
+    start(rig)
+    rig.run_until(lambda: rig.vehicle.plan.current == 2)
+    rig.send("MISSION_CLEAR_ALL", target_system=1, target_component=1)
+    rig.run(0.1)
+    assert rig.latest["MISSION_ACK"]["type"] == ERROR
+    assert len(rig.vehicle.plan) == 4
+    upload(
+        rig, [HOME, item(TAKEOFF), item(WAYPOINT, 5.0), item(WAYPOINT, 30.0, 20.0, height=5.0), item(LAND)]
+    )
+    rig.run_until(lambda: not rig.vehicle.armed)
+    assert rig.vehicle.estimate.position[0] == pytest.approx(30.0, abs=2.0)
+    assert rig.vehicle.estimate.position[1] == pytest.approx(20.0, abs=2.0)
 
 
 def test_after_the_last_waypoint_it_stays(bench: Any) -> None:
