@@ -55,6 +55,7 @@ def test_a_requirement_that_is_not_met_is_a_failure(starter):
     strict = ("--set", "requirements.battery.min=99.9 %")
     done = volery("simulate", "patrol", *strict, "--quiet", "--out", "out", cwd=starter.parent)
     assert (done.returncode, done.stdout) == (1, "")
+    assert "the requirement 'battery' is not met" in done.stderr
     outcome = json.loads((starter.parent / "out" / "run.json").read_text())["outcome"]
     assert (outcome["status"], outcome["requirements_met"]) == ("completed", False)
 
