@@ -92,7 +92,7 @@ def ardupilot_parameters() -> str:
     """Which parameters of the simulated ArduPilot change what it does."""
     lines = [
         "# Parameters of the simulated ArduPilot\n",
-        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set and kept. The copter's",
+        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set, kept. The copter's",
         "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it",
         "shares with the copter have the copter's values, the rest the documented defaults. Those in the",
         "tables change what the vehicle does; the others change nothing.",
