@@ -5,19 +5,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec, Heard
 from volery.links.link import Frame, Receiver
-from volery.links.mavlink import encode
-from volery.links.parser import Heard, Parser
+from volery.links.parser import MAVLINK
 from volery.trace.events import LinkState
 
 
 class CodedLink(ABC):
     """Frames out as bytes, bytes in as frames. A subclass moves the bytes and calls ``arrived``."""
 
-    def __init__(self, kernel: Kernel, name: str) -> None:
+    def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
         self.name = name
         self._kernel = kernel
-        self._parser = Parser()
+        self._codec = codec
+        self._parser = codec.parser()
         self._receiver: Receiver | None = None
         self._sequence = 0
         self._closed = False
@@ -31,7 +32,7 @@ class CodedLink(ABC):
         """Send at once; a link that is down or full drops it."""
         if self._closed:
             return
-        data = encode(frame, self._sequence)
+        data = self._codec.encode(frame, self._sequence)
         self._sequence = (self._sequence + 1) % 256
         self._transmit(data)
 

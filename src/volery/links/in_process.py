@@ -1,6 +1,6 @@
 """Two ends of a link within one process: frames travel as values, not as bytes, and arrive after a delay.
 
-The values are those of the wire nevertheless (``mavlink.quantised``): 32-bit floats, strings cut to length,
+The values are those of the wire nevertheless (``Codec.quantised``): 32-bit floats, strings cut to length,
 all fields present, a field that does not fit refused. That costs a few microseconds per frame and keeps a
 simulation from depending on digits that no radio carries.
 """
@@ -9,17 +9,19 @@ from __future__ import annotations
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.link import Frame, Receiver
-from volery.links.mavlink import quantised
+from volery.links.parser import MAVLINK
 
 
 class InProcess:
     """One end. Frames keep their order; those sent before the other end listens are lost, as on a wire."""
 
-    def __init__(self, kernel: Kernel, name: str, delay: Ns) -> None:
+    def __init__(self, kernel: Kernel, name: str, delay: Ns, codec: Codec = MAVLINK) -> None:
         self.name = name
         self._kernel = kernel
         self._delay = delay
+        self._codec = codec
         self._receiver: Receiver | None = None
         self._closed = False
         self.peer: InProcess = self
@@ -28,7 +30,7 @@ class InProcess:
         """To the peer, which gets it a delay later."""
         if self._closed:
             return
-        arriving = quantised(frame)
+        arriving = self._codec.quantised(frame)
         peer = self.peer
         self._kernel.call_at(self._kernel.now() + self._delay, lambda: peer.deliver(arriving))
 
@@ -50,8 +52,11 @@ class InProcess:
         self._closed = True
 
 
-def in_process(kernel: Kernel, delay: Ns = MS, name: str = "link") -> tuple[InProcess, InProcess]:
+def in_process(
+    kernel: Kernel, delay: Ns = MS, name: str = "link", codec: Codec = MAVLINK
+) -> tuple[InProcess, InProcess]:
     """The vehicle's side and the autopilot's side of a link called *name*."""
-    ours, theirs = InProcess(kernel, name, delay), InProcess(kernel, f"{name} (autopilot)", delay)
+    ours = InProcess(kernel, name, delay, codec)
+    theirs = InProcess(kernel, f"{name} (autopilot)", delay, codec)
     ours.peer, theirs.peer = theirs, ours
     return ours, theirs

@@ -6,9 +6,7 @@ arrive.
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, field
-
+from volery.links.codec import Codec, Heard
 from volery.links.link import Frame
 from volery.links.mavlink import (
     CHECKSUM,
@@ -19,29 +17,16 @@ from volery.links.mavlink import (
     STX,
     STX_V1,
     MessageType,
+    encode,
     message_type_of,
+    quantised,
 )
 
 _STARTS = frozenset((STX, STX_V1))
 _PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
-_KEPT_LINES = 20
 _LONGEST_LINE = 120
 
 Octets = bytes | bytearray
-
-
-@dataclass
-class Heard:
-    """What a parser has seen so far. ``lines`` are the last text lines that were no MAVLink."""
-
-    octets: int = 0
-    frames: int = 0
-    frames_v1: int = 0
-    unknown: int = 0
-    corrupt: int = 0
-    text: int = 0
-    garbage: int = 0
-    lines: deque[str] = field(default_factory=lambda: deque(maxlen=_KEPT_LINES))
 
 
 class _Head:
@@ -177,3 +162,24 @@ class Parser:
             self._line.clear()
         if not ends:
             self._line.append(octet)
+
+
+class _Mavlink:
+    """MAVLink 2 out, 1 and 2 in."""
+
+    name = "MAVLink"
+
+    def encode(self, frame: Frame, sequence: int) -> bytes:
+        """See ``mavlink.encode``."""
+        return encode(frame, sequence)
+
+    def parser(self) -> Parser:
+        """See ``Parser``."""
+        return Parser()
+
+    def quantised(self, frame: Frame) -> Frame:
+        """See ``mavlink.quantised``."""
+        return quantised(frame)
+
+
+MAVLINK: Codec = _Mavlink()

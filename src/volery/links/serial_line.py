@@ -5,6 +5,8 @@ from __future__ import annotations
 import serial
 
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
+from volery.links.parser import MAVLINK
 from volery.links.stream import Pipe, StreamLink
 
 _PORTION = 4096
@@ -32,9 +34,11 @@ class _SerialPipe:
 class SerialLine(StreamLink):
     """Opens *device* at *baud*, and again whenever it goes away (a plug that is pulled and put back)."""
 
-    def __init__(self, kernel: Kernel, device: str, baud: int, name: str = "") -> None:
+    def __init__(
+        self, kernel: Kernel, device: str, baud: int, name: str = "", codec: Codec = MAVLINK
+    ) -> None:
         self._device, self._baud = device, baud
-        super().__init__(kernel, name or f"serial://{device}")
+        super().__init__(kernel, name or f"serial://{device}", codec)
 
     def _open(self) -> Pipe:
         return _SerialPipe(serial.Serial(self._device, self._baud, timeout=0, write_timeout=0))

@@ -12,7 +12,9 @@ from typing import Protocol
 
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.coded import CodedLink
+from volery.links.parser import MAVLINK
 from volery.links.pump import Pump
 
 FIRST_RETRY: Ns = 500 * MS
@@ -40,8 +42,8 @@ class Pipe(Protocol):
 class StreamLink(CodedLink):
     """Keeps one stream open."""
 
-    def __init__(self, kernel: Kernel, name: str) -> None:
-        super().__init__(kernel, name)
+    def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
+        super().__init__(kernel, name, codec)
         self._pipe: Pipe | None = None
         self._unsent = bytearray()
         self._wrong = "not connected yet"

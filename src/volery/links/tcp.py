@@ -9,8 +9,9 @@ from functools import partial
 
 from volery.base.errors import UsageError
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec, FrameParser
 from volery.links.coded import CodedLink
-from volery.links.parser import Parser
+from volery.links.parser import MAVLINK
 from volery.links.pump import Pump
 from volery.links.stream import MOST_UNSENT, Pipe, StreamLink
 
@@ -42,9 +43,9 @@ class _SocketPipe:
 class TcpClient(StreamLink):
     """Connects to ``host:port``, and again whenever the connection breaks."""
 
-    def __init__(self, kernel: Kernel, host: str, port: int, name: str = "") -> None:
+    def __init__(self, kernel: Kernel, host: str, port: int, name: str = "", codec: Codec = MAVLINK) -> None:
         self._host, self._port = host, port
-        super().__init__(kernel, name or f"tcp://{host}:{port}")
+        super().__init__(kernel, name or f"tcp://{host}:{port}", codec)
 
     def _open(self) -> Pipe:
         return _SocketPipe(socket.create_connection((self._host, self._port), _CONNECT_S))
@@ -63,12 +64,14 @@ class TcpClient(StreamLink):
 class _Client:
     """One of those who are connected to a server: its own thread, its own half-received frame."""
 
-    def __init__(self, server: TcpServer, kernel: Kernel, connected: socket.socket, who: str) -> None:
+    def __init__(
+        self, server: TcpServer, kernel: Kernel, connected: socket.socket, who: str, parser: FrameParser
+    ) -> None:
         self.who = who
         self._server = server
         self._kernel = kernel
         self._pipe = _SocketPipe(connected)
-        self._parser = Parser()
+        self._parser = parser
         self._unsent = bytearray()
         self._pump = Pump(f"tcp {who}", self._read)
 
@@ -110,13 +113,14 @@ class TcpServer(CodedLink):
         name: str = "",
         *,
         joined: Callable[[], None] | None = None,
+        codec: Codec = MAVLINK,
     ) -> None:
         try:
             self._listener = socket.create_server((host, port))
         except OSError as error:
             raise UsageError(f"cannot listen at tcp {host}:{port}: {error.strerror or error}") from None
         self.port: int = self._listener.getsockname()[1]
-        super().__init__(kernel, name or f"tcp://{host}:{self.port}")
+        super().__init__(kernel, name or f"tcp://{host}:{self.port}", codec)
         self._joined = joined
         self._clients: list[_Client] = []
         self._pump = Pump(self.name, self._accept)
@@ -136,7 +140,7 @@ class TcpServer(CodedLink):
         if self._closed:
             connected.close()
             return
-        self._clients.append(_Client(self, self._kernel, connected, who))
+        self._clients.append(_Client(self, self._kernel, connected, who, self._codec.parser()))
         self._tell("up", f"{who} has connected")
         if self._joined is not None:
             self._joined()
@@ -159,7 +163,7 @@ class TcpServer(CodedLink):
             client.close()
         self._clients.clear()
 
-    def said(self, parser: Parser, data: bytes) -> None:
+    def said(self, parser: FrameParser, data: bytes) -> None:
         """House code: one of the clients, whose parser this is, has said something."""
         if self._closed:
             return

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
+from volery.links.codec import Heard
 from volery.links.link import Frame, Link, Receiver
 from volery.links.mavlink import encode
-from volery.links.parser import Heard, Parser, whole_frame
+from volery.links.parser import Parser, whole_frame
 
 _STAMP = struct.Struct(">Q")
 

@@ -9,7 +9,9 @@ from functools import partial
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.coded import CodedLink
+from volery.links.parser import MAVLINK
 from volery.links.pump import Pump
 
 PEER_GONE: Ns = 10 * S
@@ -28,7 +30,14 @@ class UdpLink(CodedLink):
     """
 
     def __init__(
-        self, kernel: Kernel, host: str, port: int, peer: Endpoint | None = None, name: str = ""
+        self,
+        kernel: Kernel,
+        host: str,
+        port: int,
+        peer: Endpoint | None = None,
+        name: str = "",
+        *,
+        codec: Codec = MAVLINK,
     ) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -41,7 +50,7 @@ class UdpLink(CodedLink):
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
         where = f"udp://{host}:{self.port}" if peer is None else f"udp://{peer[0]}:{peer[1]}"
-        super().__init__(kernel, name or where)
+        super().__init__(kernel, name or where, codec)
         self._peer = self._fixed
         self._heard_at: Ns = -1
         self._pump = Pump(self.name, self._read)

@@ -12,7 +12,9 @@ from random import Random
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, from_seconds
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.coded import CodedLink
+from volery.links.parser import MAVLINK
 
 BURST_LENGTH = 40
 """Bytes that a burst of noise overwrites, from where it begins."""
@@ -82,8 +84,10 @@ def _span(text: str) -> tuple[Ns, Ns]:
 class Wire(CodedLink):
     """One end. What it sends arrives as bytes at the peer, or does not."""
 
-    def __init__(self, kernel: Kernel, name: str, delay: Ns, faults: WireFaults, random: Random) -> None:
-        super().__init__(kernel, name)
+    def __init__(
+        self, kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns, codec: Codec
+    ) -> None:
+        super().__init__(kernel, name, codec)
         self.peer: Wire = self
         self._delay = delay
         self._faults = faults
@@ -118,10 +122,16 @@ class Wire(CodedLink):
 
 
 def wire(
-    kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns = MS
+    kernel: Kernel,
+    name: str,
+    faults: WireFaults,
+    random: Random,
+    *,
+    delay: Ns = MS,
+    codec: Codec = MAVLINK,
 ) -> tuple[Wire, Wire]:
     """The vehicle's and the autopilot's side of a link through bytes; *random* is a named, seeded stream."""
-    ours = Wire(kernel, name, delay, faults, random)
-    theirs = Wire(kernel, f"{name} (autopilot)", delay, faults, random)
+    ours = Wire(kernel, name, faults, random, delay=delay, codec=codec)
+    theirs = Wire(kernel, f"{name} (autopilot)", faults, random, delay=delay, codec=codec)
     ours.peer, theirs.peer = theirs, ours
     return ours, theirs

@@ -194,7 +194,9 @@ class Builder:
         return found
 
     def _vehicle(self, node: EmbeddedNode, name: str, interface: str) -> Drone | Rover:
-        driver = drivers.load(GRAPH_DRIVER)(self._kernel, node, name, {"namespace": f"/{name}"})
+        open_driver = drivers.load(GRAPH_DRIVER).on_graph
+        assert open_driver is not None
+        driver = open_driver(self._kernel, node, name, {"namespace": f"/{name}"})
         truth = self._fleet.truth(name)
         vehicle = (
             Drone(self._kernel, name, driver, fence=self._fence, truth=truth)

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
-from volery.base.errors import CapabilityError, VoleryError
+from volery.base.errors import CapabilityError, UsageError, VoleryError
 from volery.base.position import Position
 from volery.kernel.api import Kernel
 from volery.kernel.virtual import VirtualKernel
@@ -102,7 +102,10 @@ def _simulated_vehicle(
     kernel: Kernel, fleet: Fleet, wanted: Simulated, kind: type[Vehicle], seed: int
 ) -> Vehicle:
     name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-    driver = drivers.load(autopilot)(kernel, link_to(kernel, fleet, wanted, seed), name, SIMULATED)
+    open_driver = drivers.load(autopilot).on_link
+    if open_driver is None:
+        raise CapabilityError(f"{name}: {autopilot} is reached over a graph only")
+    driver = open_driver(kernel, link_to(kernel, fleet, wanted, seed), name, SIMULATED)
     return kind(kernel, name, driver, truth=fleet.truth(name))
 
 
@@ -119,9 +122,12 @@ def _open_real(addresses: list[Address], names: list[str], kind: type[Vehicle]) 
     try:
         vehicles = []
         for address, name in zip(addresses, names, strict=True):
-            opener = drivers.load(address.driver)
-            links.append(open_link(kernel, address))
-            vehicles.append(kind(kernel, name, opener(kernel, links[-1], name, _for_driver(address))))
+            factory = drivers.load(address.driver)
+            if factory.on_link is None:
+                raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
+            links.append(open_link(kernel, address, factory.codec))
+            driver = factory.on_link(kernel, links[-1], name, _for_driver(address))
+            vehicles.append(kind(kernel, name, driver))
     except VoleryError:
         for link in links:
             link.close()

@@ -1,6 +1,6 @@
 """Drone and Rover: blocking operations, seen on telemetry; and what a driver is."""
 
-from volery.vehicles.driver import Capability, Driver, drivers
+from volery.vehicles.driver import Capability, Driver, DriverFactory, drivers
 from volery.vehicles.drone import Drone
 from volery.vehicles.limits import Fence, Limits, Zone
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
@@ -14,6 +14,7 @@ __all__ = [
     "Capability",
     "ChangeSpeed",
     "Driver",
+    "DriverFactory",
     "Drone",
     "Fence",
     "Land",

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 from volery.base.errors import UsageError
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.coded import CodedLink
+from volery.links.parser import MAVLINK
 from volery.links.serial_line import SerialLine
 from volery.links.tcp import TcpClient, TcpServer
 from volery.links.udp import UdpLink
@@ -17,34 +19,42 @@ ANYWHERE = "0.0.0.0"
 """``udp://:PORT`` means just this: whoever speaks first."""
 
 
-def open_link(kernel: Kernel, address: Address) -> CodedLink:
-    """The link to an autopilot at *address* (tcp, udp, serial). It connects by itself, again after a break.
+def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK) -> CodedLink:
+    """The link to an autopilot at *address* (tcp, udp, serial), in the words of *codec*.
+
+    It connects by itself, again after a break.
 
     Raises ``UsageError`` for another carrier, a baud rate that is none, or a port that is taken.
     """
     if address.carrier == "tcp":
-        return TcpClient(kernel, address.host, _port(address), address.text)
+        return TcpClient(kernel, address.host, _port(address), address.text, codec)
     if address.carrier == "udp":
-        return _udp(kernel, address)
+        return _udp(kernel, address, codec)
     if address.carrier == "serial":
         baud = address.number("baud", DEFAULT_BAUD)
         if baud <= 0 or baud != int(baud):
             raise UsageError(f"{address}: baud={baud:g} is no baud rate; usual are 57600, 115200 and 921600")
-        return SerialLine(kernel, address.path, int(baud), address.text)
+        return SerialLine(kernel, address.path, int(baud), address.text, codec)
     raise UsageError(f"{address}: {address.carrier} is not a carrier of bytes; tcp, udp and serial are")
 
 
-def listen(kernel: Kernel, address: Address, *, joined: Callable[[], None] | None = None) -> CodedLink:
+def listen(
+    kernel: Kernel,
+    address: Address,
+    *,
+    joined: Callable[[], None] | None = None,
+    codec: Codec = MAVLINK,
+) -> CodedLink:
     """Where an autopilot serves: tcp clients connect; udp sends to a host or answers the first speaker."""
     if address.carrier == "tcp":
-        return TcpServer(kernel, address.host, _port(address), address.text, joined=joined)
-    return _udp(kernel, address)
+        return TcpServer(kernel, address.host, _port(address), address.text, joined=joined, codec=codec)
+    return _udp(kernel, address, codec)
 
 
-def _udp(kernel: Kernel, address: Address) -> UdpLink:
+def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
     if address.host:
-        return UdpLink(kernel, ANYWHERE, 0, (address.host, _port(address)), address.text)
-    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text)
+        return UdpLink(kernel, ANYWHERE, 0, (address.host, _port(address)), address.text, codec=codec)
+    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text, codec=codec)
 
 
 def _port(address: Address) -> int:

@@ -16,6 +16,8 @@ from volery.base.position import Position
 from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
+from volery.links.codec import Codec
+from volery.links.parser import MAVLINK
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
@@ -165,6 +167,12 @@ class Driver(Protocol):
     def stop(self) -> None:
         """Let go of sticks and of set-points that are being repeated."""
 
+    def if_silent(self) -> str:
+        """In one line, from the aircraft's own parameters: what it will do if its commander falls silent.
+
+        Empty until they are known.
+        """
+
     def problem(self) -> LinkError | None:
         """What is wrong with the way to the autopilot, ready to be raised; ``None`` if nothing is."""
 
@@ -177,4 +185,20 @@ Opener = Callable[[Kernel, Any, str, Mapping[str, str]], Driver]
 on a graph; *options* are those of the address. Raises ``UsageError`` for options it does not know.
 """
 
-drivers: Registry[Opener] = Registry("volery.drivers", "driver")
+
+@dataclass(frozen=True, kw_only=True)
+class DriverFactory:
+    """How a driver is opened: on a link, whose frames *codec* turns into bytes; on a node of a graph; or on
+    either. ``None``: not on that.
+
+    ``namespace`` is where on the graph its topics are if the address does not say; ``{name}`` is the
+    vehicle's.
+    """
+
+    on_link: Opener | None = None
+    codec: Codec = MAVLINK
+    on_graph: Opener | None = None
+    namespace: str = "/{name}"
+
+
+drivers: Registry[DriverFactory] = Registry("volery.drivers", "driver")

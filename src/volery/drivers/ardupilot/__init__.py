@@ -11,8 +11,9 @@ from volery.drivers.ardupilot.mavros import MavrosCommands, geoid_of
 from volery.graph import EmbeddedNode
 from volery.kernel.api import Kernel
 from volery.links.link import Link
+from volery.vehicles.driver import DriverFactory
 
-__all__ = ["ArduPilot", "open_driver", "open_mavros"]
+__all__ = ["DRIVER", "MAVROS", "ArduPilot", "open_driver", "open_mavros"]
 
 
 def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> ArduPilot:
@@ -33,3 +34,10 @@ def open_mavros(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[
     check_options(options, *MAVROS_OPTIONS)
     namespace = options.get("namespace", f"/{name}")
     return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, namespace, geoid_of(options)))
+
+
+DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
+"""ArduPilot on a MAVLink link; on a graph it goes by MAVROS's names."""
+
+MAVROS = DriverFactory(on_graph=open_mavros)
+"""Whatever flies behind a vehicle node with MAVROS's names."""

@@ -84,6 +84,10 @@ class ArduPilot:
         """Take in what has arrived."""
         self._commands.look()
 
+    def if_silent(self) -> str:
+        """Not known yet."""
+        return ""
+
     def problem(self) -> LinkError | None:
         """What is wrong with the way to the autopilot."""
         return self._commands.problem()

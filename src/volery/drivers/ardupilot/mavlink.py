@@ -26,9 +26,9 @@ from volery.drivers.ardupilot.vocabulary import (
     VELOCITY_AND_YAW_RATE,
 )
 from volery.kernel.api import Action, Kernel
+from volery.links.codec import Heard
 from volery.links.link import Frame, Link
 from volery.links.mavlink import constant, entry_name, message_type
-from volery.links.parser import Heard
 from volery.trace.events import LinkState
 from volery.vehicles.telemetry import Answer, Telemetry, Velocity
 
