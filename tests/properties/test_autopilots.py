@@ -98,7 +98,7 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     return kernel, autopilot, ours
 
 
-COMMANDS = [*sorted(DIALECT.kinds["multirotor"].commands), 510, 511, 512, 520]
+COMMANDS = [*sorted(_vehicle()[1].face.dialect.commands), 510, 511, 512, 520]
 PARAMETERS = sorted(DIALECT.kinds["multirotor"].honoured)
 LISTENED = sorted(_vehicle()[1].face.listens_to)
 

@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 from math import cos, pi, radians, sin
 
 from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.dialect import dialects
+from volery.autopilots.simulated.dialect import Family, dialects
 from volery.autopilots.simulated.flight import Flight, make_world
+from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
+from volery.links.codec import Codec
 from volery.links.in_process import in_process
 from volery.links.link import Link
 from volery.model.environment import Battery as BatteryModel
@@ -46,21 +48,30 @@ class Fleet:
         self.world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, Autopilot] = {}
+        self._families: dict[str, Family] = {}
         for system, (vehicle, flight) in enumerate(zip(vehicles, flights, strict=True), start=1):
             self.flights[vehicle.name] = flight
+            family = self._families[vehicle.name] = dialects.load(vehicle.autopilot)
             self.autopilots[vehicle.name] = Autopilot(
                 kernel,
                 flight,
-                dialects.load(vehicle.autopilot),
+                family,
                 system=system,
                 parameters=vehicle.parameters,
                 warm=vehicle.started == "warm",
                 name=vehicle.name,
             )
 
+    def codec(self, vehicle: str) -> Codec:
+        """What its autopilot's links speak. Raises ``UsageError`` if it is reached over a graph only."""
+        family = self._families[vehicle]
+        if family.codec is None:
+            raise UsageError(f"{vehicle}: a simulated {family.name} has no links; it is reached over a graph")
+        return family.codec
+
     def link(self, vehicle: str) -> Link:
         """A new link to the autopilot of *vehicle*, as over a serial line beside it."""
-        ours, theirs = in_process(self._kernel, LINK_DELAY, vehicle)
+        ours, theirs = in_process(self._kernel, LINK_DELAY, vehicle, self.codec(vehicle))
         self.autopilots[vehicle].connect(theirs)
         return ours
 

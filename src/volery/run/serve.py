@@ -27,7 +27,8 @@ class Server:
         self.kernel = VirtualKernel(pace=speed)
         self.fleet: Fleet = fleet_of(self.kernel, [wanted], seed)
         self._autopilot = self.fleet.autopilots[wanted.vehicle.name]
-        self.link: CodedLink = listen(self.kernel, address, joined=self._greet)
+        codec = self.fleet.codec(wanted.vehicle.name)
+        self.link: CodedLink = listen(self.kernel, address, joined=self._greet, codec=codec)
         self._autopilot.connect(self.link)
 
     def _greet(self) -> None:

@@ -98,6 +98,7 @@ def link_to(kernel: Kernel, fleet: Fleet, wanted: Simulated, seed: int) -> Link:
     name = wanted.vehicle.name
     if wanted.faults is None:
         return fleet.link(name)
-    ours, theirs = wire(kernel, name, wanted.faults, stream(seed, f"wire/{name}"), delay=LINK_DELAY)
+    random = stream(seed, f"wire/{name}")
+    ours, theirs = wire(kernel, name, wanted.faults, random, delay=LINK_DELAY, codec=fleet.codec(name))
     fleet.autopilots[name].connect(theirs)
     return ours

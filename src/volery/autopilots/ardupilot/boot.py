@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from volery.autopilots.ardupilot.arming import INFO
-from volery.autopilots.simulated.dialect import Act, BootBytes, Event
+from volery.autopilots.simulated.dialect import Act, Event
+from volery.autopilots.simulated.mavlink.dialect import BootBytes
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import S
 

@@ -31,6 +31,8 @@ from volery.autopilots.simulated.manoeuvres.mission import FlyMission, copter_le
 from volery.autopilots.simulated.manoeuvres.pilot import AltitudeHold, ByPilot, Loiter, Stabilize
 from volery.autopilots.simulated.manoeuvres.points import Brake, Land, Return
 from volery.autopilots.simulated.mavlink.command_service import DENIED, FAILED
+from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
+from volery.autopilots.simulated.mavlink.face import MavlinkFace
 from volery.autopilots.simulated.mode import Mode
 from volery.autopilots.simulated.parameters import Parameter, load
 from volery.autopilots.simulated.vehicle import Vehicle
@@ -244,42 +246,13 @@ def refuse_interval(vehicle: Vehicle, number: int) -> int:
 
 _FAILSAFES = CopterFailsafes(switch, ARMED_WORDS[1])
 
-COPTER = Dialect(
-    name="ardupilot",
-    kind="multirotor",
-    boot_mode=MODES[0],
-    boot_events=boot.copter_events(ready),
+_MAVLINK = MavlinkDialect(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
     ),
-    ready_after=READY,
-    origin_after=ORIGIN,
-    position_after=POSITION,
-    local_position_after=POSITION,
-    on_warm=warm,
-    on_warm_position=partial(routine.on_position, before_arming=before_arming),
     heartbeat_first=(round(1.05 * S),),
     heartbeat_from=round(2.037 * S),
     deaf_until=100 * MS,
-    each_second=partial(routine.each_second, before_arming=before_arming),
-    each_second_from=EACH_SECOND,
-    modes=MODES,
-    tuning=tuning.copter,
-    transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
-    stands=True,
-    motors_rest=2 * S,
-    spool_time=500 * MS,
-    takeoff_slew=100 * MS,
-    resigns_after=1500 * MS,
-    watches=_FAILSAFES.watches(),
-    on_step=on_step,
-    on_disarmed=on_disarmed,
-    guided_arrived=lambda _vehicle: None,
-    guided_stale=lambda _vehicle: None,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_ended=missions.copter_ended,
-    mission_action=missions.act,
     messages={
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
@@ -315,6 +288,39 @@ COPTER = Dialect(
     go_to_item=commands.go_to_item,
     mission_grew=missions.mission_grew,
     timesync_every=10 * S,
+)
+
+COPTER = Dialect(
+    name="ardupilot",
+    kind="multirotor",
+    face=partial(MavlinkFace, _MAVLINK),
+    boot_mode=MODES[0],
+    boot_events=boot.copter_events(ready),
+    ready_after=READY,
+    origin_after=ORIGIN,
+    position_after=POSITION,
+    local_position_after=POSITION,
+    on_warm=warm,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
+    each_second=partial(routine.each_second, before_arming=before_arming),
+    each_second_from=EACH_SECOND,
+    modes=MODES,
+    tuning=tuning.copter,
+    transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    stands=True,
+    motors_rest=2 * S,
+    spool_time=500 * MS,
+    takeoff_slew=100 * MS,
+    resigns_after=1500 * MS,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=on_disarmed,
+    guided_arrived=lambda _vehicle: None,
+    guided_stale=lambda _vehicle: None,
+    mission_item_done=missions.item_done,
+    mission_item_begins=missions.item_begins,
+    mission_ended=missions.copter_ended,
+    mission_action=missions.act,
     parameters=parameters,
     own_parameters=own_parameters,
     honoured=HONOURED,

@@ -38,6 +38,8 @@ from volery.autopilots.simulated.dialect import Dialect
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission
 from volery.autopilots.simulated.manoeuvres.rover import GuidedRover, Manual, ReturnRover, Stand, rover_leg
 from volery.autopilots.simulated.mavlink.command_service import FAILED
+from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
+from volery.autopilots.simulated.mavlink.face import MavlinkFace
 from volery.autopilots.simulated.mode import Mode
 from volery.autopilots.simulated.parameters import Parameter, load
 from volery.autopilots.simulated.vehicle import Vehicle
@@ -181,40 +183,14 @@ def parameters() -> tuple[Parameter, ...]:
 
 _FAILSAFES = RoverFailsafes(switch, ARMED_WORDS[1])
 
-ROVER = Dialect(
-    name="ardupilot",
-    kind="rover",
-    boot_mode=INITIALISING,
-    boot_events=boot.rover_events(ready),
+_MAVLINK = MavlinkDialect(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
     ),
-    ready_after=READY,
-    origin_after=HOME,
-    position_after=POSITION,
-    local_position_after=HOME,
-    on_warm=warm,
-    on_warm_position=partial(routine.on_position, before_arming=before_arming),
     heartbeat_first=(round(1.025 * S),),
     heartbeat_from=round(3.04 * S),
     deaf_until=100 * MS,
     least_period=25 * MS,
-    each_second=partial(routine.each_second, before_arming=before_arming),
-    each_second_from=round(0.345 * S),
-    modes=MODES,
-    tuning=tuning.rover,
-    transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
-    throttle_centred=True,
-    stands=False,
-    watches=_FAILSAFES.watches(),
-    on_step=on_step,
-    on_disarmed=lambda _vehicle: None,
-    guided_arrived=guided_arrived,
-    guided_stale=guided_stale,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_ended=missions.rover_ended,
-    mission_action=missions.act,
     messages={
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
@@ -248,6 +224,36 @@ ROVER = Dialect(
     go_to_item=commands.go_to_item,
     mission_grew=missions.mission_grew,
     timesync_every=10 * S,
+)
+
+ROVER = Dialect(
+    name="ardupilot",
+    kind="rover",
+    face=partial(MavlinkFace, _MAVLINK),
+    boot_mode=INITIALISING,
+    boot_events=boot.rover_events(ready),
+    ready_after=READY,
+    origin_after=HOME,
+    position_after=POSITION,
+    local_position_after=HOME,
+    on_warm=warm,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
+    each_second=partial(routine.each_second, before_arming=before_arming),
+    each_second_from=round(0.345 * S),
+    modes=MODES,
+    tuning=tuning.rover,
+    transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    throttle_centred=True,
+    stands=False,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=lambda _vehicle: None,
+    guided_arrived=guided_arrived,
+    guided_stale=guided_stale,
+    mission_item_done=missions.item_done,
+    mission_item_begins=missions.item_begins,
+    mission_ended=missions.rover_ended,
+    mission_action=missions.act,
     parameters=parameters,
     own_parameters=own_parameters,
     honoured=HONOURED,

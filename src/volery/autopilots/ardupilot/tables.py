@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from volery.autopilots.ardupilot import motion, status
-from volery.autopilots.simulated.dialect import Builder
+from volery.autopilots.simulated.mavlink.dialect import Builder
 from volery.autopilots.simulated.vehicle import Vehicle
 
 RAW_SENSORS, EXTENDED_STATUS, RC_CHANNELS, RAW_CONTROLLER, POSITION = 1, 2, 3, 4, 6

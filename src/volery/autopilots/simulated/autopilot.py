@@ -1,4 +1,4 @@
-"""A simulated autopilot: one vehicle's flight stack behind MAVLink links.
+"""A simulated autopilot: one vehicle's flight stack behind the protocol of its firmware.
 
 ```python
 world, flights = make_world(kernel.now, [Multirotor()], seed=7, frame=frame)
@@ -15,8 +15,8 @@ from functools import partial
 from math import nan
 
 from volery.autopilots.simulated.dialect import Dialect, Family
+from volery.autopilots.simulated.face import Face, LinkFace
 from volery.autopilots.simulated.flight import Flight
-from volery.autopilots.simulated.mavlink.face import Face
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.errors import UsageError, choices
 from volery.base.frames import Vector, ned_to_enu
@@ -54,7 +54,7 @@ class Autopilot:
         self.dialect = chosen
         self.name = name or f"{chosen.name}_{system}"
         self.vehicle = Vehicle(kernel, flight, chosen, system=system, name=self.name, overrides=parameters)
-        self.face = Face(self.vehicle)
+        self.face: Face = chosen.face(self.vehicle)
         self.vehicle.outlet = self.face
         self.on_reboot: Action = _nothing
         """Called when a station restarts the autopilot: whoever serves its links may close them."""
@@ -70,14 +70,19 @@ class Autopilot:
 
     @property
     def banner(self) -> bytes:
-        """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
-        return self.dialect.boot_bytes[0].data if self.dialect.boot_bytes else b""
+        """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
+        return self._on_links().banner
 
     def connect(self, link: Link, *, switch_on: bool = True) -> None:
         """Serve this link, too. The first one switches a cold vehicle on, unless *switch_on* is False."""
-        self.face.connect(link)
+        self._on_links().connect(link)
         if switch_on:
             self.switch_on()
+
+    def _on_links(self) -> LinkFace:
+        if not isinstance(self.face, LinkFace):
+            raise UsageError(f"{self.name}: a simulated {self.dialect.name} is reached over a graph")
+        return self.face
 
     def switch_on(self) -> None:
         """Boot now, if that has not happened yet: a firmware on TCP waits for its first client."""
@@ -87,7 +92,7 @@ class Autopilot:
 
     def disconnect(self, link: Link) -> None:
         """Stop serving it. The vehicle flies on."""
-        self.face.disconnect(link)
+        self._on_links().disconnect(link)
 
     def close(self) -> None:
         """Stop all clocks and serve no link any more."""
@@ -117,8 +122,6 @@ class Autopilot:
         else:
             for event in dialect.boot_events:
                 self._at(event.after, partial(event.act, vehicle))
-            for words in dialect.boot_bytes[1:]:  # the banner is sent by whoever accepts a client
-                self._at(words.after, partial(self.face.send_bytes, words.data))
         self.face.start()
         self._clocks.append(self._kernel.every(dialect.tick, self._tick))
         phase = (dialect.each_second_from - age) % S

@@ -5,23 +5,22 @@ name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from volery.autopilots.simulated.flight import Flight
-from volery.autopilots.simulated.mavlink.command_service import Handler
 from volery.autopilots.simulated.mode import Mode
 from volery.autopilots.simulated.parameters import Parameter, Parameters
 from volery.autopilots.simulated.plan import Item
 from volery.autopilots.simulated.tuning import Tuning
 from volery.base.registry import Registry
 from volery.base.time import MS, Ns, S
+from volery.links.codec import Codec
+from volery.links.parser import MAVLINK
 
 if TYPE_CHECKING:
+    from volery.autopilots.simulated.face import Face
     from volery.autopilots.simulated.vehicle import Vehicle
-
-Builder = Callable[["Vehicle"], dict[str, Any] | None]
-"""The fields of a message as it would be sent now; ``None`` while the firmware does not send it."""
 
 Act = Callable[["Vehicle"], None]
 
@@ -31,13 +30,6 @@ class Event(NamedTuple):
 
     after: Ns
     act: Act
-
-
-class BootBytes(NamedTuple):
-    """Bytes on the wire that are no message, a fixed time after boot."""
-
-    after: Ns
-    data: bytes
 
 
 class Watch(NamedTuple):
@@ -51,18 +43,31 @@ class Watch(NamedTuple):
     ends: Act
 
 
+def _nothing(_vehicle: Vehicle) -> None:
+    """Many firmwares do nothing special then."""
+
+
+def _no_item(_vehicle: Vehicle, _number: int, _item: Item) -> None:
+    """Nothing is said of items."""
+
+
+def _no_action(_vehicle: Vehicle, _item: Item) -> None:
+    """No item is an action."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Dialect:
-    """One firmware for one kind of vehicle."""
+    """One firmware for one kind of vehicle: how it flies. What it says on the wire is its face's."""
 
     name: str
     kind: str
     """``multirotor`` or ``rover``."""
+    face: Callable[[Vehicle], Face]
+    """The protocol it speaks."""
 
     # -- boot
     boot_mode: Mode
     boot_events: tuple[Event, ...] = ()
-    boot_bytes: tuple[BootBytes, ...] = ()
     ready_after: Ns
     """From then on it streams, and texts follow the answer that they belong to."""
     origin_after: Ns
@@ -82,15 +87,6 @@ class Dialect:
     tick: Ns = 100 * MS
     watch_every: int = 3
     """Failsafes are looked at each so many ticks."""
-    heartbeat_first: tuple[Ns, ...] = ()
-    """Heartbeats before the regular ones, after boot."""
-    heartbeat_from: Ns = S
-    """First of the regular ones, each second."""
-    answer_delay: Ns = 5 * MS
-    deaf_until: Ns = 0
-    """Before that, message intervals are acknowledged and forgotten."""
-    least_period: Ns = 3 * MS
-    """No message is streamed more often."""
     each_second: Act
     each_second_from: Ns = 0
 
@@ -111,42 +107,15 @@ class Dialect:
     on_disarmed: Act
     throttle_centred: bool = False
     """Whether the throttle stick rests in its middle."""
-    guided_arrived: Act
+    guided_arrived: Act = _nothing
     """A rover has reached the point that it was sent to."""
-    guided_stale: Act
+    guided_stale: Act = _nothing
     """A rover stops because no target came."""
-    mission_item_done: Callable[[Vehicle, int, Item], None]
-    mission_item_begins: Callable[[Vehicle, int, Item], None]
-    mission_ended: Act
-    mission_action: Callable[[Vehicle, Item], None]
+    mission_item_done: Callable[[Vehicle, int, Item], None] = _no_item
+    mission_item_begins: Callable[[Vehicle, int, Item], None] = _no_item
+    mission_ended: Act = _nothing
+    mission_action: Callable[[Vehicle, Item], None] = _no_action
     """Do an item that does not navigate."""
-
-    # -- MAVLink
-    messages: Mapping[str, Builder]
-    message_order: Sequence[str]
-    streams: Mapping[int, Sequence[str]]
-    """What belongs to each MAV_DATA_STREAM."""
-    on_stream_request: Callable[[Vehicle, int, int, int], None]
-    """Vehicle, index of the link, stream, rate."""
-    usual_period: Callable[[str], Ns]
-    refuse_interval: Callable[[Vehicle, int], int]
-    unknown_message: int
-    commands: Mapping[int, Handler]
-    handlers: Mapping[str, Callable[[Vehicle, dict[str, Any], int], None]] = field(default_factory=dict)
-    """Messages that are for this vehicle and need no answer: vehicle, fields, sender's system id."""
-    set_mode: Callable[[Vehicle, int, int], int]
-    """SET_MODE: base mode, custom mode; returns a MAV_RESULT."""
-    set_mode_ack: int
-    on_parameter_list: Act
-    mission_runs: Callable[[Vehicle], bool]
-    """Whether it may not be cleared now."""
-    stored_item: Callable[[Item], Item | int]
-    """An uploaded item as it is kept, or the MAV_MISSION_RESULT that refuses it."""
-    home_item: Callable[[Vehicle], Item | None]
-    """Item 0 where the firmware has its home there."""
-    go_to_item: Callable[[Vehicle, Item], bool]
-    mission_grew: Callable[[Vehicle, int], None]
-    timesync_every: Ns = 0
 
     # -- parameters
     parameters: Callable[[], tuple[Parameter, ...]]
@@ -158,10 +127,13 @@ class Dialect:
 
 @dataclass(frozen=True)
 class Family:
-    """A firmware: its dialects by kind of vehicle."""
+    """A firmware: its dialects by kind of vehicle, and the codec of its links; without one it is reached over
+    a graph.
+    """
 
     name: str
     kinds: Mapping[str, Dialect]
+    codec: Codec | None = MAVLINK
 
 
 dialects: Registry[Family] = Registry("volery.autopilots", "simulated autopilot")

@@ -16,6 +16,7 @@ from volery.base.time import MS, US
 from volery.links.mavlink import message_type_of
 
 if TYPE_CHECKING:
+    from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
     from volery.autopilots.simulated.vehicle import Vehicle
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
@@ -86,8 +87,9 @@ def _heading(value: float) -> float:
 class CommandService:
     """Answers for one vehicle."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, dialect: MavlinkDialect) -> None:
         self._vehicle = vehicle
+        self._dialect = dialect
         self._own: dict[int, Callable[[Peer, Command], int]] = {
             GET_MESSAGE_INTERVAL: self._get_interval,
             SET_MESSAGE_INTERVAL: self._set_interval,
@@ -108,7 +110,7 @@ class CommandService:
         if own is not None:
             result = own(peer, command)
         else:
-            handler = self._vehicle.dialect.commands.get(command.number)
+            handler = self._dialect.commands.get(command.number)
             result = UNSUPPORTED if handler is None else handler(self._vehicle, command)
         self.acknowledge(peer, command.number, result)
 
@@ -131,11 +133,11 @@ class CommandService:
         number, interval = round(command.param1), command.param2
         name = self._name(number)
         if name is None:
-            return self._vehicle.dialect.refuse_interval(self._vehicle, number)
-        if self._vehicle.uptime() < self._vehicle.dialect.deaf_until:
+            return self._dialect.refuse_interval(self._vehicle, number)
+        if self._vehicle.uptime() < self._dialect.deaf_until:
             return ACCEPTED
         if interval == 0.0:
-            period = self._vehicle.dialect.usual_period(name)
+            period = self._dialect.usual_period(name)
         else:
             period = max(MS, round(interval) * US // MS * MS) if interval > 0 else 0
         peer.channel.streams.set((name,), period)
@@ -144,14 +146,14 @@ class CommandService:
     def _request_message(self, peer: Peer, command: Command) -> int:
         name = self._name(round(command.param1))
         if name is None:
-            return self._vehicle.dialect.unknown_message
+            return self._dialect.unknown_message
         return self._send(peer, name)
 
     def _send(self, peer: Peer, name: str) -> int:
         """Send it after the acknowledgement."""
 
         def send() -> None:
-            fields = self._vehicle.dialect.messages[name](self._vehicle)
+            fields = self._dialect.messages[name](self._vehicle)
             if fields is not None:
                 peer.channel.send(name, fields)
 
@@ -160,4 +162,4 @@ class CommandService:
 
     def _name(self, number: int) -> str | None:
         kind = message_type_of(number)
-        return kind.name if kind is not None and kind.name in self._vehicle.dialect.messages else None
+        return kind.name if kind is not None and kind.name in self._dialect.messages else None

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import count
 from typing import Any
 
 from volery.autopilots.simulated.mavlink.channel import Channel, Peer
 from volery.autopilots.simulated.mavlink.command_service import CommandService
+from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.mission_service import MissionService
 from volery.autopilots.simulated.mavlink.parameter_service import ParameterService, value_fields
 from volery.autopilots.simulated.mavlink.streams import Streams
@@ -28,11 +30,12 @@ TEXT_LENGTH = 50
 BROADCAST = 0
 
 
-class Face:
+class MavlinkFace:
     """One vehicle's ``Outlet``, and its ear."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, dialect: MavlinkDialect, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
+        self.dialect = dialect
         self._kernel = vehicle.kernel
         self.channels: list[Channel] = []
         self._arrived: deque[tuple[Channel, Frame]] = deque()
@@ -41,8 +44,8 @@ class Face:
         self._text_id = 0
         self._clocks: list[Handle] = []
         parameters = ParameterService(vehicle)
-        missions = MissionService(vehicle)
-        self._commands = CommandService(vehicle)
+        missions = MissionService(vehicle, dialect)
+        self._commands = CommandService(vehicle, dialect)
         self._handlers: dict[str, Handler] = {
             "COMMAND_INT": self._commands.on_int,
             "COMMAND_LONG": self._commands.on_long,
@@ -66,6 +69,11 @@ class Face:
 
     # -- links
 
+    @property
+    def banner(self) -> bytes:
+        """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
+        return self.dialect.boot_bytes[0].data if self.dialect.boot_bytes else b""
+
     def connect(self, link: Link) -> None:
         """Listen to and speak on this link, too."""
         vehicle = self._vehicle
@@ -74,9 +82,9 @@ class Face:
         channel = Channel(link, index, vehicle.system)
         channel.streams = Streams(
             self._kernel,
-            vehicle.dialect.message_order,
+            self.dialect.message_order,
             lambda names: self._burst(channel, names),
-            least=vehicle.dialect.least_period,
+            least=self.dialect.least_period,
         )
         self.channels.append(channel)
         if vehicle.uptime() >= vehicle.dialect.ready_after:
@@ -98,16 +106,16 @@ class Face:
     @property
     def listens_to(self) -> frozenset[str]:
         """The messages that change something or are answered."""
-        return frozenset(self._handlers) | frozenset(self._vehicle.dialect.handlers)
+        return frozenset(self._handlers) | frozenset(self.dialect.handlers)
 
     def _burst(self, channel: Channel, names: Sequence[str]) -> None:
-        messages, vehicle = self._vehicle.dialect.messages, self._vehicle
+        messages, vehicle = self.dialect.messages, self._vehicle
         for name in names:
             fields = messages[name](vehicle)
             if fields is not None:
                 channel.send(name, fields)
 
-    def send_bytes(self, data: bytes) -> None:
+    def _send_bytes(self, data: bytes) -> None:
         """Bytes that are no message, to links that carry bytes."""
         for channel in self.channels:
             channel.send_bytes(data)
@@ -117,18 +125,20 @@ class Face:
     def start(self) -> None:
         """The vehicle was switched on: heartbeats and time requests from its boot on."""
         self.stop()
-        vehicle, dialect = self._vehicle, self._vehicle.dialect
+        vehicle, dialect = self._vehicle, self.dialect
         age = vehicle.uptime()
+        for words in dialect.boot_bytes[1:] if not age else ():
+            self._at_uptime(words.after, partial(self._send_bytes, words.data))
         for after in dialect.heartbeat_first:
             if after >= age:
                 self._at_uptime(after, lambda: self.announce("HEARTBEAT"))
         self._regularly(dialect.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
         if dialect.timesync_every:
             self._regularly(dialect.timesync_every, dialect.timesync_every, self._ask_time)
-        if age >= dialect.ready_after:
+        if age >= vehicle.dialect.ready_after:
             self.stream()
         else:
-            self._at_uptime(dialect.ready_after, self.stream)
+            self._at_uptime(vehicle.dialect.ready_after, self.stream)
 
     def stop(self) -> None:
         """Fall silent."""
@@ -179,7 +189,7 @@ class Face:
 
     def announce(self, message: str) -> None:
         """That message to everyone."""
-        fields = self._vehicle.dialect.messages[message](self._vehicle)
+        fields = self.dialect.messages[message](self._vehicle)
         if fields is not None:
             self._tell_all(message, fields)
 
@@ -209,7 +219,7 @@ class Face:
         if not channel.open:
             return
         self._arrived.append((channel, frame))
-        self._kernel.call_at(self._kernel.now() + self._vehicle.dialect.answer_delay, self._handle)
+        self._kernel.call_at(self._kernel.now() + self.dialect.answer_delay, self._handle)
 
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
@@ -221,7 +231,7 @@ class Face:
         if own is not None:
             own(Peer(channel, frame.system, frame.component), fields)
         else:
-            heard = self._vehicle.dialect.handlers.get(name)
+            heard = self.dialect.handlers.get(name)
             if heard is not None:
                 heard(self._vehicle, fields, frame.system)
         self._handling = False
@@ -232,12 +242,12 @@ class Face:
     def _on_parameter_list(self, listing: Handler) -> Handler:
         def on_list(peer: Peer, fields: dict[str, Any]) -> None:
             listing(peer, fields)
-            self._vehicle.dialect.on_parameter_list(self._vehicle)
+            self.dialect.on_parameter_list(self._vehicle)
 
         return on_list
 
     def _on_stream_request(self, peer: Peer, fields: dict[str, Any]) -> None:
-        vehicle, dialect = self._vehicle, self._vehicle.dialect
+        vehicle, dialect = self._vehicle, self.dialect
         stream = fields["req_stream_id"]
         rate = fields["req_message_rate"] if fields["start_stop"] else 0
         names = dialect.streams.get(stream)
@@ -246,8 +256,8 @@ class Face:
             dialect.on_stream_request(vehicle, peer.channel.index, stream, rate)
 
     def _on_set_mode(self, peer: Peer, fields: dict[str, Any]) -> None:
-        result = self._vehicle.dialect.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
-        self._commands.acknowledge(peer, self._vehicle.dialect.set_mode_ack, result)
+        result = self.dialect.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
+        self._commands.acknowledge(peer, self.dialect.set_mode_ack, result)
 
     def _on_ping(self, peer: Peer, fields: dict[str, Any]) -> None:
         if fields["target_system"] == BROADCAST:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from volery.autopilots.simulated.mavlink.channel import Peer
 from volery.autopilots.simulated.mavlink.numbers import number
@@ -11,6 +11,9 @@ from volery.autopilots.simulated.plan import Item
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import Ns, S
 from volery.kernel.api import Handle
+
+if TYPE_CHECKING:
+    from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 
 ACCEPTED, ERROR, UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE, CANCELLED = 0, 1, 3, 4, 13, 15
 """MAV_MISSION_RESULT."""
@@ -37,8 +40,9 @@ class _Upload:
 class MissionService:
     """Answers for one vehicle. One upload at a time; whoever starts another one replaces it."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, dialect: MavlinkDialect) -> None:
         self._vehicle = vehicle
+        self._dialect = dialect
         self._kernel = vehicle.kernel
         self._upload: _Upload | None = None
 
@@ -98,9 +102,7 @@ class MissionService:
             fields["autocontinue"],
         )
         if fields["current"] == GUIDED_ITEM:
-            self._acknowledge(
-                peer, ACCEPTED if self._vehicle.dialect.go_to_item(self._vehicle, item) else ERROR
-            )
+            self._acknowledge(peer, ACCEPTED if self._dialect.go_to_item(self._vehicle, item) else ERROR)
         elif self._upload is None:
             self._acknowledge(peer, ERROR)
         elif fields["seq"] != len(self._upload.items):
@@ -109,7 +111,7 @@ class MissionService:
             self._take(self._upload, item)
 
     def _take(self, upload: _Upload, item: Item) -> None:
-        stored = self._vehicle.dialect.stored_item(item)
+        stored = self._dialect.stored_item(item)
         if isinstance(stored, int):
             self._drop_upload()
             self._acknowledge(upload.peer, stored)
@@ -125,7 +127,7 @@ class MissionService:
             self._vehicle.plan.replace(upload.items)
             self._acknowledge(upload.peer, ACCEPTED)
             self._vehicle.say(6, "Flight plan received")
-        self._vehicle.dialect.mission_grew(self._vehicle, len(upload.items))
+        self._dialect.mission_grew(self._vehicle, len(upload.items))
 
     # -- download
 
@@ -150,7 +152,7 @@ class MissionService:
     def _requested(self, peer: Peer, fields: dict[str, Any]) -> Item | None:
         sequence, plan = fields["seq"], self._vehicle.plan
         if fields["mission_type"] == MISSION:
-            home = self._vehicle.dialect.home_item(self._vehicle)
+            home = self._dialect.home_item(self._vehicle)
             if sequence == 0 and home is not None:
                 return home
             if sequence < len(plan):
@@ -184,20 +186,20 @@ class MissionService:
 
     def on_clear(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_CLEAR_ALL: not while the mission is flown."""
-        if self._vehicle.dialect.mission_runs(self._vehicle):
+        if self._dialect.mission_runs(self._vehicle):
             self._acknowledge(peer, ERROR, fields["mission_type"])
             return
         if fields["mission_type"] in (MISSION, 255):
             self._drop_upload()
             self._vehicle.plan.clear()
         self._acknowledge(peer, ACCEPTED, fields["mission_type"])
-        self._vehicle.dialect.mission_grew(self._vehicle, 0)
+        self._dialect.mission_grew(self._vehicle, 0)
 
     def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_SET_CURRENT."""
         if self._vehicle.choose_item(fields["seq"]):
             peer.channel.send(
-                "MISSION_CURRENT", self._vehicle.dialect.messages["MISSION_CURRENT"](self._vehicle) or {}
+                "MISSION_CURRENT", self._dialect.messages["MISSION_CURRENT"](self._vehicle) or {}
             )
 
     def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:

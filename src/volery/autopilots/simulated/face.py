@@ -1,0 +1,40 @@
+"""What a vehicle speaks through: its outlet for words, and the way to those who command it.
+
+A face is one protocol. On links it serves any number of them; on a graph it is a node. The flight stack
+knows neither.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from volery.autopilots.simulated.vehicle import Outlet
+from volery.links.link import Link
+
+
+class Face(Outlet, Protocol):
+    """One vehicle's protocol."""
+
+    def start(self) -> None:
+        """The vehicle was switched on: what it sends regularly is sent from its boot on."""
+
+    def stop(self) -> None:
+        """Fall silent: it was switched off."""
+
+    def hang_up(self) -> None:
+        """Serve nobody any more."""
+
+
+@runtime_checkable
+class LinkFace(Face, Protocol):
+    """A protocol on links."""
+
+    @property
+    def banner(self) -> bytes:
+        """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
+
+    def connect(self, link: Link) -> None:
+        """Listen to and speak on this link, too."""
+
+    def disconnect(self, link: Link) -> None:
+        """Nobody is there any more."""

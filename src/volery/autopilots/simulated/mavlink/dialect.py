@@ -1,0 +1,66 @@
+"""What differs between firmwares that speak MAVLink: what they send, how often, and how they answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from volery.autopilots.simulated.dialect import Act
+from volery.autopilots.simulated.mavlink.command_service import Handler
+from volery.autopilots.simulated.plan import Item
+from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import MS, Ns, S
+
+Builder = Callable[[Vehicle], dict[str, Any] | None]
+"""The fields of a message as it would be sent now; ``None`` while the firmware does not send it."""
+
+
+class BootBytes(NamedTuple):
+    """Bytes on the wire that are no message, a fixed time after boot."""
+
+    after: Ns
+    data: bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class MavlinkDialect:
+    """One firmware's MAVLink, for one kind of vehicle."""
+
+    boot_bytes: tuple[BootBytes, ...] = ()
+    """The first of them is the banner: whoever accepts a client sends it."""
+    heartbeat_first: tuple[Ns, ...] = ()
+    """Heartbeats before the regular ones, after boot."""
+    heartbeat_from: Ns = S
+    """First of the regular ones, each second."""
+    answer_delay: Ns = 5 * MS
+    deaf_until: Ns = 0
+    """Before that, message intervals are acknowledged and forgotten."""
+    least_period: Ns = 3 * MS
+    """No message is streamed more often."""
+
+    messages: Mapping[str, Builder]
+    message_order: Sequence[str]
+    streams: Mapping[int, Sequence[str]]
+    """What belongs to each MAV_DATA_STREAM."""
+    on_stream_request: Callable[[Vehicle, int, int, int], None]
+    """Vehicle, index of the link, stream, rate."""
+    usual_period: Callable[[str], Ns]
+    refuse_interval: Callable[[Vehicle, int], int]
+    unknown_message: int
+    commands: Mapping[int, Handler]
+    handlers: Mapping[str, Callable[[Vehicle, dict[str, Any], int], None]] = field(default_factory=dict)
+    """Messages that are for this vehicle and need no answer: vehicle, fields, sender's system id."""
+    set_mode: Callable[[Vehicle, int, int], int]
+    """SET_MODE: base mode, custom mode; returns a MAV_RESULT."""
+    set_mode_ack: int
+    on_parameter_list: Act
+    mission_runs: Callable[[Vehicle], bool]
+    """Whether it may not be cleared now."""
+    stored_item: Callable[[Item], Item | int]
+    """An uploaded item as it is kept, or the MAV_MISSION_RESULT that refuses it."""
+    home_item: Callable[[Vehicle], Item | None]
+    """Item 0 where the firmware has its home there."""
+    go_to_item: Callable[[Vehicle, Item], bool]
+    mission_grew: Callable[[Vehicle, int], None]
+    timesync_every: Ns = 0
