@@ -22,9 +22,9 @@ from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
+from volery.run.airfield import Airfield
 from volery.run.ending import Ending
 from volery.run.fences import fence_of
-from volery.run.fleet import Fleet
 from volery.run.platform import Platform, commanded_by, is_node
 from volery.run.setup import node_name
 from volery.vehicles import Drone, Rover, Vehicle, drivers
@@ -84,12 +84,12 @@ class Builder:
     """Makes the components of one run."""
 
     def __init__(
-        self, system: System, kernel: VirtualKernel, platform: Platform, fleet: Fleet, ending: Ending
+        self, system: System, kernel: VirtualKernel, platform: Platform, airfield: Airfield, ending: Ending
     ) -> None:
         self._system = system
         self._kernel = kernel
         self._platform = platform
-        self._fleet = fleet
+        self._airfield = airfield
         self._ending = ending
         self._fence = fence_of(system.environment)
         self._graph = Graph(kernel, platform.price, platform.carry)
@@ -169,7 +169,7 @@ class Builder:
         return found
 
     def _body(self, vehicle: str) -> Body:
-        return Body(self._kernel, vehicle, self._fleet.truth(vehicle))
+        return Body(self._kernel, vehicle, self._airfield.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
         here, there = model.processor, self._system.instance(callee).processor
@@ -197,7 +197,7 @@ class Builder:
         open_driver = drivers.load(GRAPH_DRIVER).on_graph
         assert open_driver is not None
         driver = open_driver(self._kernel, node, name, {"namespace": f"/{name}"})
-        truth = self._fleet.truth(name)
+        truth = self._airfield.truth(name)
         vehicle = (
             Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
             if interface == "Drone"
@@ -218,7 +218,7 @@ class Builder:
     def _serve(self, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""
         place = Place(node_name(name), self._platform.processors[processor] if processor else None)
-        serve_vehicle(self._graph, self._fleet.link(name), name, place)
+        serve_vehicle(self._graph, self._airfield.link(name), name, place)
 
 
 def _kind(connection: Connection) -> TargetKind | None:

@@ -13,8 +13,8 @@ from volery.kernel.api import Kernel
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
-from volery.run.fleet import Fleet
-from volery.run.simulated import HOME, Simulated, fleet_of, link_to, simulated
+from volery.run.airfield import Airfield
+from volery.run.simulated import HOME, Simulated, airfield_of, link_to, simulated
 from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import open_link
@@ -31,13 +31,13 @@ KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
 
 @dataclass(frozen=True)
 class Opened:
-    """A kernel and the vehicles that were opened on it; ``fleet`` is ``None`` for vehicles that are out
+    """A kernel and the vehicles that were opened on it; ``airfield`` is ``None`` for vehicles that are out
     there.
     """
 
     kernel: VirtualKernel | WallKernel
     vehicles: tuple[Vehicle, ...]
-    fleet: Fleet | None = None
+    airfield: Airfield | None = None
 
 
 @contextmanager
@@ -87,9 +87,9 @@ def open_vehicles(
         simulated(address, name, KINDS[kind], home) for address, name in zip(addresses, names, strict=True)
     ]
     kernel = VirtualKernel(pace=pace)
-    fleet = fleet_of(kernel, wanted, seed)
-    vehicles = tuple(_simulated_vehicle(kernel, fleet, one, kind, seed) for one in wanted)
-    return Opened(kernel, vehicles, fleet)
+    airfield = airfield_of(kernel, wanted, seed)
+    vehicles = tuple(_simulated_vehicle(kernel, airfield, one, kind, seed) for one in wanted)
+    return Opened(kernel, vehicles, airfield)
 
 
 def _names(addresses: list[Address]) -> list[str]:
@@ -99,14 +99,14 @@ def _names(addresses: list[Address]) -> list[str]:
 
 
 def _simulated_vehicle(
-    kernel: Kernel, fleet: Fleet, wanted: Simulated, kind: type[Vehicle], seed: int
+    kernel: Kernel, airfield: Airfield, wanted: Simulated, kind: type[Vehicle], seed: int
 ) -> Vehicle:
     name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
     open_driver = drivers.load(autopilot).on_link
     if open_driver is None:
         raise CapabilityError(f"{name}: {autopilot} is reached over a graph only")
-    driver = open_driver(kernel, link_to(kernel, fleet, wanted, seed), name, SIMULATED)
-    return kind(kernel, name, driver, truth=fleet.truth(name))
+    driver = open_driver(kernel, link_to(kernel, airfield, wanted, seed), name, SIMULATED)
+    return kind(kernel, name, driver, truth=airfield.truth(name))
 
 
 def _open_real(addresses: list[Address], names: list[str], kind: type[Vehicle]) -> Opened:

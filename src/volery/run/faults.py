@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from volery.autopilots.simulated.flight import Flight
 from volery.kernel.api import Kernel
 from volery.model.environment import Fault
-from volery.run.fleet import Fleet
+from volery.run.airfield import Airfield
 from volery.trace.events import Text
 
 Break = Callable[[Flight, bool], None]
@@ -24,18 +24,18 @@ KINDS: Mapping[str, Break] = {
 """By the name that a model uses."""
 
 
-def inject(kernel: Kernel, fleet: Fleet, faults: Iterable[Fault]) -> None:
+def inject(kernel: Kernel, airfield: Airfield, faults: Iterable[Fault]) -> None:
     """Let every fault happen at its time, and end when it ends; both are told to the trace."""
     for fault in faults:
-        kernel.call_at(fault.at_ns, _act(kernel, fleet, fault, broken=True))
+        kernel.call_at(fault.at_ns, _act(kernel, airfield, fault, broken=True))
         if fault.duration_ns is not None:
-            kernel.call_at(fault.at_ns + fault.duration_ns, _act(kernel, fleet, fault, broken=False))
+            kernel.call_at(fault.at_ns + fault.duration_ns, _act(kernel, airfield, fault, broken=False))
 
 
-def _act(kernel: Kernel, fleet: Fleet, fault: Fault, *, broken: bool) -> Callable[[], None]:
+def _act(kernel: Kernel, airfield: Airfield, fault: Fault, *, broken: bool) -> Callable[[], None]:
     def act() -> None:
         words = f"fault {fault.name}: {fault.kind}" if broken else f"fault {fault.name} is over"
         kernel.record(Text(kernel.now(), fault.vehicle, WARNING, words))
-        KINDS[fault.kind](fleet.flights[fault.vehicle], broken)
+        KINDS[fault.kind](airfield.flights[fault.vehicle], broken)
 
     return act

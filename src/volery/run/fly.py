@@ -66,11 +66,11 @@ class _Flight:
         setup, attachments = setup_of_flight(self._path, urls, self._opened, options.seed)
         self._recording = Recording(setup, options.out, attachments)
         kernel.record = self._recording.stream
-        fleet = self._opened.fleet
-        if fleet is not None:
-            fleet.sample()
+        airfield = self._opened.airfield
+        if airfield is not None:
+            airfield.sample()
             if options.show is not None:
-                self._recording.stream.tap(Reporter(kernel, fleet, 0, options.show))
+                self._recording.stream.tap(Reporter(kernel, airfield, 0, options.show))
         self._under_way = len(self._opened.vehicles)
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
@@ -98,8 +98,8 @@ class _Flight:
         finally:
             for vehicle in self._opened.vehicles:
                 vehicle.close()
-            if self._opened.fleet is not None:
-                self._opened.fleet.record_states()
+            if self._opened.airfield is not None:
+                self._opened.airfield.record_states()
             record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
         return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
 

@@ -9,26 +9,26 @@ from __future__ import annotations
 from volery.base.errors import EstimateError
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.run.fleet import Fleet
+from volery.run.airfield import Airfield
 from volery.run.platform import Platform
 
 PERIOD: Ns = 500 * MS
 
 
 class PowerFeed:
-    """Feeds the computers of one platform from the batteries of one fleet."""
+    """Feeds the computers of one platform from the batteries of one airfield."""
 
-    def __init__(self, kernel: Kernel, platform: Platform, fleet: Fleet) -> None:
+    def __init__(self, kernel: Kernel, platform: Platform, airfield: Airfield) -> None:
         self._kernel = kernel
         self._platform = platform
-        self._fleet = fleet
+        self._airfield = airfield
         self._fed = platform.powered_by()
         self._busy: dict[str, Ns] = {name: 0 for names in self._fed.values() for name in names}
         self._then: Ns = kernel.now()
         for name in self._busy:
             self._check(name)
         for vehicle, names in self._fed.items():
-            fleet.flights[vehicle].payload_power(sum(platform.watts(name, 0.0) for name in names))
+            airfield.flights[vehicle].payload_power(sum(platform.watts(name, 0.0) for name in names))
         if self._fed:
             kernel.every(PERIOD, self._feed)
 
@@ -43,7 +43,7 @@ class PowerFeed:
         if now == self._then:
             return
         for vehicle, names in self._fed.items():
-            self._fleet.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
+            self._airfield.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
         self._then = now
 
     def _watts(self, processor: str, now: Ns) -> float:

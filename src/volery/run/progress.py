@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
-from volery.run.fleet import Fleet
+from volery.run.airfield import Airfield
 from volery.trace.events import Event, Milestone
 
 PERIOD: Ns = S
@@ -41,9 +41,9 @@ Show = Callable[[Progress], None]
 class Reporter:
     """Tells *show* how a run goes. A tap of its stream."""
 
-    def __init__(self, kernel: Kernel, fleet: Fleet, limit: Ns, show: Show) -> None:
+    def __init__(self, kernel: Kernel, airfield: Airfield, limit: Ns, show: Show) -> None:
         self._kernel = kernel
-        self._fleet = fleet
+        self._airfield = airfield
         self._limit = limit
         self._show = show
         self._parcels: dict[str, str] = {}
@@ -55,10 +55,10 @@ class Reporter:
             self._parcels[event.subject] = event.state
 
     def _tell(self) -> None:
-        vehicles = tuple(self._vehicle(name) for name in self._fleet.flights)
+        vehicles = tuple(self._vehicle(name) for name in self._airfield.flights)
         self._show(Progress(self._kernel.now(), self._limit, vehicles, dict(Counter(self._parcels.values()))))
 
     def _vehicle(self, name: str) -> VehicleProgress:
-        vehicle = self._fleet.autopilots[name].vehicle
-        truth = self._fleet.flights[name].truth()
+        vehicle = self._airfield.autopilots[name].vehicle
+        truth = self._airfield.flights[name].truth()
         return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)

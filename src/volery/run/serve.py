@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded import CodedLink
-from volery.run.fleet import Fleet
-from volery.run.simulated import Simulated, fleet_of
+from volery.run.airfield import Airfield
+from volery.run.simulated import Simulated, airfield_of
 from volery.vehicles.address import Address
 from volery.vehicles.carriers import listen
 
@@ -25,9 +25,9 @@ class Server:
 
     def __init__(self, wanted: Simulated, address: Address, *, speed: float = 1.0, seed: int = 1) -> None:
         self.kernel = VirtualKernel(pace=speed)
-        self.fleet: Fleet = fleet_of(self.kernel, [wanted], seed)
-        self._autopilot = self.fleet.autopilots[wanted.vehicle.name]
-        codec = self.fleet.codec(wanted.vehicle.name)
+        self.airfield: Airfield = airfield_of(self.kernel, [wanted], seed)
+        self._autopilot = self.airfield.autopilots[wanted.vehicle.name]
+        codec = self.airfield.codec(wanted.vehicle.name)
         self.link: CodedLink = listen(self.kernel, address, joined=self._greet, codec=codec)
         self._autopilot.connect(self.link)
 

@@ -188,11 +188,11 @@ def setup_of_flight(
         VehicleSetup(vehicle.name, autopilot, "multirotor" if isinstance(vehicle, Drone) else "rover")
         for vehicle, autopilot in zip(opened.vehicles, autopilots, strict=True)
     )
-    fidelity = "code" if opened.fleet else "hardware"
+    fidelity = "code" if opened.airfield else "hardware"
     setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
     attachments = []
-    if opened.fleet is not None:
-        origin = opened.fleet.frame
+    if opened.airfield is not None:
+        origin = opened.airfield.frame
         scenery = Scenery(Origin(origin.latitude, origin.longitude, origin.amsl))
         attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", scenery_to_json(scenery)))
     if path is not None:

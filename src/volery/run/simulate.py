@@ -12,10 +12,10 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.reader import load
 from volery.model.system import System
 from volery.requirements.observables import Observers
+from volery.run.airfield import Airfield
 from volery.run.build import Builder
 from volery.run.ending import Ending
 from volery.run.faults import inject
-from volery.run.fleet import Fleet
 from volery.run.platform import Platform
 from volery.run.power import PowerFeed
 from volery.run.progress import Reporter, Show
@@ -93,8 +93,10 @@ class _Simulation:
         setup = setup_of(system, platform, options.seed, options.fidelity)
         self._ending = Ending(kernel)
         surroundings = system.environment
-        self._fleet = Fleet(kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed)
-        builder = Builder(system, kernel, platform, self._fleet, self._ending)
+        self._airfield = Airfield(
+            kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed
+        )
+        builder = Builder(system, kernel, platform, self._airfield, self._ending)
         self._built = builder.build(options.fidelity, options.seed)
         self._recording = Recording(setup, options.out, attachments_of(system))
         kernel.record = self._recording.stream
@@ -105,11 +107,11 @@ class _Simulation:
             self._recording.stream.tap(self._goal)
             kernel.every(GOAL_PERIOD, self._look_at_goal)
         if options.show is not None:
-            reporter = Reporter(kernel, self._fleet, system.limits.duration_ns, options.show)
+            reporter = Reporter(kernel, self._airfield, system.limits.duration_ns, options.show)
             self._recording.stream.tap(reporter)
-        self._feed = PowerFeed(kernel, platform, self._fleet)
-        self._fleet.sample()
-        inject(kernel, self._fleet, surroundings.faults)
+        self._feed = PowerFeed(kernel, platform, self._airfield)
+        self._airfield.sample()
+        inject(kernel, self._airfield, surroundings.faults)
 
     def _look_at_goal(self) -> None:
         if self._goal.all_hold(self._kernel.now()):
@@ -131,7 +133,7 @@ class _Simulation:
 
     def _close(self, left: Sequence[str]) -> Run:
         now, ending = self._kernel.now(), self._ending
-        self._fleet.record_states()
+        self._airfield.record_states()
         for warning in self._built.warnings():
             self._recording.stream(Text(now, WHO, WARNING, warning))
         verdicts = self._observers.verdicts(now)

@@ -13,7 +13,7 @@ from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.links.wire import FAULT_OPTIONS, WireFaults, faults_of, wire
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
-from volery.run.fleet import LINK_DELAY, Fleet
+from volery.run.airfield import LINK_DELAY, Airfield
 from volery.vehicles.address import Address
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
@@ -80,11 +80,11 @@ def _faults(address: Address) -> WireFaults | None:
     return faults_of(wanted)
 
 
-def fleet_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Fleet:
+def airfield_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Airfield:
     """A world with these vehicles in it: its origin and its wind are the first one's."""
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
-    return Fleet(kernel, vehicles, first.frame, first.wind, seed)
+    return Airfield(kernel, vehicles, first.frame, first.wind, seed)
 
 
 def _placed(vehicle: Vehicle, frame: LocalFrame) -> Vehicle:
@@ -93,12 +93,12 @@ def _placed(vehicle: Vehicle, frame: LocalFrame) -> Vehicle:
     return replace(vehicle, at=replace(at, east_m=east, north_m=north))
 
 
-def link_to(kernel: Kernel, fleet: Fleet, wanted: Simulated, seed: int) -> Link:
+def link_to(kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int) -> Link:
     """A link to its autopilot, as the address wants it."""
     name = wanted.vehicle.name
     if wanted.faults is None:
-        return fleet.link(name)
+        return airfield.link(name)
     random = stream(seed, f"wire/{name}")
-    ours, theirs = wire(kernel, name, wanted.faults, random, delay=LINK_DELAY, codec=fleet.codec(name))
-    fleet.autopilots[name].connect(theirs)
+    ours, theirs = wire(kernel, name, wanted.faults, random, delay=LINK_DELAY, codec=airfield.codec(name))
+    airfield.autopilots[name].connect(theirs)
     return ours

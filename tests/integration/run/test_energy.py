@@ -7,7 +7,7 @@ import pytest
 from volery import Options, simulate
 from volery.cost import catalogue
 from volery.run import simulate as simulation
-from volery.run.fleet import Fleet
+from volery.run.airfield import Airfield
 
 pytestmark = pytest.mark.integration
 
@@ -28,16 +28,16 @@ def flown(delivery):
     """The record of a run, and the true state of each vehicle at its end."""
     fleets = []
 
-    class Kept(Fleet):
+    class Kept(Airfield):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
             fleets.append(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "Fleet", Kept)
+        patch.setattr(simulation, "Airfield", Kept)
         run = simulate(delivery, Options(fidelity="code", seed=7), scenario="pocket")
-    (fleet,) = fleets
-    return run.record, {name: flight.truth() for name, flight in fleet.flights.items()}
+    (airfield,) = fleets
+    return run.record, {name: flight.truth() for name, flight in airfield.flights.items()}
 
 
 @pytest.mark.parametrize(("vehicle", "processor"), FED.items())

@@ -31,7 +31,7 @@ SAMPLING_PERIOD: Ns = 200 * MS
 """How often the state of every vehicle is recorded."""
 
 
-class Fleet:
+class Airfield:
     """Simulated vehicles, by name, in the order of the model."""
 
     def __init__(
