@@ -55,6 +55,11 @@ def _no_action(_vehicle: Vehicle, _item: Item) -> None:
     """No item is an action."""
 
 
+def _no_memory(_vehicle: Vehicle) -> object:
+    """What all firmwares keep is enough."""
+    return None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Dialect:
     """One firmware for one kind of vehicle: how it flies. What it says on the wire is its face's."""
@@ -64,6 +69,8 @@ class Dialect:
     """``multirotor`` or ``rover``."""
     face: Callable[[Vehicle], Face]
     """The protocol it speaks."""
+    memory: Callable[[Vehicle], object] = _no_memory
+    """What this firmware alone keeps about a vehicle: ``Vehicle.memory``."""
 
     # -- boot
     boot_mode: Mode

@@ -31,8 +31,14 @@ class Outlet(Protocol):
     def parameter(self, name: str) -> None:
         """A parameter has another value."""
 
+    def mode_changed(self) -> None:
+        """It flies another mode."""
+
+    def home_changed(self) -> None:
+        """Home is elsewhere."""
+
     def announce(self, message: str) -> None:
-        """Send that message now, to everyone."""
+        """Send that message of the firmware's protocol now, to everyone."""
 
     def tell(self, message: str, fields: dict[str, Any]) -> None:
         """Send an event with these fields, to everyone."""
@@ -77,6 +83,8 @@ class Vehicle:
         self.tuning = dialect.tuning(self.parameters)
         self.sticks = Sticks(dialect.transmitter)
         self.plan = Plan()
+        self.memory: Any = dialect.memory(self)
+        """What only its firmware knows of."""
         self.boot_at: Ns = kernel.now()
         self.mode: Mode = dialect.boot_mode
         self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
@@ -151,8 +159,7 @@ class Vehicle:
         """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
         north, east, _ = self.flight.to_ned(latitude, longitude, amsl)
         self.home = Home(latitude, longitude, amsl, (north, east, self.estimate.origin[2] - amsl))
-        self.outlet.announce("GPS_GLOBAL_ORIGIN")
-        self.outlet.announce("HOME_POSITION")
+        self.outlet.home_changed()
 
     def home_is_here(self) -> None:
         """Home is where the vehicle is."""
@@ -199,7 +206,7 @@ class Vehicle:
         self.manoeuvre.enter()
         if self.armed:
             self.act()
-        self.outlet.announce("HEARTBEAT")
+        self.outlet.mode_changed()
 
     def choose_item(self, index: int) -> bool:
         """Fly that mission item next."""

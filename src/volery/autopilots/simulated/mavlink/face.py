@@ -187,6 +187,15 @@ class MavlinkFace:
         if found is not None:
             self._tell_all("PARAM_VALUE", value_fields(self._vehicle.parameters, found))
 
+    def mode_changed(self) -> None:
+        """HEARTBEAT to everyone."""
+        self.announce("HEARTBEAT")
+
+    def home_changed(self) -> None:
+        """GPS_GLOBAL_ORIGIN and HOME_POSITION to everyone."""
+        self.announce("GPS_GLOBAL_ORIGIN")
+        self.announce("HOME_POSITION")
+
     def announce(self, message: str) -> None:
         """That message to everyone."""
         fields = self.dialect.messages[message](self._vehicle)
