@@ -1,1 +1,17 @@
-"""Conformance suites and fakes as library code."""
+"""Conformance suites and fakes as library code: for us, and for whoever writes a driver of his own."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from volery.testing.conformance import Outcome, Report, Result, conformance
+
+__all__ = ["Outcome", "Report", "Result", "conformance"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'volery.testing' has no attribute {name!r}")
+    return getattr(import_module("volery.testing.conformance"), name)

@@ -8,7 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VoleryError
+from volery.base.errors import (
+    Failsafe,
+    LinkLost,
+    NotArrived,
+    Overridden,
+    Refused,
+    VehicleError,
+    VoleryError,
+)
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.waiting import sleep
@@ -28,6 +36,14 @@ SILENCE: Ns = 5 * S
 """A link that says nothing for so long is lost: five missed heartbeats."""
 
 
+Look = Callable[[str, Ns], VehicleError | None]
+"""Told what is asked and the time with each message of telemetry: the error that ends it, or ``None``."""
+
+
+def _at_nothing(_asked: str, _now: Ns) -> None:
+    """Nothing ends it."""
+
+
 class Performer:
     """Runs steps for one vehicle. ``commanded`` is the mode that was asked for last; empty when not ours."""
 
@@ -36,8 +52,17 @@ class Performer:
         self._driver = driver
         self._silence = silence
         self.commanded = ""
+        self.turn = 0  # whose it is: what was begun in an earlier one ends
+        self.successor = ""  # what took the vehicle from it
 
-    def perform(self, asked: str, plan: Callable[[], Sequence[Step]], *, restarts: int = 0) -> None:
+    def perform(
+        self,
+        asked: str,
+        plan: Callable[[], Sequence[Step]],
+        *,
+        restarts: int = 0,
+        look: Look = _at_nothing,
+    ) -> None:
         """Run the steps of *plan*; while it is undone before lift-off start over, at most *restarts* times.
 
         Raises:
@@ -45,14 +70,21 @@ class Performer:
             Overridden, Failsafe: somebody else has the vehicle.
             NotArrived: not seen to be done in time.
             LinkLost: the autopilot has fallen silent.
+            VehicleError: what *look* returns.
         """
         undone = ""
         for _ in range(restarts + 1):
-            undone = self._sequence(asked, plan())
+            undone = self._sequence(asked, plan(), look)
             if not undone:
                 return
         times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
         raise Overridden(self._driver.name, asked, undone + times + self.last_words())
+
+    def give_way(self, successor: str) -> None:
+        """What is under way in another task ends now: *successor* takes the vehicle."""
+        self.turn += 1
+        self.successor = successor
+        self._driver.telemetry.changed.notify()
 
     def is_ours(self) -> bool:
         """It is in the mode that was commanded last, or in the one in which it obeys a computer."""
@@ -72,13 +104,20 @@ class Performer:
             f"{self.last_words()}; to hand it over, switch the vehicle to {self._driver.handover}",
         )
 
-    def _sequence(self, asked: str, steps: Sequence[Step]) -> str:
+    def _sequence(self, asked: str, steps: Sequence[Step], look: Look) -> str:
         """Why it was undone on the ground; empty if all is done."""
+        turn = self.turn
         for step in steps:
-            undone = _Attempt(self, self._kernel, self._driver, asked, step).run()
+            if turn != self.turn:
+                raise self.taken_over(asked)
+            undone = _Attempt(self, self._kernel, self._driver, asked, step, look).run()
             if undone:
                 return undone
         return ""
+
+    def taken_over(self, asked: str) -> Overridden:
+        """Another part of the same program has it now."""
+        return Overridden(self._driver.name, asked, f"{self.successor} took its place")
 
     def wait(self, holds: Callable[[], bool], within: Ns) -> bool:
         """Until it *holds* of the telemetry (True), at most for *within* (False)."""
@@ -112,8 +151,13 @@ class Performer:
 class _Attempt:
     """One step under way."""
 
-    def __init__(self, owner: Performer, kernel: Kernel, driver: Driver, asked: str, step: Step) -> None:
+    def __init__(
+        self, owner: Performer, kernel: Kernel, driver: Driver, asked: str, step: Step, look: Look
+    ) -> None:
         self._owner = owner
+        self._turn = owner.turn
+        self._look = look
+        self._stopped: VehicleError | None = None  # what ends it, seen by *look*
         self._kernel = kernel
         self._driver = driver
         self._asked = asked
@@ -128,12 +172,14 @@ class _Attempt:
     def run(self) -> str:
         """Why it was undone before lift-off; empty if it is done."""
         step = self._step
-        if step.skippable and step.done(self._seen):
-            return ""
-        self._check_not_fought()
-        self._seen.answers.pop(step.answer, None)
+        skipped = step.skippable and step.done(self._seen)
+        if not skipped:
+            self._check_not_fought()
         if step.enters:
-            self._owner.commanded = step.enters
+            self._owner.commanded = step.enters  # also where it is in that mode already: it is ours now
+        if skipped:
+            return ""
+        self._seen.answers.pop(step.answer, None)
         if self._driver.cycle is None:
             self._wait_for_telemetry()
         else:
@@ -186,9 +232,14 @@ class _Attempt:
             self._step.send()
 
     def _over(self) -> bool:
-        """Done, refused, or taken by somebody else."""
+        """Done, refused, taken by somebody else, or not to be gone on with."""
         step, seen = self._step, self._seen
+        if self._turn != self._owner.turn:
+            return True
         if step.done(seen):
+            return True
+        self._stopped = self._stopped or self._look(self._asked, self._kernel.now())
+        if self._stopped is not None:
             return True
         if self._is_refused() and not self._repeated:
             return True
@@ -223,8 +274,12 @@ class _Attempt:
     # -- the end
 
     def _judge(self) -> str:
+        if self._turn != self._owner.turn:
+            raise self._owner.taken_over(self._asked)
         if self._step.done(self._seen):
             return ""
+        if self._stopped is not None and not self._changed:
+            raise self._stopped
         self._hear_reasons()
         if not self._changed:
             raise self._refused()

@@ -1,0 +1,77 @@
+"""Missions that the autopilot flies by itself."""
+
+from __future__ import annotations
+
+from volery.base.errors import OutOfBounds, UsageError
+from volery.testing.checks import check, demand, raising
+from volery.testing.driver_checks.flight import demand_there
+from volery.testing.stage import Stage
+from volery.vehicles import Capability, ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
+
+MISSION = (Capability.MISSION,)
+
+
+@check(needs=MISSION, flies=True)
+def mission(stage: Stage) -> None:
+    """A mission is uploaded, started, flown over its points and landed; start_mission() returns disarmed."""
+    stage.drone.wait_ready()
+    goal = stage.at(25, 10, 12)
+    reached: list[bool] = []
+    items: list[MissionItem] = [
+        TakeOff(10),
+        Waypoint(goal),
+        ChangeSpeed(3.0),
+        Waypoint(stage.at(5, 5)),
+        Land(),
+    ]
+    stage.drone.upload_mission(items)
+    demand(not stage.drone.armed, "an upload has armed it")
+    seen = stage.drone.telemetry
+
+    def look() -> None:
+        if seen.position is not None:
+            north, east, _ = stage.offset(goal, seen.position)
+            reached.append(north * north + east * east < 16.0)
+
+    handle = stage.kernel.every(200_000_000, look)
+    stage.drone.start_mission(within=300)
+    handle.cancel()
+    demand(any(reached), "it never came within 4 m of its first point")
+    demand(not stage.drone.armed, "it is armed")
+
+
+@check(needs=MISSION, flies=True)
+def mission_that_returns(stage: Stage) -> None:
+    """A mission that ends with the way home ends there, disarmed."""
+    stage.drone.wait_ready()
+    stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(15, 0)), ReturnHome()])
+    home = stage.drone.home
+    stage.drone.start_mission(within=300)
+    demand(not stage.drone.armed, "it is armed")
+    north, east, _ = stage.offset(home, stage.drone.position)
+    demand(north * north + east * east < 16.0, f"it ended {north:.1f}, {east:.1f} m from home")
+
+
+@check(needs=(*MISSION, Capability.GOTO), flies=True)
+def mission_that_ends_in_the_air(stage: Stage) -> None:
+    """After a mission whose last item is a point, the program has it again: goto() and land() work."""
+    stage.drone.wait_ready()
+    last = stage.at(15, 5)
+    stage.drone.upload_mission([TakeOff(10), Waypoint(last)])
+    stage.drone.start_mission(within=300)
+    demand(stage.drone.flying, "it does not fly")
+    goal = stage.at(0, 5)
+    stage.drone.goto(goal)
+    demand_there(stage, goal)
+    stage.drone.land()
+
+
+@check(needs=MISSION)
+def missions_that_make_no_sense(stage: Stage) -> None:
+    """An empty mission, and one that leaves the stated limits, are refused before anything is sent."""
+    stage.drone.wait_ready()
+    with raising(UsageError, naming=stage.name):
+        stage.drone.upload_mission([])
+    far = stage.drone.limits.highest + 50.0
+    with raising(OutOfBounds, naming=stage.name):
+        stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(10, 0, far))])

@@ -1,0 +1,143 @@
+"""Somebody else: another station that changes the mode or stops the motors, another vehicle on the air."""
+
+from __future__ import annotations
+
+from volery.base.errors import Failsafe, LinkSilent, Overridden, VehicleError
+from volery.base.time import S
+from volery.testing.checks import ImpossibleError, check, demand, raising
+from volery.testing.stage import Stage
+from volery.vehicles import Capability
+
+GO = (Capability.TAKEOFF, Capability.GOTO)
+
+
+@check(needs=(*GO, Capability.LAND), flies=True)
+def mode_change_by_another(stage: Stage) -> str:
+    """Another station has it land: goto() ends with Overridden, nothing we do fights it, it comes down."""
+    other = stage.other()
+    stage.drone.takeoff(10)
+    stage.later(3.0, other.lands_it)
+    with raising(Overridden, Failsafe, naming=stage.name) as caught:
+        stage.drone.goto(stage.at(60, 0), speed=_slow(stage))
+    theirs = stage.drone.mode
+    if stage.drone.flying:
+        with raising(VehicleError, naming=stage.name):
+            stage.drone.goto(stage.at(10, 0))
+        demand(stage.drone.mode == theirs, f"its mode was fought: {theirs} became {stage.drone.mode}")
+    stage.until(lambda: not stage.drone.armed, 120.0, f"it did not come down in {theirs}")
+    return caught.text.removeprefix(f"{stage.name}: ")
+
+
+def _slow(stage: Stage) -> float | None:
+    return 2.0 if Capability.SPEED in stage.drone.capabilities else None
+
+
+@check(needs=(*GO, Capability.LAND), flies=True)
+def mode_change_while_idle(stage: Stage) -> None:
+    """Another station has it land while the program does nothing: its next goto() says so and fights
+    nothing.
+    """
+    other = stage.other()
+    stage.drone.takeoff(15)
+    stage.later(0.0, other.lands_it)
+    stage.sleep(4)
+    with raising(Overridden, naming=stage.name):
+        stage.drone.goto(stage.at(10, 0))
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+
+
+@check(needs=(Capability.TAKEOFF, Capability.LAND), flies=True)
+def mode_change_during_takeoff(stage: Stage) -> str:
+    """Another station has it land while it takes off: takeoff() ends with a VehicleError, and it is not
+    started over in the air.
+    """
+    other = stage.other()
+    stage.drone.wait_ready()
+
+    def lands_it_in_the_air() -> None:
+        stage.until(lambda: other.seen.flying and other.seen.above_home > 3.0, 60.0, "it never rose")
+        other.lands_it()
+
+    stage.later(0.0, lands_it_in_the_air)
+    with raising(VehicleError, naming=stage.name) as caught:
+        stage.drone.takeoff(20)
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+    return caught.text.removeprefix(f"{stage.name}: ")
+
+
+@check(needs=GO, flies=True, lets_fall=True)
+def disarmed_midway(stage: Stage) -> str:
+    """Another station stops the motors in flight: goto() ends with Overridden, and is not resumed."""
+    other = stage.other()
+    stage.drone.takeoff(5)
+    stage.later(2.0, other.disarms_it)
+    with raising(Overridden, Failsafe, naming=stage.name) as caught:
+        stage.drone.goto(stage.at(60, 0, 5), speed=_slow(stage))
+    stage.sleep(5)
+    demand(not stage.drone.armed, "it was armed again")
+    return caught.text.removeprefix(f"{stage.name}: ")
+
+
+@check(needs=(Capability.TAKEOFF,), flies=True)
+def disarmed_before_lift_off(stage: Stage) -> str:
+    """Another station disarms it before it lifts off: the take-off is started over, or ends saying so."""
+    other = stage.other()
+    stage.drone.wait_ready()
+
+    def disarms_it_once_armed() -> None:
+        stage.until(lambda: other.seen.armed, 60.0, "it was never armed")
+        other.disarms_it()
+
+    stage.later(0.0, disarms_it_once_armed)
+    try:
+        stage.drone.takeoff(10)
+    except VehicleError as error:
+        demand(stage.name in str(error), f"the error does not name it: {error}")
+        return type(error).__name__
+    demand(stage.drone.flying, "takeoff() returned on the ground")
+    return "started over"
+
+
+@check(needs=(Capability.TAKEOFF,), flies=True, neighbour=True)
+def another_vehicle_on_the_air(stage: Stage) -> None:
+    """A second vehicle is heard and hears on the same link: only the one that is meant arms and flies."""
+    neighbour = stage.neighbour
+    neighbour.wait_heard()
+    stage.drone.takeoff(10)
+    demand(not neighbour.armed, "the neighbour was armed, too")
+    north, east, _ = stage.offset(stage.drone.home, stage.drone.position)
+    demand(north * north + east * east < 100.0, "its position is the neighbour's")
+    stage.drone.land()
+
+
+@check(kind="")
+def wrong_system_id(stage: Stage) -> str:
+    """A driver that was told of another system id hears nobody, and says so."""
+    stranger = stage.of_system(77)
+    try:
+        with raising(LinkSilent, naming=stage.name) as caught:
+            stranger.wait_heard(5.0)
+    finally:
+        stranger.close()
+    return caught.text.removeprefix(f"{stage.name}: ")
+
+
+@check(needs=GO, flies=True)
+def home_moved_by_another(stage: Stage) -> str:
+    """Another station moves home by 20 m: the program sees it, and return_home() goes there."""
+    other = stage.other()
+    stage.drone.takeoff(10)
+    there = stage.at(20, 0, 0.0, amsl=True)
+    other.moves_home(there)
+
+    def moved() -> bool:
+        north, east, _ = stage.offset(there, stage.drone.home)
+        return north * north + east * east < 4.0
+
+    stage.until(moved, 10.0, "the program still sees the old home")
+    if Capability.RETURN_HOME not in stage.drone.capabilities:
+        raise ImpossibleError("it cannot return home")
+    stage.drone.return_home()
+    north, east, _ = stage.offset(there, stage.drone.position)
+    demand(north * north + east * east < 16.0, f"it came down {north:.1f}, {east:.1f} m from there")
+    return f"seen, and returned to, after {stage.kernel.now() // S} s"

@@ -1,0 +1,141 @@
+"""A stage of its own for each check: a new vehicle in a new world, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from volery.autopilots.simulated.flight import Flight
+from volery.base.errors import CapabilityError, UsageError
+from volery.base.time import MINUTE, Ns, S
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.links.link import Link
+from volery.run.connect import KINDS, SIMULATED
+from volery.run.simulated import airfield_of, link_to, simulated
+from volery.testing.checks import ImpossibleError
+from volery.testing.stage import Commander, Stage
+from volery.testing.tap import Tap
+from volery.trace.events import Event
+from volery.vehicles import Vehicle
+from volery.vehicles.address import Address
+from volery.vehicles.driver import Driver, drivers
+
+HUNG_AFTER: Ns = 30 * MINUTE
+"""A check that is not over after so much simulated time hangs."""
+
+AWAY_DEG = 0.0005
+"""How far east of the vehicle its neighbour stands: about 40 m."""
+
+
+class SimulatedStage(Stage):
+    """See ``Stage``. ``events`` is all that was recorded."""
+
+    def __init__(
+        self,
+        address: Address,
+        kind: type[Vehicle],
+        seed: int,
+        *,
+        cold: bool = False,
+        neighbour: bool = False,
+    ) -> None:
+        super().__init__()
+        self.events: list[Event] = []
+        self.kernel: VirtualKernel = VirtualKernel(record=self.events.append)
+        options = {**address.options, "start": "cold" if cold else "warm"}
+        self._wanted = simulated(replace(address, options=options), address.driver, KINDS[kind])
+        all_wanted = [self._wanted, _beside(self._wanted)] if neighbour else [self._wanted]
+        self.airfield = airfield_of(self.kernel, all_wanted, seed)
+        self._kind = kind
+        self._factory = drivers.load(address.driver)
+        self._tap = Tap(link_to(self.kernel, self.airfield, self._wanted, seed))
+        self._neighbour = ""
+        if neighbour:
+            self._neighbour = all_wanted[1].vehicle.name
+            self._tap.share(self.airfield.link(self._neighbour))
+        self.driver = self._opened(self._tap, self.name_of_vehicle)
+        self.drone = self._kind(self.kernel, self.name_of_vehicle, self.driver)
+
+    @property
+    def name_of_vehicle(self) -> str:
+        """As the simulation calls it."""
+        return self._wanted.vehicle.name
+
+    def _opened(self, link: Link, name: str, **options: str) -> Driver:
+        open_driver = self._factory.on_link
+        if open_driver is None:
+            raise CapabilityError(f"{name} is reached over a graph only")
+        return open_driver(self.kernel, link, name, {**SIMULATED, **options})
+
+    def perform(self, body: Callable[[], str | None]) -> str | None:
+        """Run *body* as a task: returns and raises what it does; ``TimeoutError`` if it hangs."""
+        outcome: list[str | Exception | None] = []
+
+        def flow() -> None:
+            try:
+                outcome.append(body())
+            except Exception as error:
+                outcome.append(error)
+
+        self.kernel.spawn(flow, "check", Place("check"))
+        while not outcome:
+            if self.kernel.now() >= HUNG_AFTER:
+                raise TimeoutError(f"it hangs: not over after {HUNG_AFTER // MINUTE} simulated minutes")
+            self.kernel.run(self.kernel.now() + S)
+        (found,) = outcome
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    @property
+    def tap(self) -> Tap:
+        """The hand on the link."""
+        return self._tap
+
+    def _commander(self) -> Commander:
+        link = self.airfield.link(self.name_of_vehicle)
+        driver = self._opened(link, self.name_of_vehicle)
+        return Commander(self.kernel, driver, link, self._factory.codec.name)
+
+    def another_program(self) -> Any:
+        """On a new link."""
+        return self._program()
+
+    def of_system(self, system: int) -> Any:
+        """Raises ``ImpossibleError`` for drivers that do not ask for a system id."""
+        try:
+            return self._program(system=str(system))
+        except UsageError as error:
+            raise ImpossibleError(f"the driver takes no system id: {error}") from None
+
+    def _program(self, **options: str) -> Any:
+        driver = self._opened(self.airfield.link(self.name_of_vehicle), self.name_of_vehicle, **options)
+        return self._kind(self.kernel, self.name_of_vehicle, driver)
+
+    @property
+    def flight(self) -> Flight:
+        """The body and its sensors."""
+        return self.airfield.flights[self.name_of_vehicle]
+
+    @property
+    def neighbour(self) -> Any:
+        """On a link of its own."""
+        if not self._neighbour:
+            raise ImpossibleError("it is alone")
+        driver = self._opened(self.airfield.link(self._neighbour), self._neighbour)
+        self._others.append(Commander(self.kernel, driver))
+        return self._kind(self.kernel, self._neighbour, driver)
+
+    def close(self) -> None:
+        """Let go of everything."""
+        self.rest()
+        self.drone.close()
+        self.kernel.close()
+
+
+def _beside(wanted: Any) -> Any:
+    at = wanted.vehicle.at
+    moved = replace(at, longitude=at.longitude + AWAY_DEG)
+    return replace(wanted, vehicle=replace(wanted.vehicle, name="neighbour", at=moved))
