@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+ROS2 := $(VENV)/ros2-jazzy.stamp $(VENV)/ros2-kilted.stamp
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 
 .PHONY: demo test check bench docs clean
@@ -46,10 +47,22 @@ $(VENV)/dev.stamp: $(VENV)/volery.stamp
 	@$(PIP) install --group dev
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages
+$(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages $(VENV)/ros1.stamp $(ROS2)
 	@echo "setting up $(VENV): independent MAVLink clients"
 	@$(PIP) install --group clients
 	@scripts/debian-packages chromium
+	@touch $@
+
+$(VENV)/ros1.stamp: $(VENV)/volery.stamp scripts/debian-packages scripts/ros1-modules
+	@echo "setting up $(VENV): ROS 1"
+	@scripts/debian-packages ros1 roscpp
+	@$(PIP) install --group ros1
+	@scripts/ros1-modules $(VENV)
+	@touch $@
+
+$(VENV)/ros2-%.stamp: $(VENV)/volery.stamp scripts/ros2-venv
+	@echo "setting up $(VENV)/ros2-$*: ROS 2"
+	@scripts/ros2-venv $(VENV) $*
 	@touch $@
 
 $(VENV)/bench.stamp: $(VENV)/dev.stamp

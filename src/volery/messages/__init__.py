@@ -8,6 +8,7 @@ ROS 2 Humble; the few packages that the stores lack are written out in ``definit
 from volery.messages.cdr import cdr_size, from_cdr, to_cdr
 from volery.messages.message import Message
 from volery.messages.packages import modules
+from volery.messages.ros1 import Ros1Service, Ros1Type, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.messages.store import (
     ServiceType,
     define,
@@ -24,19 +25,25 @@ from volery.messages.store import (
 
 __all__ = [
     "Message",
+    "Ros1Service",
+    "Ros1Type",
     "ServiceType",
     "cdr_size",
     "define",
     "definition",
     "from_cdr",
+    "from_ros1",
     "message_class",
     "message_name",
     "modules",
     "new",
     "request",
+    "ros1_service",
+    "ros1_type",
     "service",
     "service_name",
     "service_types",
     "to_cdr",
+    "to_ros1",
     "types",
 ]

@@ -8,7 +8,8 @@ from typing import Any
 from volery.base.errors import choices, did_you_mean
 from volery.messages.store import message_class, service, service_types, types
 
-_ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
+ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
+"""Types that ROS 1 spells otherwise: by package, its name and ours."""
 
 
 class _Definitions(ModuleType):
@@ -23,7 +24,7 @@ class _Definitions(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        wanted = _ROS1_SPELLING.get(self._package, {}).get(name, name)
+        wanted = ROS1_SPELLING.get(self._package, {}).get(name, name)
         for ending in ("Request", "Response"):
             if self._kind == "srv" and wanted.endswith(ending) and wanted not in self._known:
                 pair = getattr(self, wanted.removesuffix(ending).removesuffix("_"))

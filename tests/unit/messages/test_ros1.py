@@ -1,0 +1,81 @@
+"""ROS 1's names, checksums and bytes; the sums are those that Debian's packages state."""
+
+import pytest
+
+from volery import messages
+from volery.base.errors import UsageError
+
+SUMS = {
+    "std_msgs/String": "992ce8a1687cec8c8bd883ec73ca41d1",
+    "std_msgs/Header": "2176decaecbce78abc3b96ef049fabed",
+    "std_msgs/Empty": "d41d8cd98f00b204e9800998ecf8427e",
+    "sensor_msgs/NavSatFix": "2d3a8cd499b9b4a0249fb98fd05cfa48",
+    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
+    "sensor_msgs/CameraInfo": "c9a58c1b0b154e0e6da7578cb991d214",
+    "geometry_msgs/PoseStamped": "d3812c3cbc69362b77dc0b19b345f8f5",
+    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
+    "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
+    "rosgraph_msgs/Clock": "a9c97c1d230cfc112e270351a944ee47",
+}
+SERVICES = {
+    "std_srvs/Empty": "d41d8cd98f00b204e9800998ecf8427e",
+    "std_srvs/SetBool": "09fb03525b03e7ea1fd3992bafd87e16",
+    "std_srvs/Trigger": "937c9679a518e3a18d831e57125ea522",
+    "mavros_msgs/CommandBool": "e09abbb4e5bae6b558e5010966eb6e9e",
+}
+DIFFERENT = {
+    "shape_msgs/msg/SolidPrimitive",
+    "visualization_msgs/msg/InteractiveMarker",
+    "visualization_msgs/msg/InteractiveMarkerControl",
+    "visualization_msgs/msg/InteractiveMarkerInit",
+    "visualization_msgs/msg/InteractiveMarkerUpdate",
+    "visualization_msgs/msg/Marker",
+    "visualization_msgs/msg/MarkerArray",
+}
+
+
+@pytest.mark.parametrize(("name", "checksum"), SUMS.items())
+def test_checksum_of_a_message(name: str, checksum: str) -> None:
+    assert messages.ros1_type(name)[:2] == (name, checksum)
+
+
+@pytest.mark.parametrize(("name", "checksum"), SERVICES.items())
+def test_checksum_of_a_service(name: str, checksum: str) -> None:
+    kind = messages.ros1_service(name)
+    assert (kind.name, kind.md5) == (name, checksum)
+    assert kind.request.name == f"{name}Request"
+
+
+def test_a_spelling_of_ros1() -> None:
+    assert messages.ros1_type("mavros_msgs/VfrHud").name == "mavros_msgs/VFR_HUD"
+
+
+def test_header_is_seen_from_the_type() -> None:
+    assert messages.ros1_type("sensor_msgs/Imu").has_header
+    assert not messages.ros1_type("std_msgs/String").has_header
+    assert not messages.ros1_type("std_msgs/Empty").has_header
+
+
+def test_the_encoding_of_a_string_and_a_header() -> None:
+    assert messages.to_ros1(messages.new("std_msgs/String", data="ab")) == b"\x02\0\0\0ab"
+    header = messages.new("std_msgs/Header", stamp={"sec": 3, "nanosec": 4}, frame_id="m")
+    assert messages.to_ros1(header) == b"\0\0\0\0\x03\0\0\0\x04\0\0\0\x01\0\0\0m"
+    assert messages.to_ros1(messages.new("std_msgs/Empty")) == b""
+
+
+@pytest.mark.parametrize("name", [one for one in messages.types() if one not in DIFFERENT])
+def test_every_type_goes_there_and_back(name: str) -> None:
+    message = messages.new(name)
+    assert messages.from_ros1(name, messages.to_ros1(message)) == message
+
+
+@pytest.mark.parametrize("name", sorted(DIFFERENT))
+def test_a_type_that_differs_is_refused(name: str) -> None:
+    with pytest.raises(UsageError, match="has other fields in ROS 1"):
+        messages.ros1_type(name)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x02", b"\xff\xff\xff\x7fabc", b"\x01\0\0\0ab", b"\x01\0\0\0\xff"])
+def test_bytes_that_are_no_message(data: bytes) -> None:
+    with pytest.raises(UsageError, match=r"are no std_msgs/msg/String"):
+        messages.from_ros1("std_msgs/String", data)
