@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from volery.base.errors import LinkError
+from volery.base.errors import CapabilityError, LinkError
 from volery.base.position import Position
 from volery.base.registry import Registry
 from volery.base.time import Ns
@@ -173,8 +173,8 @@ class Driver(Protocol):
         Empty until they are known.
         """
 
-    def problem(self) -> LinkError | None:
-        """What is wrong with the way to the autopilot, ready to be raised; ``None`` if nothing is."""
+    def problem(self) -> LinkError | CapabilityError | None:
+        """What is wrong with the way to the autopilot, or why it cannot be flown; ready to be raised."""
 
     def close(self) -> None:
         """Stop talking and let go of the link."""

@@ -23,7 +23,7 @@ from volery.vehicles import Drone, Vehicle
 
 HOME = (-353632610, 1491652300, 584_000)  # degE7, degE7, mm AMSL
 ACCEPTED, FAILED = 0, 4
-SET_MODE, ARM, TAKEOFF, SPEED, YAW, START, INTERVAL = 176, 400, 22, 178, 115, 300, 511
+SET_MODE, ARM, TAKEOFF, SPEED, YAW, START, INTERVAL, ASK = 176, 400, 22, 178, 115, 300, 511, 512
 COMMON_HEALTH = 0x10000000  # the arming checks pass
 
 
@@ -61,6 +61,8 @@ class FakeAutopilot:
     deaf: bool = False
     mute: bool = False
     climb_s: float = 2.0
+    version: int = 0x040506FF
+    parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.modes = ROVER if self.kind == 10 else COPTER
@@ -153,6 +155,9 @@ class FakeAutopilot:
             self.craft.east = (frame.fields["lon_int"] - HOME[1]) * 0.9080e-2
             amsl = frame.fields["coordinate_frame"] == 5
             self.craft.up = frame.fields["alt"] - (HOME[2] / 1000.0 if amsl else 0.0)
+        elif frame.name == "PARAM_REQUEST_READ" and frame.fields["param_id"] in self.parameters:
+            name = frame.fields["param_id"]
+            self.say("PARAM_VALUE", param_id=name, param_value=self.parameters[name], param_type=9)
         elif frame.name in {"MISSION_COUNT", "MISSION_ITEM_INT"}:
             self._take_mission(frame)
 
@@ -188,6 +193,8 @@ class FakeAutopilot:
             names = ("GLOBAL_POSITION_INT", "SYS_STATUS", "EKF_STATUS_REPORT", "EXTENDED_SYS_STATE")
             known = (*names, "HOME_POSITION", "GPS_RAW_INT", "MISSION_CURRENT")
             self.streams.update(name for name in known if message_type(name).id == number)
+        elif command == ASK:
+            self.say("AUTOPILOT_VERSION", flight_sw_version=self.version)
         elif command == SET_MODE:
             self.enter(self.modes[int(fields["param2"])])
         elif command == ARM:
@@ -219,8 +226,8 @@ class FakeAutopilot:
         return [frame.fields for frame in self.heard if frame.name == name]
 
     def commands(self) -> list[int]:
-        """The commands that it heard, requests for streams left out."""
-        return [f["command"] for f in self.sent("COMMAND_LONG") if f["command"] != INTERVAL]
+        """The commands that it heard, requests for messages left out."""
+        return [f["command"] for f in self.sent("COMMAND_LONG") if f["command"] not in {INTERVAL, ASK}]
 
 
 class Bench:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.drivers.ardupilot.driver import ArduPilot
-from volery.drivers.ardupilot.mavlink import OPTIONS, MavlinkCommands, check_options
+from volery.drivers.ardupilot.mavlink import MavlinkCommands
 from volery.drivers.ardupilot.mavros import OPTIONS as MAVROS_OPTIONS
 from volery.drivers.ardupilot.mavros import MavrosCommands, geoid_of
+from volery.drivers.mavlink.options import OPTIONS, check_options
 from volery.graph import EmbeddedNode
 from volery.kernel.api import Kernel
 from volery.links.link import Link
@@ -22,7 +23,7 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
     Options: ``rate`` of the position and ``attitude`` in Hz, ``system`` id; and ``texts=unrecorded``
     where the autopilot records its texts itself, as a simulated one does.
     """
-    check_options(options, *OPTIONS)
+    check_options("ardupilot", options, *OPTIONS)
     return ArduPilot(kernel, name, MavlinkCommands(kernel, link, name, options))
 
 
@@ -31,7 +32,7 @@ def open_mavros(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[
 
     Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.
     """
-    check_options(options, *MAVROS_OPTIONS)
+    check_options("mavros", options, *MAVROS_OPTIONS)
     namespace = options.get("namespace", f"/{name}")
     return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, namespace, geoid_of(options)))
 

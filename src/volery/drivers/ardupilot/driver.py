@@ -8,135 +8,56 @@ and never expires; a velocity stands for 3 s. Sticks fall back on the transmitte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
-from volery.base.errors import LinkError, UsageError
+from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
-from volery.base.time import MINUTE, Ns, S
-from volery.drivers.ardupilot import commands as key
-from volery.drivers.ardupilot.arrival import NEAR_UP_M, ROVER_NEAR_M, STANDING_M_S, at, distance, standing
+from volery.base.time import Ns, S
 from volery.drivers.ardupilot.commands import Commands
 from volery.drivers.ardupilot.items import items_of
-from volery.drivers.ardupilot.modes import DRONE_KIND, GUIDED
+from volery.drivers.ardupilot.modes import GUIDED
 from volery.drivers.ardupilot.setpoints import VELOCITY_PERIOD, Setpoints
-from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, Repeat, Step, Sticks
-from volery.vehicles.mission import MissionItem, Waypoint
+from volery.drivers.ardupilot.silence import if_silent
+from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, ROVER_NEAR_M, STANDING_M_S, at, distance, standing
+from volery.drivers.mavlink import commands as key
+from volery.drivers.mavlink.commands import Item
+from volery.drivers.mavlink.sequences import (
+    ANSWERED_WITHIN,
+    READY_WITHIN,
+    STOPPED_WITHIN,
+    TURNED_WITHIN,
+    Sequences,
+    at_once,
+    heads,
+    nothing,
+)
+from volery.kernel.api import Kernel
+from volery.vehicles.driver import Repeat, Step, Sticks
+from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
-CHECKS_PERIOD: Ns = 10 * S
-ANSWERED_WITHIN: Ns = 5 * S
-ARMED_WITHIN: Ns = 10 * S
-READY_WITHIN: Ns = 2 * MINUTE
-STOPPED_WITHIN: Ns = 30 * S
-TURNED_WITHIN: Ns = 30 * S
-
-TURNED_DEG = 3.0
 IDLE_THROTTLE = 0.1
 
-_SHARED = frozenset(
-    {
-        Capability.GOTO,
-        Capability.SPEED,
-        Capability.RETURN_HOME,
-        Capability.HOLD,
-        Capability.STICKS,
-        Capability.MISSION,
-    }
-)
-_DRONE = _SHARED | {
-    Capability.TAKEOFF,
-    Capability.VELOCITY,
-    Capability.HEADING,
-    Capability.LAND,
-    Capability.STABILIZE,
-    Capability.ALTITUDE_HOLD,
-}
-_NOTHING: frozenset[Capability] = frozenset()
 
-
-class ArduPilot:
+class ArduPilot(Sequences):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     handover = GUIDED
     comes_down = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
 
     def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
-        self.name = name
+        super().__init__(name, commands)
         self._commands = commands
-        self.telemetry = commands.telemetry
         self._setpoints = Setpoints(kernel, commands)
-        self._last_item: int | None = None  # where the mission on board ends in the air
-
-    @property
-    def capabilities(self) -> frozenset[Capability]:
-        """By the kind of vehicle; none until it has been heard."""
-        return {"drone": _DRONE, "rover": _SHARED}.get(self.telemetry.kind, _NOTHING)
-
-    @property
-    def cycle(self) -> Action | None:
-        """The carrier's."""
-        return self._commands.cycle
-
-    def look(self) -> None:
-        """Take in what has arrived."""
-        self._commands.look()
 
     def if_silent(self) -> str:
-        """Not known yet."""
-        return ""
+        """From its failsafe for ground stations."""
+        parameters = self._commands.parameters
+        return if_silent(self.telemetry.kind, parameters) if parameters is not None else ""
 
-    def problem(self) -> LinkError | None:
-        """What is wrong with the way to the autopilot."""
-        return self._commands.problem()
-
-    def close(self) -> None:
-        """Stop talking and let go of the link."""
-        self.stop()
-        self._commands.close()
-
-    # -- on the ground
-
-    def ready(self, within: Ns) -> Sequence[Step]:
-        """Until the arming checks pass and there is a position."""
-        step = Step(
-            ask="be ready to arm and to go by position",
-            send=_nothing,
-            done=lambda seen: seen.ready or seen.armed,
-            within=within,
-            skippable=True,
-            keep=Repeat(CHECKS_PERIOD, self._commands.check),
-            advice="give it a view of the sky, stand it still and level, and look at its arming checks",
-        )
-        return (step,)
-
-    def arm(self) -> Sequence[Step]:
-        """In the mode it is in."""
-        step = Step(
-            ask="arm",
-            send=lambda: self._commands.arm(True),
-            done=lambda seen: seen.armed,
-            within=ARMED_WITHIN,
-            skippable=True,
-            answer=key.ARM,
-            again=2 * S,
-        )
-        return (step,)
-
-    def disarm(self, force: bool) -> Sequence[Step]:
-        """In the air it is refused without *force*."""
-        step = Step(
-            ask="disarm",
-            send=lambda: self._commands.arm(False, force=force),
-            done=lambda seen: not seen.armed,
-            within=ARMED_WITHIN,
-            skippable=True,
-            answer=key.ARM,
-            again=2 * S,
-        )
-        return (step,)
+    # -- from the ground
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Ready, GUIDED, armed, up: within 10 s of each other, or it disarms itself."""
@@ -177,12 +98,12 @@ class ArduPilot:
             mode=GUIDED,
             armed=True,
         )
-        return (*start, *(self._at_speed(speed) if speed is not None else ()), target)
+        return (*start, *(self._at_speed(speed, GUIDED) if speed is not None else ()), target)
 
     def hold(self) -> Sequence[Step]:
         """A rover in HOLD; a drone in GUIDED, first without velocity, then where it has stopped."""
         if self.telemetry.kind != DRONE_KIND:
-            stand = Step(ask="stand", send=_nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
+            stand = Step(ask="stand", send=nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
             return (*self._change("HOLD"), stand)
         brake = Step(
             ask="stop",
@@ -193,26 +114,22 @@ class ArduPilot:
             mode=GUIDED,
             armed=True,
         )
-        return (*self._guided(), brake, self._now("stay", self._stay))
+        return (*self._guided(), brake, at_once("stay", self._stay))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """GUIDED, then repeated until it has lasted long enough; then it stops."""
         return (
             *self._guided(),
-            self._now("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
+            at_once("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
         )
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """In GUIDED, on the spot."""
 
-        def turned(seen: Telemetry) -> bool:
-            off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
-            return abs(off) <= TURNED_DEG
-
         turn = Step(
             ask=f"turn to {degrees:g} degrees",
             send=lambda: self._commands.turn(degrees),
-            done=turned,
+            done=heads(degrees),
             within=TURNED_WITHIN,
             answer=key.HEADING,
             again=2 * S,
@@ -231,14 +148,14 @@ class ArduPilot:
 
         come = Step(
             ask="return home",
-            send=_nothing,
+            send=nothing,
             done=lambda seen: home(seen) and standing(seen),
             within=within,
             mode="RTL",
             leads_to=("HOLD",),
             armed=True,
         )
-        return (*self._change("RTL"), self._now("let go of the sticks", self._setpoints.release), come)
+        return (*self._change("RTL"), at_once("let go of the sticks", self._setpoints.release), come)
 
     def land(self, within: Ns) -> Sequence[Step]:
         """LAND, until it has disarmed itself."""
@@ -283,19 +200,8 @@ class ArduPilot:
 
     # -- missions
 
-    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """By MAVLink's mission protocol."""
-        items = items_of(mission)
-        step = Step(
-            ask=f"take a mission of {len(items)} items",
-            send=lambda: self._commands.upload(items),
-            done=lambda seen: key.MISSION in seen.answers and seen.answers[key.MISSION].accepted,
-            within=30 * S + len(items) * S,
-            answer=key.MISSION,
-            again=2 * S,
-        )
-        self._last_item = len(items) - 1 if isinstance(mission[-1], Waypoint) else None
-        return (step,)
+    def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
+        return items_of(mission)
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
         """Ready, GUIDED, armed, AUTO, start; to its end: disarmed, at the last point, or said to be over."""
@@ -309,78 +215,32 @@ class ArduPilot:
             mode="AUTO",
             armed=True,
         )
-        go_on = Step(
-            ask="finish the mission",
-            send=self._commands.watch_mission,
-            done=self._mission_over,
-            within=within,
-            mode="AUTO",
-            leads_to=("HOLD", "RTL"),
-        )
-        prepare = self._now("prepare the mission", self._forget_progress)
+        go_on = self._finish_mission("AUTO", ("HOLD", "RTL"), within)
+        prepare = at_once("prepare the mission", self._forget_progress)
         armed = (*self.ready(READY_WITHIN), *self._guided(), *self.arm())
         return (*armed, prepare, *self._change("AUTO"), begin, go_on)
 
-    def _forget_progress(self) -> None:
-        self.telemetry.mission_reached = -1
-        self.telemetry.mission_ended = False
-
-    def _mission_over(self, seen: Telemetry) -> bool:
-        last = self._last_item
-        return not seen.armed or seen.mission_ended or (last is not None and seen.mission_reached >= last)
-
     # -- pieces of sequences
 
-    def _now(self, ask: str, action: Callable[[], None]) -> Step:
-        """Something that is done as soon as it is sent."""
-        return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN)
+    def _asks_for(self, mode: str) -> None:
+        self._setpoints.asked_mode = mode
 
     def _change(self, mode: str) -> Sequence[Step]:
-        def send() -> None:
-            self._setpoints.asked_mode = mode
-            self._commands.set_mode(mode)
-
         self._setpoints.unfollow()
-        step = Step(
-            ask=f"change to {mode}",
-            send=send,
-            done=lambda seen: seen.mode == mode,
-            within=ANSWERED_WITHIN,
-            skippable=True,
-            answer=key.MODE,
-            again=S,
-            enters=mode,
-        )
-        return (step,)
+        return super()._change(mode)
 
     def _guided(self) -> Sequence[Step]:
         """GUIDED first; only then are the sticks let go."""
-        return (*self._change(GUIDED), self._now("let go of the sticks", self._setpoints.release))
-
-    def _at_speed(self, speed: float) -> Sequence[Step]:
-        step = Step(
-            ask=f"go at {speed:g} m/s",
-            send=lambda: self._commands.speed(speed),
-            done=lambda seen: key.SPEED in seen.answers and seen.answers[key.SPEED].accepted,
-            within=ANSWERED_WITHIN,
-            answer=key.SPEED,
-            again=S,
-            mode=GUIDED,
-        )
-        return (step,)
+        return (*self._change(GUIDED), at_once("let go of the sticks", self._setpoints.release))
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        down = Step(ask=ask, send=_nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
-        return (*self._change(mode), self._now("let go of the sticks", self._setpoints.release), down)
+        down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
+        return (*self._change(mode), at_once("let go of the sticks", self._setpoints.release), down)
 
     def _stay(self) -> None:
         here = self.telemetry.position
         if here is not None and isfinite(self.telemetry.above_home):
             above = AboveHome(self.telemetry.above_home)
             self._commands.target(Position(here.latitude, here.longitude, above))
-
-
-def _nothing() -> None:
-    """Some steps only wait."""

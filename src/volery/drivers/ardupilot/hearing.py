@@ -1,142 +1,22 @@
-"""What an ArduPilot's messages say, as ``Telemetry``. One method for each message that is listened to."""
+"""What an ArduPilot's messages say beyond those of every MAVLink autopilot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from math import degrees, nan
-from typing import Any
-
-from volery.base.position import AMSL, Position
-from volery.drivers.ardupilot.modes import DRONE_KIND, KINDS, mode_name
-from volery.drivers.ardupilot.texts import Texts
-from volery.drivers.ardupilot.vocabulary import ACTIVE, ARMED, FAILSAFE, ON_GROUND, UNDEFINED
+from volery.drivers.ardupilot.modes import mode_name
+from volery.drivers.mavlink import hearing
 from volery.kernel.api import Kernel
-from volery.links.mavlink import constant, entry_name
-from volery.trace.events import Text
-from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
-
-Fields = Mapping[str, Any]
-
-_PREARM = constant("MAV_SYS_STATUS_PREARM_CHECK")
-_POSITION = constant("EKF_POS_HORIZ_ABS")
-_NO_POSITION = constant("EKF_CONST_POS_MODE")
-_COMPLETE = constant("MISSION_STATE_COMPLETE")
-_UNKNOWN_16 = 65535
-_UNKNOWN = -1
+from volery.vehicles.telemetry import Telemetry
 
 
-class Hearing:
-    """Turns messages into telemetry. ``hear`` one; it says whether it was of interest.
+class Hearing(hearing.Hearing):
+    """ArduPilot's mode names; its estimator speaks in EKF_STATUS_REPORT."""
 
-    *record*: the autopilot's texts go into the trace, too.
-    """
+    autopilot = "ArduPilot"
+    resting = "HOLD"
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
-        self._kernel = kernel
-        self._seen = telemetry
-        self._records = record
-        self._texts = Texts(self._say)
-        self._landed_state = UNDEFINED
-        self._estimates_position = False
-        self._handlers: Mapping[str, Callable[[Fields], None]] = {
-            "HEARTBEAT": self._heartbeat,
-            "GLOBAL_POSITION_INT": self._global_position,
-            "SYS_STATUS": self._sys_status,
-            "EKF_STATUS_REPORT": self._ekf_status,
-            "EXTENDED_SYS_STATE": self._extended_state,
-            "HOME_POSITION": self._home_position,
-            "GPS_RAW_INT": self._gps,
-            "ATTITUDE": self._attitude,
-            "STATUSTEXT": self._texts.hear,
-            "MISSION_ITEM_REACHED": self._reached,
-            "MISSION_CURRENT": self._mission_current,
-        }
+        super().__init__(kernel, telemetry, record=record)
+        self._handlers["EKF_STATUS_REPORT"] = self._estimator
 
-    def hear(self, name: str, fields: Fields) -> bool:
-        """Take note of a message of our autopilot."""
-        self._seen.heard = self._kernel.now()
-        handler = self._handlers.get(name)
-        if handler is None:
-            return False
-        handler(fields)
-        return True
-
-    def _heartbeat(self, fields: Fields) -> None:
-        seen = self._seen
-        kind: int = fields["type"]
-        seen.kind = KINDS.get(kind) or entry_name("MAV_TYPE", kind).lower().replace("_", " ")
-        seen.autopilot = "ArduPilot"
-        seen.mode = mode_name(seen.kind, fields["custom_mode"])
-        seen.armed = bool(fields["base_mode"] & ARMED)
-        status: int = fields["system_status"]
-        seen.status = entry_name("MAV_STATE", status).lower()
-        seen.failsafe = status in FAILSAFE
-        self._judge_flying(status)
-
-    def _judge_flying(self, status: int) -> None:
-        """The landed state says it, where it is sent; a rover rests in HOLD, else is off once armed."""
-        seen = self._seen
-        if seen.kind != DRONE_KIND:
-            seen.flying = seen.armed and seen.mode != "HOLD"
-        elif self._landed_state == UNDEFINED:
-            seen.flying = seen.armed and status == ACTIVE
-
-    def _extended_state(self, fields: Fields) -> None:
-        self._landed_state = fields["landed_state"]
-        if self._landed_state != UNDEFINED and self._seen.kind == DRONE_KIND:
-            self._seen.flying = self._landed_state != ON_GROUND
-
-    def _global_position(self, fields: Fields) -> None:
-        """Before there is an estimate, ArduPilot sends zeros."""
-        latitude, longitude = fields["lat"], fields["lon"]
-        if latitude == 0 and longitude == 0:
-            return
-        seen = self._seen
-        seen.position = Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0))
-        seen.above_home = fields["relative_alt"] / 1000.0
-        seen.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
-        heading: int = fields["hdg"]
-        if heading != _UNKNOWN_16:
-            seen.attitude = seen.attitude._replace(heading=heading / 100.0)
-
-    def _sys_status(self, fields: Fields) -> None:
-        seen = self._seen
-        seen.armable = bool(fields["onboard_control_sensors_health"] & _PREARM)
-        volts, amperes = fields["voltage_battery"], fields["current_battery"]
-        remaining: int = fields["battery_remaining"]
-        seen.battery = Battery(
-            nan if remaining == _UNKNOWN else remaining / 100.0,
-            nan if volts == _UNKNOWN_16 else volts / 1000.0,
-            nan if amperes == _UNKNOWN else amperes / 100.0,
-        )
-        seen.ready = seen.armable and self._estimates_position
-
-    def _ekf_status(self, fields: Fields) -> None:
-        flags: int = fields["flags"]
-        self._estimates_position = bool(flags & _POSITION) and not flags & _NO_POSITION
-        self._seen.ready = self._seen.armable and self._estimates_position
-
-    def _home_position(self, fields: Fields) -> None:
-        altitude = AMSL(fields["altitude"] / 1000.0)
-        self._seen.home = Position(fields["latitude"] / 1e7, fields["longitude"] / 1e7, altitude)
-
-    def _gps(self, fields: Fields) -> None:
-        self._seen.fix = entry_name("GPS_FIX_TYPE", fields["fix_type"]).lower()
-        self._seen.satellites = fields["satellites_visible"]
-
-    def _attitude(self, fields: Fields) -> None:
-        heading = degrees(fields["yaw"]) % 360.0
-        self._seen.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
-
-    def _reached(self, fields: Fields) -> None:
-        self._seen.mission_reached = fields["seq"]
-
-    def _mission_current(self, fields: Fields) -> None:
-        self._seen.mission_item = fields["seq"]
-        self._seen.mission_ended = fields["mission_state"] == _COMPLETE
-
-    def _say(self, severity: int, text: str) -> None:
-        now = self._kernel.now()
-        self._seen.texts.append(Said(now, severity, text))
-        if self._records:
-            self._kernel.record(Text(now, self._seen.name, severity, text))
+    def _mode_name(self, number: int) -> str:
+        return mode_name(self._seen.kind, number)

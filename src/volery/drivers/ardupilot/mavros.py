@@ -20,11 +20,11 @@ from volery.base.frames import ned_to_enu
 from volery.base.geoid import Geoid
 from volery.base.position import Position
 from volery.base.time import MS, Ns, S
-from volery.drivers.ardupilot import commands as key
-from volery.drivers.ardupilot.commands import Item
-from volery.drivers.ardupilot.items import INT_FRAMES, frame_of
 from volery.drivers.ardupilot.mavros_hearing import MavrosHearing
-from volery.drivers.ardupilot.vocabulary import (
+from volery.drivers.mavlink import commands as key
+from volery.drivers.mavlink.commands import Item
+from volery.drivers.mavlink.items import INT_FRAMES, frame_of
+from volery.drivers.mavlink.vocabulary import (
     FORCE,
     GROUND_SPEED,
     LEFT_ALONE,
@@ -94,6 +94,11 @@ class MavrosCommands:
     def _go_round(self) -> None:
         self.look()
         self._rate.sleep()
+
+    @property
+    def parameters(self) -> Mapping[str, float] | None:
+        """Not read over a graph."""
+        return None
 
     def look(self) -> None:
         """One ``spinOnce``: it is paid once, and runs the callbacks of all that has arrived."""

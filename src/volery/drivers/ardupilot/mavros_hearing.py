@@ -9,7 +9,7 @@ from typing import Any
 from volery.base.frames import enu_to_ned
 from volery.base.geoid import Geoid
 from volery.base.position import AMSL, Position
-from volery.drivers.ardupilot.vocabulary import ACTIVE, FAILSAFE, ON_GROUND, UNDEFINED
+from volery.drivers.mavlink.vocabulary import ACTIVE, FAILSAFE, ON_GROUND, UNDEFINED
 from volery.kernel.api import Kernel
 from volery.links.mavlink import entry_name
 from volery.vehicles.telemetry import Battery, Said, Telemetry, Velocity

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from volery.drivers.arrival import DRONE_KIND, ROVER_KIND
+
 GUIDED = "GUIDED"
 
 COPTER: Mapping[int, str] = {
@@ -51,22 +53,6 @@ ROVER: Mapping[int, str] = {
     15: GUIDED,
     16: "INITIALISING",
 }
-
-DRONE_KIND, ROVER_KIND = "drone", "rover"
-
-KINDS: Mapping[int, str] = {
-    2: DRONE_KIND,  # quadrotor
-    3: DRONE_KIND,  # coaxial helicopter
-    4: DRONE_KIND,  # helicopter
-    13: DRONE_KIND,  # hexarotor
-    14: DRONE_KIND,  # octorotor
-    15: DRONE_KIND,  # tricopter
-    29: DRONE_KIND,  # dodecarotor
-    35: DRONE_KIND,  # decarotor
-    10: ROVER_KIND,
-    11: ROVER_KIND,  # boat: the same firmware
-}
-"""What a MAV_TYPE is, for ours that can be commanded."""
 
 MODES: Mapping[str, Mapping[int, str]] = {DRONE_KIND: COPTER, ROVER_KIND: ROVER}
 NUMBERS: Mapping[str, Mapping[str, int]] = {

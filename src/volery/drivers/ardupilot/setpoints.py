@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from volery.base.time import MS, Ns
 from volery.drivers.ardupilot.commands import RELEASED, Commands
-from volery.drivers.ardupilot.modes import DRONE_KIND, GUIDED
+from volery.drivers.ardupilot.modes import GUIDED
+from volery.drivers.arrival import DRONE_KIND
 from volery.kernel.api import Handle, Kernel
 from volery.vehicles.driver import Sticks
 from volery.vehicles.telemetry import Velocity

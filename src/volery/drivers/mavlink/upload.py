@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from volery.base.time import Ns, S
-from volery.drivers.ardupilot.commands import Item
+from volery.drivers.mavlink.commands import Item
 
 STALLED: Ns = 5 * S
 MISSION = 0

@@ -1,4 +1,4 @@
-"""MAVLink's numbers that both carriers use."""
+"""MAVLink's numbers that drivers use."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from volery.links.mavlink import constant
 
 POSITION_ONLY = 0x0DF8
 VELOCITY_AND_YAW_RATE = 0x05C7
+VELOCITY_AND_YAW = 0x09C7
 """Type masks of SET_POSITION_TARGET_*: a bit that is set means ignore that field."""
 
 FORCE = 21196.0
@@ -13,6 +14,8 @@ FORCE = 21196.0
 
 GROUND_SPEED = 1.0
 UNCHANGED = -1.0
+OWN_SPEED = -1.0
+"""In DO_CHANGE_SPEED: back to the autopilot's own."""
 SHORTEST_WAY = 0.0
 
 LEFT_ALONE = 65535

@@ -7,14 +7,16 @@ from math import hypot, inf, isnan
 
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
-from volery.drivers.ardupilot.modes import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry
+
+DRONE_KIND, ROVER_KIND = "drone", "rover"
+"""What ``Telemetry.kind`` says."""
 
 NEAR_M, NEAR_UP_M = 0.6, 0.3
 """A drone, horizontally and vertically."""
 STANDING_M_S = 0.5
 ROVER_NEAR_M = 2.5
-"""ArduRover stops within WP_RADIUS, 2 m, of a goal."""
+"""Rovers stop within their waypoint radius of a goal: 2 m in ArduRover (WP_RADIUS) and PX4 (NAV_ACC_RAD)."""
 ROVER_STANDING_M_S = 0.3
 
 
