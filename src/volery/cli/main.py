@@ -167,6 +167,46 @@ def vehicle(
     run_command(output, lambda: command.vehicle(output, wanted))
 
 
+@app.command()
+def conformance(
+    url: Annotated[
+        str, typer.Argument(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...")
+    ] = "sim:ardupilot",
+    only: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Only these checks, or groups of checks.")
+    ] = None,
+    only_list: Annotated[bool, typer.Option("--list", help="List the checks and what each demands.")] = False,
+    kind: Annotated[str, typer.Option(help="drone or rover.")] = "drone",
+    allow_flight: Annotated[
+        bool,
+        typer.Option("--fly", help="Let a real vehicle arm and fly: 60 m around home and 30 m up are free."),
+    ] = False,
+    second: Annotated[
+        str,
+        typer.Option(metavar="URL", help="A second link to the same real vehicle, to play another station."),
+    ] = "",
+    seed: Seed = 1,
+    out: Annotated[Path | None, typer.Option(help="A folder for conformance.json.")] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Check a driver and its autopilot: readiness, operations, refusals, others, the wire.
+
+    A simulated vehicle is a new one for every check and flies in virtual time. A real one goes through the
+    checks in order, in real time; those that arm or fly it are left out without --fly. Exit status: 0 if no
+    check failed, 2 for bad input, 1 otherwise.
+    """
+    from volery.cli import conformance as command
+
+    output = Output(quiet, as_json, debug)
+    names = tuple(name.strip() for name in (only or "").split(",") if name.strip())
+    if only_list:
+        run_command(output, lambda: command.show_checks(output, names, kind))
+    wanted = command.Wanted(url, names, kind, allow_flight, second, seed, out)
+    run_command(output, lambda: command.check(output, wanted))
+
+
 @model_app.command("check")
 def model_check(
     model: Model,

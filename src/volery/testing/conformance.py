@@ -14,6 +14,7 @@ Whoever writes a driver of his own runs the same checks over it: register it wit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
@@ -140,10 +141,15 @@ def _real(wanted: list[Check], stage: RealStage, fly: bool, told: Show) -> list[
     try:
         with stage.kernel.adopt("conformance"):
             stage.drone.wait_heard()
-            for one in wanted:
-                told(one, None)
-                results.append(_on_real(one, stage, fly))
-                told(one, results[-1])
+            try:
+                for one in wanted:
+                    told(one, None)
+                    results.append(_on_real(one, stage, fly))
+                    told(one, results[-1])
+            except KeyboardInterrupt:
+                with suppress(VoleryError):
+                    stage.rest()
+                raise
     finally:
         stage.close()
     return results
