@@ -19,24 +19,35 @@ from volery.links.parser import MAVLINK
 BURST_LENGTH = 40
 """Bytes that a burst of noise overwrites, from where it begins."""
 
+OVERTAKEN: Ns = 60 * MS
+"""How much later a frame arrives that is overtaken by others: longer than between two of a fast stream."""
+
+PROBABILITIES = ("burst", "drop", "duplicate", "flip", "reorder", "truncate")
+
 
 @dataclass(frozen=True)
 class WireFaults:
     """What happens to bytes on their way. Probabilities are 0..1.
 
     ``drop``: that a frame vanishes. ``flip``: that a bit of a byte is turned, for each byte. ``burst``: that
-    noise begins with a frame and overwrites ``BURST_LENGTH`` bytes. ``jitter``: up to so much later, in
-    order. ``cuts``: from, to; in between nothing passes in either direction.
+    noise begins with a frame and overwrites ``BURST_LENGTH`` bytes. ``truncate``: that a frame ends too
+    early. ``duplicate``: that a frame arrives twice. ``reorder``: that a frame is overtaken by those sent in
+    the next 60 ms. ``jitter``: up to so much later, in order. ``cuts``: from, to; in between nothing passes
+    in either direction.
     """
 
     drop: float = 0.0
     flip: float = 0.0
     burst: float = 0.0
+    truncate: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
     jitter: Ns = 0
     cuts: tuple[tuple[Ns, Ns], ...] = ()
 
     def __post_init__(self) -> None:
-        for name, value in (("drop", self.drop), ("flip", self.flip), ("burst", self.burst)):
+        for name in PROBABILITIES:
+            value = getattr(self, name)
             if not 0.0 <= value <= 1.0:
                 raise UsageError(f"wire faults: {name}={value} is no probability; 0 to 1")
 
@@ -45,13 +56,14 @@ class WireFaults:
         return any(start <= now < end for start, end in self.cuts)
 
 
-FAULT_OPTIONS = ("burst", "cut", "drop", "flip", "jitter")
+FAULT_OPTIONS = (*PROBABILITIES, "cut", "jitter")
 
 
 def faults_of(options: Mapping[str, str]) -> WireFaults:
     """Faults as an address states them: ``drop=0.01&flip=1e-5&burst=0.001&jitter=0.05&cut=20-25,60-70``.
 
-    ``jitter`` and ``cut`` (from-to) in seconds. Raises ``UsageError`` for anything else.
+    Also ``truncate``, ``duplicate`` and ``reorder``. ``jitter`` and ``cut`` (from-to) in seconds. Raises
+    ``UsageError`` for anything else.
     """
     numbers: dict[str, float] = {}
     cuts: tuple[tuple[Ns, Ns], ...] = ()
@@ -93,7 +105,11 @@ class Wire(CodedLink):
         self._faults = faults
         self._random = random
         self._noise = 0  # bytes that the burst under way will still overwrite
-        self._latest: Ns = 0  # nothing overtakes
+        self._latest: Ns = 0  # nothing overtakes, unless faults say so
+
+    def suffer(self, faults: WireFaults) -> None:
+        """From now on this happens to what passes, in both directions."""
+        self._faults = self.peer._faults = faults
 
     def _transmit(self, data: bytes) -> None:
         now = self._kernel.now()
@@ -104,11 +120,24 @@ class Wire(CodedLink):
             self._noise = BURST_LENGTH
         if faults.flip or self._noise:
             data = self._garbled(data)
+        if faults.truncate and random.random() < faults.truncate:
+            data = data[: random.randrange(len(data))]
         if faults.cut_at(now):
             return
+        for late in self._delays():
+            self._kernel.call_at(late, lambda: self.peer.arrived(data))
+
+    def _delays(self) -> list[Ns]:
+        """When what is sent now arrives: twice, it may be."""
+        faults, random = self._faults, self._random
         late = int(random.random() * faults.jitter) if faults.jitter else 0
-        self._latest = max(self._latest, now + self._delay + late)
-        self._kernel.call_at(self._latest, lambda: self.peer.arrived(data))
+        self._latest = max(self._latest, self._kernel.now() + self._delay + late)
+        arrives = self._latest
+        if faults.reorder and random.random() < faults.reorder:
+            arrives += OVERTAKEN
+        if faults.duplicate and random.random() < faults.duplicate:
+            return [arrives, arrives + self._delay]
+        return [arrives]
 
     def _garbled(self, data: bytes) -> bytes:
         garbled = bytearray(data)

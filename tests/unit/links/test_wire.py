@@ -64,11 +64,46 @@ def test_nothing_passes_while_the_wire_is_cut() -> None:
     assert [number for _, number in seen] == [*range(100), *range(200, COUNT)]
 
 
+def test_some_arrive_twice() -> None:
+    seen, _ = arrivals(WireFaults(duplicate=0.25))
+    numbers = [number for _, number in seen]
+    assert set(numbers) == set(range(COUNT))
+    assert 1.15 * COUNT < len(numbers) < 1.35 * COUNT
+
+
+def test_some_are_overtaken_and_none_is_lost() -> None:
+    seen, _ = arrivals(WireFaults(reorder=0.1))
+    numbers = [number for _, number in seen]
+    assert sorted(numbers) == list(range(COUNT))
+    behind = sum(later < earlier for earlier, later in pairwise(numbers))
+    assert 0.05 * COUNT < behind < 0.15 * COUNT
+
+
+def test_a_frame_that_ends_too_early_spoils_itself_and_at_most_its_neighbour() -> None:
+    seen, _ = arrivals(WireFaults(truncate=0.1))
+    assert 0.75 * COUNT < len(seen) < 0.95 * COUNT
+    assert [number for _, number in seen] == sorted(number for _, number in seen)
+
+
+def test_faults_that_begin_and_end_while_it_is_in_use() -> None:
+    kernel = VirtualKernel()
+    ours, theirs = wire(kernel, "radio", WireFaults(), stream(1, "radio"))
+    seen: list[int] = []
+    ours.receive(lambda frame: seen.append(frame.fields["seq"]))
+    for number, faults in enumerate((WireFaults(), WireFaults(drop=1.0), WireFaults())):
+        ours.suffer(faults)
+        theirs.send(Frame("MISSION_CURRENT", {"seq": number}, 1, 1))
+        kernel.run(kernel.now() + S)
+    assert seen == [0, 2]
+
+
 def test_faults_as_an_address_states_them() -> None:
     stated = {"drop": "0.01", "flip": "1e-5", "burst": "0.001", "jitter": "0.05", "cut": "20-25,60-70"}
     assert faults_of(stated) == WireFaults(
         drop=0.01, flip=1e-5, burst=0.001, jitter=50 * MS, cuts=((20 * S, 25 * S), (60 * S, 70 * S))
     )
+    stated = {"duplicate": "0.1", "reorder": "0.2", "truncate": "0.3"}
+    assert faults_of(stated) == WireFaults(duplicate=0.1, reorder=0.2, truncate=0.3)
 
 
 @pytest.mark.parametrize(
