@@ -5,7 +5,7 @@ are asked of two functions that are given from above.
 """
 
 from volery.graph.embedded import EmbeddedNode
-from volery.graph.graph import Graph, ServiceState, TopicState
+from volery.graph.graph import Graph
 from volery.graph.node import (
     AS_OFFERED,
     BEST_AVAILABLE,
@@ -27,9 +27,13 @@ from volery.graph.node import (
     Publisher,
     QoS,
     Rate,
+    RosGraph,
     Service,
+    ServiceState,
     Subscription,
     Timer,
+    TopicState,
+    Work,
 )
 from volery.graph.services import ServiceError
 
@@ -56,10 +60,12 @@ __all__ = [
     "Publisher",
     "QoS",
     "Rate",
+    "RosGraph",
     "Service",
     "ServiceError",
     "ServiceState",
     "Subscription",
     "Timer",
     "TopicState",
+    "Work",
 ]

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.graph import names
 from volery.graph.clock import CLOCK
 from volery.graph.context import Context, Member
-from volery.graph.group import CallbackGroup, Work
+from volery.graph.local import LocalNode
 from volery.graph.node import AS_OFFERED, DEFAULT, Callback, Group, Handler, Node, QoS
 from volery.graph.services import EmbeddedClient, EmbeddedService
-from volery.graph.timing import NodeRate, NodeTimer, sleep
 from volery.graph.topics import EmbeddedPublisher, EmbeddedSubscription, topic
 from volery.kernel.task import Place
 
@@ -24,65 +22,20 @@ if TYPE_CHECKING:
         return node
 
 
-class _Closes(Protocol):
-    def close(self) -> None: ...
-
-
-Made = TypeVar("Made", bound=_Closes)
-
-
-class EmbeddedNode:
+class EmbeddedNode(LocalNode):
     """See ``volery.graph.node.Node``. Made by ``Graph.node``."""
 
     def __init__(
         self, context: Context, name: str, namespace: str, remaps: Mapping[str, str], place: Place
     ) -> None:
-        self.name = names.node_name(name, namespace)
-        self.namespace = namespace
-        self._context = context
-        self._member = Member(context, self.name, place)
-        self._remaps = names.remapping(remaps, namespace, self.name)
-        self._groups: list[CallbackGroup] = []
-        self._own = self._new_group("callbacks")
-        self._made: list[_Closes] = []
-        self.on_close: Callable[[], None] | None = None
-
-    @property
-    def place(self) -> Place:
-        """Where its computing is spent."""
-        return self._member.place
-
-    @property
-    def closed(self) -> bool:
-        """Whether it has left the graph."""
-        return self._member.closed
+        full = names.node_name(name, namespace)
+        super().__init__(context, name, namespace, remaps, Member(context, full, place))
 
     def join(self) -> None:
         """Pay for it."""
         self._member.pay("init")
         self._member.pay("node_handle")
         self._context.changed.notify()
-
-    def resolve(self, name: str) -> str:
-        """The absolute name, remappings applied."""
-        absolute = names.absolute(name, self.namespace, self.name)
-        return self._remaps.get(absolute, absolute)
-
-    def _new_group(self, label: str, start: Callable[[Work], None] | None = None) -> CallbackGroup:
-        made = CallbackGroup(self._member, label, start)
-        self._groups.append(made)
-        return made
-
-    def group(self, start: Callable[[Work], None] | None = None) -> CallbackGroup:
-        """A new group. With *start* its work waits for no spin: *start* is given it, as house code."""
-        return self._new_group(f"callbacks of group {len(self._groups)}", start)
-
-    def _group_of(self, group: Group | None) -> CallbackGroup:
-        if group is None:
-            return self._own
-        if not isinstance(group, CallbackGroup) or group not in self._groups:
-            raise UsageError(f"node {self.name}: this group is of another node; make one with group()")
-        return group
 
     def advertise(self, topic_name: str, message_type: str, qos: QoS = DEFAULT) -> EmbeddedPublisher:
         """Publish to a topic."""
@@ -120,11 +73,6 @@ class EmbeddedNode:
             into = self._group_of(group)
             return self._keep(EmbeddedService(self._member, self.resolve(name), service_type, handler, into))
 
-    def _keep(self, made: Made) -> Made:
-        self._made.append(made)
-        self._context.changed.notify()
-        return made
-
     def client(self, name: str, service_type: str) -> EmbeddedClient:
         """Call a service."""
         with self._context.kernel:
@@ -136,33 +84,6 @@ class EmbeddedNode:
         """Block until somebody serves *name*; False if *within* has passed first."""
         full = self.resolve(name)
         return self._context.changed.wait_for(lambda: full in self._context.services, within)
-
-    def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> NodeTimer:
-        """Call back each *period*."""
-        with self._context.kernel:
-            self._member.check_open()
-            return NodeTimer(self._member, period, callback, self._group_of(group))
-
-    def rate(self, period: Ns) -> NodeRate:
-        """Keep the loop of the current task at *period*."""
-        return NodeRate(self._member, period)
-
-    def sleep(self, duration: Ns) -> None:
-        """Block the current task for *duration*."""
-        sleep(self._member, duration)
-
-    def now(self) -> Ns:
-        """ROS time."""
-        with self._context.kernel:
-            return self._context.stamp()
-
-    def spin_once(self, within: Ns | None = None) -> bool:
-        """``spin_once`` of the node's own group."""
-        return self._own.spin_once(within)
-
-    def spin(self) -> None:
-        """``spin`` of the node's own group."""
-        self._own.spin()
 
     def get_parameter(self, name: str, default: Any = ...) -> Any:
         """A parameter's value."""
@@ -186,17 +107,3 @@ class EmbeddedNode:
         """Remove a parameter."""
         with self._context.kernel:
             self._context.parameters.delete(self.resolve(name))
-
-    def close(self) -> None:
-        """Leave the graph."""
-        with self._context.kernel.guard:
-            if self._member.closed:
-                return
-            self._member.closed = True
-            for made in self._made:
-                made.close()
-            for group in self._groups:
-                group.wake()
-            if self.on_close is not None:
-                self.on_close()
-            self._context.changed.notify()

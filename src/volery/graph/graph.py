@@ -7,35 +7,24 @@ knows neither laws nor networks.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.graph.clock import Clock
 from volery.graph.context import Context, Records
 from volery.graph.embedded import EmbeddedNode
-from volery.graph.node import Carry, Price
+from volery.graph.node import Carry, Price, RosGraph, ServiceState, TopicState
 from volery.graph.parameters import Parameters
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
 
+if TYPE_CHECKING:
 
-class TopicState(NamedTuple):
-    """A topic as it is: who publishes and who subscribes, by the nodes' names."""
-
-    name: str
-    type: str
-    publishers: tuple[str, ...]
-    subscribers: tuple[str, ...]
-
-
-class ServiceState(NamedTuple):
-    """A service as it is: its type, and who serves it by the node's name."""
-
-    name: str
-    type: str
-    server: str
+    def _is_a(graph: Graph) -> RosGraph:
+        """Checked by the type checker: it has all that a graph has."""
+        return graph
 
 
 def everything(topic_name: str) -> bool:
@@ -130,3 +119,8 @@ class Graph:
         """The services that somebody serves, by name."""
         served = sorted(self._context.services.items())
         return [ServiceState(name, one.type, one.member.name) for name, one in served]
+
+    def close(self) -> None:
+        """All nodes leave the graph."""
+        for node in list(self._nodes.values()):
+            node.close()

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
 
 from volery.base.time import Ns
 from volery.graph.context import Member
+from volery.graph.node import Work
 from volery.kernel.waiting import Signal, current_task, end_activation
 
+__all__ = ["FIRST", "NEXT", "CallbackGroup", "Work"]
+
 FIRST, NEXT = 1.0, 0.0
-
-
-class Work(NamedTuple):
-    """A callback that is ready: since when, and what runs it (as user code)."""
-
-    arrived: Ns
-    run: Callable[[], None]
 
 
 class CallbackGroup:
@@ -26,6 +21,9 @@ class CallbackGroup:
     A wait in ``spin_once`` ends the caller's activation; the callback that ends the wait is a new one,
     released when its message (request, timer) arrived. Polling (``within=0``) belongs to the activation that
     is under way. With *start* nothing waits: it is given the work at once, as house code.
+
+    An executor that waits for several groups at once sets ``on_ready``, which is called (as house code)
+    whenever something has become ready, and ``take``s it.
     """
 
     def __init__(self, member: Member, label: str, start: Callable[[Work], None] | None = None) -> None:
@@ -34,6 +32,7 @@ class CallbackGroup:
         self._ready: deque[Work] = deque()
         self._filled = Signal(member.context.kernel, f"{member.name} ({label})")
         self._spun = False
+        self.on_ready: Callable[[], None] | None = None
 
     def __len__(self) -> int:
         return len(self._ready)
@@ -45,6 +44,19 @@ class CallbackGroup:
             return
         self._ready.append(work)
         self._filled.notify()
+        if self.on_ready is not None:
+            self.on_ready()
+
+    @property
+    def oldest(self) -> Ns | None:
+        """Since when the next one has been ready; ``None`` if none is."""
+        return self._ready[0].arrived if self._ready else None
+
+    def take(self) -> Work:
+        """The next one; who takes it pays for a ``spin_once`` and runs it. ``IndexError`` if there is none."""
+        work = self._ready.popleft()
+        self._pay()
+        return work
 
     def wake(self) -> None:
         """Let those who wait look again: the node has been closed."""

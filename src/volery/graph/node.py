@@ -8,12 +8,14 @@ longer, unless it is said.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from volery.base.errors import UsageError, choices
 from volery.base.time import Ns
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place
 
 RELIABLE, BEST_EFFORT, BEST_AVAILABLE = "reliable", "best_effort", "best_available"
 VOLATILE, TRANSIENT_LOCAL = "volatile", "transient_local"
@@ -159,6 +161,13 @@ class Rate(Protocol):
         """
 
 
+class Work(NamedTuple):
+    """A callback that is ready: since when, and what runs it (as user code)."""
+
+    arrived: Ns
+    run: Callable[[], None]
+
+
 class Group(Protocol):
     """A queue of callbacks that are ready; who spins it runs them, one after the other."""
 
@@ -178,11 +187,22 @@ class Node(Protocol):
     name: str
     namespace: str
 
+    @property
+    def place(self) -> Place:
+        """Where its computing is spent."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has left the graph."""
+
     def resolve(self, name: str) -> str:
         """The absolute name, remappings applied. ``UsageError`` if it is no valid ROS name."""
 
-    def group(self) -> Group:
-        """A new group, for callbacks that are to run beside those of the node's own group."""
+    def group(self, start: Callable[[Work], None] | None = None) -> Group:
+        """A new group, for callbacks that are to run beside those of the node's own group.
+
+        With *start* its work waits for no spin: *start* is given it, as house code.
+        """
 
     def advertise(self, topic: str, message_type: str, qos: QoS = DEFAULT) -> Publisher:
         """Publish to a topic."""
@@ -202,6 +222,9 @@ class Node(Protocol):
 
     def client(self, name: str, service_type: str) -> Client:
         """Call a service; it need not be there yet."""
+
+    def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
+        """Block until somebody serves *name*; False if *within* has passed first."""
 
     def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> Timer:
         """Call back each *period*, for the first time after one."""
@@ -238,3 +261,57 @@ class Node(Protocol):
 
     def close(self) -> None:
         """Leave the graph: everything this node has made is gone, who spins it returns."""
+
+
+class TopicState(NamedTuple):
+    """A topic as it is: who publishes and who subscribes, by the nodes' names."""
+
+    name: str
+    type: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+
+
+class ServiceState(NamedTuple):
+    """A service as it is: its type, and who serves it by the node's name."""
+
+    name: str
+    type: str
+    server: str
+
+
+class RosGraph(Protocol):
+    """A ROS graph as one process sees it: embedded, or a real one behind a transport."""
+
+    kernel: Kernel
+
+    @property
+    def epoch(self) -> Ns:
+        """What ROS time is at the kernel's zero."""
+
+    def node(
+        self,
+        name: str,
+        namespace: str = "/",
+        *,
+        remaps: Mapping[str, str] | None = None,
+        anonymous: bool = False,
+        place: Place | None = None,
+    ) -> Node:
+        """Join the graph as *name*. *anonymous* adds something to the name that makes it unique.
+
+        *place* is where the node's computing is spent, that of the current task if it is not given.
+        ``UsageError`` for an invalid name or one that is taken.
+        """
+
+    def node_names(self) -> list[str]:
+        """Who is there, sorted."""
+
+    def topics(self) -> list[TopicState]:
+        """The topics that somebody publishes or subscribes to, by name."""
+
+    def services(self) -> list[ServiceState]:
+        """The services that somebody serves, by name."""
+
+    def close(self) -> None:
+        """All nodes made by it leave the graph."""
