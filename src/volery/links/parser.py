@@ -7,6 +7,7 @@ arrive.
 from __future__ import annotations
 
 from volery.links.codec import Codec, Heard
+from volery.links.evidence import Evidence
 from volery.links.link import Frame
 from volery.links.mavlink import (
     CHECKSUM,
@@ -23,8 +24,6 @@ from volery.links.mavlink import (
 )
 
 _STARTS = frozenset((STX, STX_V1))
-_PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
-_LONGEST_LINE = 120
 
 Octets = bytes | bytearray
 
@@ -88,7 +87,7 @@ class Parser:
     def __init__(self) -> None:
         self.heard = Heard()
         self._buffer = bytearray()
-        self._line = bytearray()
+        self._evidence = Evidence(self.heard)
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames completed by *data*, in order, MAVLink 1 frames among them. Never raises."""
@@ -99,7 +98,7 @@ class Parser:
         place = 0
         while place < len(buffer):
             if buffer[place] not in _STARTS:
-                self._classify(buffer[place])
+                self._evidence.note(buffer[place])
                 place += 1
                 continue
             head = _head(buffer, place)
@@ -120,8 +119,9 @@ class Parser:
             return ""
         if heard.frames_v1:
             return "MAVLink 1 only: set SERIALx_PROTOCOL=2 (ArduPilot) or MAV_PROTO_VER=2 (PX4) for this port"
-        if heard.text > 4 * heard.garbage:
-            return f"only text arrives: {self._sample()!r}"
+        text = self._evidence.only_text()
+        if text:
+            return text
         if heard.corrupt > 2 or heard.unknown > 2:
             return (
                 f"{heard.octets} bytes arrive but no whole MAVLink frame ({heard.corrupt} corrupt, "
@@ -129,16 +129,12 @@ class Parser:
             )
         return f"{heard.octets} bytes arrive but no MAVLink: another protocol, or the wrong baud rate"
 
-    def _sample(self) -> str:
-        lines = [line for line in self.heard.lines if line.strip()]
-        return lines[0] if lines else self._line.decode("ascii")
-
     def _take(self, head: _Head, frames: list[Frame]) -> int:
         """How many bytes are dealt with."""
         if not head.length or not head.whole(self._buffer):
             if head.length and head.kind is not None:
                 self.heard.corrupt += 1
-            self._classify(self._buffer[head.start])
+            self._evidence.note(self._buffer[head.start])
             return 1
         if head.kind is None:
             self.heard.unknown += 1
@@ -150,18 +146,6 @@ class Parser:
         payload = bytes(self._buffer[head.payload : head.start + head.length - head.trailer])
         frames.append(Frame(head.kind.name, head.kind.unpack(payload), head.system, head.component))
         return head.length
-
-    def _classify(self, octet: int) -> None:
-        if octet not in _PRINTABLE:
-            self.heard.garbage += 1
-            return
-        self.heard.text += 1
-        ends = octet in b"\r\n"
-        if self._line and (ends or len(self._line) >= _LONGEST_LINE):
-            self.heard.lines.append(self._line.decode("ascii"))
-            self._line.clear()
-        if not ends:
-            self._line.append(octet)
 
 
 class _Mavlink:
