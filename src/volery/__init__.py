@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from volery.run.fly import fly
     from volery.run.result import Run
     from volery.run.simulate import Options, simulate
-    from volery.vehicles import Drone, Fence, Limits, Rover, Zone
+    from volery.vehicles import Drone, Fence, Fleet, Limits, Rover, Zone
 
 _HOME_OF = {
     "AMSL": "base.position",
@@ -25,6 +25,7 @@ _HOME_OF = {
     "Drone": "vehicles",
     "Ellipsoidal": "base.position",
     "Fence": "vehicles",
+    "Fleet": "vehicles",
     "Limits": "vehicles",
     "Options": "run.simulate",
     "Position": "base.position",
@@ -49,6 +50,7 @@ __all__ = [
     "Drone",
     "Ellipsoidal",
     "Fence",
+    "Fleet",
     "Limits",
     "Options",
     "Position",

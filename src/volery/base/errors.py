@@ -8,6 +8,7 @@
 | ``CapabilityError`` | nobody: this vehicle cannot | mission upload where the autopilot has none |
 | ``LinkError`` | the wire | silent, lost, garbled |
 | ``VehicleError`` | the aircraft | refused, overridden, in failsafe, did not arrive |
+| ``FleetError`` | several of a fleet | each vehicle's own error, by its name |
 | ``EstimateError`` | a law of cost or physics | out of range, no figure for this processor |
 
 A message names the offender and, where there are any, the valid choices. The command line shows the message
@@ -16,9 +17,9 @@ alone; a traceback is for ``--debug``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 
 class VoleryError(Exception):
@@ -100,7 +101,45 @@ class NotArrived(VehicleError):
 
 
 class OutOfBounds(VehicleError):
-    """A goal or a path outside what the fence or the stated limits allow; refused before anything moved."""
+    """Outside what the fence or the stated limits allow: a goal or a path, refused before anything moved; or
+    the vehicle itself, which has strayed while it travelled.
+    """
+
+
+class LowBattery(VehicleError):
+    """The battery is below the stated reserve: nothing but the way down or home is begun any more."""
+
+
+class FleetError(ExceptionGroup[Exception], VoleryError):
+    """What went wrong with some vehicles of a fleet, by their names; the others did what was asked.
+
+    It is a group of exceptions, too: ``except* Refused`` picks from it.
+    """
+
+    failed: Mapping[str, Exception]
+
+    def __new__(cls, asked: str, failed: Mapping[str, Exception]) -> Self:
+        """*failed* has at least one error."""
+        made = super().__new__(cls, asked, list(failed.values()))
+        made.failed = dict(failed)
+        return made
+
+    def __init__(self, asked: str, failed: Mapping[str, Exception]) -> None:
+        super().__init__(asked, list(failed.values()))
+
+    def derive(self, errors: Sequence[Exception]) -> ExceptionGroup[Exception]:  # type: ignore[override]  # typeshed states a group of any exceptions
+        """The part of it that ``except*`` did not take."""
+        left = {name: error for name, error in self.failed.items() if error in errors}
+        return FleetError(self.message, left)
+
+    def __str__(self) -> str:
+        told = (f"{name}: {_said(name, error)}" for name, error in self.failed.items())
+        return f"{self.message}: {len(self.failed)} failed: " + "; ".join(told)
+
+
+def _said(name: str, error: Exception) -> str:
+    said = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
+    return said.removeprefix(f"{name}: ")
 
 
 class EstimateError(VoleryError):

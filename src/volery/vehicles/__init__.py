@@ -2,6 +2,7 @@
 
 from volery.vehicles.driver import Capability, Driver, DriverFactory, drivers
 from volery.vehicles.drone import Drone
+from volery.vehicles.fleet import Fleet
 from volery.vehicles.limits import Fence, Limits, Zone
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.rover import Rover
@@ -17,6 +18,7 @@ __all__ = [
     "DriverFactory",
     "Drone",
     "Fence",
+    "Fleet",
     "Land",
     "Limits",
     "MissionItem",

@@ -8,11 +8,12 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, from_seconds
+from volery.vehicles.commanded import NOWHERE, SAFE, STREAM, TRAVEL, TURN, Goal
 from volery.vehicles.driver import Capability, Sticks
 from volery.vehicles.limits import too_high
 from volery.vehicles.perform import RESTARTS
 from volery.vehicles.telemetry import Velocity
-from volery.vehicles.vehicle import NOWHERE, Goal, Vehicle, travel_within
+from volery.vehicles.vehicle import Vehicle, travel_within
 
 VELOCITY_LASTS_S = 3.0
 RETURN_CLIMB = 30.0
@@ -68,6 +69,7 @@ class Drone(Vehicle):
             "takeoff",
             asked,
             lambda: self._driver.takeoff(height, within),
+            manner=TRAVEL,
             goal=lambda: self._above(here, height),
             restarts=RESTARTS,
         )
@@ -75,32 +77,40 @@ class Drone(Vehicle):
     def goto(self, goal: Position, speed: float | None = None) -> None:
         """Go straight to *goal* and stop there; *speed* in m/s over ground, else the autopilot's own.
 
-        Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or the straight way.
+        Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or the straight way,
+        and on the way if it strays all the same.
         """
         self._require(Capability.GOTO)
         asked = f"go to {goal}"
-        if speed is not None:
-            self._require(Capability.SPEED)
-            if not speed > 0:
-                raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+        self._check_speed(asked, speed)
         self._not_on_ground(asked)
         self._check_altitude(goal)
         self._check_path(asked, self.position, goal)
         within = self._within(goal, speed)
         self._operate(
-            "goto", asked, lambda: self._driver.goto(goal, speed, within), goal=lambda: self._goal(goal)
+            "goto",
+            asked,
+            lambda: self._driver.goto(goal, speed, within),
+            manner=TRAVEL,
+            goal=lambda: self._goal(goal),
         )
 
     def return_home(self) -> None:
-        """Let the autopilot return to home and land there, until it is disarmed."""
+        """Let the autopilot return to home and land there, until it is disarmed.
+
+        Raises ``OutOfBounds`` if the straight way leads out of the fence or through a no-fly zone, but not
+        if it is out of bounds already. What another task has under way ends with ``Overridden``.
+        """
         self._require(Capability.RETURN_HOME)
         home, here = self.home, self.position
-        self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
+        if not self._strayed_already():
+            self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
         within = self._within(home, None) + self._landing_within(RETURN_CLIMB)
         self._operate(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
+            manner=SAFE,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
@@ -117,20 +127,23 @@ class Drone(Vehicle):
 
         It stands for *lasting* seconds or until the next operation, then the drone stops: a program that
         hangs does not fly away. A loop that controls calls it each time round. Raises ``OutOfBounds`` if it
-        would leave limits or fence in that time.
+        would leave limits or fence in that time; where it strays later it is told to hold, and the next
+        call raises it.
         """
         self._require(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
         asked = f"fly at {north:g} m/s north, {east:g} m/s east, {up:g} m/s up"
         if not all(isfinite(part) for part in (*velocity, yaw_rate)):
             raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
+        if not (isfinite(lasting) and lasting > 0):
+            raise UsageError(f"{self.name}: {asked}, lasting {lasting:g} s; give seconds above 0")
         self._not_on_ground(asked)
         self._check_path(asked, self.position, self._after(velocity, lasting))
         self._operate(
             "set_velocity",
             asked,
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
-            noted=False,
+            manner=STREAM,
         )
 
     def set_heading(self, degrees: float) -> None:
@@ -140,20 +153,25 @@ class Drone(Vehicle):
         if not isfinite(degrees):
             raise UsageError(f"{self.name}: {asked}: not a number")
         self._not_on_ground(asked)
-        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0))
+        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), manner=TURN)
 
     def hold(self) -> None:
-        """Stop and stay where it is; on the ground it does that anyhow."""
+        """Stop and stay where it is, also out of bounds; on the ground it does that anyhow.
+
+        What another task has under way ends with ``Overridden``; a drone that somebody else has is left
+        alone.
+        """
         if self.flying:
             super().hold()
 
     # -- without
 
     def land(self, at: Position | None = None) -> None:
-        """Descend here, until it is on the ground and disarmed.
+        """Descend here, until it is on the ground and disarmed: also out of bounds and without a position.
 
-        *at* is where it was to touch down, if that is not here: the record measures against it. The autopilot
-        goes straight down either way.
+        What another task has under way ends with ``Overridden``; a drone that somebody else has is left
+        alone: ``Overridden``, too. *at* is where it was to touch down, if that is not here: the record
+        measures against it. The autopilot goes straight down either way.
         """
         self._require(Capability.LAND)
         here = at or self._driver.telemetry.position
@@ -162,6 +180,7 @@ class Drone(Vehicle):
             "land",
             "land",
             lambda: self._driver.land(within),
+            manner=SAFE,
             goal=lambda: NOWHERE if here is None else Goal(here.latitude, here.longitude, nan),
         )
 
@@ -172,25 +191,34 @@ class Drone(Vehicle):
         altitude in altitude hold. They are sent again and again: else the autopilot would fall back on a
         transmitter. They take effect in ``stabilize`` and ``altitude_hold``, and are let go by the operations
         with a position and as soon as somebody else changes the mode.
+
+        Raises ``UsageError`` naming the stick that is out of range or no number.
         """
         self._require(Capability.STICKS)
         sticks = Sticks(pitch, roll, throttle, yaw)
         for name, value, low in zip(Sticks._fields, sticks, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from {low:g} to 1")
-        with self._kernel:
-            self._performer.check_ours("manual control")
-            self._driver.sticks(sticks)
+        self._move_sticks(sticks)
 
     def stabilize(self) -> None:
-        """Fly by sticks: they command attitude and throttle. In the air, set the sticks first."""
+        """Fly by sticks: they command attitude and throttle. On the ground it is armed, too.
+
+        Returns when the mode is seen, without a position, too. Raises ``Refused`` unless
+        ``manual_control`` was called within the last second.
+        """
         self._require(Capability.STABILIZE)
-        self._operate("stabilize", "fly stabilized", self._driver.stabilize)
+        self._by_hand("stabilize", "fly stabilized", self._driver.stabilize)
 
     def altitude_hold(self) -> None:
-        """Fly by sticks: they command attitude and climb rate; the throttle's middle keeps the altitude."""
+        """Fly by sticks: they command attitude and climb rate; the throttle's middle keeps the altitude. On
+        the ground it is armed, too.
+
+        Returns when the mode is seen, without a position, too. Raises ``Refused`` unless
+        ``manual_control`` was called within the last second.
+        """
         self._require(Capability.ALTITUDE_HOLD)
-        self._operate("altitude_hold", "hold the altitude", self._driver.altitude_hold)
+        self._by_hand("altitude_hold", "hold the altitude", self._driver.altitude_hold)
 
     # -- the end of a program
 

@@ -1,4 +1,5 @@
-"""Where a vehicle may go: stated limits about home, and a fence. Checked before a command, by straight paths.
+"""Where a vehicle may go: stated limits about home, and a fence. Here: checked before a command, by straight
+paths. ``bounds`` looks at them while it travels.
 
 Everything is judged in the local frame about home: metres east, north and up of it.
 """
@@ -23,19 +24,25 @@ Corner = tuple[float, float]
 
 @dataclass(frozen=True)
 class Limits:
-    """How far and how high; all in metres, about home.
+    """How far and how high, in metres about home; and how much of the battery is kept, 0..1.
 
     ``highest`` is the 120 m above ground to which drones may fly without a permit in the EU and much of the
     world. ``lowest`` leaves 2 m for the error of an estimate: where a goal is lower than home, state it.
+    Below ``battery_reserve`` nothing but the way down or home is begun; 0 is no reserve.
     """
 
     farthest: float = 10_000.0
     highest: float = 120.0
     lowest: float = -2.0
+    battery_reserve: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.farthest <= 0 or self.highest <= self.lowest:
+        if not (self.farthest > 0 and self.highest > self.lowest):
             raise UsageError(f"{self} leaves no room to fly: farthest > 0 and highest > lowest")
+        if not 0.0 <= self.battery_reserve < 1.0:
+            raise UsageError(
+                f"battery_reserve={self.battery_reserve:g}: give a share from 0 to below 1, as 0.2"
+            )
 
 
 @dataclass(frozen=True)
@@ -77,10 +84,12 @@ def _check_corners(what: str, corners: Sequence[Corner]) -> None:
         Position(latitude, longitude, AMSL(0.0))
 
 
-def _check_heights(what: str, *heights: Altitude | None) -> None:
-    for height in heights:
+def _check_heights(what: str, low: Altitude | None, high: Altitude | None) -> None:
+    for height in (low, high):
         if height is not None and not isinstance(height, AMSL | AboveHome):
             raise UsageError(f"{what}: {height} cannot be compared; give AMSL or AboveHome")
+    if low is not None and high is not None and type(low) is type(high) and low.metres >= high.metres:
+        raise UsageError(f"{what}: its floor of {low} is not below its ceiling of {high}")
 
 
 class Home(NamedTuple):
@@ -122,6 +131,32 @@ def violation(start: Position, goal: Position, home: Position, limits: Limits, f
     if not found and fence is not None:
         found = _beyond_fence((about.local(start), there), about, fence)
     return found
+
+
+def excludes_home(fence: Fence, home: Position) -> str:
+    """Why nobody could start from *home* (AMSL) within the fence; empty if one can.
+
+    The floor does not count: it is for the flight, and crossed on the way up and down.
+    """
+    about = Home.at(home)
+    if fence.polygon and not area_of(fence.polygon, about).covers(Point(0.0, 0.0)):
+        return f"home ({home}) is outside the fence's polygon{_swapped(fence.polygon, about)}"
+    if band_of(fence.floor, fence.ceiling, about)[1] <= 0.0:
+        return f"home ({home}) is not below the fence's ceiling of {fence.ceiling}"
+    for zone in fence.no_fly:
+        low, high = band_of(zone.floor, zone.ceiling, about)
+        if low <= 0.0 <= high and area_of(zone.corners, about).contains(Point(0.0, 0.0)):
+            return f"home ({home}) is in the no-fly zone {zone.name!r}"
+    return ""
+
+
+def _swapped(corners: Sequence[Corner], home: Home) -> str:
+    """The usual reason: longitude before latitude."""
+    if any(abs(longitude) > 90.0 for _, longitude in corners):
+        return ""
+    turned = tuple((longitude, latitude) for latitude, longitude in corners)
+    inside = area_of(turned, home).covers(Point(0.0, 0.0))
+    return "; corners are (latitude, longitude): are they swapped?" if inside else ""
 
 
 def too_high(height: float, limits: Limits, home: Position | None = None) -> str:
@@ -170,12 +205,12 @@ Segment = tuple[Vector, Vector]
 
 def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
     if fence.polygon:
-        area, (start, goal) = _area(fence.polygon, home), path
+        area, (start, goal) = area_of(fence.polygon, home), path
         if not area.covers(Point(goal[:2])):
             return "the goal is outside the fence"
         if area.covers(Point(start[:2])) and not area.covers(_track(path)):
             return "the straight way there leaves the fence"
-    low, high = _band(fence.floor, fence.ceiling, home)
+    low, high = band_of(fence.floor, fence.ceiling, home)
     if path[1][2] < low:
         return f"the goal is below the fence's floor of {fence.floor}"
     if path[1][2] > high:
@@ -186,14 +221,14 @@ def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
     return ""
 
 
-def _band(floor: Altitude | None, ceiling: Altitude | None, home: Home) -> tuple[float, float]:
-    """Metres above home from, to."""
+def band_of(floor: Altitude | None, ceiling: Altitude | None, home: Home) -> tuple[float, float]:
+    """Metres above home from, to; infinite where not stated."""
     low = None if floor is None else home.above(floor)
     high = None if ceiling is None else home.above(ceiling)
     return (-inf if low is None else low, inf if high is None else high)
 
 
-def _area(corners: Sequence[Corner], home: Home) -> BaseGeometry:
+def area_of(corners: Sequence[Corner], home: Home) -> BaseGeometry:
     """What the corners enclose; both halves of an outline that crosses itself."""
     outline = Polygon([home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in corners])
     return make_valid(outline, method="structure", keep_collapsed=False)
@@ -207,10 +242,10 @@ def _track(path: Segment) -> BaseGeometry:
 
 def _passes(path: Segment, zone: Zone, home: Home) -> bool:
     """The path leads through the zone. Straight out of one in which it starts, it may go."""
-    part = _clipped(path, *_band(zone.floor, zone.ceiling, home))
+    part = _clipped(path, *band_of(zone.floor, zone.ceiling, home))
     if part is None:
         return False
-    area, track = _area(zone.corners, home), _track(part)
+    area, track = area_of(zone.corners, home), _track(part)
     if not area.intersects(track) or area.touches(track):
         return False
     starts_inside = part[0] == path[0] and area.contains(Point(part[0][:2]))

@@ -238,13 +238,12 @@ class _Attempt:
             return True
         if step.done(seen):
             return True
-        self._stopped = self._stopped or self._look(self._asked, self._kernel.now())
-        if self._stopped is not None:
-            return True
         if self._is_refused() and not self._repeated:
             return True
         self._notice_changes()
-        return bool(self._changed)
+        if not self._changed:
+            self._stopped = self._stopped or self._look(self._asked, self._kernel.now())
+        return bool(self._changed) or self._stopped is not None
 
     def _is_refused(self) -> bool:
         """Of what was asked twice it proves nothing: the first may have been obeyed, and its answer lost."""

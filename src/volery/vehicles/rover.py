@@ -6,8 +6,9 @@ from math import nan
 
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
+from volery.vehicles.commanded import SAFE, TRAVEL, Goal
 from volery.vehicles.driver import Capability, Sticks
-from volery.vehicles.vehicle import Goal, Vehicle
+from volery.vehicles.vehicle import Vehicle
 
 
 class Rover(Vehicle):
@@ -32,8 +33,7 @@ class Rover(Vehicle):
         latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
         there = Position(latitude, longitude, AboveHome(0.0))
         asked = f"drive to {latitude:.7f}, {longitude:.7f}"
-        if speed is not None and not speed > 0:
-            raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+        self._check_speed(asked, speed)
         if self._driver.telemetry.position is None:
             self.wait_ready()
         here = self.position
@@ -44,37 +44,44 @@ class Rover(Vehicle):
             "drive",
             asked,
             lambda: self._driver.goto(there, speed, within),
+            manner=TRAVEL,
             goal=lambda: Goal(latitude, longitude, nan),
         )
 
     def return_home(self) -> None:
-        """Let the autopilot return to home and stop there."""
+        """Let the autopilot return to home and stop there. See ``Drone.return_home``."""
         self._require(Capability.RETURN_HOME)
         home, here = self.home, self.position
         level = Position(here.latitude, here.longitude, home.altitude)
-        self._check_path("return home", level, home)
+        if not self._strayed_already():
+            self._check_path("return home", level, home)
         within = self._within(home, 1.0)
         self._operate(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
+            manner=SAFE,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
     def manual(self) -> None:
-        """Drive by ``manual_control``."""
+        """Drive by ``manual_control``; it is armed if need be. Returns when the mode is seen.
+
+        Raises ``Refused`` unless ``manual_control`` was called within the last second.
+        """
         self._require(Capability.STICKS)
-        self._operate("manual", "drive by hand", self._driver.manual)
+        self._by_hand("manual", "drive by hand", self._driver.manual)
 
     def manual_control(self, steering: float, throttle: float) -> None:
-        """Hold the controls so until the next call: steering (right +) and throttle (back -) in -1..1."""
+        """Hold the controls so until the next call: steering (right +) and throttle (back -) in -1..1.
+
+        Raises ``UsageError`` naming the control that is out of range or no number.
+        """
         self._require(Capability.STICKS)
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")
-        with self._kernel:
-            self._performer.check_ours("manual control")
-            self._driver.sticks(Sticks(roll=steering, throttle=throttle))
+        self._move_sticks(Sticks(roll=steering, throttle=throttle))
 
     def come_to_rest(self) -> str:
         """Stop and disarm it if nobody else has it; says what was done. For the end of a program.

@@ -1,4 +1,4 @@
-"""What drones and rovers share: state, readiness, missions, and how an operation is carried out and recorded.
+"""What drones and rovers share: state, readiness, missions, and the ways to safety.
 
 Every call is an interaction point. One that waits blocks until what was asked is *seen* on the telemetry, has
 a time-out, and raises an error that names the vehicle, what was asked, what the autopilot said, what to do.
@@ -7,52 +7,23 @@ a time-out, and raises an error that names the vehicle, what was asked, what the
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from math import hypot, nan
-from typing import NamedTuple
+from collections.abc import Sequence
+from math import hypot, isfinite
 
-from volery.base.errors import (
-    CapabilityError,
-    LinkLost,
-    LinkSilent,
-    OutOfBounds,
-    Refused,
-    UsageError,
-    VehicleError,
-)
-from volery.base.frames import LocalFrame
+from volery.base.errors import CapabilityError, OutOfBounds, UsageError
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import Ns, from_seconds
-from volery.kernel.api import Kernel
-from volery.kernel.task import Task
-from volery.trace.events import Operation
-from volery.vehicles.driver import Capability, Driver, Step
-from volery.vehicles.limits import Fence, Home, Limits, violation
-from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint
-from volery.vehicles.perform import SILENCE, Performer
+from volery.vehicles.commanded import ANYHOW, LAST_RESORT, MISSION, SAFE, Commanded, Goal
+from volery.vehicles.driver import Capability
+from volery.vehicles.limits import Home, violation
+from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
 
-Truth = Callable[[], Position]
-"""Where a simulated vehicle really is (AMSL): for the errors that are recorded, never for the operations."""
-
-HEARD_WITHIN_S = 10.0
 READY_WITHIN_S = 120.0
 MISSION_WITHIN_S = 3600.0
-RETURN_OF_LINK_S = 30.0
 SLOWEST_TRAVEL = 2.5
 """Metres per second over ground that a time-out reckons with where no speed is stated."""
 MARGIN_S = 30.0
-
-
-class Goal(NamedTuple):
-    """What an operation is measured against at its end. NaN: not this coordinate."""
-
-    latitude: float
-    longitude: float
-    amsl: float
-
-
-NOWHERE = Goal(nan, nan, nan)
 
 
 def travel_within(distance: float, climb: float, speed: float | None) -> float:
@@ -61,34 +32,20 @@ def travel_within(distance: float, climb: float, speed: float | None) -> float:
     return MARGIN_S + across + abs(climb) / 0.5
 
 
-class Vehicle(ABC):
+class Vehicle(Commanded, ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
-    *limits* and *fence* are checked before anything moves. *truth* is known in simulation only. A link that
-    says nothing for *silence* is lost; one that returns earlier is as if nothing had happened.
+    *limits* and *fence* are checked before anything moves and, with each position that the vehicle reports,
+    while it travels: one that strays is held and the call raises ``OutOfBounds``; below
+    ``Limits.battery_reserve`` it is held and the call raises ``LowBattery``. ``hold``, ``return_home``,
+    ``land`` and ``kill`` are allowed then, too, and take the place of what another task has under way.
+    Whatever happens, a vehicle that somebody else has taken is left alone; only ``kill`` does not ask.
+
+    *truth* is known in simulation only. A link that says nothing for *silence* is lost; one that returns
+    earlier is as if nothing had happened.
     """
 
-    kind = ""
-
-    def __init__(
-        self,
-        kernel: Kernel,
-        name: str,
-        driver: Driver,
-        *,
-        limits: Limits | None = None,
-        fence: Fence | None = None,
-        truth: Truth | None = None,
-        silence: Ns = SILENCE,
-    ) -> None:
-        self.name = name
-        self.limits = limits or Limits()
-        self.fence = fence
-        self._kernel = kernel
-        self._driver = driver
-        self._truth = truth
-        self._performer = Performer(kernel, driver, silence)
-        self._busy: tuple[Task | None, str] | None = None
+    _mission: Sequence[MissionItem] = ()  # on board, as far as this program put it there
 
     # -- state, as the autopilot last told it
 
@@ -159,56 +116,52 @@ class Vehicle(ABC):
         with self._kernel:
             return self._driver.capabilities
 
-    def _look(self) -> Telemetry:
-        if self._driver.cycle is not None:
-            self._driver.look()
-        with self._kernel:
-            return self._driver.telemetry
+    @property
+    def if_silent(self) -> str:
+        """In one line, from the aircraft's own parameters: what it will do if this program falls silent.
 
-    def _known(self, what: str, value: Position | None) -> Position:
-        if value is None:
-            raise VehicleError(self.name, what, "the autopilot does not know it yet; wait_ready() first")
-        return value
+        Empty until they are known. A run records the line as soon as it is.
+        """
+        self._look()
+        with self._kernel:
+            return self._driver.if_silent()
 
     # -- getting there
-
-    def wait_heard(self, within: float = HEARD_WITHIN_S) -> None:
-        """Until the autopilot is heard. Raises ``LinkSilent`` or ``LinkGarbled``: what is there instead."""
-        seen = self._driver.telemetry
-
-        def well_heard() -> bool:
-            return seen.heard >= 0 and self._driver.problem() is None
-
-        if not self._performer.wait(well_heard, from_seconds(within)):
-            with self._kernel:
-                problem = self._driver.problem()
-            if problem is not None:
-                raise type(problem)(f"{self.name}: {problem}")
-            raise LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
-        if not seen.kind:
-            seen.kind = self.kind  # MAVROS does not say what it is
-        if seen.kind != self.kind:
-            raise CapabilityError(f"{self.name} is a {seen.kind}, not a {self.kind}")
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:
         """Until it could arm and go by position, in at most *within* seconds; the error says what lacks."""
         self._hear()
         self._operate("wait_ready", "be ready", lambda: self._driver.ready(from_seconds(within)))
+        if self._driver.telemetry.home is not None:
+            self._check_fence(self._driver.telemetry.home)
 
     def arm(self) -> None:
         """Arm in the mode it is in. ``Refused`` quotes the checks that failed."""
         self._hear()
         self._operate("arm", "arm", self._driver.arm)
 
-    def disarm(self, *, force: bool = False) -> None:
-        """Disarm. In the air the autopilot refuses, unless *force*: then the motors stop and it falls."""
+    def disarm(self) -> None:
+        """Disarm. In the air the autopilot refuses."""
         self._hear()
-        self._operate("disarm", "disarm", lambda: self._driver.disarm(force), ours=False)
+        self._operate("disarm", "disarm", lambda: self._driver.disarm(False), manner=ANYHOW)
+
+    def kill(self, *, sure: bool) -> None:
+        """Stop the motors now, wherever it is: in the air it falls. For when that is the lesser harm.
+
+        The one thing that is sent whoever has the vehicle. What another task has under way ends with
+        ``Overridden``. Returns when it is seen to be disarmed. ``kill(sure=True)`` says that it is meant.
+        """
+        if sure is not True:
+            raise UsageError(f"{self.name}: kill() stops the motors in the air; if that is meant: sure=True")
+        self._hear()
+        self._operate("kill", "stop the motors", lambda: self._driver.disarm(True), manner=LAST_RESORT)
 
     def hold(self) -> None:
-        """Stop and stay where it is."""
+        """Stop and stay where it is, also out of bounds. What another task has under way ends with
+        ``Overridden``; a vehicle that somebody else has is left alone.
+        """
         self._require(Capability.HOLD)
-        self._operate("hold", "hold", self._driver.hold)
+        self._operate("hold", "hold", self._driver.hold, manner=SAFE)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
         """Replace the mission on board. Limits and fence are checked for each leg, taken as straight."""
@@ -218,13 +171,25 @@ class Vehicle(ABC):
             raise UsageError(f"{self.name}: an empty mission; give at least one item")
         self._check_mission(items)
         asked = f"upload a mission of {len(items)} items"
-        self._operate("upload_mission", asked, lambda: self._driver.upload(items), ours=False)
+        self._operate("upload_mission", asked, lambda: self._driver.upload(items), manner=ANYHOW)
+        self._mission = tuple(items)
 
     def start_mission(self, within: float = MISSION_WITHIN_S) -> None:
-        """Arm if need be, carry out the mission on board, and return at its end."""
+        """Arm if need be, carry out the mission on board, and return at its end.
+
+        What was uploaded by this program is checked against limits and fence once more; the fence's floor
+        does not count on the way.
+        """
         self._require(Capability.MISSION)
+        if self._mission and self._driver.telemetry.position is not None:
+            self._check_mission(self._mission)
         asked = "carry out the mission on board"
-        self._operate("start_mission", asked, lambda: self._driver.start_mission(from_seconds(within)))
+        self._operate(
+            "start_mission",
+            asked,
+            lambda: self._driver.start_mission(from_seconds(within)),
+            manner=MISSION,
+        )
 
     @abstractmethod
     def come_to_rest(self) -> str:
@@ -233,85 +198,17 @@ class Vehicle(ABC):
     def close(self) -> None:
         """Stop talking to it. It goes on with what it does."""
         with self._kernel.guard:
+            for handle in (self._asking, self._straying):
+                if handle is not None:
+                    handle.cancel()
             self._driver.close()
 
-    # -- how an operation is carried out
-
-    def _hear(self) -> None:
-        """What comes before every operation: take in what has arrived, and wait if nothing ever has."""
-        self._look()
-        if self._driver.telemetry.heard < 0 or self._driver.telemetry.kind != self.kind:
-            self.wait_heard()
-
-    def _require(self, capability: Capability) -> None:
-        self._hear()
-        if capability not in self._driver.capabilities:
-            can = ", ".join(sorted(each.value for each in self._driver.capabilities))
-            raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
-
-    def _operate(
-        self,
-        operation: str,
-        asked: str,
-        plan: Callable[[], Sequence[Step]],
-        *,
-        goal: Callable[[], Goal] = lambda: NOWHERE,
-        restarts: int = 0,
-        ours: bool = True,
-        noted: bool = True,
-    ) -> None:
-        """Perform and record it. *ours*: refuse it while somebody else flies the vehicle.
-
-        *noted* False: record it only if it fails; a loop of set-points is no list of operations.
-        """
-        with self._kernel as kernel:
-            mine = self._take(kernel.current(), operation)
-            start = kernel.now()
-        outcome, said = "ok", ""
-        try:
-            if ours:
-                self._performer.check_ours(asked)
-            self._performer.perform(asked, plan, restarts=restarts)
-        except BaseException as error:
-            outcome, said = type(error).__name__, str(error)
-            raise
-        finally:
-            with self._kernel.guard:
-                if self._busy is mine:
-                    self._busy = None
-                if noted or outcome != "ok":
-                    self._record(start, operation, asked, (outcome, said), goal())
-
-    def _take(self, task: Task | None, operation: str) -> tuple[Task | None, str]:
-        """One operation at a time: two tasks that command one vehicle is a fault of the program."""
-        if self._busy is not None:
-            holder, under_way = self._busy
-            if holder is None or not (holder.done or holder.scope.cancelled):
-                name = holder.name if holder is not None else "house code"
-                raise UsageError(f"{self.name}: {operation}: {name} has {under_way} under way")
-        mine = self._busy = (task, operation)
-        return mine
-
-    def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
-        estimate = _offset(self._driver.telemetry.position, goal)
-        truth = _offset(self._truth() if self._truth is not None else None, goal)
-        self._kernel.record(
-            Operation(start, self._kernel.now(), self.name, operation, asked, *end, *estimate, *truth)
-        )
-
-    def _wait_for_link(self) -> None:
-        """If it is lost at this moment, give it time to return."""
-        if self._performer.silent() and not self._performer.wait(
-            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)
-        ):
-            raise LinkLost(f"{self.name}: the link did not return; nobody knows whether it has come to rest")
-
-    # -- bounds
+    # -- bounds, before it travels
 
     def _check_path(self, asked: str, start: Position, goal: Position) -> None:
-        found = violation(
-            start, goal, self._known("its home", self._driver.telemetry.home), self.limits, self.fence
-        )
+        home = self._known("its home", self._driver.telemetry.home)
+        self._check_fence(home)
+        found = violation(start, goal, home, self.limits, self.fence)
         if found:
             raise OutOfBounds(self.name, asked, found)
 
@@ -328,6 +225,7 @@ class Vehicle(ABC):
         start = self._known("its position", self._driver.telemetry.position)
         for number, item in enumerate(items, 1):
             asked = f"mission item {number} ({type(item).__name__})"
+            self._check_numbers(asked, item)
             if isinstance(item, TakeOff):
                 start = Position(start.latitude, start.longitude, AboveHome(item.height))
                 self._check_path(asked, self._amsl(start), start)
@@ -340,6 +238,26 @@ class Vehicle(ABC):
                 goal = Position(home.latitude, home.longitude, self._amsl(start).altitude)
                 self._check_path(asked, self._amsl(start), goal)
                 start = home
+
+    def _check_numbers(self, asked: str, item: MissionItem) -> None:
+        if isinstance(item, ChangeSpeed) and not (isfinite(item.speed) and item.speed > 0):
+            raise UsageError(f"{self.name}: {asked}: a speed of {item.speed:g} m/s; give one above 0")
+        if isinstance(item, TakeOff) and not (isfinite(item.height) and item.height > 0):
+            raise UsageError(f"{self.name}: {asked}: a height of {item.height:g} m; give one above 0")
+        if isinstance(item, Waypoint) and not (isfinite(item.stay_s) and item.stay_s >= 0):
+            raise UsageError(f"{self.name}: {asked}: a stay of {item.stay_s:g} s; give 0 or more")
+
+    def _check_speed(self, asked: str, speed: float | None) -> None:
+        if speed is None:
+            return
+        self._require(Capability.SPEED)
+        if not (isfinite(speed) and speed > 0):
+            raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+
+    def _strayed_already(self) -> bool:
+        """It is out of bounds now, so any way back is allowed."""
+        here, bounds = self._driver.telemetry.position, self._bounds_now()
+        return here is not None and bounds is not None and bool(bounds.left(here))
 
     def _amsl(self, position: Position) -> Position:
         """The same place with an AMSL altitude; above ground is taken as above home."""
@@ -362,21 +280,3 @@ class Vehicle(ABC):
         start, end = about.local(here), about.local(goal)
         distance = hypot(end[0] - start[0], end[1] - start[1])
         return from_seconds(travel_within(distance, end[2] - start[2], speed))
-
-    def _not_on_ground(self, asked: str) -> None:
-        if not self._driver.telemetry.flying:
-            raise Refused(self.name, asked, "it is on the ground; takeoff(height) first")
-
-
-def _offset(position: Position | None, goal: Goal) -> tuple[float, float]:
-    """How far *position* (AMSL) is from *goal*: horizontally and vertically, metres; NaN where unknown."""
-    if position is None:
-        return nan, nan
-    vertical = abs(position.altitude.metres - goal.amsl)
-    if goal.latitude != goal.latitude:
-        return nan, vertical
-    height = position.altitude.metres
-    east, north, _ = LocalFrame(goal.latitude, goal.longitude, height).to_enu(
-        position.latitude, position.longitude, height
-    )
-    return hypot(east, north), vertical

@@ -451,14 +451,14 @@ def test_two_tasks_do_not_command_one_vehicle(bench: Make) -> None:
 
     def second() -> None:
         try:
-            at.vehicle.land()
+            at.vehicle.disarm()
         except UsageError as error:
             errors.append(str(error))
 
     at.kernel.run(2 * S)
     at.kernel.call_at(4 * S, lambda: at.kernel.spawn(second, "second", Place("second")))
     at.fly(up)
-    assert errors == ["craft_1: land: mission has takeoff under way"]
+    assert errors == ["craft_1: disarm: mission has takeoff under way"]
 
 
 # -- velocities, sticks
@@ -555,11 +555,12 @@ def test_stabilize_with_an_idle_throttle_in_the_air_is_refused(bench: Make) -> N
     assert at.craft.mode == "GUIDED"
 
 
-def test_stabilize_from_the_ground_holds_idle_sticks(bench: Make) -> None:
+def test_stabilize_from_the_ground_arms_with_the_sticks_held(bench: Make) -> None:
     at = bench()
-    at.fly(lambda drone: (drone.stabilize(), drone.arm()))
+    at.fly(lambda drone: (drone.manual_control(0, 0, 0, 0), drone.stabilize()))
     assert at.autopilot.sent("RC_CHANNELS_OVERRIDE")[0]["chan3_raw"] == 1000
-    assert at.craft.armed
+    assert (at.craft.mode, at.craft.armed) == ("STABILIZE", True)
+    assert at.autopilot.commands() == [ARM]
 
 
 # -- missions
