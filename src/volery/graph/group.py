@@ -53,7 +53,7 @@ class CallbackGroup:
         return self._ready[0].arrived if self._ready else None
 
     def take(self) -> Work:
-        """The next one; who takes it pays for a ``spin_once`` and runs it. ``IndexError`` if there is none."""
+        """The next one: who takes it pays for a ``spin_once`` and runs it. ``IndexError`` if none waits."""
         work = self._ready.popleft()
         self._pay()
         return work

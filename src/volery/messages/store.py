@@ -32,8 +32,9 @@ def store() -> Typestore:
     """The types of ROS 2 Humble and those of ``definitions/``. For this room only."""
     humble = get_typestore(Stores.ROS2_HUMBLE)
     texts: dict[str, str] = {}
-    for package in ("geographic_msgs", "std_srvs", "mavros_msgs"):
-        text = files("volery.messages").joinpath(f"definitions/{package}.txt").read_text(encoding="utf-8")
+    written_out = files("volery.messages").joinpath("definitions").iterdir()
+    for file in sorted(written_out, key=lambda file: file.name):
+        package, text = file.name.removesuffix(".txt"), file.read_text(encoding="utf-8")
         for section in text.split("\n=== ")[1:]:
             heading, body = section.split("\n", 1)
             texts.update(_parts(f"{package}/{heading.strip()}", body))

@@ -16,7 +16,8 @@ from volery.components.ports import Port, PortList
 from volery.components.python import Program, load_program, start
 from volery.components.stand_ins import stand_ins
 from volery.components.stub import StubProgram
-from volery.faces import rospy
+from volery.faces import rclpy, rospy
+from volery.faces.launch import Launch
 from volery.graph import EmbeddedNode, Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -100,16 +101,18 @@ class Builder:
     def build(self, fidelity: str, seed: int) -> Built:
         """Load every file, make every instance, connect every port."""
         steps = Steps() if fidelity == "code" else None
-        modules = rospy.modules(self._graph, self._launches(), self._nodes)
+        launches = self._launches()
+        faces = (face.modules(self._graph, launches, self._nodes) for face in (rospy, rclpy))
+        modules = {name: module for face in faces for name, module in face.items()}
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         models = self._system.instances
         self._instances = {model.name: self._instance(model, steps) for model in models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in models))
         return Built(starters, loader)
 
-    def _launches(self) -> dict[str, rospy.Launch]:
+    def _launches(self) -> dict[str, Launch]:
         return {
-            model.name: rospy.Launch(model.namespace, model.remap, dict(model.parameters))
+            model.name: Launch(model.namespace, model.remap, dict(model.parameters))
             for model in self._system.instances
             if is_node(model)
         }

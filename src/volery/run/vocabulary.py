@@ -8,7 +8,7 @@ from volery.model.system import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
 from volery.run.faults import KINDS
 
-LANGUAGES = frozenset({"python", "rospy"})
+LANGUAGES = frozenset({"python", "rclpy", "rospy"})
 """Languages of components that run today."""
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import builtins
+import textwrap
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -8,7 +9,8 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery.base.time import S
-from volery.faces.rospy import Launch, modules
+from volery.faces import rclpy, rospy
+from volery.faces.launch import Launch
 from volery.graph import EmbeddedNode, Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -20,7 +22,7 @@ class Free(NamedTuple):
 
 
 class Stage:
-    """Runs texts of Python files as components that import rospy."""
+    """Runs texts of Python files as components that import rospy or rclpy."""
 
     def __init__(self) -> None:
         self.events: list[Any] = []
@@ -29,7 +31,10 @@ class Stage:
         self.graph = Graph(self.kernel, self._price, self._carry)
         self.launched: dict[str, Launch] = {}
         self.nodes: dict[str, EmbeddedNode] = {}
-        self.modules = modules(self.graph, self.launched, self.nodes)
+        self.modules = {
+            **rospy.modules(self.graph, self.launched, self.nodes),
+            **rclpy.modules(self.graph, self.launched, self.nodes),
+        }
         self.out: list[Any] = []
 
     def _price(self, node: Any, call: str, x: float) -> Free:
@@ -44,7 +49,7 @@ class Stage:
             name: str, globals_: Any = None, locals_: Any = None, wanted: Any = (), level: int = 0
         ) -> Any:
             if name in self.modules:
-                return self.modules[name]
+                return self.modules[name if wanted else name.partition(".")[0]]
             raise ImportError(name)
 
         module = ModuleType("user")
@@ -56,6 +61,14 @@ class Stage:
         """The text is the body of a function that runs as component *name*."""
         lines = "\n".join(f"    {line}" for line in text.strip("\n").splitlines())
         main: Callable[[], None] = self.load(f"import rospy\ndef main():\n{lines}\n").main
+        self.kernel.spawn(main, name, Place(name))
+
+    def script(self, name: str, text: str) -> None:
+        """The text is a file that runs as component *name*."""
+
+        def main() -> None:
+            self.load(textwrap.dedent(text))
+
         self.kernel.spawn(main, name, Place(name))
 
     def run(self, until: int = 60 * S) -> list[Any]:

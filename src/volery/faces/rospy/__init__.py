@@ -10,7 +10,7 @@ Python code; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternio
 (ROS 2) and not as zero; shutdown hooks run on ``signal_shutdown``, not when the run ends the component.
 """
 
+from volery.faces.launch import Launch
 from volery.faces.rospy.module import modules
-from volery.faces.rospy.session import Launch
 
 __all__ = ["Launch", "modules"]

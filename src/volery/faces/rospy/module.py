@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import Any
 
 from volery import messages
-from volery.base.errors import UsageError, choices, did_you_mean
+from volery.base.errors import UsageError
 from volery.base.time import S
+from volery.faces.launch import Launch
+from volery.faces.module import face_module
 from volery.faces.rospy import services, time, topics
 from volery.faces.rospy.errors import EXCEPTIONS
 from volery.faces.rospy.logging import LEVELS, loggers
-from volery.faces.rospy.session import Launch, Sessions
+from volery.faces.rospy.session import Sessions
 from volery.graph import EmbeddedNode, Graph
 
 _BOUND = (
@@ -45,27 +47,10 @@ def modules(
     names["TimerEvent"] = time.TimerEvent
     names["Header"] = messages.message_class("std_msgs/msg/Header")
     names["Message"] = messages.Message
-    rospy = _module("rospy", names)
-    exceptions = _module("rospy.exceptions", EXCEPTIONS)
+    rospy = face_module("rospy", names)
+    exceptions = face_module("rospy.exceptions", EXCEPTIONS)
     vars(rospy)["exceptions"] = exceptions
     return {**messages.modules(), "rospy": rospy, "rospy.exceptions": exceptions}
-
-
-def _module(name: str, names: Mapping[str, Any]) -> ModuleType:
-    module = ModuleType(name, "rospy on the embedded graph.")
-    module.__path__ = []
-    vars(module).update(names)
-
-    def missing(attribute: str) -> NoReturn:
-        if attribute.startswith("__"):
-            raise AttributeError(attribute)
-        hint = did_you_mean(attribute, names)
-        raise AttributeError(
-            f"{name}.{attribute} is not there on the embedded graph{hint}; there is {choices(names)}"
-        )
-
-    vars(module)["__getattr__"] = missing
-    return module
 
 
 def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:

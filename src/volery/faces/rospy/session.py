@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.base.time import Ns
+from volery.faces.launch import Launch
 from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
 from volery.graph import EmbeddedNode, Graph
 from volery.graph.group import CallbackGroup, Work
@@ -19,14 +20,6 @@ from volery.trace.events import Failure, Text
 
 ERROR = 3
 """Severity, as in syslog."""
-
-
-class Launch(NamedTuple):
-    """What a launch file says about a node: its namespace, its remappings and its private parameters."""
-
-    namespace: str = "/"
-    remaps: Mapping[str, str] = {}
-    parameters: Mapping[str, Any] = {}
 
 
 @dataclass(eq=False)

@@ -1,0 +1,153 @@
+"""What one component is to rclpy: its context, its nodes, and whether it is shutting down."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.faces.launch import Launch
+from volery.faces.rclpy.errors import NameValidationException, NotInitializedException
+from volery.graph import EmbeddedNode, Graph
+from volery.kernel.waiting import Signal, current_task
+from volery.trace.events import Text
+
+if TYPE_CHECKING:
+    from volery.faces.rclpy.executors import Executor
+
+
+class Context:
+    """One component's. ``rclpy.init()`` starts it, ``rclpy.shutdown()`` ends it; it may be started again.
+
+    The first node that it makes is called as the component is, whatever the file says, as a launch file does
+    it; further ones keep their own names.
+    """
+
+    def __init__(
+        self, graph: Graph, component: str, launch: Launch | None, node: EmbeddedNode | None
+    ) -> None:
+        self._graph = graph
+        self._component = component
+        self._launch = launch
+        self._given = node
+        self._nodes: list[EmbeddedNode] = []
+        self._started = False
+        self._hooks: list[Callable[[], Any]] = []
+        self.kernel = graph.kernel
+        self.changed = Signal(graph.kernel, f"{component} (rclpy)")
+        self.executor: Executor | None = None
+        """The one that ``rclpy.spin`` uses."""
+        self.task = current_task(graph.kernel)
+
+    def init(self, args: Any = None, **options: Any) -> None:
+        """Start it. Options about signals and domains are accepted and mean nothing here."""
+        if self._started:
+            raise RuntimeError("Context.init() must only be called once")
+        self._started = True
+
+    def ok(self) -> bool:
+        """Whether it runs. An interaction point, as every call is."""
+        with self.kernel:
+            return self._started
+
+    @property
+    def running(self) -> bool:
+        """``ok`` without being an interaction point."""
+        return self._started
+
+    def on_shutdown(self, callback: Callable[[], Any]) -> None:
+        """Call it at shutdown."""
+        self._hooks.append(callback)
+
+    def shutdown(self) -> None:
+        """End it: who spins returns. Nodes stay until they are destroyed, but nothing spins them."""
+        if not self._started:
+            raise RuntimeError("rcl_shutdown already called on the given context")
+        self.try_shutdown()
+
+    def try_shutdown(self) -> None:
+        """End it, if it runs."""
+        if self._started:
+            self._started = False
+            for hook in self._hooks:
+                hook()
+            self._hooks.clear()
+            self.executor = None
+            self.changed.notify()
+
+    # -- nodes
+
+    def join(self, name: str, namespace: str | None) -> EmbeddedNode:
+        """A new node of the graph."""
+        if not self._started:
+            raise NotInitializedException("cannot create node: rclpy.init() has not been called")
+        if not re.fullmatch(r"[A-Za-z_]\w*", name):
+            raise NameValidationException(f"Invalid node name: {name!r}: letters, digits and underscores")
+        first = not self._nodes and self._launch is not None
+        launch = self._launch or Launch()
+        where = namespace if namespace is not None and launch.namespace == "/" else launch.namespace
+        where = where if where.startswith("/") else f"/{where}"
+        made = self._given if first else None
+        if made is None:
+            label = re.sub(r"\W", "_", self._component) if first else name
+            made = self._graph.node(label, where, remaps=launch.remaps)
+        if first:
+            for key, value in launch.parameters.items():
+                made.set_parameter(f"~{key.replace('.', '/')}", value)
+        self._nodes.append(made)
+        return made
+
+    def node(self) -> EmbeddedNode:
+        """Its first node: who pays for what no node is named for."""
+        if not self._nodes:
+            raise UsageError(f"{self._component}: create a node first")
+        return self._nodes[0]
+
+    def leave(self, node: EmbeddedNode) -> None:
+        """A node was destroyed."""
+        node.close()
+        self.changed.notify()
+
+    def sleep(self, duration: Ns) -> None:
+        """Block the current task."""
+        self.node().sleep(duration)
+
+    def spawn(self, body: Callable[[], None], label: str) -> None:
+        """A helping task of this component."""
+        place = replace(self.task.place, deadline=None, on_release=None)
+        self.kernel.spawn(body, f"{self._component} ({label})", place, self.task.scope)
+
+    def say(self, severity: int, text: str) -> None:
+        """Record a log line. An interaction point."""
+        with self.kernel as kernel:
+            kernel.record(Text(kernel.now(), self._component, severity, text))
+
+
+class Contexts:
+    """All components of one run that import rclpy."""
+
+    def __init__(
+        self, graph: Graph, launched: Mapping[str, Launch], nodes: Mapping[str, EmbeddedNode] | None = None
+    ) -> None:
+        self.graph = graph
+        self.kernel = graph.kernel
+        self._launched = launched
+        self._nodes = {} if nodes is None else nodes
+        self._contexts: dict[str, Context] = {}
+
+    def here(self) -> Context:
+        """That of the component that the current task computes for."""
+        component = current_task(self.kernel).place.component
+        found = self._contexts.get(component)
+        if found is None:
+            launch, node = self._launched.get(component), self._nodes.get(component)
+            found = self._contexts[component] = Context(self.graph, component, launch, node)
+        return found
+
+    def now(self) -> Ns:
+        """ROS time; an interaction point."""
+        with self.kernel as kernel:
+            return self.graph.epoch + kernel.now()

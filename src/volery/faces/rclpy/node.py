@@ -1,0 +1,378 @@
+"""rclpy's ``Node``, which users' classes derive from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from inspect import iscoroutinefunction
+from typing import Any, ClassVar
+
+from volery.base.time import S
+from volery.faces.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, Queue
+from volery.faces.rclpy.context import Context, Contexts
+from volery.faces.rclpy.entities import Client, Publisher, Service, Subscription, Timer, period_of
+from volery.faces.rclpy.executors import Executor
+from volery.faces.rclpy.logging import Logger
+from volery.faces.rclpy.parameters import Declared, Parameter, Watcher
+from volery.faces.rclpy.task import Task
+from volery.faces.rclpy.time import Clock, ClockType, Rate
+
+_SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")
+
+
+class Node:
+    """A node. As a launch file does, the component's name names its first node."""
+
+    contexts: ClassVar[Contexts]
+    loggers: ClassVar[type[Logger]]
+    clocks: ClassVar[type[Clock]]
+
+    def __init__(
+        self,
+        node_name: str,
+        *,
+        context: Context | None = None,
+        cli_args: Sequence[str] | None = None,
+        namespace: str | None = None,
+        parameter_overrides: Sequence[Parameter] | None = None,
+        allow_undeclared_parameters: bool = False,
+        automatically_declare_parameters_from_overrides: bool = False,
+        **services: Any,
+    ) -> None:
+        for name in services:
+            if name not in _SERVICES:
+                raise TypeError(f"Node() has no argument {name!r}")
+        self._context = context or self.contexts.here()
+        self.graph_node = self._context.join(node_name, namespace)
+        self.queues: list[Queue] = []
+        self._executor: Executor | None = None
+        self._default_group = MutuallyExclusiveCallbackGroup()
+        self._made: list[Any] = []
+        self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."))
+        self._clock = self.clocks(clock_type=ClockType.ROS_TIME)
+        self._declared = Declared(self.graph_node, parameter_overrides or (), allow_undeclared_parameters)
+        if automatically_declare_parameters_from_overrides:
+            for override in parameter_overrides or ():
+                self._declared.declare(override.name, override.value)
+
+    # -- who it is
+
+    @property
+    def context(self) -> Context:
+        """The context that it belongs to."""
+        return self._context
+
+    @property
+    def default_callback_group(self) -> CallbackGroup:
+        """For what is made without one."""
+        return self._default_group
+
+    def get_name(self) -> str:
+        """Its name without the namespace."""
+        return self.graph_node.name.rpartition("/")[2]
+
+    def get_namespace(self) -> str:
+        """Its namespace."""
+        return self.graph_node.namespace
+
+    def get_fully_qualified_name(self) -> str:
+        """Namespace and name."""
+        return self.graph_node.name
+
+    def get_logger(self) -> Logger:
+        """Its logger."""
+        return self._logger
+
+    def get_clock(self) -> Clock:
+        """Its clock: ROS time."""
+        return self._clock
+
+    # -- who spins it
+
+    @property
+    def executor(self) -> Executor | None:
+        """Who spins it."""
+        return self._executor
+
+    @executor.setter
+    def executor(self, executor: Executor) -> None:
+        previous, self._executor = self._executor, executor
+        if previous is not None and previous is not executor:
+            previous.remove_node(self)
+        executor.add_node(self)
+        executor.wake()
+
+    def drop_executor(self, executor: Executor) -> None:
+        """*executor* spins it no longer."""
+        if self._executor is executor:
+            self._executor = None
+
+    def _filled(self) -> None:
+        if self._executor is not None:
+            self._executor.wake()
+
+    def _queue(self, group: CallbackGroup | None) -> Queue:
+        wanted = group or self._default_group
+        for queue in self.queues:
+            if queue.group is wanted:
+                return queue
+        ready = self.graph_node.group()
+        ready.on_ready = self._filled
+        made = Queue(wanted, ready)
+        self.queues.append(made)
+        return made
+
+    def execute(self, callback: Callable[..., Any], *args: Any) -> None:
+        """Run a callback; a coroutine is carried on by the executor."""
+        if self._executor is not None and iscoroutinefunction(callback):
+            Task(callback, args, self._executor)()
+        else:
+            callback(*args)
+
+    # -- what it makes
+
+    def _keep(self, made: Any) -> Any:
+        self._made.append(made)
+        return made
+
+    def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Publisher:
+        """Publish to a topic; *qos_profile* is a profile or a depth."""
+        made: Publisher = self._keep(Publisher(self, msg_type, topic, qos_profile))
+        return made
+
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[[Any], Any],
+        qos_profile: Any,
+        *,
+        callback_group: CallbackGroup | None = None,
+        raw: bool = False,
+        **options: Any,
+    ) -> Subscription:
+        """Call back with each message of a topic."""
+        if raw:
+            raise NotImplementedError("create_subscription(raw=True) is not there on the embedded graph")
+        queue = self._queue(callback_group)
+        made: Subscription = self._keep(
+            Subscription(self, msg_type, topic, callback, qos=qos_profile, queue=queue)
+        )
+        return made
+
+    def create_service(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        callback_group: CallbackGroup | None = None,
+        **options: Any,
+    ) -> Service:
+        """Answer requests."""
+        made: Service = self._keep(Service(self, srv_type, srv_name, callback, self._queue(callback_group)))
+        return made
+
+    def create_client(
+        self, srv_type: Any, srv_name: str, *, callback_group: CallbackGroup | None = None, **options: Any
+    ) -> Client:
+        """Call a service."""
+        made: Client = self._keep(Client(self, srv_type, srv_name, self._queue(callback_group)))
+        return made
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[..., Any],
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        *,
+        autostart: bool = True,
+    ) -> Timer:
+        """Call back each period."""
+        queue = self._queue(callback_group)
+        made: Timer = self._keep(
+            Timer(self, period_of(timer_period_sec), callback, queue, autostart=autostart)
+        )
+        return made
+
+    def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
+        """Keep a loop at *frequency* in Hz."""
+        if frequency <= 0:
+            raise ValueError("frequency must be > 0")
+        return Rate(self._context, round(S / frequency))
+
+    def _destroy(self, made: Any) -> bool:
+        if made not in self._made:
+            return False
+        self._made.remove(made)
+        made.destroy()
+        return True
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        """Take it away; False if it is not this node's."""
+        return self._destroy(publisher)
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        """Take it away; False if it is not this node's."""
+        return self._destroy(subscription)
+
+    def destroy_service(self, service: Service) -> bool:
+        """Take it away; False if it is not this node's."""
+        return self._destroy(service)
+
+    def destroy_client(self, client: Client) -> bool:
+        """Take it away; False if it is not this node's."""
+        return self._destroy(client)
+
+    def destroy_timer(self, timer: Timer) -> bool:
+        """Take it away; False if it is not this node's."""
+        return self._destroy(timer)
+
+    def destroy_rate(self, rate: Rate) -> bool:
+        """Nothing to let go of."""
+        return True
+
+    def destroy_node(self) -> None:
+        """Leave the graph, and with it all that this node has made."""
+        for made in tuple(self._made):
+            self._destroy(made)
+        if self._executor is not None:
+            self._executor.remove_node(self)
+        self._context.leave(self.graph_node)
+
+    def _of(self, kind: type) -> list[Any]:
+        return [made for made in self._made if isinstance(made, kind)]
+
+    @property
+    def publishers(self) -> list[Publisher]:
+        """All of them."""
+        return self._of(Publisher)
+
+    @property
+    def subscriptions(self) -> list[Subscription]:
+        """All of them."""
+        return self._of(Subscription)
+
+    @property
+    def clients(self) -> list[Client]:
+        """All of them."""
+        return self._of(Client)
+
+    @property
+    def services(self) -> list[Service]:
+        """All of them."""
+        return self._of(Service)
+
+    @property
+    def timers(self) -> list[Timer]:
+        """All of them."""
+        return self._of(Timer)
+
+    # -- parameters
+
+    def declare_parameter(
+        self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False
+    ) -> Parameter:
+        """Declare a parameter with its default; what a launch file gives comes first."""
+        return self._declared.declare(name, value, descriptor, ignore_override)
+
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
+    ) -> list[Parameter]:
+        """Several: ``(name,)``, ``(name, value)`` or ``(name, value, descriptor)``."""
+        prefix = f"{namespace}." if namespace else ""
+        declared = []
+        for name, *rest in parameters:
+            value, descriptor = (*rest, None, None)[:2]
+            declared.append(self._declared.declare(prefix + name, value, descriptor, ignore_override))
+        return declared
+
+    def undeclare_parameter(self, name: str) -> None:
+        """Forget it."""
+        self._declared.forget(name)
+
+    def has_parameter(self, name: str) -> bool:
+        """Whether it is declared."""
+        return self._declared.has(name)
+
+    def get_parameter(self, name: str) -> Parameter:
+        """Its value now."""
+        return self._declared.get(name)
+
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Several."""
+        return [self._declared.get(name) for name in names]
+
+    def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
+        """Its value now, or the alternative."""
+        known = self._declared.has(name)
+        return self._declared.get(name) if known else alternative_value or Parameter(name)
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
+        """Those below *prefix*, without it."""
+        start = f"{prefix}." if prefix else ""
+        names = [name for name in self._declared.names() if name.startswith(start)]
+        return {name.removeprefix(start): self._declared.get(name) for name in names}
+
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[Any]:
+        """Each for itself."""
+        return [self._declared.set([one]) for one in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> Any:
+        """All or none."""
+        return self._declared.set(parameter_list)
+
+    def describe_parameter(self, name: str) -> Any:
+        """Its descriptor."""
+        return self._declared.descriptor(name)
+
+    def add_on_set_parameters_callback(self, callback: Watcher) -> Watcher:
+        """Ask it before values are set."""
+        self._declared.watch(callback)
+        return callback
+
+    def remove_on_set_parameters_callback(self, callback: Watcher) -> None:
+        """Ask it no longer."""
+        self._declared.unwatch(callback)
+
+    # -- the graph
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """The absolute name."""
+        return self.graph_node.resolve(topic)
+
+    resolve_service_name = resolve_topic_name
+
+    def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:
+        """The topics that somebody publishes or listens to."""
+        with self._context.kernel:
+            return [(one.name, [one.type]) for one in self.contexts.graph.topics()]
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """The services that somebody serves."""
+        with self._context.kernel:
+            return [(one.name, [one.type]) for one in self.contexts.graph.services()]
+
+    def get_node_names(self) -> list[str]:
+        """The nodes' names without their namespaces."""
+        with self._context.kernel:
+            return [name.rpartition("/")[2] for name in self.contexts.graph.node_names()]
+
+    def count_publishers(self, topic_name: str) -> int:
+        """How many publish it."""
+        return self._count(topic_name, "publishers")
+
+    def count_subscribers(self, topic_name: str) -> int:
+        """How many listen to it."""
+        return self._count(topic_name, "subscribers")
+
+    def _count(self, topic_name: str, side: str) -> int:
+        full = self.graph_node.resolve(topic_name)
+        with self._context.kernel:
+            return sum(len(getattr(one, side)) for one in self.contexts.graph.topics() if one.name == full)
+
+    def __enter__(self) -> Node:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy_node()
