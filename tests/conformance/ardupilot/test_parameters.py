@@ -135,7 +135,10 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     """What is listed as honoured is what the code of the dialect reads."""
     room = Path(volery.autopilots.__file__).parent
     source = "".join(
-        path.read_text(encoding="utf-8") for path in sorted(room.rglob("*.py")) if path.name != "honoured.py"
+        path.read_text(encoding="utf-8")
+        for part in ("ardupilot", "simulated")
+        for path in sorted((room / part).rglob("*.py"))
+        if path.name != "honoured.py"
     )
     read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
     read |= set(re.findall(r'"(BATT_(?:LOW|CRT)_(?:VOLT|MAH)|BATT_FS_(?:LOW|CRT)_ACT)"', source))

@@ -267,7 +267,6 @@ _MAVLINK = MavlinkDialect(
     message_order=ORDER,
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
     on_stream_request=_ignored,
-    usual_period=lambda _name: 0,
     refuse_interval=refuse_interval,
     unknown_message=FAILED,
     commands=commands.copter(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),

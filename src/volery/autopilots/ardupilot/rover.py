@@ -204,7 +204,6 @@ _MAVLINK = MavlinkDialect(
     message_order=ORDER,
     streams=streams(("RC_CHANNELS_SCALED",), ()),
     on_stream_request=on_stream_request,
-    usual_period=lambda _name: 0,
     refuse_interval=refuse_interval,
     unknown_message=FAILED,
     commands=commands.rover(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),

@@ -73,9 +73,12 @@ class Autopilot:
         """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
         return self._on_links().banner
 
-    def connect(self, link: Link, *, switch_on: bool = True) -> None:
-        """Serve this link, too. The first one switches a cold vehicle on, unless *switch_on* is False."""
-        self._on_links().connect(link)
+    def connect(self, link: Link, *, switch_on: bool = True, use: str = "") -> None:
+        """Serve this link, too. The first one switches a cold vehicle on, unless *switch_on* is False.
+
+        *use* is what the firmware has the link for, such as ``station``; by default its usual one.
+        """
+        self._on_links().connect(link, use)
         if switch_on:
             self.switch_on()
 

@@ -114,6 +114,8 @@ class Dialect:
     on_disarmed: Act
     throttle_centred: bool = False
     """Whether the throttle stick rests in its middle."""
+    first_item: int = 1
+    """Number of the first mission item that is flown: 1 where item 0 is home."""
     guided_arrived: Act = _nothing
     """A rover has reached the point that it was sent to."""
     guided_stale: Act = _nothing

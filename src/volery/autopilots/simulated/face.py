@@ -33,8 +33,8 @@ class LinkFace(Face, Protocol):
     def banner(self) -> bytes:
         """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
 
-    def connect(self, link: Link) -> None:
-        """Listen to and speak on this link, too."""
+    def connect(self, link: Link, use: str = "") -> None:
+        """Listen to and speak on this link, too. *use* is what the firmware has it for."""
 
     def disconnect(self, link: Link) -> None:
         """Nobody is there any more."""

@@ -85,6 +85,10 @@ class Parameters:
         name, kind, _ = self._order[index]
         return Parameter(name, kind, self._values[name])
 
+    def index(self, name: str) -> int:
+        """The index of a parameter that exists."""
+        return self._index[name]
+
     def find(self, name: str) -> Parameter | None:
         """The parameter of that name, or ``None``."""
         index = self._index.get(name)

@@ -125,7 +125,7 @@ class FlyMission(Manoeuvre):
     def _begin_current(self) -> None:
         plan = self.vehicle.plan
         if len(plan) and not plan.complete:
-            self._advance_to(max(1, plan.current))
+            self._advance_to(max(self.vehicle.dialect.first_item, plan.current))
 
     def _finish(self) -> None:
         index, item = self._flown
@@ -184,7 +184,7 @@ class FlyMission(Manoeuvre):
         if item.param2 != FOREVER and done >= item.param2:
             return index + 1
         self._jumps[index] = done + 1
-        return max(1, round(item.param1))
+        return max(self.vehicle.dialect.first_item, round(item.param1))
 
     def _do(self, item: Item) -> None:
         self.vehicle.dialect.mission_action(self.vehicle, item)

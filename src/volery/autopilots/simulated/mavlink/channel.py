@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from volery.autopilots.simulated.mavlink.streams import Streams
+from volery.autopilots.simulated.mavlink.texts import TextLine
+from volery.base.time import Ns
 from volery.links.link import ByteLink, Frame, Link
 
 AUTOPILOT = 1
@@ -12,12 +15,16 @@ AUTOPILOT = 1
 
 
 class Channel:
-    """A link with its streams. ``index`` numbers the links that are open at once."""
+    """A link with its streams. ``index`` numbers the links that are open at once; ``usual`` is what is
+    streamed unasked.
+    """
 
-    def __init__(self, link: Link, index: int, system: int) -> None:
+    def __init__(self, link: Link, index: int, system: int, usual: Mapping[str, Ns]) -> None:
         self.link = link
         self.index = index
+        self.usual = usual
         self.streams: Streams
+        self.texts: TextLine
         self.open = True
         self._system = system
 
@@ -25,6 +32,13 @@ class Channel:
         """Send a message as the autopilot; nothing once it has hung up."""
         if self.open:
             self.link.send(Frame(name, fields, self._system, AUTOPILOT))
+
+    def stream(self) -> None:
+        """Send regularly from now on: the usual, and what was asked for."""
+        for name, period in self.usual.items():
+            if not self.streams.period(name):
+                self.streams.set((name,), period)
+        self.streams.start()
 
     def send_bytes(self, data: bytes) -> None:
         """Bytes that are no message, where the link carries bytes; else nothing."""

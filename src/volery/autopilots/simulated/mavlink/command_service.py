@@ -10,7 +10,7 @@ from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from volery.autopilots.simulated.mavlink.channel import Peer
-from volery.autopilots.simulated.mavlink.numbers import number
+from volery.autopilots.simulated.mavlink.numbers import number as finite
 from volery.autopilots.simulated.plan import GLOBAL_RELATIVE
 from volery.base.time import MS, US
 from volery.links.mavlink import message_type_of
@@ -25,11 +25,15 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
 REQUEST_CAPABILITIES = 520
 
+NOT_GIVEN = 2_147_483_647
+"""A coordinate of COMMAND_INT that is none."""
+
 
 class Command(NamedTuple):
     """A command, whichever form it came in. ``x`` and ``y`` are degrees where they are a place.
 
-    All are numbers, but ``param4``, where a NaN may mean: leave the heading alone.
+    All are numbers, but ``param4``, where a NaN may mean: leave the heading alone; and the others where the
+    firmware reads a NaN as: not given.
     """
 
     number: int
@@ -48,40 +52,43 @@ Handler = Callable[["Vehicle", Command], int]
 """Does it and returns a MAV_RESULT."""
 
 
-def from_long(fields: dict[str, Any]) -> Command:
-    """COMMAND_LONG."""
+def from_long(fields: dict[str, Any], reads_nan: bool = False) -> Command:
+    """COMMAND_LONG. *reads_nan*: what is no number stays none."""
+    read = _number_or_nan if reads_nan else finite
     return Command(
         fields["command"],
-        number(fields["param1"]),
-        number(fields["param2"]),
-        number(fields["param3"]),
-        _heading(fields["param4"]),
-        number(fields["param5"]),
-        number(fields["param6"]),
-        number(fields["param7"]),
+        read(fields["param1"]),
+        read(fields["param2"]),
+        read(fields["param3"]),
+        _number_or_nan(fields["param4"]),
+        read(fields["param5"]),
+        read(fields["param6"]),
+        read(fields["param7"]),
         GLOBAL_RELATIVE,
         is_int=False,
     )
 
 
-def from_int(fields: dict[str, Any]) -> Command:
-    """COMMAND_INT."""
+def from_int(fields: dict[str, Any], reads_nan: bool = False) -> Command:
+    """COMMAND_INT. *reads_nan*: what is no number stays none, and the largest integer is none."""
+    read = _number_or_nan if reads_nan else finite
+    x, y = (nan if reads_nan and value == NOT_GIVEN else value / 1e7 for value in (fields["x"], fields["y"]))
     return Command(
         fields["command"],
-        number(fields["param1"]),
-        number(fields["param2"]),
-        number(fields["param3"]),
-        _heading(fields["param4"]),
-        fields["x"] / 1e7,
-        fields["y"] / 1e7,
-        number(fields["z"]),
+        read(fields["param1"]),
+        read(fields["param2"]),
+        read(fields["param3"]),
+        _number_or_nan(fields["param4"]),
+        x,
+        y,
+        read(fields["z"]),
         fields["frame"],
         is_int=True,
     )
 
 
-def _heading(value: float) -> float:
-    return number(value) if isfinite(value) else nan
+def _number_or_nan(value: float) -> float:
+    return finite(value) if isfinite(value) else nan
 
 
 class CommandService:
@@ -99,11 +106,11 @@ class CommandService:
 
     def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
         """COMMAND_LONG."""
-        self._perform(peer, from_long(fields))
+        self._perform(peer, from_long(fields, self._dialect.reads_nan))
 
     def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
         """COMMAND_INT."""
-        self._perform(peer, from_int(fields))
+        self._perform(peer, from_int(fields, self._dialect.reads_nan))
 
     def _perform(self, peer: Peer, command: Command) -> None:
         own = self._own.get(command.number)
@@ -121,7 +128,7 @@ class CommandService:
     # -- messages on request
 
     def _get_interval(self, peer: Peer, command: Command) -> int:
-        number = round(command.param1)
+        number = round(finite(command.param1))
         name = self._name(number)
         if name is None:
             return FAILED
@@ -130,21 +137,21 @@ class CommandService:
         return ACCEPTED
 
     def _set_interval(self, peer: Peer, command: Command) -> int:
-        number, interval = round(command.param1), command.param2
+        number, interval = round(finite(command.param1)), finite(command.param2)
         name = self._name(number)
         if name is None:
             return self._dialect.refuse_interval(self._vehicle, number)
         if self._vehicle.uptime() < self._dialect.deaf_until:
             return ACCEPTED
         if interval == 0.0:
-            period = self._dialect.usual_period(name)
+            period = peer.channel.usual.get(name, 0)
         else:
             period = max(MS, round(interval) * US // MS * MS) if interval > 0 else 0
         peer.channel.streams.set((name,), period)
         return ACCEPTED
 
     def _request_message(self, peer: Peer, command: Command) -> int:
-        name = self._name(round(command.param1))
+        name = self._name(round(finite(command.param1)))
         if name is None:
             return self._dialect.unknown_message
         return self._send(peer, name)

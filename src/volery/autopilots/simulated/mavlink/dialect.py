@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from volery.autopilots.simulated.dialect import Act
 from volery.autopilots.simulated.mavlink.command_service import Handler
+from volery.autopilots.simulated.mavlink.habits import ParameterHabits, Texts, UploadHabits
 from volery.autopilots.simulated.plan import Item
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import MS, Ns, S
@@ -38,6 +39,21 @@ class MavlinkDialect:
     """Before that, message intervals are acknowledged and forgotten."""
     least_period: Ns = 3 * MS
     """No message is streamed more often."""
+    uses: Mapping[str, Mapping[str, Ns]] = field(default_factory=lambda: {"": {}})
+    """What a link is for, to what is streamed on it unasked; the first is what a link is for by default."""
+    mode_told: Sequence[str] = ("HEARTBEAT",)
+    """Messages that a change of mode sends at once, to everyone."""
+    home_told: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")
+    """Messages that a change of home sends at once, to everyone."""
+    texts: Texts = field(default_factory=Texts)
+    parameter_habits: ParameterHabits = field(default_factory=ParameterHabits)
+    upload_habits: UploadHabits = field(default_factory=UploadHabits)
+    wrong_target: int | None = None
+    """MAV_RESULT of a command for another system or component; ``None``: silence, and components do not
+    matter.
+    """
+    reads_nan: bool = False
+    """Whether a parameter of a command may be no number, which means: not given."""
 
     messages: Mapping[str, Builder]
     message_order: Sequence[str]
@@ -45,7 +61,6 @@ class MavlinkDialect:
     """What belongs to each MAV_DATA_STREAM."""
     on_stream_request: Callable[[Vehicle, int, int, int], None]
     """Vehicle, index of the link, stream, rate."""
-    usual_period: Callable[[str], Ns]
     refuse_interval: Callable[[Vehicle, int], int]
     unknown_message: int
     commands: Mapping[int, Handler]

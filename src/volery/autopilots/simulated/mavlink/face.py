@@ -12,12 +12,13 @@ from functools import partial
 from itertools import count
 from typing import Any
 
-from volery.autopilots.simulated.mavlink.channel import Channel, Peer
+from volery.autopilots.simulated.mavlink.channel import AUTOPILOT, Channel, Peer
 from volery.autopilots.simulated.mavlink.command_service import CommandService
 from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.mission_service import MissionService
-from volery.autopilots.simulated.mavlink.parameter_service import ParameterService, value_fields
+from volery.autopilots.simulated.mavlink.parameter_service import ParameterService
 from volery.autopilots.simulated.mavlink.streams import Streams
+from volery.autopilots.simulated.mavlink.texts import TextLine, chunks
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import S
 from volery.kernel.api import Action, Handle
@@ -26,8 +27,8 @@ from volery.trace.events import Text
 
 Handler = Callable[[Peer, dict[str, Any]], None]
 
-TEXT_LENGTH = 50
 BROADCAST = 0
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 
 
 class MavlinkFace:
@@ -43,7 +44,7 @@ class MavlinkFace:
         self._after: list[Action] = []
         self._text_id = 0
         self._clocks: list[Handle] = []
-        parameters = ParameterService(vehicle)
+        self._parameters = parameters = ParameterService(vehicle, dialect.parameter_habits)
         missions = MissionService(vehicle, dialect)
         self._commands = CommandService(vehicle, dialect)
         self._handlers: dict[str, Handler] = {
@@ -74,21 +75,24 @@ class MavlinkFace:
         """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
         return self.dialect.boot_bytes[0].data if self.dialect.boot_bytes else b""
 
-    def connect(self, link: Link) -> None:
-        """Listen to and speak on this link, too."""
-        vehicle = self._vehicle
+    def connect(self, link: Link, use: str = "") -> None:
+        """Listen to and speak on this link, too. *use* is what the firmware has it for."""
+        vehicle, uses = self._vehicle, self.dialect.uses
         taken = {channel.index for channel in self.channels}
         index = next(index for index in count() if index not in taken)
-        channel = Channel(link, index, vehicle.system)
+        channel = Channel(link, index, vehicle.system, uses[use] if use else next(iter(uses.values())))
         channel.streams = Streams(
             self._kernel,
             self.dialect.message_order,
             lambda names: self._burst(channel, names),
             least=self.dialect.least_period,
         )
+        channel.texts = TextLine(
+            self._kernel, self.dialect.texts, lambda fields: channel.send("STATUSTEXT", fields)
+        )
         self.channels.append(channel)
         if vehicle.uptime() >= vehicle.dialect.ready_after:
-            channel.streams.start()
+            channel.stream()
         link.receive(lambda frame: self._hear(channel, frame))
 
     def disconnect(self, link: Link) -> None:
@@ -151,7 +155,7 @@ class MavlinkFace:
     def stream(self) -> None:
         """Send what was asked for."""
         for channel in self.channels:
-            channel.streams.start()
+            channel.stream()
 
     def _at_uptime(self, uptime: int, action: Action) -> None:
         self._clocks.append(self._kernel.call_at(self._vehicle.boot_at + uptime, action))
@@ -172,29 +176,33 @@ class MavlinkFace:
 
     def say(self, severity: int, text: str) -> None:
         """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
-        self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
-        chunks = [text[start : start + TEXT_LENGTH] for start in range(0, max(1, len(text)), TEXT_LENGTH)]
-        if len(chunks) > 1:
+        self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text.strip()))
+        numbered = self.dialect.texts.numbered or len(chunks(severity, text, 0)) > 1
+        if numbered:
             self._text_id = self._text_id % 65_535 + 1
-        number = self._text_id if len(chunks) > 1 else 0
-        for place, chunk in enumerate(chunks):
-            fields = {"severity": severity, "text": chunk, "id": number, "chunk_seq": place}
-            self._tell_all("STATUSTEXT", fields)
+        pieces = chunks(severity, text, self._text_id if numbered else 0)
+
+        def tell() -> None:
+            for channel in self.channels:
+                channel.texts.put(pieces)
+
+        self.after_answer(tell)
 
     def parameter(self, name: str) -> None:
         """PARAM_VALUE to everyone."""
-        found = self._vehicle.parameters.find(name)
-        if found is not None:
-            self._tell_all("PARAM_VALUE", value_fields(self._vehicle.parameters, found))
+        fields = self._parameters.unlisted(name)
+        if fields is not None:
+            self._tell_all("PARAM_VALUE", fields)
 
     def mode_changed(self) -> None:
-        """HEARTBEAT to everyone."""
-        self.announce("HEARTBEAT")
+        """What a change of mode sends, to everyone."""
+        for message in self.dialect.mode_told:
+            self.announce(message)
 
     def home_changed(self) -> None:
-        """GPS_GLOBAL_ORIGIN and HOME_POSITION to everyone."""
-        self.announce("GPS_GLOBAL_ORIGIN")
-        self.announce("HOME_POSITION")
+        """What a change of home sends, to everyone."""
+        for message in self.dialect.home_told:
+            self.announce(message)
 
     def announce(self, message: str) -> None:
         """That message to everyone."""
@@ -232,21 +240,39 @@ class MavlinkFace:
 
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
-        name, fields = frame.name, frame.fields
-        if fields.get("target_system", BROADCAST) not in (BROADCAST, self._vehicle.system):
+        fields = frame.fields
+        if not self._is_for_me(frame):
+            self._turn_away(channel, frame)
             return
+        if frame.name == "HEARTBEAT":
+            channel.texts.on_heartbeat(fields["type"])
         self._handling = True
-        own = self._handlers.get(name)
+        own = self._handlers.get(frame.name)
         if own is not None:
             own(Peer(channel, frame.system, frame.component), fields)
         else:
-            heard = self.dialect.handlers.get(name)
+            heard = self.dialect.handlers.get(frame.name)
             if heard is not None:
                 heard(self._vehicle, fields, frame.system)
         self._handling = False
         after, self._after = self._after, []
         for action in after:
             action()
+
+    def _is_for_me(self, frame: Frame) -> bool:
+        fields, strict = frame.fields, self.dialect.wrong_target is not None
+        system, component = fields.get("target_system", BROADCAST), fields.get("target_component", BROADCAST)
+        if strict and frame.name in COMMANDS and system != self._vehicle.system:
+            return False
+        if system not in (BROADCAST, self._vehicle.system):
+            return False
+        return not strict or component in (BROADCAST, AUTOPILOT)
+
+    def _turn_away(self, channel: Channel, frame: Frame) -> None:
+        result = self.dialect.wrong_target
+        if result is not None and frame.name in COMMANDS:
+            peer = Peer(channel, frame.system, frame.component)
+            self._commands.acknowledge(peer, frame.fields["command"], result)
 
     def _on_parameter_list(self, listing: Handler) -> Handler:
         def on_list(peer: Peer, fields: dict[str, Any]) -> None:

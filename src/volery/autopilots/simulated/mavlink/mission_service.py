@@ -59,7 +59,8 @@ class MissionService:
             self._vehicle.plan.clear()
             self._acknowledge(peer, ACCEPTED)
         else:
-            self._vehicle.plan.clear()
+            if not self._dialect.upload_habits.keeps_old:
+                self._vehicle.plan.clear()
             self._upload = _Upload(peer, fields["count"], self._kernel.now())
             self._ask()
 
@@ -72,7 +73,9 @@ class MissionService:
             self._acknowledge(upload.peer, CANCELLED)
             self._upload = None
             return
-        upload.peer.answer("MISSION_REQUEST", seq=len(upload.items), mission_type=MISSION)
+        asked = len(upload.items)
+        request = self._dialect.upload_habits.asks_with(asked)
+        upload.peer.answer(request, seq=asked, mission_type=MISSION)
         upload.reminder = self._kernel.call_at(self._kernel.now() + ASK_AGAIN, self._ask)
 
     def _drop_upload(self) -> None:
@@ -126,7 +129,8 @@ class MissionService:
             self._upload = None
             self._vehicle.plan.replace(upload.items)
             self._acknowledge(upload.peer, ACCEPTED)
-            self._vehicle.say(6, "Flight plan received")
+            if self._dialect.upload_habits.received:
+                self._vehicle.say(6, self._dialect.upload_habits.received)
         self._dialect.mission_grew(self._vehicle, len(upload.items))
 
     # -- download

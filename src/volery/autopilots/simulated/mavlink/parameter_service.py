@@ -2,73 +2,107 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
+from zlib import crc32
 
 from volery.autopilots.simulated.mavlink.channel import Channel, Peer
-from volery.autopilots.simulated.parameters import Parameter, Parameters
+from volery.autopilots.simulated.mavlink.habits import ParameterHabits
+from volery.autopilots.simulated.parameters import REAL32, Parameter
 from volery.autopilots.simulated.vehicle import Vehicle
-from volery.base.time import MS
 
 UNSOLICITED = 65535
 """The index of a value that nobody listed."""
 
-LIST_BURST = 200
-LIST_PERIOD = 100 * MS
-"""ArduPilot lists 1390 parameters in 0.61 s: about 230 each tenth of a second."""
+UINT32 = 5
+"""MAV_PARAM_TYPE of a checksum."""
 
-READ_DELAY = 50 * MS
-"""A parameter read by name is answered after 55 to 100 ms; a list and a set are answered at once."""
+_REAL = struct.Struct("<f")
 
 
-def value_fields(parameters: Parameters, parameter: Parameter, index: int = UNSOLICITED) -> dict[str, Any]:
-    """The fields of a PARAM_VALUE."""
-    return {
-        "param_id": parameter.name,
-        "param_value": parameter.value,
-        "param_type": parameter.type,
-        "param_count": len(parameters),
-        "param_index": index,
-    }
+def as_bytes(kind: int, value: float) -> float:
+    """The real number whose bytes are those of an integer; a real number is itself."""
+    if kind == REAL32:
+        return value
+    number: float = _REAL.unpack(struct.pack("<I", int(value) & 0xFFFF_FFFF))[0]
+    return number
+
+
+def from_bytes(kind: int, value: float) -> float:
+    """What ``as_bytes`` was given."""
+    if kind == REAL32:
+        return value
+    return float(struct.unpack("<i", _REAL.pack(value))[0])
 
 
 class ParameterService:
     """Answers for one vehicle."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, habits: ParameterHabits) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
+        self._habits = habits
+
+    def unlisted(self, name: str) -> dict[str, Any] | None:
+        """The fields of a PARAM_VALUE that nobody listed; ``None`` if there is no such parameter."""
+        if name == self._habits.checksum and name:
+            return self._fields(self._checksum(), UNSOLICITED)
+        found = self._vehicle.parameters.find(name)
+        if found is None:
+            return None
+        keeps = self._habits.keeps_index
+        return self._fields(found, self._vehicle.parameters.index(name) if keeps else UNSOLICITED)
+
+    def _fields(self, parameter: Parameter, index: int) -> dict[str, Any]:
+        name, kind, value = parameter
+        return {
+            "param_id": name,
+            "param_value": as_bytes(kind, value) if self._habits.bytewise else value,
+            "param_type": kind,
+            "param_count": len(self._vehicle.parameters),
+            "param_index": index,
+        }
+
+    def _checksum(self) -> Parameter:
+        """Over names and values: it changes when any of them does."""
+        total = 0
+        for name, kind, value in self._vehicle.parameters:
+            total = crc32(name.encode() + _REAL.pack(as_bytes(kind, value)), total)
+        return Parameter(self._habits.checksum, UINT32, float(total))
 
     def on_list(self, peer: Peer, _fields: dict[str, Any]) -> None:
         """PARAM_REQUEST_LIST."""
+        if self._habits.checksum:
+            peer.channel.send("PARAM_VALUE", self._fields(self._checksum(), UNSOLICITED))
         self._burst(peer.channel, 0)
 
     def _burst(self, channel: Channel, start: int) -> None:
         parameters = self._vehicle.parameters
-        end = min(start + LIST_BURST, len(parameters))
+        end = min(start + self._habits.burst, len(parameters))
         for index in range(start, end):
-            channel.send("PARAM_VALUE", value_fields(parameters, parameters.at(index), index))
+            channel.send("PARAM_VALUE", self._fields(parameters.at(index), index))
         if end < len(parameters):
-            self._kernel.call_at(self._kernel.now() + LIST_PERIOD, lambda: self._burst(channel, end))
+            self._kernel.call_at(self._kernel.now() + self._habits.period, lambda: self._burst(channel, end))
 
     def on_read(self, peer: Peer, fields: dict[str, Any]) -> None:
         """PARAM_REQUEST_READ, by name or by index. Silence if there is no such parameter."""
         index = fields["param_index"]
-        if index >= 0:
-            found = self._vehicle.parameters.at(index) if index < len(self._vehicle.parameters) else None
-        else:
-            found = self._vehicle.parameters.find(fields["param_id"])
-        if found is not None:
-            name, shown = found.name, index if index >= 0 else UNSOLICITED
-            self._kernel.call_at(
-                self._kernel.now() + READ_DELAY, lambda: self._tell(peer.channel, name, shown)
-            )
+        if index >= len(self._vehicle.parameters):
+            return
+        name = fields["param_id"] if index < 0 else self._vehicle.parameters.at(index).name
+        self._kernel.call_at(
+            self._kernel.now() + self._habits.read_delay, lambda: self._tell(peer.channel, name, index)
+        )
 
     def on_set(self, peer: Peer, fields: dict[str, Any]) -> None:
         """PARAM_SET. Every link learns the new value; silence if it cannot be set."""
-        self._vehicle.set_parameter(fields["param_id"], fields["param_value"])
+        name, kind, value = fields["param_id"], fields["param_type"], fields["param_value"]
+        found = self._vehicle.parameters.find(name)
+        if found is None or (self._habits.typed and kind != found.type):
+            return
+        self._vehicle.set_parameter(name, from_bytes(found.type, value) if self._habits.bytewise else value)
 
     def _tell(self, channel: Channel, name: str, index: int) -> None:
-        parameters = self._vehicle.parameters
-        found = parameters.find(name)
-        if found is not None:
-            channel.send("PARAM_VALUE", value_fields(parameters, found, index))
+        fields = self.unlisted(name)
+        if fields is not None:
+            channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
