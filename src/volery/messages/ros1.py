@@ -92,6 +92,12 @@ def ros1_name(name: str) -> str:
     return f"{package}/{label}"
 
 
+def our_name(name: str) -> str:
+    """``std_msgs/String`` as ``std_msgs/msg/String``; the type need not be known."""
+    package, _, label = name.partition("/")
+    return f"{package}/msg/{ROS1_SPELLING.get(package, {}).get(label, label)}" if label else name
+
+
 @cache
 def ros1_type(name: str) -> Ros1Type:
     """What ROS 1 knows of a message type. ``UsageError`` if unknown, or if ROS 1's has other fields."""

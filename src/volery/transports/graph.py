@@ -1,0 +1,140 @@
+"""A real ROS graph as this process sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from time import time_ns
+from typing import TYPE_CHECKING, NoReturn
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.graph.context import Context, Records
+from volery.graph.graph import everything
+from volery.graph.node import Cost, NodeId, RosGraph, ServiceState, TopicState
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place
+from volery.kernel.waiting import Signal
+from volery.trace.events import Text
+from volery.transports.abroad import abroad
+from volery.transports.node import TransportNode
+from volery.transports.topics import WARNING
+from volery.transports.wire import Library
+
+if TYPE_CHECKING:
+
+    def _is_a(graph: TransportGraph) -> RosGraph:
+        """Checked by the type checker: it has all that a graph has."""
+        return graph
+
+
+@dataclass(frozen=True)
+class _Free:
+    caller: Ns = 0
+    background: Ns = 0
+
+
+def _price(node: NodeId, call: str, x: float) -> Cost:
+    return _Free()
+
+
+def _carry(*what: object) -> NoReturn:
+    raise AssertionError("real ROS carries its messages itself")
+
+
+class TransportGraph:
+    """The nodes of this process on a real ROS graph.
+
+    *epoch* is what ROS time is at the kernel's zero: by default the Unix time then.
+    """
+
+    def __init__(
+        self, kernel: Kernel, library: Library, *, records: Records = everything, epoch: Ns | None = None
+    ) -> None:
+        self.kernel = kernel
+        if epoch is None:
+            epoch = time_ns() - kernel.now()
+        self._context = Context(kernel, _price, _carry, records, epoch, Signal(kernel, "the ROS graph"))
+        self._library = library
+        self._nodes: dict[str, TransportNode] = {}
+        self._numbers = 0
+
+    @property
+    def epoch(self) -> Ns:
+        """What ROS time is at the kernel's zero."""
+        return self._context.epoch
+
+    def node(
+        self,
+        name: str,
+        namespace: str = "/",
+        *,
+        remaps: Mapping[str, str] | None = None,
+        anonymous: bool = False,
+        place: Place | None = None,
+    ) -> TransportNode:
+        """Join the graph as *name*.
+
+        *anonymous* adds the time and a number to the name. Raises ``UsageError`` for an invalid name or one
+        that is taken, ``LinkError`` if the graph cannot be reached.
+        """
+        if anonymous:
+            self._numbers += 1
+            name = f"{name}_{time_ns() // 1000}_{self._numbers}"
+        task = self.kernel.current()
+        here = place or (task.place if task is not None else Place(name))
+        made = TransportNode(self._context, name, namespace, remaps or {}, here)
+        if made.name in self._nodes:
+            raise UsageError(
+                f"a node named {made.name} is there already, in this process; choose another name"
+            )
+        lost = partial(self._lost, made)
+        self._nodes[made.name] = made
+        try:
+            made.join(
+                abroad(
+                    self.kernel, f"joining as {made.name}", lambda: self._library.wire(name, namespace, lost)
+                )
+            )
+        except BaseException:
+            del self._nodes[made.name]
+            raise
+        made.on_close = partial(self._leave, made)
+        return made
+
+    def _lost(self, node: TransportNode, why: str) -> None:
+        """A thread of the client library says that *node* was thrown out."""
+
+        def tell() -> None:
+            if not node.closed:
+                self.kernel.record(Text(self.kernel.now(), node.name, WARNING, f"{node.name}: {why}"))
+                node.thrown_out(why)
+
+        self.kernel.post(tell)
+
+    def _leave(self, node: TransportNode) -> None:
+        del self._nodes[node.name]
+        node.leave()
+
+    def warn(self, text: str) -> None:
+        """Record what the client library says went wrong. From any thread."""
+        self.kernel.post(lambda: self.kernel.record(Text(self.kernel.now(), "ROS", WARNING, text)))
+
+    def node_names(self) -> list[str]:
+        """Who is there, sorted."""
+        return abroad(self.kernel, "the nodes of the graph", self._library.node_names)
+
+    def topics(self) -> list[TopicState]:
+        """The topics that somebody publishes or subscribes to, by name."""
+        return abroad(self.kernel, "the topics of the graph", self._library.topics)
+
+    def services(self) -> list[ServiceState]:
+        """The services that somebody serves, by name."""
+        return abroad(self.kernel, "the services of the graph", self._library.services)
+
+    def close(self) -> None:
+        """All nodes leave the graph."""
+        for node in list(self._nodes.values()):
+            node.close()
+        self._library.close()
