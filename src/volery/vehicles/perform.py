@@ -52,6 +52,7 @@ class Performer:
         self._driver = driver
         self._silence = silence
         self.commanded = ""
+        self._kept = ""  # the mode that was ours before, until the one commanded last is seen
         self.turn = 0  # whose it is: what was begun in an earlier one ends
         self.successor = ""  # what took the vehicle from it
 
@@ -87,15 +88,30 @@ class Performer:
         self._driver.telemetry.changed.notify()
 
     def is_ours(self) -> bool:
-        """It is in the mode that was commanded last, or in the one in which it obeys a computer."""
-        return self._driver.telemetry.mode in {self.commanded, self._driver.handover}
+        """It is in the mode that was commanded last, still in the one that was ours before if that was
+        refused, or in the one in which it obeys a computer.
+        """
+        return self._driver.telemetry.mode in {self.commanded, self._kept, self._driver.handover}
+
+    def command(self, mode: str) -> None:
+        """*mode* is being asked for: it is ours from now on."""
+        if mode != self.commanded:
+            self._kept, self.commanded = self.commanded, mode
+
+    def entered(self) -> None:
+        """The mode that was commanded last is seen: what was ours before is no more."""
+        self._kept = ""
+
+    def lose(self) -> None:
+        """Somebody else has it."""
+        self.commanded = self._kept = ""
 
     def check_ours(self, asked: str) -> None:
         """Raise ``Overridden`` if it flies in a mode that this program did not command."""
         seen = self._driver.telemetry
         if not seen.flying or self.is_ours():
             return
-        self.commanded = ""
+        self.lose()
         kind = Failsafe if seen.failsafe else Overridden
         raise kind(
             self._driver.name,
@@ -176,8 +192,9 @@ class _Attempt:
         if not skipped:
             self._check_not_fought()
         if step.enters:
-            self._owner.commanded = step.enters  # also where it is in that mode already: it is ours now
+            self._owner.command(step.enters)  # also where it is in that mode already: it is ours now
         if skipped:
+            self._settle()
             return ""
         self._seen.answers.pop(step.answer, None)
         if self._driver.cycle is None:
@@ -185,6 +202,10 @@ class _Attempt:
         else:
             self._go_round(self._driver.cycle)
         return self._judge()
+
+    def _settle(self) -> None:
+        if self._step.enters:
+            self._owner.entered()
 
     def _check_not_fought(self) -> None:
         """Guided is never commanded over a failsafe, not even over one that took the mode we were in."""
@@ -276,6 +297,7 @@ class _Attempt:
         if self._turn != self._owner.turn:
             raise self._owner.taken_over(self._asked)
         if self._step.done(self._seen):
+            self._settle()
             return ""
         if self._stopped is not None and not self._changed:
             raise self._stopped
@@ -283,7 +305,7 @@ class _Attempt:
         if not self._changed:
             raise self._refused()
         if self._seen.flying or self._seen.failsafe:
-            self._owner.commanded = ""
+            self._owner.lose()
             raise self._taken(self._changed)
         return self._changed
 

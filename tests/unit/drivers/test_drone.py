@@ -669,3 +669,22 @@ def test_options_of_the_driver(bench: Make) -> None:
     for wrong in ({"rate": "0"}, {"system": "0"}, {"speed": "3"}):
         with pytest.raises(UsageError):
             bench(options=wrong)
+
+
+def test_a_mode_that_is_refused_leaves_the_one_before_ours(bench: Make) -> None:
+    """Flown by hand, GUIDED refused: the program still has it, and brings it down in the end."""
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.manual_control(0, 0, 0.5, 0)
+        drone.altitude_hold()
+        obeys, at.autopilot.refuse = at.autopilot.refuse, {SET_MODE: ["Mode change to GUIDED failed"]}
+        with pytest.raises(Refused, match="failed"):
+            drone.goto(NEAR)
+        at.autopilot.refuse = obeys
+        assert drone.mode == "ALT_HOLD"
+        drone.manual_control(0, 0, 0.5, 0)
+        assert drone.come_to_rest() == "landed"
+
+    at.fly(mission)

@@ -165,6 +165,12 @@ class Flight:
         """Fault: the magnetometer is stuck."""
         self._world.drive(self._body, U_MAG_BLOCKED, float(blocked))
 
+    def drain_battery(self, left: float) -> None:
+        """Fault: from the next grid step on only the fraction *left* of the charge is in it."""
+        if not 0.0 <= left <= 1.0:
+            raise UsageError(f"a battery with {left} left: 0 to 1")
+        self._world.drive(self._body, S_CHARGE, self.capacity_as * (1.0 - left))
+
     def weaken_motor(self, motor: int, health: float) -> None:
         """Fault: *motor* (0 to 3) gives only the fraction *health* of its thrust."""
         if not 0 <= motor <= 3 or not 0.0 <= health <= 1.0:
