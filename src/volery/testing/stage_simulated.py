@@ -50,7 +50,8 @@ class SimulatedStage(Stage):
         self.airfield = airfield_of(self.kernel, all_wanted, seed)
         self._kind = kind
         self._factory = drivers.load(address.driver)
-        self._tap = Tap(link_to(self.kernel, self.airfield, self._wanted, seed))
+        self.link = link_to(self.kernel, self.airfield, self._wanted, seed)
+        self._tap = Tap(self.link)
         self._neighbour = ""
         if neighbour:
             self._neighbour = all_wanted[1].vehicle.name

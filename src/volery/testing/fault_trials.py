@@ -1,0 +1,229 @@
+"""Trials of faults: one fault in one phase of a flight, what the aircraft did, and what the caller saw.
+
+A trial demands of every driver and autopilot: no call hangs; it ends done or with an error of this project
+that names the vehicle; what ended done was done, by the vehicle's own truth; nothing was done twice; nobody
+else's mode was fought; and the vehicle comes down in the end, by us or by whoever has it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+
+from volery.base.errors import VoleryError
+from volery.base.time import MINUTE, MS, Ns, S
+from volery.kernel.task import Cancelled, Place
+from volery.links.wire import Wire
+from volery.testing.checks import BrokenError, ImpossibleError, demand
+from volery.testing.faults import FAULTS, WHOLE, Fault
+from volery.testing.phases import PHASES
+from volery.testing.stage_simulated import SimulatedStage
+from volery.trace.events import VehicleState
+from volery.vehicles import Drone
+from volery.vehicles.address import parse
+
+LONGEST: Ns = 15 * MINUTE
+"""A call that is not over by then hangs: no time-out of these short flights is longer."""
+
+WATCHED: Ns = 100 * MS
+LOST_S = 30.0
+"""Between the death of a program and the start of the next."""
+DOWN_WITHIN_S = 300.0
+
+
+@dataclass
+class Seen:
+    """What the aircraft did from the fault on: its modes in order, and how often it was armed."""
+
+    modes: list[str] = field(default_factory=list)
+    armed: list[bool] = field(default_factory=list)
+    states: list[VehicleState] = field(default_factory=list)
+
+    def note(self, state: VehicleState) -> None:
+        """Another look."""
+        self.states.append(state)
+        if not self.modes or self.modes[-1] != state.mode:
+            self.modes.append(state.mode)
+        if not self.armed or self.armed[-1] != state.armed:
+            self.armed.append(state.armed)
+
+    @property
+    def armings(self) -> int:
+        """How often it went from disarmed to armed."""
+        return sum(later and not earlier for earlier, later in pairwise(self.armed))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One fault in one phase. ``caller``: ``done``, or the error's name, and ``said`` its words.
+
+    ``aircraft``: its modes from the fault on. ``broken`` says which demand was not met; empty if all were.
+    ``possible`` is False where there is nothing that this fault could happen to.
+    """
+
+    autopilot: str
+    fault: str
+    phase: str
+    caller: str
+    said: str
+    aircraft: tuple[str, ...]
+    ended: str
+    broken: str = ""
+    possible: bool = True
+
+
+def try_fault(autopilot: str, fault: str, phase: str, seed: int = 1) -> Trial:
+    """One trial of a simulated *autopilot*, through bytes where it has a wire."""
+    return _Trying(autopilot, fault, phase, seed).result()
+
+
+class _Trying:
+    """A trial under way."""
+
+    def __init__(self, autopilot: str, fault: str, phase: str, seed: int) -> None:
+        self._names = autopilot, fault, phase
+        self._fault: Fault = FAULTS[fault]
+        self._program = PHASES[phase]
+        self._stage = SimulatedStage(parse(f"sim:{autopilot}?wire=bytes"), Drone, seed)
+        self._name = self._stage.name_of_vehicle
+        self._seen = Seen()
+        self._after = Seen()  # from the fault on
+        self._struck = False
+        self._possible = True
+        self._caller, self._said = "", ""
+        self._ended = ""
+        self._scope = self._stage.kernel.root.child("program")
+
+    def result(self) -> Trial:
+        """Fly it and judge."""
+        stage = self._stage
+        stage.kernel.every(WATCHED, self._look)
+        broken = ""
+        try:
+            self._fly()
+            demand(self._struck, "the fault never came: the call was over before")
+            self._judge_caller()
+            stage.perform(self._bring_down)
+            self._judge_aircraft()
+        except BrokenError as error:
+            broken = str(error)
+        except TimeoutError as error:
+            broken = str(error)
+        finally:
+            stage.close()
+        return Trial(
+            *self._names,
+            self._caller,
+            self._said,
+            tuple(self._after.modes),
+            self._ended,
+            broken,
+            self._possible,
+        )
+
+    def _look(self) -> None:
+        state = self._stage.airfield.autopilots[self._name].state()
+        self._seen.note(state)
+        if self._struck:
+            self._after.note(state)
+
+    # -- the flight
+
+    def _fly(self) -> None:
+        kernel = self._stage.kernel
+        kernel.spawn(self._call, "program", Place("program"), self._scope)
+        while not self._caller:
+            demand(kernel.now() < LONGEST, "it hangs")
+            kernel.run(kernel.now() + S)
+
+    def _call(self) -> None:
+        try:
+            self._stage.drone.wait_heard()
+            self._program(self._stage, self._strike)
+            self._caller = "done"
+        except VoleryError as error:
+            self._caller, self._said = type(error).__name__, str(error)
+        except Cancelled:
+            self._caller = "killed"
+            raise
+        except Exception as error:  # a fault of ours: it is told as such
+            self._caller, self._said = f"a fault of volery: {type(error).__name__}", str(error)
+
+    def _strike(self) -> None:
+        kernel = self._stage.kernel
+        self._struck = True
+        self._look()
+        if self._fault.deadly:
+            self._fault.begins(self._stage)
+            kernel.call_at(kernel.now(), partial(kernel.cancel, self._scope, "killed"))
+            return
+        kernel.spawn(self._begin, "fate", Place("fate"))
+
+    def _begin(self) -> None:
+        try:
+            self._fault.begins(self._stage)
+        except ImpossibleError:
+            self._possible = False
+        except VoleryError:
+            return  # the other station's refusals are its own concern
+
+    # -- judgement
+
+    def _judge_caller(self) -> None:
+        if self._caller in {"done", "killed"}:
+            return
+        demand(not self._caller.startswith("a fault"), f"{self._caller}: {self._said}")
+        demand(self._name in self._said, f"{self._caller} does not name the vehicle: {self._said}")
+
+    def _bring_down(self) -> None:
+        stage = self._stage
+        if self._caller == "done":
+            self._demand_done()
+        if isinstance(stage.link, Wire):
+            stage.link.suffer(WHOLE)
+        program = stage.drone
+        if self._fault.deadly:
+            stage.sleep(LOST_S)
+            program = stage.another_program()
+            program.wait_heard()
+        try:
+            self._ended = program.come_to_rest()
+        except VoleryError as error:
+            self._ended = f"{type(error).__name__} at the end of the program"
+        waited = 0.0
+        while self._seen.armed[-1] and waited < DOWN_WITHIN_S:
+            stage.sleep(1.0)
+            waited += 1.0
+
+    def _demand_done(self) -> None:
+        """What ended done is so, by the vehicle's own truth."""
+        state, phase = self._seen.states[-1], self._names[2]
+        if phase == "ground":
+            demand(not state.armed, "disarm() returned, and it is armed")
+        elif phase in {"arming", "take-off"}:
+            demand(state.z > 12.0, f"takeoff(15) returned at {state.z:.1f} m")
+        elif phase in {"return", "land"}:
+            demand(not state.armed and state.z < 1.0, f"it returned at {state.z:.1f} m, armed: {state.armed}")
+        else:
+            demand(state.armed and state.z > 5.0, f"goto() returned at {state.z:.1f} m, armed: {state.armed}")
+
+    def _judge_aircraft(self) -> None:
+        demand(not self._seen.armed[-1], f"it is still armed in {self._seen.modes[-1]} ({self._ended})")
+        demand(self._seen.armings <= 1 or self._fault.brings_down, f"it was armed {self._seen.armings} times")
+        height = self._seen.states[-1].z
+        demand(height < 1.0, f"it is disarmed at {height:.1f} m")
+        if self._fault.brings_down:
+            self._demand_not_fought()
+
+    def _demand_not_fought(self) -> None:
+        """Once the other station's mode was seen in the air, ours never follows while it is armed."""
+        start = self._after.modes[0]
+        theirs = next((mode for mode in self._after.modes[1:] if mode in self._stage.driver.comes_down), "")
+        if not theirs or not self._after.armed[0]:
+            return
+        rest = [state.mode for state in self._after.states if state.armed]
+        behind = rest[rest.index(theirs) :] if theirs in rest else []
+        demand(
+            start == theirs or start not in behind, f"its mode was fought: {' > '.join(self._after.modes)}"
+        )
