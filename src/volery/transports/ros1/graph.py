@@ -53,11 +53,14 @@ class Ros1:
 
     def start(self) -> None:
         """Watch the master, and rospy's log."""
-        self._log = _ToTrace(lambda text: self.say(text))
+        self._log = _ToTrace(self._pass_on)
         for name in LOGGERS:
             logging.getLogger(name).addHandler(self._log)
             logging.getLogger(name).propagate = False
         threading.Thread(target=self._watch, name="ROS master", daemon=True).start()
+
+    def _pass_on(self, text: str) -> None:
+        self.say(text)
 
     def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Wire:
         """Register a node."""

@@ -173,6 +173,8 @@ class Ros1Wire:
         rospy.names._set_caller_id(names.join(namespace, "unnamed"))
         rospy.init_node(name, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
         self._closing = False
+        self._gone = threading.Event()
+        rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
         rospy.core.add_preshutdown_hook(lambda reason: None if self._closing else lost(_thrown_out(reason)))
 
     def _check_free(self) -> None:
@@ -270,9 +272,8 @@ class Ros1Wire:
         if self._closing:
             return
         self._closing = True
-        leaving = threading.Thread(target=partial(self.rospy.core.signal_shutdown, "closed"), daemon=True)
-        leaving.start()
-        leaving.join(GOODBYE_S)
+        _aside(partial(self.rospy.core.signal_shutdown, "closed"))
+        self._gone.wait(GOODBYE_S)
 
 
 def _thrown_out(reason: str) -> str:
