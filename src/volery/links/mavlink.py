@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.links.link import Frame
+from volery.links.mavlink_newer import NEWER
 
 STX = 0xFD
 STX_V1 = 0xFE
@@ -121,7 +122,7 @@ class MessageType:
         return int(mcrf4xx(covered + self._extra))
 
 
-_TYPES = {number: MessageType(definition) for number, definition in dialect.mavlink_map.items()}
+_TYPES = {definition.id: MessageType(definition) for definition in (*NEWER, *dialect.mavlink_map.values())}
 _BY_NAME = {kind.name: kind for kind in _TYPES.values()}
 
 

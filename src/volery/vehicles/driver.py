@@ -102,8 +102,11 @@ class Driver(Protocol):
 
     name: str
     telemetry: Telemetry
-    handover: str
     comes_down: frozenset[str]
+
+    @property
+    def handover(self) -> str:
+        """See above."""
 
     @property
     def capabilities(self) -> frozenset[Capability]:

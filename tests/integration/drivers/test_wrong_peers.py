@@ -104,7 +104,7 @@ def test_another_autopilot() -> None:
     beat = bytes(mavlink_2.MAVLink_heartbeat_message(2, 12, 81, 65536, 3, 3).pack(sender))
     with peer(lambda to: to.sendall(beat)) as url:
         error = said_to_the_user(url)
-    assert "a PX4 autopilot speaks here, not an ArduPilot" in str(error)
+    assert "a PX4 speaks here, not an ArduPilot" in str(error)
 
 
 def test_a_baud_rate_that_is_none() -> None:

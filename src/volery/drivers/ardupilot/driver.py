@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
-from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.drivers.ardupilot.commands import Commands
@@ -35,10 +34,8 @@ from volery.drivers.mavlink.sequences import (
 )
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Repeat, Step, Sticks
-from volery.vehicles.mission import MissionItem
+from volery.vehicles.mission import MissionItem, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
-
-IDLE_THROTTLE = 0.1
 
 
 class ArduPilot(Sequences):
@@ -166,13 +163,7 @@ class ArduPilot(Sequences):
     def stabilize(self) -> Sequence[Step]:
         """STABILIZE, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._setpoints.hold_any()
-        held = self._setpoints.held
-        throttle = held.throttle if held is not None else 0.0
-        if self.telemetry.flying and throttle < IDLE_THROTTLE:
-            raise UsageError(
-                f"{self.name}: the throttle is at {throttle:g}: in STABILIZE the motors would idle and it "
-                f"would fall; manual_control() with a throttle about 0.5 first"
-            )
+        self._not_idle(self._setpoints.held)
         return self._change("STABILIZE")
 
     def altitude_hold(self) -> Sequence[Step]:
@@ -202,6 +193,10 @@ class ArduPilot(Sequences):
 
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
         return items_of(mission)
+
+    def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
+        """Item 0 is home; of one waypoint with a heading the waypoint is the last."""
+        return len(items_of(mission)) - 1 if isinstance(mission[-1], Waypoint) else None
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
         """Ready, GUIDED, armed, AUTO, start; to its end: disarmed, at the last point, or said to be over."""

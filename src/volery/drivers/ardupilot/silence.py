@@ -54,7 +54,7 @@ def if_silent(kind: str, parameters: Mapping[str, float]) -> str:
 
 
 def _left_alone(kind: str, parameters: Mapping[str, float]) -> str:
-    said = "it does not look for its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there"
+    said = "it does not miss its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there"
     stands = parameters.get("GUID_TIMEOUT", 3.0)
     return f"{said}; a velocity ends after {stands:g} s" if kind == DRONE_KIND else said
 

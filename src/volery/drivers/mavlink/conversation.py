@@ -37,6 +37,12 @@ _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
 
+_AUTOPILOTS: Mapping[int, str] = {
+    constant("MAV_AUTOPILOT_ARDUPILOTMEGA"): "an ArduPilot",
+    constant("MAV_AUTOPILOT_PX4"): "a PX4",
+    constant("MAV_AUTOPILOT_PPZ"): "a Paparazzi",
+}
+
 KEYS: Mapping[int, str] = {
     constant("MAV_CMD_DO_SET_MODE"): key.MODE,
     constant("MAV_CMD_COMPONENT_ARM_DISARM"): key.ARM,
@@ -144,7 +150,7 @@ class Conversation:
         if frame.name != "HEARTBEAT" or frame.fields["autopilot"] == _NO_AUTOPILOT:
             return False
         if frame.fields["autopilot"] != self.firmware.number:
-            self._stranger = entry_name("MAV_AUTOPILOT", frame.fields["autopilot"])
+            self._stranger = _called(frame.fields["autopilot"])
             return False
         if self._system is not None and frame.system != self._system:
             return False
@@ -243,7 +249,7 @@ class Conversation:
         if self.telemetry.heard >= 0:
             return None
         if self._stranger:
-            return LinkGarbled(f"a {self._stranger} autopilot speaks here, not {self.firmware.called}")
+            return LinkGarbled(f"{self._stranger} speaks here, not {self.firmware.called}")
         return LinkSilent(f"no {self.firmware.name} was heard")
 
     def close(self) -> None:
@@ -295,6 +301,11 @@ class Conversation:
         """MISSION_CURRENT tells the end of missions that do not land."""
         self._streams.want("MISSION_CURRENT", S)
         self._streams.look(self._kernel.now())
+
+
+def _called(autopilot: int) -> str:
+    known = _AUTOPILOTS.get(autopilot)
+    return known or f"a {entry_name('MAV_AUTOPILOT', autopilot)} autopilot"
 
 
 def _for_us(fields: Mapping[str, Any]) -> bool:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 
-from volery.base.errors import CapabilityError, LinkError
+from volery.base.errors import CapabilityError, LinkError, UsageError
 from volery.base.time import MINUTE, Ns, S
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Carrier, Item
 from volery.kernel.api import Action
-from volery.vehicles.driver import Capability, Repeat, Step
-from volery.vehicles.mission import MissionItem, Waypoint
+from volery.vehicles.driver import Capability, Repeat, Step, Sticks
+from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 
 CHECKS_PERIOD: Ns = 10 * S
@@ -21,6 +21,7 @@ READY_WITHIN: Ns = 2 * MINUTE
 STOPPED_WITHIN: Ns = 30 * S
 TURNED_WITHIN: Ns = 30 * S
 TURNED_DEG = 3.0
+IDLE_THROTTLE = 0.1
 
 ROVER_CAN = frozenset(
     {
@@ -138,8 +139,12 @@ class Sequences:
             answer=key.MISSION,
             again=2 * S,
         )
-        self._last_item = len(items) - 1 if isinstance(mission[-1], Waypoint) else None
+        self._last_item = self._ends_at(mission)
         return (step,)
+
+    @abstractmethod
+    def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
+        """The number on the wire of the item with which it ends in the air; ``None`` if it ends otherwise."""
 
     def _finish_mission(self, mode: str, leads_to: tuple[str, ...], within: Ns) -> Step:
         """To its end: disarmed, at the last point, or said to be over."""
@@ -162,6 +167,15 @@ class Sequences:
 
     # -- pieces of sequences
 
+    def _not_idle(self, held: Sticks | None) -> None:
+        """In the air the motors must not idle when the throttle becomes the sticks'."""
+        throttle = held.throttle if held is not None else 0.0
+        if self.telemetry.flying and throttle < IDLE_THROTTLE:
+            raise UsageError(
+                f"{self.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle "
+                f"and it would fall; manual_control() with a throttle about 0.5 first"
+            )
+
     @abstractmethod
     def _asks_for(self, mode: str) -> None:
         """This mode is about to be commanded."""
@@ -171,6 +185,8 @@ class Sequences:
             self._asks_for(mode)
             self._carrier.set_mode(mode)
 
+        if self.telemetry.mode == mode:
+            self._asks_for(mode)  # the step will be skipped
         step = Step(
             ask=f"change to {mode}",
             send=send,

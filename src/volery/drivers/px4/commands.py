@@ -1,0 +1,43 @@
+"""What a PX4 can be sent, beyond what every MAVLink autopilot can."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import NamedTuple, Protocol
+
+from volery.base.position import Position
+from volery.base.time import Ns
+from volery.drivers.mavlink.commands import Carrier
+from volery.vehicles.driver import Sticks
+from volery.vehicles.telemetry import Velocity
+
+
+class Setpoint(NamedTuple):
+    """Of OFFBOARD: a velocity, and a heading in degrees, or, where that is NaN, degrees/s clockwise."""
+
+    velocity: Velocity
+    yaw_rate: float = 0.0
+    heading: float = nan
+
+
+class Commands(Carrier, Protocol):
+    """The port between PX4's sequences and what carries them."""
+
+    @property
+    def beat(self) -> Ns:
+        """When the last heartbeat came: PX4's mode is only ever a second old, and as old as that."""
+
+    def takeoff(self, amsl: float) -> None:
+        """Climb from the ground, armed, to metres above mean sea level; at least its MIS_TAKEOFF_ALT."""
+
+    def reposition(self, goal: Position) -> None:
+        """Change to AUTO.LOITER and go there; the altitude is AMSL."""
+
+    def setpoint(self, setpoint: Setpoint) -> None:
+        """One of the stream without which there is no OFFBOARD."""
+
+    def sticks(self, sticks: Sticks) -> None:
+        """One of the stream without which there are no sticks."""
+
+    def rewind(self) -> None:
+        """The mission begins at its first item."""
