@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from volery.base.errors import VoleryError
     from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
     from volery.components.services import add_time, log, note, now, sleep
-    from volery.run.connect import connect
+    from volery.run.connect import connect, connect_fleet
     from volery.run.fly import fly
     from volery.run.result import Run
     from volery.run.simulate import Options, simulate
@@ -35,6 +35,7 @@ _HOME_OF = {
     "Zone": "vehicles",
     "add_time": "components.services",
     "connect": "run.connect",
+    "connect_fleet": "run.connect",
     "fly": "run.fly",
     "log": "components.services",
     "note": "components.services",
@@ -60,6 +61,7 @@ __all__ = [
     "Zone",
     "add_time",
     "connect",
+    "connect_fleet",
     "fly",
     "log",
     "note",

@@ -132,6 +132,15 @@ def fly(
     on: On,
     seed: Seed = 1,
     speed: Annotated[str, typer.Option(help="Of a simulated vehicle: max, 1, 10 ...")] = "max",
+    fence: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="GeoJSON: the polygon to stay in, no-fly zones.")
+    ] = None,
+    ceiling: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Above home, nothing goes higher; else 120.")
+    ] = None,
+    reserve: Annotated[
+        str | None, typer.Option(metavar="SHARE", help="Of the battery, such as 20%: below it only back.")
+    ] = None,
     out: Out = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -141,7 +150,7 @@ def fly(
     from volery.cli import fly as command
 
     output = Output(quiet, as_json, debug)
-    wanted = command.Wanted(mission, tuple(on), seed, speed, out)
+    wanted = command.Wanted(mission, tuple(on), seed, speed, out, fence, ceiling, reserve)
     run_command(output, lambda: command.fly(output, wanted))
 
 

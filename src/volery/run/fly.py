@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from volery.base.errors import ComponentError, UsageError, VoleryError, choices
 from volery.base.position import AMSL, Position
@@ -17,16 +18,17 @@ from volery.components.services import serve
 from volery.components.stand_ins import stand_ins
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.run.connect import Opened, open_vehicles
 from volery.run.ending import Ending
-from volery.run.progress import Reporter
+from volery.run.opening import Opened, Stated, open_vehicles
+from volery.run.progress import Reporter, Teller
 from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import setup_of_flight
 from volery.run.simulate import AS_USUAL, Options
 from volery.run.simulated import HOME
 from volery.trace.events import Failure
-from volery.vehicles import Drone, Rover, Vehicle
+from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
+from volery.vehicles.address import parse
 
 Mission = Callable[[Any], object]
 """``def mission(drone: Drone)``, or ``def mission(rover: Rover)``."""
@@ -34,12 +36,38 @@ Mission = Callable[[Any], object]
 FUNCTION = "mission"
 
 
-def fly(mission: Mission | str | Path, on: str | Sequence[str], options: Options = AS_USUAL) -> Run:
+@dataclass(frozen=True, kw_only=True)
+class Restrictions:
+    """What holds instead of what a mission's file states: ``fence`` for its ``FENCE``; ``highest`` (metres
+    above home) and ``battery_reserve`` (0..1) for those of its ``LIMITS``.
+    """
+
+    fence: Fence | None = None
+    highest: float | None = None
+    battery_reserve: float | None = None
+
+    def applied_to(self, limits: Limits | None) -> Limits | None:
+        """*limits* with what is stated here."""
+        stated = {"highest": self.highest, "battery_reserve": self.battery_reserve}
+        changed = {name: value for name, value in stated.items() if value is not None}
+        return replace(limits or Limits(), **changed) if changed else limits
+
+
+NONE_STATED = Restrictions()
+
+
+def fly(
+    mission: Mission | str | Path,
+    on: str | Sequence[str],
+    options: Options = AS_USUAL,
+    restrictions: Restrictions = NONE_STATED,
+) -> Run:
     """Fly *mission* (a function, or a file that defines ``mission``) on the vehicle at the address *on*.
 
-    A file's ``HOME`` is where simulated vehicles stand. With several addresses each vehicle flies it, all at
-    once. The parameter's annotation says whether the mission is for a ``Drone`` (also without one) or a
-    ``Rover``. Simulated vehicles fly in virtual time, real ones in real time.
+    A file's ``HOME`` is where simulated vehicles stand, its ``FENCE`` and ``LIMITS`` hold for all vehicles;
+    *restrictions* override these. With several addresses each vehicle flies it, all at once. The parameter's
+    annotation says whether the mission is for a ``Drone`` (also without one) or a ``Rover``. Simulated
+    vehicles fly in virtual time, real ones in real time.
 
     Raises ``UsageError`` and ``ModelError`` before anything has started; what happens later is in the
     ``Run``.
@@ -47,18 +75,30 @@ def fly(mission: Mission | str | Path, on: str | Sequence[str], options: Options
     urls = [on] if isinstance(on, str) else list(on)
     if not urls:
         raise UsageError("fly: no address to fly on; sim:ardupilot is one")
-    return _Flight(mission, urls, options).run()
+    return _Flight(mission, urls, options, restrictions).run()
 
 
 class _Flight:
     """One execution of ``fly``."""
 
-    def __init__(self, mission: Mission | str | Path, urls: list[str], options: Options) -> None:
+    def __init__(
+        self,
+        mission: Mission | str | Path,
+        urls: list[str],
+        options: Options,
+        restrictions: Restrictions,
+    ) -> None:
         self._path = None if callable(mission) else Path(mission)
         looked_at = mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION)
-        self._opened: Opened = open_vehicles(
-            urls, kind_of(looked_at), seed=options.seed, pace=options.pace, home=home_of(looked_at)
+        stated = Stated(
+            seed=options.seed,
+            pace=options.pace,
+            home=home_of(looked_at),
+            limits=restrictions.applied_to(_beside(looked_at, "LIMITS", Limits)),
+            fence=restrictions.fence or _beside(looked_at, "FENCE", Fence),
         )
+        named = names_of(urls)
+        self._opened: Opened = open_vehicles(named, dict.fromkeys(named, kind_of(looked_at)), stated)
         self._kernel = kernel = self._opened.kernel
         self._mission = self._load(mission, options.seed)
         self._ending = Ending(kernel)
@@ -66,6 +106,8 @@ class _Flight:
         setup, attachments = setup_of_flight(self._path, urls, self._opened, options.seed)
         self._recording = Recording(setup, options.out, attachments)
         kernel.record = self._recording.stream
+        if options.tell is not None:
+            self._recording.stream.tap(Teller(options.tell))
         airfield = self._opened.airfield
         if airfield is not None:
             airfield.sample()
@@ -139,9 +181,31 @@ def kind_of(mission: Mission) -> type[Vehicle]:
     return Rover if hint is Rover else Drone
 
 
+def names_of(urls: Sequence[str]) -> dict[str, str]:
+    """The addresses by the names of their vehicles: the autopilot's, with a number if there are several."""
+    autopilots = [parse(url).driver for url in urls]
+    if len(urls) == 1:
+        return {autopilots[0]: urls[0]}
+    return {
+        f"{autopilot}_{number}": url
+        for number, (autopilot, url) in enumerate(zip(autopilots, urls, strict=True), 1)
+    }
+
+
 def home_of(mission: Mission) -> Position:
     """Where simulated vehicles stand: the ``HOME`` beside the mission in its file, if there is one."""
     home = getattr(mission, "__globals__", {}).get("HOME", HOME)
     if not isinstance(home, Position) or not isinstance(home.altitude, AMSL):
         raise UsageError(f"HOME is {home!r}; state it as Position(LATITUDE, LONGITUDE, AMSL(METRES))")
     return home
+
+
+T = TypeVar("T")
+
+
+def _beside(mission: Mission, name: str, kind: type[T]) -> T | None:
+    """What the mission's file states under that *name*; ``None`` if it does not."""
+    found = getattr(mission, "__globals__", {}).get(name)
+    if found is not None and not isinstance(found, kind):
+        raise UsageError(f"{name} is {found!r}; state it as volery.{kind.__name__}(...)")
+    return found

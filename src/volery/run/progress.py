@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.run.airfield import Airfield
-from volery.trace.events import Event, Milestone
+from volery.trace.events import Event, Milestone, Text
+from volery.vehicles.commanded import IF_SILENT
 
 PERIOD: Ns = S
 
@@ -36,6 +37,22 @@ class Progress:
 
 Show = Callable[[Progress], None]
 """Called about once a simulated second. It must not block and changes nothing."""
+
+
+Tell = Callable[[str], None]
+"""Called with a line that is worth reading at once. It must not block and changes nothing."""
+
+
+class Teller:
+    """Passes on what vehicles are known to do if their commander falls silent. A tap of a run's stream."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+
+    def __call__(self, event: Event) -> None:
+        """Follow texts."""
+        if isinstance(event, Text) and event.text.startswith(IF_SILENT):
+            self._tell(f"{event.source}: {event.text}")
 
 
 class Reporter:

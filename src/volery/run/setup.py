@@ -8,7 +8,7 @@ from pathlib import Path
 from volery.cost import NOT_COUNTED, ProcessorEntry
 from volery.model.environment import Environment, Prism, Ways
 from volery.model.system import Instance, Processor, System
-from volery.run.connect import Opened
+from volery.run.opening import Opened
 from volery.run.platform import Platform
 from volery.trace.events import NONE
 from volery.trace.mcap_writer import Attachment

@@ -18,7 +18,7 @@ from volery.run.ending import Ending
 from volery.run.faults import inject
 from volery.run.platform import Platform
 from volery.run.power import PowerFeed
-from volery.run.progress import Reporter, Show
+from volery.run.progress import Reporter, Show, Tell
 from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import attachments_of, setup_of
@@ -39,13 +39,17 @@ GOAL_PERIOD: Ns = 100 * MS
 
 @dataclass(frozen=True)
 class Options:
-    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes."""
+    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes.
+
+    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once.
+    """
 
     fidelity: str = "times"
     seed: int = 1
     pace: float | None = None
     out: Path | None = None
     show: Show | None = None
+    tell: Tell | None = None
 
 
 AS_USUAL = Options()

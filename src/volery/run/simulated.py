@@ -37,6 +37,12 @@ class Simulated:
     wind: Wind
     faults: WireFaults | None = None
 
+    @property
+    def home(self) -> Position:
+        """Where it stands."""
+        at = self.vehicle.at
+        return Position(at.latitude, at.longitude, AMSL(at.amsl_m))
+
 
 def simulated(address: Address, name: str, kind: str = "multirotor", home: Position = HOME) -> Simulated:
     """Read a ``sim:`` address; *kind* and *home* hold unless it says otherwise.

@@ -7,7 +7,7 @@ from typing import Any
 from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import CapabilityError, UsageError
 from volery.kernel.wall import WallKernel
-from volery.run.connect import GRAPHS
+from volery.run.opening import GRAPHS
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
 from volery.testing.tap import Tap

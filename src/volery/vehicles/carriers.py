@@ -12,6 +12,7 @@ from volery.links.parser import MAVLINK
 from volery.links.serial_line import SerialLine
 from volery.links.tcp import TcpClient, TcpServer
 from volery.links.udp import UdpLink
+from volery.links.udp_server import UdpServer
 from volery.vehicles.address import Address
 
 DEFAULT_BAUD = 57_600
@@ -19,8 +20,9 @@ ANYWHERE = "0.0.0.0"
 """``udp://:PORT`` means just this: whoever speaks first."""
 
 
-def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK) -> CodedLink:
-    """The link to an autopilot at *address* (tcp, udp, serial), in the words of *codec*.
+def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, shared: bool = False) -> CodedLink:
+    """The link to an autopilot at *address* (tcp, udp, serial), in the words of *codec*; *shared*: to all
+    that speak there.
 
     It connects by itself, again after a break.
 
@@ -29,6 +31,8 @@ def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK) -> Coded
     if address.carrier == "tcp":
         return TcpClient(kernel, address.host, _port(address), address.text, codec)
     if address.carrier == "udp":
+        if shared and not address.host:
+            return UdpServer(kernel, ANYWHERE, _port(address), address.text, codec=codec)
         return _udp(kernel, address, codec)
     if address.carrier == "serial":
         baud = address.number("baud", DEFAULT_BAUD)

@@ -53,7 +53,8 @@ class Fleet(Mapping[str, Vehicle]):
 
         *asked* names it in messages, else the function does. Raises ``FleetError`` after the last has ended.
         """
-        asked = asked or getattr(function, "__name__", "each")
+        named = getattr(function, "__name__", "each")
+        asked = asked or (named if named.isidentifier() else "each")
         return _Round(self._kernel, asked, self._vehicles, function).run()
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:

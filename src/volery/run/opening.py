@@ -1,0 +1,181 @@
+"""From addresses to vehicles: simulated ones in one world, or those that are out there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
+from volery.base.position import Position
+from volery.kernel.api import Kernel
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.wall import WallKernel
+from volery.links.link import Link
+from volery.links.shared import SharedLink
+from volery.run.airfield import Airfield
+from volery.run.simulated import HOME, Simulated, airfield_of, link_to, simulated
+from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
+from volery.vehicles.address import Address, parse
+from volery.vehicles.carriers import open_link
+from volery.vehicles.driver import DriverFactory, drivers
+from volery.vehicles.limits import excludes_home
+
+GRAPHS = ("graph", "ros1", "ros2")
+SIMULATED = {"texts": "unrecorded"}
+"""Options of the driver of a simulated vehicle: its autopilot records its texts itself."""
+KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A kernel and the vehicles that were opened on it; ``airfield`` is ``None`` for vehicles that are out
+    there.
+    """
+
+    kernel: VirtualKernel | WallKernel
+    vehicles: tuple[Vehicle, ...]
+    airfield: Airfield | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stated:
+    """What holds for all vehicles that are opened together. *home* is where simulated ones stand."""
+
+    seed: int = 1
+    pace: float | None = None
+    home: Position = HOME
+    limits: Limits | None = None
+    fence: Fence | None = None
+
+
+def open_vehicles(urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: Stated) -> Opened:
+    """Open all of *urls*, by the vehicles' names: either simulated ones, in one world, or real ones.
+
+    Raises ``UsageError`` for an address that makes no sense or a fence that excludes a simulated home,
+    ``CapabilityError`` for what cannot be opened together or so.
+    """
+    addresses = {name: parse(url) for name, url in urls.items()}
+    for address in addresses.values():
+        drivers.load(address.driver)  # a name that is none is told before anything else
+    if any(address.carrier != "sim" for address in addresses.values()):
+        return _open_real(addresses, kinds, stated)
+    wanted = [
+        simulated(address, name, KINDS[kinds[name]], stated.home) for name, address in addresses.items()
+    ]
+    for one in wanted:
+        _check_home(one, stated.fence)
+    kernel = VirtualKernel(pace=stated.pace)
+    airfield = airfield_of(kernel, wanted, stated.seed)
+    vehicles = [_simulated_vehicle(kernel, airfield, one, kinds[one.vehicle.name], stated) for one in wanted]
+    return Opened(kernel, tuple(vehicles), airfield)
+
+
+def _check_home(wanted: Simulated, fence: Fence | None) -> None:
+    home = wanted.home
+    found = excludes_home(fence, home) if fence is not None else ""
+    if found:
+        raise UsageError(f"{wanted.vehicle.name}: the fence excludes home: {found}")
+
+
+def _simulated_vehicle(
+    kernel: Kernel, airfield: Airfield, wanted: Simulated, kind: type[Vehicle], stated: Stated
+) -> Vehicle:
+    name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
+    open_driver = drivers.load(autopilot).on_link
+    if open_driver is None:
+        raise CapabilityError(f"{name}: {autopilot} is reached over a graph only")
+    driver = open_driver(kernel, link_to(kernel, airfield, wanted, stated.seed), name, SIMULATED)
+    return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=airfield.truth(name))
+
+
+# -- out there
+
+
+def _open_real(
+    addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: Stated
+) -> Opened:
+    for address in addresses.values():
+        if address.carrier == "sim":
+            raise CapabilityError(
+                f"{address}: simulated and real vehicles do not share a clock; fly them apart"
+            )
+        if address.carrier in GRAPHS:
+            raise CapabilityError(f"{address}: vehicles on a graph are commanded by components of a model")
+    kernel = WallKernel()
+    ways = _Ways(kernel, addresses)
+    try:
+        vehicles = []
+        for name, address in addresses.items():
+            open_driver = drivers.load(address.driver).on_link
+            assert open_driver is not None, "seen by _Ways"
+            driver = open_driver(kernel, ways.to(name), name, _for_driver(address))
+            vehicles.append(kinds[name](kernel, name, driver, limits=stated.limits, fence=stated.fence))
+    except VoleryError:
+        ways.close()
+        raise
+    return Opened(kernel, tuple(vehicles))
+
+
+class _Ways:
+    """The links of vehicles that are out there: one each, or one for all behind the same radio or port."""
+
+    def __init__(self, kernel: Kernel, addresses: Mapping[str, Address]) -> None:
+        self._kernel = kernel
+        self._addresses = addresses
+        self._links: list[Link] = []
+        self._shared: dict[tuple[object, ...], SharedLink] = {}
+        self._behind: dict[tuple[object, ...], list[str]] = {}
+        for name, address in addresses.items():
+            if drivers.load(address.driver).on_link is None:
+                raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
+            self._behind.setdefault(_way(address), []).append(name)
+        for names in self._behind.values():
+            self._check_distinct(names)
+
+    def _check_distinct(self, names: list[str]) -> None:
+        """Several vehicles behind one link: it must be said which is which, in one protocol."""
+        if len(names) == 1:
+            return
+        first, *others = (self._addresses[name] for name in names)
+        systems = [self._addresses[name].options.get("system", "") for name in names]
+        if "" in systems or len(set(systems)) < len(systems):
+            raise UsageError(
+                f"{' and '.join(names)} are behind the same {first.carrier} address; say which is which by "
+                f"their system ids, as in {first.text.partition('?')[0]}?system=1"
+            )
+        for other in others:
+            codecs = {self._factory(one).codec.name for one in (first, other)}
+            if len(codecs) > 1:
+                raise UsageError(f"{first} and {other}: one link carries one protocol, not {choices(codecs)}")
+            if first.options.get("baud") != other.options.get("baud"):
+                raise UsageError(f"{first} and {other}: one serial line has one baud rate")
+
+    def _factory(self, address: Address) -> DriverFactory:
+        return drivers.load(address.driver)
+
+    def to(self, name: str) -> Link:
+        """The link for the driver of the vehicle called *name*."""
+        address = self._addresses[name]
+        codec, way = self._factory(address).codec, _way(address)
+        if len(self._behind[way]) == 1:
+            self._links.append(open_link(self._kernel, address, codec))
+            return self._links[-1]
+        if way not in self._shared:
+            self._links.append(open_link(self._kernel, address, codec, shared=True))
+            self._shared[way] = SharedLink(self._links[-1])
+        return self._shared[way].share()
+
+    def close(self) -> None:
+        """Of those that were opened, each."""
+        for link in self._links:
+            link.close()
+
+
+def _way(address: Address) -> tuple[object, ...]:
+    """What two vehicles behind one link have in common."""
+    return address.carrier, address.host, address.port, address.path
+
+
+def _for_driver(address: Address) -> dict[str, str]:
+    """Options of the address that are not for the carrier."""
+    return {key: value for key, value in address.options.items() if key != "baud"}
