@@ -44,6 +44,11 @@ class Source:
                 names += [alias.asname or alias.name for alias in node.names]
         return names
 
+    def is_script(self) -> bool:
+        """Whether it has an ``if __name__ == "__main__":`` at top level."""
+        tests = (node.test for node in self.tree.body if isinstance(node, ast.If))
+        return any("__main__" in ast.unparse(test) for test in tests)
+
     def line_of(self, class_name: str, method: str = "") -> int:
         """The line of a top-level class, or of one of its methods; 1 if it is not there."""
         for node in self.tree.body:

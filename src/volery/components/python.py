@@ -160,6 +160,16 @@ def load_program(
     return ClassProgram(cls, source)
 
 
+def script_or_class(path: Path, class_name: str, where: Location | None = None) -> str:
+    """Which of the two a file written for ROS is: empty for a script, else *class_name*.
+
+    It is a script if it runs something when it is ``__main__``, or defines no such class. Errors as
+    ``load_program``'s.
+    """
+    source = parse(path, where)
+    return "" if source.is_script() or class_name not in source.class_names() else class_name
+
+
 def load_class(path: Path, class_name: str, loader: Loader | None = None) -> type:
     """*class_name* of the file at *path*, for tests and tools; errors as ``load_program``'s."""
     source = parse(path)

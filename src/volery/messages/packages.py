@@ -1,19 +1,20 @@
-"""Message packages as Python modules, so that a user's file may say ``from std_msgs.msg import String``."""
+"""Packages of interfaces as modules, so that a file may say ``from std_msgs.msg import String``."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
 from volery.base.errors import choices, did_you_mean
-from volery.messages.store import message_class, service, service_types, types
+from volery.messages.store import action_types, message_class, service, service_types, types
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
 """Types that ROS 1 spells otherwise: by package, its name and ours."""
 
 
 class _Definitions(ModuleType):
-    """``package.msg`` or ``package.srv``; a class is made when it is first asked for."""
+    """``package.msg``, ``package.srv`` or ``package.action``; a class is made when it is first asked for."""
 
     def __init__(self, package: str, kind: str, names: list[str]) -> None:
         super().__init__(f"{package}.{kind}", f"The {kind} types of {package}.")
@@ -33,7 +34,7 @@ class _Definitions(ModuleType):
             hint = did_you_mean(name, self._known)
             raise AttributeError(f"{self.__name__} has no {name!r}{hint}; it has {choices(self._known)}")
         full = f"{self._package}/{self._kind}/{wanted}"
-        made = message_class(full) if self._kind == "msg" else _service_class(full)
+        made = _MAKERS[self._kind](full)
         setattr(self, name, made)
         return made
 
@@ -51,10 +52,30 @@ def _service_class(full: str) -> type:
     return type(full.rpartition("/")[2], (), members)
 
 
+def _action_class(full: str) -> type:
+    """What ``from package.action import Name`` gives."""
+    inner = full.replace("/action/", "/msg/")
+    members = {
+        "_type": full,
+        **{part: message_class(f"{inner}_{part}") for part in ("Goal", "Result", "Feedback")},
+        "SendGoal": _service_class(f"{full}_SendGoal"),
+        "GetResult": _service_class(f"{full}_GetResult"),
+        "FeedbackMessage": message_class(f"{full}_FeedbackMessage"),
+    }
+    return type(full.rpartition("/")[2], (), members)
+
+
+_MAKERS: dict[str, Callable[[str], type]] = {
+    "msg": message_class,
+    "srv": _service_class,
+    "action": _action_class,
+}
+
+
 def modules() -> dict[str, ModuleType]:
     """All packages: ``std_msgs``, ``std_msgs.msg``, ``std_srvs.srv`` and so on, by the name of the import."""
     found: dict[str, ModuleType] = {}
-    for kind, names in (("msg", types()), ("srv", service_types())):
+    for kind, names in (("msg", types()), ("srv", service_types()), ("action", action_types())):
         by_package: dict[str, list[str]] = {}
         for full in names:
             by_package.setdefault(full.split("/")[0], []).append(full.split("/")[-1])

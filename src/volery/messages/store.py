@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ from rosbags.typesys.base import TypesysError, normalize_fieldname
 from rosbags.typesys.store import Typestore
 
 from volery.base.errors import UsageError, choices, did_you_mean
+from volery.messages.interface import parts
 from volery.messages.message import Field, Header, Message, Nothing, make_class
 from volery.messages.stamp import DurationValue, TimeValue
 
@@ -37,19 +39,9 @@ def store() -> Typestore:
         package, text = file.name.removesuffix(".txt"), file.read_text(encoding="utf-8")
         for section in text.split("\n=== ")[1:]:
             heading, body = section.split("\n", 1)
-            texts.update(_parts(f"{package}/{heading.strip()}", body))
+            texts.update(parts(f"{package}/{heading.strip()}", body))
     _register(humble, texts)
     return humble
-
-
-def _parts(name: str, text: str) -> dict[str, str]:
-    """A message's text under its name; a service's two under ``_Request`` and ``_Response``."""
-    if name.split("/")[1] != "srv":
-        return {name: text}
-    halves = f"\n{text}".split("\n---")
-    if len(halves) != 2:
-        raise UsageError(f"{name}: a service has a request and a response with one line '---' between them")
-    return {f"{name}_Request": halves[0], f"{name}_Response": halves[1]}
 
 
 def _register(into: Typestore, texts: dict[str, str]) -> None:
@@ -57,7 +49,8 @@ def _register(into: Typestore, texts: dict[str, str]) -> None:
     for name, text in texts.items():
         try:
             # a service's halves read as messages, so that unqualified types are looked for among them
-            [parsed[name]] = get_types_from_msg(text, name.replace("/srv/", "/msg/")).values()
+            read_as = name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
+            [parsed[name]] = get_types_from_msg(text, read_as).values()
         except TypesysError as error:
             raise UsageError(f"{name}: not a ROS message definition: {error}") from error
     for name, (_, fields) in parsed.items():
@@ -80,14 +73,20 @@ def _inner_type(what: Any) -> str:
 
 
 def define(name: str, text: str) -> None:
-    """Add a type of your own from the text of its ``.msg`` or ``.srv`` file.
+    """Add a type of your own from the text of its ``.msg``, ``.srv`` or ``.action`` file.
 
-    *name* is ``package/msg/Name`` or ``package/srv/Name``. ``UsageError`` if the text is no definition or
-    the name is taken by another one.
+    *name* is ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``. ``UsageError`` if the
+    text is no definition or the name is taken by another one.
     """
-    if len(name.split("/")) != 3 or name.split("/")[1] not in ("msg", "srv"):
-        raise UsageError(f"{name!r} is no name of a type: package/msg/Name or package/srv/Name")
-    _register(store(), _parts(name, text))
+    define_all({name: text})
+
+
+def define_all(texts: Mapping[str, str]) -> None:
+    """``define`` several types, which may be made of each other."""
+    found: dict[str, str] = {}
+    for name, text in texts.items():
+        found.update(parts(name, text))
+    _register(store(), found)
 
 
 def types() -> list[str]:
@@ -96,14 +95,21 @@ def types() -> list[str]:
 
 
 def service_types() -> list[str]:
-    """The names of all service types, sorted."""
+    """The names of all service types, sorted; an action's are not among them."""
     ending = "_Request"
+    names = (name for name in store().fielddefs if name.endswith(ending) and "/srv/" in name)
+    return sorted(name.removesuffix(ending) for name in names)
+
+
+def action_types() -> list[str]:
+    """The names of all action types, sorted."""
+    ending = "_FeedbackMessage"
     return sorted(name.removesuffix(ending) for name in store().fielddefs if name.endswith(ending))
 
 
 def _full(name: str, kind: str) -> str:
     package, _, rest = name.partition("/")
-    return name if rest.startswith(f"{kind}/") else f"{package}/{kind}/{rest}"
+    return name if "/" in rest else f"{package}/{kind}/{rest}"
 
 
 def _unknown(what: str, name: str, known: list[str]) -> UsageError:

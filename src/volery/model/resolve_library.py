@@ -65,6 +65,7 @@ def _component(context: Context, name: str, form: ComponentForm, known: dict[str
         language=form.language,
         path=form.path,
         class_name=form.class_name or camel_case(name),
+        class_stated=bool(form.class_name),
         provides=form.provides,
         requires=requires,
         parameters=parameters(form.parameters),

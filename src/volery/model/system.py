@@ -121,15 +121,16 @@ class Component:
     """A kind of component in the library.
 
     ``path`` is as written, relative to the model's folder (``System.file_of`` resolves it), and empty where
-    there is no code yet. ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive
-    component. ``operations`` and ``activation`` hold the figures of fidelity ``times``, one per processor
-    kind.
+    there is no code yet. ``class_name`` is the usual one where the model states none (``class_stated``).
+    ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive component.
+    ``operations`` and ``activation`` hold the figures of fidelity ``times``, one per processor kind.
     """
 
     name: str
     language: str
     path: str = ""
     class_name: str = ""
+    class_stated: bool = False
     provides: Mapping[str, str] = field(default_factory=dict)
     requires: Mapping[str, RequiredPort] = field(default_factory=dict)
     parameters: Mapping[str, Value] = field(default_factory=dict)

@@ -21,6 +21,7 @@ from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.world.specs import Battery, BodySpec, Multirotor, Rover
 from volery.world.wind import Wind
+from volery.world.world import World
 
 LINK_DELAY: Ns = 2 * MS
 """One way between an autopilot and the computer beside it, over a serial line."""
@@ -45,7 +46,10 @@ class Airfield:
         self._kernel = kernel
         self.frame = frame
         specs = [body_of(vehicle) for vehicle in vehicles]
-        self.world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
+        self._world: World | None = None
+        flights: list[Flight] = []
+        if specs:  # a model of computers alone has no world
+            self._world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, Autopilot] = {}
         self._families: dict[str, Family] = {}
@@ -61,6 +65,13 @@ class Airfield:
                 warm=vehicle.started == "warm",
                 name=vehicle.name,
             )
+
+    @property
+    def world(self) -> World:
+        """Where the bodies are. Raises ``UsageError`` if there are none."""
+        if self._world is None:
+            raise UsageError("there is no vehicle in this run, and so no world")
+        return self._world
 
     def codec(self, vehicle: str) -> Codec:
         """What its autopilot's links speak. Raises ``UsageError`` if it is reached over a graph only."""

@@ -13,7 +13,7 @@ from volery.components.counting import Steps
 from volery.components.instance import Instance
 from volery.components.loading import Loader
 from volery.components.ports import Port, PortList
-from volery.components.python import Program, load_program, start
+from volery.components.python import Program, ScriptProgram, load_program, script_or_class, start
 from volery.components.stand_ins import stand_ins
 from volery.components.stub import StubProgram
 from volery.faces import rclpy, rospy
@@ -21,6 +21,7 @@ from volery.faces.launch import Launch
 from volery.graph import EmbeddedNode, Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.messages import define_imported
 from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.run.airfield import Airfield
@@ -29,6 +30,9 @@ from volery.run.fences import fence_of
 from volery.run.platform import Platform, commanded_by, is_node
 from volery.run.setup import node_name
 from volery.vehicles import Drone, Rover, Vehicle, drivers
+
+PYTHON_ROS = ("rospy", "rclpy")
+"""Languages whose files import interfaces of ROS."""
 
 GRAPH_DRIVER = "mavros"
 """Components command vehicles over topics and services under MAVROS's names."""
@@ -101,6 +105,9 @@ class Builder:
     def build(self, fidelity: str, seed: int) -> Built:
         """Load every file, make every instance, connect every port."""
         steps = Steps() if fidelity == "code" else None
+        for model in self._system.instances:
+            if model.component.path and model.component.language in PYTHON_ROS:
+                define_imported(self._system.file_of(model.component))
         launches = self._launches()
         faces = (face.modules(self._graph, launches, self._nodes) for face in (rospy, rclpy))
         modules = {name: module for face in faces for name, module in face.items()}
@@ -137,8 +144,10 @@ class Builder:
 
     def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
         instance = self._instances[model.name]
-        given = {**model.parameters, **self._given(model)}
         program = self._program(model, loader)
+        given = self._given(model)
+        if not isinstance(program, ScriptProgram):  # a script has its parameters from ROS
+            given = {**model.parameters, **given}
         if commanded_by(model):
             commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
             names = [one.port for one in commands]
@@ -152,7 +161,10 @@ class Builder:
             period = model.activity.period_ns if model.activity else None
             return StubProgram(self._kernel, self._operations(model), period)
         path = self._system.file_of(component)
-        return load_program(loader, model.name, path, component.class_name, component.where)
+        chosen = component.class_name
+        if component.language in PYTHON_ROS and not component.class_stated:
+            chosen = script_or_class(path, chosen, component.where)
+        return load_program(loader, model.name, path, chosen, component.where)
 
     # -- ports
 

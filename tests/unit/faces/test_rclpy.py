@@ -258,6 +258,85 @@ except ParameterNotDeclaredException as error:
 """
 
 
+FIBONACCI = """
+import rclpy
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.duration import Duration
+from rclpy.node import Node
+from example_interfaces.action import Fibonacci
+
+class Server(Node):
+    def __init__(self):
+        super().__init__("server")
+        self._server = ActionServer(self, Fibonacci, "fibonacci", self.work,
+                                    cancel_callback=lambda goal: CancelResponse.ACCEPT)
+
+    def work(self, goal):
+        feedback = Fibonacci.Feedback(sequence=[0, 1])
+        for _ in range(1, goal.request.order):
+            if goal.is_cancel_requested:
+                goal.canceled()
+                return Fibonacci.Result(sequence=feedback.sequence)
+            feedback.sequence.append(feedback.sequence[-1] + feedback.sequence[-2])
+            goal.publish_feedback(feedback)
+            self.get_clock().sleep_for(Duration(seconds=1.0))
+        goal.succeed()
+        return Fibonacci.Result(sequence=feedback.sequence)
+
+rclpy.init()
+rclpy.spin(Server())
+"""
+
+GOAL = """
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from example_interfaces.action import Fibonacci
+
+class Client(Node):
+    def __init__(self):
+        super().__init__("client")
+        self._client = ActionClient(self, Fibonacci, "fibonacci")
+        self._cancel_after = {cancel_after}
+
+    def go(self):
+        self._client.wait_for_server()
+        sent = self._client.send_goal_async(Fibonacci.Goal(order=5), feedback_callback=self.fed_back)
+        sent.add_done_callback(self.answered)
+
+    def answered(self, future):
+        self._goal = future.result()
+        out(self._goal.accepted)
+        self._goal.get_result_async().add_done_callback(self.ended)
+
+    def fed_back(self, message):
+        out(list(message.feedback.sequence)[-1])
+        if len(message.feedback.sequence) == self._cancel_after:
+            self._goal.cancel_goal_async()
+
+    def ended(self, future):
+        out((future.result().status, list(future.result().result.sequence)))
+        rclpy.shutdown()
+
+rclpy.init()
+client = Client()
+client.go()
+rclpy.spin(client)
+"""
+
+
+def test_an_action(stage: Stage) -> None:
+    stage.script("server", FIBONACCI)
+    stage.script("client", GOAL.format(cancel_after=99))
+    assert stage.run(20 * S) == [True, 1, 2, 3, 5, (4, [0, 1, 1, 2, 3, 5])]
+
+
+def test_an_action_that_is_cancelled(stage: Stage) -> None:
+    stage.script("server", FIBONACCI)
+    stage.script("client", GOAL.format(cancel_after=4))
+    assert stage.run(20 * S) == [True, 1, 2, (5, [0, 1, 1, 2])]
+
+
 def test_parameters(stage: Stage) -> None:
     stage.launched["tuner"] = stage_launch(parameters={"gain": 2, "limits.high": 3})
     stage.script("tuner", PARAMETERS)

@@ -10,7 +10,7 @@ from typing import Any
 from volery import messages
 from volery.faces.launch import Launch
 from volery.faces.module import face_module
-from volery.faces.rclpy import callback_groups, entities, errors, executors, logging, parameters, qos
+from volery.faces.rclpy import action, callback_groups, entities, errors, executors, logging, parameters, qos
 from volery.faces.rclpy import task as tasks
 from volery.faces.rclpy import time as times
 from volery.faces.rclpy.context import Context, Contexts
@@ -58,6 +58,7 @@ def _parts(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """What is in each module of the package."""
     timing = {"Duration": times.Duration, "Infinite": times.Infinite}
     return {
+        "action": action.ACTION,
         "callback_groups": {
             kind.__name__: kind
             for kind in (

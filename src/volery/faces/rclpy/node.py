@@ -15,6 +15,7 @@ from volery.faces.rclpy.logging import Logger
 from volery.faces.rclpy.parameters import Declared, Parameter, Watcher
 from volery.faces.rclpy.task import Task
 from volery.faces.rclpy.time import Clock, ClockType, Rate
+from volery.graph.group import Work
 
 _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")
 
@@ -170,6 +171,21 @@ class Node:
     ) -> Service:
         """Answer requests."""
         made: Service = self._keep(Service(self, srv_type, srv_name, callback, self._queue(callback_group)))
+        return made
+
+    def create_waiting_service(
+        self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any]
+    ) -> Service:
+        """A service whose callback may wait: each request has a task of its own, beside the executor.
+
+        rclpy has none; its action servers need one.
+        """
+
+        def start(work: Work) -> None:
+            self._context.spawn(work.run, srv_name)
+
+        queue = Queue(CallbackGroup(), self.graph_node.group(start))
+        made: Service = self._keep(Service(self, srv_type, srv_name, callback, queue))
         return made
 
     def create_client(
