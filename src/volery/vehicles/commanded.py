@@ -206,7 +206,9 @@ class Commanded:
         ):
             raise LinkLost(f"{self.name}: the link did not return; nobody knows whether it has come to rest")
 
-    def _not_on_ground(self, asked: str) -> None:
+    def _in_flight(self, asked: str) -> None:
+        """It flies, and if it has strayed since the last call, that is told first."""
+        self._tell_strayed()
         if not self._driver.telemetry.flying:
             raise Refused(self.name, asked, "it is on the ground; takeoff(height) first")
 
@@ -257,9 +259,9 @@ class Commanded:
 
     def _admit(self, asked: str, manner: Manner) -> None:
         """Whether it may begin."""
-        strayed, self._strayed = self._strayed, None
-        if strayed is not None and not manner.safe:
-            raise strayed
+        if manner.safe:
+            self._strayed = None
+        self._tell_strayed()
         if manner.ours:
             self._performer.check_ours(asked)
         if manner.travels:
@@ -357,6 +359,11 @@ class Commanded:
         with self._kernel.guard:
             self._straying = handle = self._kernel.every(STRAY_PERIOD, look)
 
+    def _tell_strayed(self) -> None:
+        strayed, self._strayed = self._strayed, None
+        if strayed is not None:
+            raise strayed
+
     def _hold_strayed(self) -> None:
         strayed = self._strayed
         with suppress(VoleryError):  # recorded; and told to whoever commands it next
@@ -367,9 +374,7 @@ class Commanded:
 
     def _move_sticks(self, sticks: Sticks) -> None:
         with self._kernel as kernel:
-            strayed, self._strayed = self._strayed, None
-            if strayed is not None:
-                raise strayed
+            self._tell_strayed()
             self._performer.check_ours("manual control")
             self._sticks_at = kernel.now()
             self._driver.sticks(sticks)

@@ -83,7 +83,7 @@ class Drone(Vehicle):
         self._require(Capability.GOTO)
         asked = f"go to {goal}"
         self._check_speed(asked, speed)
-        self._not_on_ground(asked)
+        self._in_flight(asked)
         self._check_altitude(goal)
         self._check_path(asked, self.position, goal)
         within = self._within(goal, speed)
@@ -137,7 +137,7 @@ class Drone(Vehicle):
             raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
         if not (isfinite(lasting) and lasting > 0):
             raise UsageError(f"{self.name}: {asked}, lasting {lasting:g} s; give seconds above 0")
-        self._not_on_ground(asked)
+        self._in_flight(asked)
         self._check_path(asked, self.position, self._after(velocity, lasting))
         self._operate(
             "set_velocity",
@@ -152,7 +152,7 @@ class Drone(Vehicle):
         asked = f"turn to {degrees:g} degrees"
         if not isfinite(degrees):
             raise UsageError(f"{self.name}: {asked}: not a number")
-        self._not_on_ground(asked)
+        self._in_flight(asked)
         self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), manner=TURN)
 
     def hold(self) -> None:

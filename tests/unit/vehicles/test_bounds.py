@@ -1,0 +1,145 @@
+"""What a vehicle has strayed out of while it travels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from volery.base.errors import LowBattery, OutOfBounds, UsageError
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.time import S
+from volery.kernel.virtual import VirtualKernel
+from volery.vehicles import Battery, Fence, Limits, Zone
+from volery.vehicles.bounds import FLOOR, Bounds, Watch
+from volery.vehicles.limits import excludes_home
+from volery.vehicles.telemetry import Telemetry
+
+HOME = Position(46.0825, -103.8995, AMSL(900.0))
+FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
+
+
+def place(east: float, north: float, up: float = 10.0) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
+    return Position(latitude, longitude, AMSL(900.0 + up))
+
+
+def square(half: float, east: float = 0.0) -> tuple[tuple[float, float], ...]:
+    corners = ((-half, -half), (half, -half), (half, half), (-half, half))
+    found = (place(east + x, y) for x, y in corners)
+    return tuple((one.latitude, one.longitude) for one in found)
+
+
+FENCED = Fence(square(50.0), AboveHome(5.0), AboveHome(40.0), (Zone("mast", square(10.0, 30.0)),))
+
+
+@pytest.mark.parametrize(
+    ("where", "keys"),
+    [
+        (place(0, 0), []),
+        (place(0, 52), []),  # on the way to a stop
+        (place(0, 60), ["polygon"]),
+        (place(0, 0, 42), []),
+        (place(0, 0, 45), ["ceiling"]),
+        (place(0, 0, 1), [FLOOR]),
+        (place(0, 0, 130), ["highest", "ceiling"]),
+        (place(0, 0, -7), ["lowest", FLOOR]),
+        (place(31, 0), ["zone mast"]),
+        (place(21, 0), []),  # at its edge
+        (place(0, 300), ["farthest", "polygon"]),
+    ],
+)
+def test_what_it_is_out_of(where: Position, keys: list[str]) -> None:
+    assert list(Bounds(HOME, Limits(farthest=200.0), FENCED).left(where)) == keys
+
+
+def test_a_small_zone_is_not_overlooked() -> None:
+    fence = Fence(no_fly=(Zone("post", square(1.0)),))
+    assert list(Bounds(HOME, Limits(), fence).left(place(0, 0))) == ["zone post"]
+
+
+def telemetry(where: Position, remaining: float = 1.0) -> Telemetry:
+    seen = Telemetry(VirtualKernel(), "craft_1")
+    seen.position, seen.battery = where, Battery(remaining, 12.0, 10.0)
+    return seen
+
+
+def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
+    seen = telemetry(place(0, 80))
+    watch = Watch(seen, Bounds(HOME, Limits(), FENCED), 0.0)
+    for north in (70, 60, 10):
+        seen.position = place(0, north)
+        assert watch.look("go", 0) is None
+    seen.position = place(0, 60)
+    error = watch.look("go", 0)
+    assert isinstance(error, OutOfBounds)
+    assert "10 m outside the fence" in str(error)
+
+
+def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
+    for excused, expected in ((frozenset[str](), True), (frozenset({FLOOR}), False)):
+        seen = telemetry(place(0, 0, 0))
+        watch = Watch(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
+        for up in (0.5, 20.0):
+            seen.position = place(0, 0, up)
+            assert watch.look("up", 0) is None
+        seen.position = place(0, 0, 1.0)
+        assert (watch.look("down", 0) is not None) is expected
+
+
+def test_a_battery_that_sags_for_a_moment_is_not_empty() -> None:
+    seen = telemetry(place(0, 0), 0.19)
+    watch = Watch(seen, None, 0.2)
+    assert watch.look("go", 0) is None
+    assert watch.look("go", 2 * S) is None
+    seen.battery = Battery(0.21, 12.0, 10.0)
+    assert watch.look("go", 3 * S) is None
+    seen.battery = Battery(0.18, 12.0, 10.0)
+    assert watch.look("go", 4 * S) is None
+    error = watch.look("go", 7 * S)
+    assert isinstance(error, LowBattery)
+    assert "at 18%, below the reserve of 20%" in str(error)
+
+
+def test_a_battery_that_is_not_measured_ends_nothing() -> None:
+    watch = Watch(telemetry(place(0, 0), float("nan")), None, 0.2)
+    assert watch.look("go", 0) is None
+    assert watch.look("go", 10 * S) is None
+
+
+@pytest.mark.parametrize(
+    ("fence", "says"),
+    [
+        (FENCED, ""),  # its floor is above home: that is crossed on the way up
+        (Fence(square(50.0, 100.0)), "outside the fence's polygon"),
+        (Fence(ceiling=AMSL(880.0)), "not below the fence's ceiling of 880 m AMSL"),
+        (Fence(no_fly=(Zone("park", square(20.0)),)), "in the no-fly zone 'park'"),
+        (Fence(no_fly=(Zone("approach", square(20.0), AboveHome(30.0)),)), ""),
+    ],
+)
+def test_a_fence_that_excludes_home(fence: Fence, says: str) -> None:
+    found = excludes_home(fence, HOME)
+    assert (says in found) if says else found == ""
+
+
+def test_swapped_corners_are_recognised() -> None:
+    home = Position(46.0, 7.0, AMSL(900.0))
+    turned = ((6.9, 45.9), (7.1, 45.9), (7.1, 46.1), (6.9, 46.1))
+    assert "are they swapped?" in excludes_home(Fence(turned), home)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Limits(battery_reserve=20), "a share from 0 to below 1"),
+        (lambda: Limits(battery_reserve=float("nan")), "a share from 0 to below 1"),
+        (lambda: Limits(highest=float("nan")), "no room to fly"),
+        (lambda: Fence(floor=AboveHome(30), ceiling=AboveHome(10)), "not below its ceiling"),
+        (lambda: Fence(((0.0, 0.0), (1.0, 1.0))), "2 corners; it takes at least 3"),
+        (lambda: Fence(((float("nan"), 0.0), (1.0, 1.0), (1.0, 0.0))), "off the globe"),
+    ],
+)
+def test_bounds_that_make_no_sense(make: Any, says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        make()
