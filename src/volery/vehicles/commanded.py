@@ -195,6 +195,9 @@ class Commanded:
 
     def _require(self, capability: Capability) -> None:
         self._hear()
+        problem = self._driver.problem()
+        if isinstance(problem, CapabilityError):
+            raise CapabilityError(f"{self.name}: {problem}")
         if capability not in self._driver.capabilities:
             can = ", ".join(sorted(each.value for each in self._driver.capabilities))
             raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")

@@ -233,17 +233,21 @@ class FakeAutopilot:
 class Bench:
     """``fly(mission)`` runs it as a task and returns what it returns, or raises what it raises."""
 
+    peer: Any = FakeAutopilot
+    opener: Any = staticmethod(open_driver)
+    standing = "HOLD"  # the mode in which a rover begins
+
     def __init__(
         self, kind: type[Vehicle] = Drone, *, options: dict[str, str] | None = None, **stated: Any
     ) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
         self.link, theirs = in_process(self.kernel, name="radio")
-        self.autopilot = FakeAutopilot(self.kernel, theirs, 2 if kind is Drone else 10)
+        self.autopilot = self.peer(self.kernel, theirs, 2 if kind is Drone else 10)
         self.craft = self.autopilot.craft
         if kind is not Drone:
-            self.craft.mode = "HOLD"
-        driver = open_driver(self.kernel, self.link, "craft_1", options or {})
+            self.craft.mode = self.standing
+        driver = self.opener(self.kernel, self.link, "craft_1", options or {})
         self.vehicle: Any = kind(self.kernel, "craft_1", driver, **stated)
 
     def fly(self, mission: Callable[[Any], Any]) -> Any:

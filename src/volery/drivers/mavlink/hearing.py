@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from math import degrees, nan
 from typing import Any
 
+from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.drivers.arrival import DRONE_KIND
@@ -62,12 +63,15 @@ class Hearing(ABC):
         }
 
     def hear(self, name: str, fields: Fields) -> bool:
-        """Take note of a message of our autopilot."""
+        """Take note of a message of our autopilot. One that puts it off the globe is left unheard."""
         self._seen.heard = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False
-        handler(fields)
+        try:
+            handler(fields)
+        except UsageError:
+            return False
         return True
 
     @abstractmethod

@@ -100,7 +100,7 @@ class Sequences:
         """In the mode it is in."""
         step = Step(
             ask="arm",
-            send=lambda: self._carrier.arm(True),
+            send=self._arm,
             done=lambda seen: seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
@@ -108,6 +108,13 @@ class Sequences:
             again=2 * S,
         )
         return (step,)
+
+    def _arm(self) -> None:
+        """By now its firmware has told its version."""
+        problem = self._carrier.problem()
+        if isinstance(problem, CapabilityError):
+            raise CapabilityError(f"{self.name}: {problem}")
+        self._carrier.arm(True)
 
     def disarm(self, force: bool) -> Sequence[Step]:
         """In the air it is refused without *force*."""

@@ -18,12 +18,12 @@ he has chosen another mode in between, Hold then means his.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite
 
 from volery.base.errors import UsageError, VehicleError
-from volery.base.position import AMSL, AboveGround, AboveHome, Position
+from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.drivers.arrival import DRONE_KIND, ROVER_KIND, ROVER_NEAR_M, at, distance, standing
 from volery.drivers.mavlink import commands as key
@@ -69,6 +69,7 @@ class PX4(Sequences):
         self._offboard = Offboard(kernel, commands)
         self._sticks = StickStream(kernel, commands)
         self._at_own_speed = True
+        self._lifted_at: Position | None = None
 
     @property
     def handover(self) -> str:
@@ -92,7 +93,6 @@ class PX4(Sequences):
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Hold, ready, armed, up, and then to the stated height; at once, or it disarms itself after 10 s."""
-        start = self.telemetry.position
 
         def risen(seen: Telemetry) -> bool:
             enough = max(height - TAKEOFF_SHORT_M, height / 2.0)
@@ -109,20 +109,22 @@ class PX4(Sequences):
             leads_to=(HOLD,),
             armed=True,
         )
-        over = start or self.telemetry.position
-        level = (
-            ()
-            if over is None
-            else (self._level_at(Position(over.latitude, over.longitude, AboveHome(height))),)
-        )
-        return (*self._armed_in_hold(), climb, *level)
+        return (*self._armed_in_hold(), climb, self._levelled(height))
 
     def _take_off(self, height: float) -> None:
+        self._lifted_at = self._here("take off")
         self._asks_for(modes.TAKEOFF)
         self._commands.takeoff(self._amsl(AboveHome(height)))
 
-    def _level_at(self, goal: Position) -> Step:
-        return replace(self._target(goal, LEVELLED_WITHIN), ask=f"rise to {goal.altitude.metres:g} m")
+    def _levelled(self, height: float) -> Step:
+        """At the stated height above the place where it took off."""
+
+        def goal() -> Position:
+            over = self._lifted_at or self._here("take off")
+            return Position(over.latitude, over.longitude, AboveHome(height))
+
+        level = self._target(goal, LEVELLED_WITHIN)
+        return replace(level, ask=f"rise to {height:g} m")
 
     def _armed_in_hold(self) -> Sequence[Step]:
         """Whoever changes the mode meanwhile has it: to arm in another one is not what was asked."""
@@ -136,7 +138,8 @@ class PX4(Sequences):
         if isinstance(goal.altitude, AboveGround):
             raise UsageError(f"{self.name}: {goal}: PX4 takes AMSL and AboveHome")
         start = self._armed_in_hold() if self.telemetry.kind == ROVER_KIND else self._let_go()
-        return (*start, *self._paced(speed), self._target(goal, within))
+        reach = replace(self._target(lambda: goal, within), ask=f"reach {goal}")
+        return (*start, *self._paced(speed), reach)
 
     def _paced(self, speed: float | None) -> Sequence[Step]:
         """A speed that was stated stands until another is; PX4 may forget it when the mode changes."""
@@ -145,12 +148,13 @@ class PX4(Sequences):
         self._at_own_speed = speed is None
         return (*self._change(HOLD), *self._at_speed(OWN_SPEED if speed is None else speed, HOLD))
 
-    def _target(self, goal: Position, within: Ns) -> Step:
-        there = at(goal, self.telemetry.kind == ROVER_KIND)
+    def _target(self, goal: Callable[[], Position], within: Ns) -> Step:
+        """DO_REPOSITION to *goal*, until it is there."""
+        rover = self.telemetry.kind == ROVER_KIND
         return Step(
-            ask=f"reach {goal}",
-            send=lambda: self._reposition(goal),
-            done=lambda seen: seen.mode == HOLD and there(seen),
+            ask="reach it",
+            send=lambda: self._reposition(goal()),
+            done=lambda seen: seen.mode == HOLD and at(goal(), rover)(seen),
             within=within,
             answer=key.TARGET,
             again=2 * S,
@@ -162,17 +166,21 @@ class PX4(Sequences):
         self._asks_for(HOLD)
         self._commands.reposition(Position(goal.latitude, goal.longitude, AMSL(self._amsl(goal.altitude))))
 
-    def _amsl(self, altitude: object) -> float:
+    def _here(self, asked: str) -> Position:
+        here = self.telemetry.position
+        if here is None or not isfinite(self.telemetry.above_home):
+            raise VehicleError(
+                self.name, asked, "the autopilot does not know where it is; wait_ready() first"
+            )
+        return here
+
+    def _amsl(self, altitude: Altitude) -> float:
         """Metres. Home is where its own two altitudes say; a rover goes at the altitude it has."""
-        seen = self.telemetry
-        if seen.position is None or not isfinite(seen.above_home):
-            raise VehicleError(self.name, "go by position", "the autopilot does not know where it is")
-        here = seen.position.altitude.metres
-        if seen.kind != DRONE_KIND:
+        here = self._here("go by position").altitude.metres
+        if self.telemetry.kind != DRONE_KIND:
             return here
         if isinstance(altitude, AboveHome):
-            return here - seen.above_home + altitude.metres
-        assert isinstance(altitude, AMSL)
+            return here - self.telemetry.above_home + altitude.metres
         return altitude.metres
 
     def hold(self) -> Sequence[Step]:
@@ -190,10 +198,7 @@ class PX4(Sequences):
         return (*self._let_go(), stop)
 
     def _stay(self) -> None:
-        here = self.telemetry.position
-        if here is None:
-            raise VehicleError(self.name, "hold", "the autopilot does not know where it is")
-        self._reposition(here)
+        self._reposition(self._here("hold"))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """OFFBOARD, streamed until it has lasted long enough; then AUTO.LOITER."""
@@ -300,10 +305,7 @@ class PX4(Sequences):
     # -- missions
 
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
-        here = self.telemetry.position
-        if here is None:
-            raise VehicleError(self.name, "upload a mission", "it has no position; wait_ready() first")
-        return items_of(mission, here)
+        return items_of(mission, self._here("upload a mission"))
 
     def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
         """PX4 1.14 does not say that a mission is over: it is when its last place is reached."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from volery.drivers.px4.modes import BY_STICKS, MODES
+
 ALL_MODES = 0xFFFFFFFF
 ERROR = 3
 """Log levels are those of syslog; an arming check for all modes that is no error is but a warning."""
@@ -38,6 +40,8 @@ class Event(NamedTuple):
 REPORT_BEGINS = event_id("commander_arming_check_summary")
 REPORT_ENDS = event_id("commander_health_summary")
 """Between these two stand the arming checks that fail, all of them each time one of them changes."""
+
+NO_STICKS = event_id("check_modes_manual_control")
 
 CHECKS: Mapping[int, str] = {
     event_id(name): words
@@ -147,12 +151,15 @@ class ArmingChecks:
             self._report.append(event)
         return True
 
-    def reasons(self, state: int) -> list[str]:
-        """Why it cannot arm in the mode of this ``state``."""
-        return [words_of(event.id) for event in self._failing if _forbids(event, state)]
+    def reasons(self, mode: str) -> list[str]:
+        """Why it cannot arm in this mode."""
+        return [words_of(event.id) for event in self._failing if _forbids(event, mode)]
 
 
-def _forbids(event: Event, state: int) -> bool:
+def _forbids(event: Event, mode: str) -> bool:
+    """Missing sticks are a warning for all modes, and forbid those that need them."""
+    if event.id == NO_STICKS:
+        return mode in BY_STICKS
     if event.modes == ALL_MODES:
         return event.severity <= ERROR
-    return bool(event.modes >> state & 1)
+    return bool(event.modes >> MODES[mode].state & 1) if mode in MODES else True

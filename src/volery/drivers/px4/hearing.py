@@ -5,7 +5,7 @@ from __future__ import annotations
 from volery.drivers.mavlink import hearing
 from volery.drivers.mavlink.hearing import Fields
 from volery.drivers.px4.events import NOT_FOR_PEOPLE, SAID, WITHOUT_TEXT, ArmingChecks, event_of, words_of
-from volery.drivers.px4.modes import HOLD, MODES, mode_name
+from volery.drivers.px4.modes import HOLD, mode_name
 from volery.kernel.api import Kernel
 from volery.vehicles.telemetry import Telemetry
 
@@ -56,6 +56,5 @@ class Hearing(hearing.Hearing):
 
     def say_failing_checks(self) -> None:
         """It refused to arm: PX4 says why in its last report, which may have come long before."""
-        mode = MODES.get(self._seen.mode)
-        for reason in self._checks.reasons(mode.state if mode is not None else MODES[HOLD].state):
+        for reason in self._checks.reasons(self._seen.mode):
             self.say(WARNING, f"Arming check: {reason}")

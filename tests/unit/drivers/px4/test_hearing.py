@@ -1,0 +1,162 @@
+"""What the driver makes of telemetry as PX4 1.14 sent it: extracts of recorded flights.
+
+The extracts hold what the driver listens to and brought a change, in milliseconds since their beginning.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from volery.base.time import MS
+from volery.drivers.px4.events import SAID, event_id, words_of
+from volery.drivers.px4.hearing import Hearing
+from volery.kernel.virtual import VirtualKernel
+from volery.links.link import Frame
+from volery.links.mavlink import encode, quantised
+from volery.links.parser import Parser
+from volery.vehicles.telemetry import Telemetry
+
+EXTRACTS = Path(__file__).parents[3] / "golden" / "px4_telemetry"
+ARM, REJECTED = 400, 1
+
+
+@cache
+def extract(name: str) -> list[Any]:
+    return list(json.loads((EXTRACTS / f"{name}.json").read_text()))
+
+
+def replayed(name: str) -> Iterator[tuple[float, Telemetry]]:
+    """The telemetry after each message of an extract, with its time in seconds."""
+    kernel = VirtualKernel()
+    seen = Telemetry(kernel, "recorded")
+    hearing = Hearing(kernel, seen)
+    for ms, message, fields in extract(name):
+        kernel.call_at(ms * MS, lambda: None)
+        kernel.run(ms * MS)
+        frame = quantised(Frame(message, fields, 1, 1))
+        if message == "COMMAND_ACK":
+            if frame.fields["command"] == ARM and frame.fields["result"] == REJECTED:
+                hearing.say_failing_checks()
+        else:
+            assert hearing.hear(frame.name, frame.fields)
+        yield ms / 1000.0, seen
+
+
+def changes(name: str, *facts: str) -> list[Any]:
+    """The values of these facts in the order in which they changed."""
+    found: list[Any] = []
+    for _, seen in replayed(name):
+        now = tuple(getattr(seen, fact) for fact in facts)
+        if not found or found[-1] != now:
+            found.append(now)
+    return found
+
+
+def texts(name: str) -> list[str]:
+    said: list[str] = []
+    for _, seen in replayed(name):
+        new = [one.text for one in seen.texts]
+        if new and (not said or said[-1] != new[-1] or len(new) > len(said)):
+            said = [*said, new[-1]] if len(new) >= 50 else new
+    return said
+
+
+def test_a_mission_a_return_and_a_kill() -> None:
+    states = changes("auto-gcs", "mode", "armed", "flying")
+    assert states[:8] == [
+        ("", False, False),
+        ("AUTO.LOITER", False, False),
+        ("AUTO.TAKEOFF", False, False),
+        ("AUTO.MISSION", False, False),
+        ("AUTO.MISSION", True, False),
+        ("AUTO.MISSION", True, True),
+        ("AUTO.RTL", True, True),
+        ("AUTO.LOITER", True, True),
+    ]
+    assert ("POSCTL.ORBIT", True, True) in states
+    assert ("AUTO.RTL", True, False) in states
+    assert states[-1] == ("AUTO.LOITER", False, False)
+
+
+def test_it_is_ready_only_once_it_has_a_position() -> None:
+    ready = next(at for at, seen in replayed("auto-gcs") if seen.ready)
+    placed = next(at for at, seen in replayed("auto-gcs") if seen.position is not None)
+    assert 5 < placed < ready < 10
+    *_, (_, seen) = replayed("auto-gcs")
+    assert seen.home is not None
+    assert seen.home.latitude == pytest.approx(45.467, abs=0.001)
+
+
+def test_offboard_and_its_loss_with_each_action() -> None:
+    states = changes("offboard-api", "mode", "failsafe")
+    lost = [mode for mode, failsafe in states if failsafe]
+    assert lost == ["POSCTL", "AUTO.RTL", "AUTO.LAND", "AUTO.LOITER"]
+    for mode in lost:  # and back by itself, as soon as the stream had resumed
+        assert states[states.index((mode, True)) + 1] == ("OFFBOARD", False)
+
+
+def test_sticks_that_are_missed() -> None:
+    states = changes("manual-gcs", "mode", "failsafe")
+    assert ("AUTO.LOITER", True) in states
+    assert ("AUTO.RTL", True) in states
+    said = texts("manual-gcs")
+    assert "manual control lost" in said
+    assert "pilot took over using sticks" in said
+    assert "Failsafe activated, entering Hold for 5 seconds" in said
+    assert "Arming denied: throttle above center" in said
+
+
+def test_why_it_would_not_arm_comes_from_the_report_before() -> None:
+    early = texts("auto-gcs")
+    assert "Arming check: no valid local position estimate" in early
+    assert "Arming check: no valid attitude estimate" in early
+    assert not any("offboard" in text for text in early)
+    by_hand = [text for text in texts("manual-gcs") if text.startswith("Arming check")]
+    assert set(by_hand) == {"Arming check: no manual control input"}
+
+
+def test_no_text_comes_twice_and_none_with_a_tabulator() -> None:
+    said = texts("auto-gcs")
+    assert not any(text.endswith("\t") for text in said)
+    assert said.count("Armed by external command") == 2
+    assert "armed" not in said
+
+
+def test_numbers_of_events_are_made_of_their_names() -> None:
+    recorded = {
+        fields["id"]
+        for name in ("auto-gcs", "manual-gcs", "offboard-api")
+        for _, kind, fields in extract(name)
+        if kind == "EVENT"
+    }
+    known = {number for number in recorded if not words_of(number).startswith("event")}
+    assert event_id("commander_armed_by") == 0x0190CAF3
+    assert event_id("check_modes_attitude") == 0x019F748F
+    assert {f"{number:#010x}" for number in recorded - known} == {
+        "0x01a893e0",  # begins a report of arming checks
+        "0x011d3727",  # ends it
+        "0x01125bef",
+        "0x0114827b",
+    }
+    assert len(known & SAID.keys()) >= 15
+
+
+def test_events_as_they_came_over_the_wire() -> None:
+    raw = bytes.fromhex("fd1200007a03019a01008f749f0120080000f8ff0000223ed07e00146911")
+    (frame,) = Parser().feed(raw)
+    assert frame.name == "EVENT"
+    assert (frame.fields["id"], frame.fields["sequence"], frame.fields["log_levels"]) == (
+        0x019F748F,
+        65528,
+        0x22,
+    )
+    assert frame.fields["arguments"][:5] == (0x3E, 0xD0, 0x7E, 0, 20)
+    assert encode(frame, 0x7A) == raw
+    (sequence,) = Parser().feed(bytes.fromhex("fd0300002503019b0100f6ff01ee37"))
+    assert (sequence.name, sequence.fields["sequence"]) == ("CURRENT_EVENT_SEQUENCE", 65526)
