@@ -15,13 +15,15 @@ from functools import partial
 from math import nan
 
 from volery.autopilots.simulated.dialect import Dialect, Family
-from volery.autopilots.simulated.face import Face, LinkFace
+from volery.autopilots.simulated.face import Face, GraphFace, LinkFace
 from volery.autopilots.simulated.flight import Flight
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.errors import UsageError, choices
 from volery.base.frames import Vector, ned_to_enu
 from volery.base.time import MS, Ns, S
+from volery.graph import RosGraph
 from volery.kernel.api import Action, Handle, Kernel
+from volery.kernel.task import Place
 from volery.links.link import Link
 from volery.trace.events import VehicleState
 
@@ -79,6 +81,16 @@ class Autopilot:
         *use* is what the firmware has the link for, such as ``station``; by default its usual one.
         """
         self._on_links().connect(link, use)
+        if switch_on:
+            self.switch_on()
+
+    def join(self, graph: RosGraph, namespace: str, place: Place, *, switch_on: bool = True) -> None:
+        """Serve on *graph* under *namespace*; the node's computing is spent at *place*. A cold vehicle is
+        switched on, unless *switch_on* is False. Raises ``UsageError`` for a firmware that speaks on links.
+        """
+        if not isinstance(self.face, GraphFace):
+            raise UsageError(f"{self.name}: a simulated {self.dialect.name} is reached over links")
+        self.face.join(graph, namespace, place)
         if switch_on:
             self.switch_on()
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 from volery.autopilots.simulated.vehicle import Outlet
+from volery.graph import RosGraph
+from volery.kernel.task import Place
 from volery.links.link import Link
 
 
@@ -38,3 +40,11 @@ class LinkFace(Face, Protocol):
 
     def disconnect(self, link: Link) -> None:
         """Nobody is there any more."""
+
+
+@runtime_checkable
+class GraphFace(Face, Protocol):
+    """A protocol of topics and services on a graph."""
+
+    def join(self, graph: RosGraph, namespace: str, place: Place) -> None:
+        """Serve on that graph: all its names are under *namespace*, its computing is spent at *place*."""

@@ -1,0 +1,13 @@
+"""A DJI aircraft behind the topics and services of its onboard SDK: a dialect of the simulated stack.
+
+The protocol is from public definitions; how the aircraft behaves beyond them is assumed, and each assumption
+stands in docs/dji.md and, where it is a figure, in ``parameters``.
+"""
+
+from volery.autopilots.dji.copter import COPTER
+from volery.autopilots.simulated.dialect import Family
+
+DIALECT = Family("dji", {"multirotor": COPTER}, codec=None)
+"""The firmware, by kind of vehicle. It has no links: it is reached over a graph."""
+
+__all__ = ["DIALECT"]
