@@ -10,6 +10,7 @@ from __future__ import annotations
 from volery.autopilots.paparazzi.memory import of
 from volery.autopilots.paparazzi.radio import OK
 from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import Ns, S
 
 KILL, FAILSAFE, HOME = 0, 1, 2
 ATTITUDE_DIRECT, ATTITUDE_RC_CLIMB, ATTITUDE_Z_HOLD, HOVER_Z_HOLD = 4, 6, 9, 12
@@ -24,6 +25,15 @@ NO_RC, WAITING, ARMED, KILLED, UNARMED_IN_AUTO, NOT_ALIGNED, LOW_BATTERY = 0, 1,
 """ROTORCRAFT_STATUS.arming_status, those that occur here."""
 
 
+ALIGNED_AFTER: Ns = 4 * S
+"""Uptime until which the attitude is being aligned."""
+
+
+def aligned(vehicle: Vehicle) -> bool:
+    """The attitude is known."""
+    return vehicle.uptime() >= ALIGNED_AFTER and vehicle.estimate.attitude_ok
+
+
 def in_flight(vehicle: Vehicle) -> bool:
     """As the firmware counts it: motors on, and off the ground."""
     return vehicle.armed and not vehicle.landed
@@ -34,7 +44,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
 
     Before the attitude is aligned only the start-up mode is flown. KILL stops the motors, wherever it is.
     """
-    if not vehicle.estimate.attitude_ok:
+    if not aligned(vehicle):
         number = round(vehicle.parameters["MODE_STARTUP"])
     mode = vehicle.dialect.modes.get(number)
     if mode is None:
@@ -70,7 +80,7 @@ def set_motors(vehicle: Vehicle, on: bool) -> None:
 def _refusal(vehicle: Vehicle) -> int | None:
     if vehicle.mode.number == KILL:
         return KILLED
-    if not vehicle.estimate.attitude_ok:
+    if not aligned(vehicle):
         return NOT_ALIGNED
     return LOW_BATTERY if battery_critical(vehicle) else None
 

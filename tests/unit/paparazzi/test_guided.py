@@ -1,0 +1,178 @@
+"""Guided set-points: every flag, when they count, and that they never expire."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, dist, inf, nan, pi, sin
+from typing import Any
+
+import pytest
+
+from volery.links.pprz_aircraft import stock_aircraft
+
+Make = Callable[..., Any]
+
+
+def heading(craft: Any) -> float:
+    """Of the nose, clockwise from north [rad]."""
+    yaw: float = craft.autopilot.vehicle.estimate.attitude[2]
+    return yaw
+
+
+def velocity(craft: Any) -> tuple[float, float, float]:
+    """North, east, down [m/s]."""
+    moving: tuple[float, float, float] = craft.autopilot.vehicle.estimate.velocity
+    return moving
+
+
+def test_a_point_is_reached_and_kept(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 20.0, -10.0, -15.0, 1.0)
+    craft.run(20.0)
+    assert craft.position == pytest.approx((20.0, -10.0, -15.0), abs=0.3)
+    assert heading(craft) == pytest.approx(1.0, abs=0.05)
+    craft.run(120.0)  # and nobody says anything
+    assert craft.mode == "GUIDED"
+    assert craft.position == pytest.approx((20.0, -10.0, -15.0), abs=0.3)
+
+
+def test_a_set_point_above_lifts_it_off_the_ground(craft: Any) -> None:
+    craft.set("mode", 19)
+    craft.set("kill_throttle", 0.0)
+    craft.run(3.0)
+    assert craft.up < 0.3
+    craft.guide(0x00, 0.0, 0.0, -3.0)
+    craft.run(8.0)
+    assert craft.up == pytest.approx(3.0, abs=0.2)
+
+
+def test_without_motors_a_set_point_does_nothing(craft: Any) -> None:
+    craft.set("mode", 19)
+    craft.guide(0x00, 0.0, 0.0, -3.0)
+    craft.run(5.0)
+    assert craft.up < 0.3
+
+
+def test_entering_it_stays_where_it_is(craft: Any) -> None:
+    craft.in_the_air()
+    place = craft.position
+    craft.set("mode", 19)
+    craft.run(5.0)
+    assert dist(craft.position, place) < 0.4
+
+
+@pytest.mark.parametrize("mode", [13, 2])
+def test_elsewhere_it_is_ignored_in_silence(craft: Any, mode: int) -> None:
+    craft.in_the_air()
+    craft.set("mode", mode)
+    craft.run(5.0)
+    place = craft.position
+    craft.heard.clear()
+    craft.guide(0x00, 30.0, 30.0, -20.0)
+    craft.run(8.0)
+    assert dist(craft.position, place) < 0.5
+    craft.set("mode", 19)  # and it is not kept for later
+    craft.run(5.0)
+    assert dist(craft.position, place) < 0.7
+
+
+def test_offsets_count_from_where_it_is(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 5.0, 6.0, -10.0, 0.5)
+    craft.run(10.0)
+    craft.guide(0x0D, 3.0, -2.0, -1.0, 0.25)
+    craft.run(10.0)
+    assert craft.position == pytest.approx((8.0, 4.0, -11.0), abs=0.4)
+    assert heading(craft) == pytest.approx(0.75, abs=0.05)
+
+
+def test_offsets_in_the_bodys_axes(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 0.0, 0.0, -10.0, pi / 3.0)
+    craft.run(8.0)
+    here = craft.position
+    craft.guide(0x0E, 6.0, 2.0, 0.0, 0.0)
+    craft.run(10.0)
+    c, s = cos(pi / 3.0), sin(pi / 3.0)
+    expected = here[0] + 6.0 * c - 2.0 * s, here[1] + 6.0 * s + 2.0 * c, here[2]
+    assert craft.position == pytest.approx(expected, abs=0.4)
+
+
+def test_a_velocity_goes_on_for_ever(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x60, 1.0, -2.0, -0.5)
+    craft.run(6.0)
+    assert velocity(craft) == pytest.approx((1.0, -2.0, -0.5), abs=0.15)
+    craft.run(20.0)
+    assert velocity(craft) == pytest.approx((1.0, -2.0, -0.5), abs=0.15)
+
+
+def test_a_velocity_in_the_bodys_axes(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 0.0, 0.0, -10.0, pi / 2.0)
+    craft.run(6.0)
+    craft.guide(0x62, 2.0, 0.0, 0.0, pi / 2.0)
+    craft.run(5.0)
+    assert velocity(craft) == pytest.approx((0.0, 2.0, 0.0), abs=0.15)
+
+
+def test_velocity_in_the_plane_at_a_height(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x20, 2.0, 0.0, -14.0)
+    craft.run(8.0)
+    assert velocity(craft) == pytest.approx((2.0, 0.0, 0.0), abs=0.15)
+    assert craft.up == pytest.approx(14.0, abs=0.2)
+
+
+def test_climbing_over_a_point(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x40, 0.0, 0.0, -1.0)
+    craft.run(5.0)
+    assert velocity(craft)[2] == pytest.approx(-1.0, abs=0.1)
+    assert dist(craft.position[:2], (0.0, 0.0)) < 0.3
+
+
+def test_a_turn_rate(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x80, 0.0, 0.0, -10.0, 0.4)
+    craft.run(3.0)
+    assert craft.autopilot.vehicle.estimate.rates[2] == pytest.approx(0.4, abs=0.05)
+
+
+def test_sinking_to_the_ground_leaves_the_motors_on(craft: Any) -> None:
+    craft.guided(-3.0)
+    craft.guide(0x40, 0.0, 0.0, 0.5)
+    craft.run(12.0)
+    status = craft.last("ROTORCRAFT_STATUS")
+    assert (status["ap_motors_on"], status["ap_in_flight"], status["ap_mode"]) == (1, 0, 19)
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+def test_numbers_that_are_none_change_nothing(craft: Any, bad: float) -> None:
+    craft.guided()
+    place = craft.position
+    for values in ((bad, 0.0, 0.0, 0.0), (0.0, bad, 0.0, 0.0), (0.0, 0.0, bad, 0.0), (0.0, 0.0, 0.0, bad)):
+        craft.guide(0x00, *values)
+    craft.run(3.0)
+    assert dist(craft.position, place) < 0.3
+
+
+def test_for_another_aircraft_it_is_not(craft: Any) -> None:
+    craft.guided()
+    place = craft.position
+    craft.send("GUIDED_SETPOINT_NED", ac_id=8, flags=0, x=30.0, y=0.0, z=-10.0, yaw=0.0)
+    craft.send("SETTING", ac_id=8, index=stock_aircraft().setting("mode").number, value=0.0)
+    craft.send("BLOCK", ac_id=255, block_id=2)
+    craft.run(3.0)
+    assert dist(craft.position, place) < 0.3
+    assert craft.armed
+
+
+def test_the_carrot_is_the_set_point(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 12.0, -7.0, -11.0, -1.0)
+    craft.run(0.5)
+    fp = craft.last("ROTORCRAFT_FP")
+    carrot = [fp[f"carrot_{axis}"] / 256.0 for axis in ("east", "north", "up")]
+    assert carrot == pytest.approx([-7.0, 12.0, 11.0], abs=0.01)
+    assert fp["carrot_psi"] / 4096.0 == pytest.approx(-1.0, abs=0.001)
