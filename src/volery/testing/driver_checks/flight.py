@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import hypot
 
-from volery.base.errors import Refused, UsageError
+from volery.base.errors import Refused, UsageError, VehicleError
 from volery.base.position import Position
 from volery.base.time import to_seconds
 from volery.testing.checks import check, demand, raising
@@ -233,13 +233,25 @@ def disarming_in_the_air(stage: Stage) -> str:
 
 @check(needs=UP, flies=True)
 def two_flows_of_control(stage: Stage) -> None:
-    """Of two tasks that command one vehicle at a time, the second is told so."""
+    """Of two tasks that command one vehicle at a time, the second is told so, and the first goes on."""
     stage.later(4.0, lambda: stage.drone.takeoff(10))
     stage.drone.wait_ready()
     stage.until(lambda: stage.drone.armed, 60.0, "the first task never got it armed")
     with raising(UsageError, naming=stage.name):
-        stage.drone.land()
+        stage.drone.wait_ready()
+        stage.drone.takeoff(12)
     stage.until(lambda: stage.drone.altitude.metres > 5.0, 60.0, "the first task was disturbed")
+
+
+@check(needs=(*GO, Capability.LAND), flies=True)
+def safety_comes_first(stage: Stage) -> str:
+    """land() of another task ends goto(), which says so; it is not an error to land."""
+    stage.drone.takeoff(10)
+    stage.later(3.0, stage.drone.land)
+    with raising(VehicleError, UsageError, naming=stage.name) as caught:
+        stage.drone.goto(stage.at(60, 0))
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+    return caught.text.removeprefix(f"{stage.name}: ")
 
 
 @check(needs=UP, flies=True)
