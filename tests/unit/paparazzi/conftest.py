@@ -46,6 +46,7 @@ class Craft:
         )
         codec = DIALECT.codec
         assert codec is not None
+        theirs: Any
         if through_bytes:
             ours, theirs = wire(self.kernel, "ground", WireFaults(), Random(1), delay=MS, codec=codec)
             self.link: Any = ours
