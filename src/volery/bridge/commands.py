@@ -70,9 +70,9 @@ class Commands:
         response = service("mavros_msgs/srv/SetMode").response
         base, custom = request.base_mode, 0
         if request.custom_mode:
-            number = mode_number(self._wire.kind, request.custom_mode)
+            number = mode_number(self._wire.firmware, request.custom_mode)
             if number is None:
-                names = mode_names(self._wire.kind)
+                names = mode_names(self._wire.firmware)
                 hint = did_you_mean(request.custom_mode.upper(), names)
                 self._warn(f"set_mode: no mode {request.custom_mode!r}{hint}; there is {choices(names)}")
                 return response(False)
@@ -100,7 +100,7 @@ class Commands:
         return service("mavros_msgs/srv/CommandTOL").response(*answer)
 
     def takeoff(self, request: Any) -> Any:
-        """``cmd/takeoff``: the altitude is what the autopilot takes it for (ArduPilot: above home)."""
+        """``cmd/takeoff``: the altitude is what it means to the autopilot (PX4: AMSL, else above home)."""
         return self._take_off_or_land(TAKEOFF, request)
 
     def land(self, request: Any) -> Any:

@@ -1,12 +1,13 @@
-"""Names and numbers of ArduPilot's flight modes, by MAVLink's type of vehicle.
+"""Names and numbers of flight modes, by MAVLink's autopilot and type of vehicle.
 
-Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``. A mode that is not listed goes by
-``CMODE(number)``, as in MAVROS.
+Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``, PX4's ``px4_custom_mode.h``. A mode that is
+not listed goes by ``CMODE(number)``, as in MAVROS.
 """
 
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 COPTER = {
     0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 7: "CIRCLE",
@@ -19,29 +20,50 @@ ROVER = {
     0: "MANUAL", 1: "ACRO", 3: "STEERING", 4: "HOLD", 5: "LOITER", 6: "FOLLOW", 7: "SIMPLE", 8: "DOCK",
     9: "CIRCLE", 10: "AUTO", 11: "RTL", 12: "SMART_RTL", 15: "GUIDED", 16: "INITIALISING",
 }  # fmt: skip
+_PX4_MODES = (
+    (1, 0, "MANUAL"), (2, 0, "ALTCTL"), (3, 0, "POSCTL"), (3, 1, "POSCTL.ORBIT"), (4, 1, "AUTO.READY"),
+    (4, 2, "AUTO.TAKEOFF"), (4, 3, "AUTO.LOITER"), (4, 4, "AUTO.MISSION"), (4, 5, "AUTO.RTL"),
+    (4, 6, "AUTO.LAND"), (4, 8, "AUTO.FOLLOW_TARGET"), (4, 9, "AUTO.PRECLAND"), (4, 10, "AUTO.VTOL_TAKEOFF"),
+    (5, 0, "ACRO"), (6, 0, "OFFBOARD"), (7, 0, "STABILIZED"), (8, 0, "RATTITUDE"),
+)  # fmt: skip
+PX4 = {sub << 24 | main << 16: name for main, sub, name in _PX4_MODES}
+"""The same for all types of vehicle."""
+
+ARDUPILOT_ID, PX4_ID = 3, 12
+"""MAV_AUTOPILOT."""
+
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""
 _NUMBERED = re.compile(r"(?:CMODE\()?(\d+)\)?\Z")
 
 
-def _table(kind: int) -> dict[int, str]:
-    return ROVER if kind in _ROVER_TYPES else COPTER
+class Firmware(NamedTuple):
+    """Whose modes they are: MAV_AUTOPILOT and MAV_TYPE, as heartbeats state them."""
+
+    autopilot: int = ARDUPILOT_ID
+    kind: int = 0
 
 
-def mode_name(kind: int, number: int) -> str:
-    """The name of a mode of a vehicle of MAV_TYPE *kind*."""
-    return _table(kind).get(number, f"CMODE({number})")
+def _table(firmware: Firmware) -> dict[int, str]:
+    if firmware.autopilot == PX4_ID:
+        return PX4
+    return ROVER if firmware.kind in _ROVER_TYPES else COPTER
 
 
-def mode_number(kind: int, name: str) -> int | None:
+def mode_name(firmware: Firmware, number: int) -> str:
+    """The name of a mode of that *firmware*."""
+    return _table(firmware).get(number, f"CMODE({number})")
+
+
+def mode_number(firmware: Firmware, name: str) -> int | None:
     """The number of a mode, ``None`` if there is no such name."""
-    for number, known in _table(kind).items():
+    for number, known in _table(firmware).items():
         if known == name.upper():
             return number
     numbered = _NUMBERED.match(name)
     return int(numbered.group(1)) if numbered else None
 
 
-def mode_names(kind: int) -> list[str]:
-    """All names of modes of a vehicle of MAV_TYPE *kind*."""
-    return list(_table(kind).values())
+def mode_names(firmware: Firmware) -> list[str]:
+    """All names of modes of that *firmware*."""
+    return list(_table(firmware).values())

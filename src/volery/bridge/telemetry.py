@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from volery.base import frames
 from volery.base.geoid import Geoid
 from volery.base.time import Ns, S
-from volery.bridge.modes import mode_name
+from volery.bridge.modes import Firmware, mode_name
 from volery.bridge.wire import Wire
 from volery.graph import DEFAULT, TRANSIENT_LOCAL, QoS
 from volery.links.link import Frame
@@ -114,7 +114,7 @@ class Telemetry:
                 armed=bool(base & 128),
                 guided=bool(base & 8),
                 manual_input=bool(base & 64),
-                mode=mode_name(said["type"], said["custom_mode"]),
+                mode=mode_name(Firmware(said["autopilot"], said["type"]), said["custom_mode"]),
                 system_status=said["system_status"],
             ),
         )

@@ -23,6 +23,7 @@ from volery.base.geoid import SEA_LEVEL, Geoid
 from volery.base.time import MS, Ns, S
 from volery.bridge.commands import WARNING, Commands, request_streams
 from volery.bridge.missions import Missions
+from volery.bridge.modes import PX4_ID
 from volery.bridge.parameters import Parameters
 from volery.bridge.setpoints import Subscription, subscriptions
 from volery.bridge.telemetry import LATCHED_STATE, TOPICS, Telemetry
@@ -179,11 +180,16 @@ class VehicleNode:
     def _request_what_is_missing(self, now: Ns) -> None:
         """Ask for streams that do not come: a request right after boot may be lost, though acknowledged."""
         latest = self.wire.latest
+        by_message = self.wire.firmware.autopilot == PX4_ID
         for stream, rate in self.options.streams.items():
-            shown_by = _SHOWN_BY.get(stream, "")
-            heard = latest.get(shown_by)
-            if heard is None or now - heard.at > 3 * S:
+            heard = latest.get(_SHOWN_BY.get(stream, ""))
+            if heard is not None and now - heard.at <= 3 * S:
+                continue
+            if not by_message:
                 request_streams(self.wire, stream, rate)
+                continue
+            for number in _MESSAGES_OF.get(stream, ()):
+                self._send_command(SET_MESSAGE_INTERVAL, number, 1e6 / max(rate, 1))
         if "EXTENDED_SYS_STATE" not in latest:
             self._send_command(SET_MESSAGE_INTERVAL, EXTENDED_SYS_STATE, 1e6)
         if "HOME_POSITION" not in latest:
@@ -212,3 +218,8 @@ _SHOWN_BY = {
     11: "VFR_HUD",
 }
 """The message by which one sees that a MAV_DATA_STREAM comes."""
+
+_MESSAGES_OF: Mapping[int, tuple[int, ...]] = {2: (1, 24), 3: (65,), 6: (33, 32), 10: (30,), 11: (74,)}
+"""The messages of a MAV_DATA_STREAM that are published: PX4 knows no streams and is asked for each. There is
+no RAW_IMU.
+"""

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from volery.base.time import Ns
+from volery.bridge.modes import Firmware
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 from volery.links.link import Frame, Link
@@ -66,7 +67,7 @@ class Wire:
         self._link = link
         self._system, self._component = system, component
         self.target: tuple[int, int] = (0, 0)
-        self.kind = 0
+        self.firmware = Firmware()
         self.last_heartbeat: Ns | None = None
         self.latest: dict[str, Heard] = {}
         self.fresh: list[Heard] = []
@@ -86,7 +87,7 @@ class Wire:
         now = self.kernel.now()
         if frame.name == "HEARTBEAT":
             self.last_heartbeat = now
-            self.kind = frame.fields["type"]
+            self.firmware = Firmware(frame.fields["autopilot"], frame.fields["type"])
         heard = Heard(frame, now)
         if frame.name not in _KEPT_ALL:
             self._forget(frame.name)

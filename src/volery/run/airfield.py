@@ -73,6 +73,10 @@ class Airfield:
             raise UsageError("there is no vehicle in this run, and so no world")
         return self._world
 
+    def family(self, vehicle: str) -> Family:
+        """The firmware that flies it."""
+        return self._families[vehicle]
+
     def codec(self, vehicle: str) -> Codec:
         """What its autopilot's links speak. Raises ``UsageError`` if it is reached over a graph only."""
         family = self._families[vehicle]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from volery.bridge import serve_vehicle
 from volery.components.body import Body
 from volery.components.counting import Steps
 from volery.components.instance import Instance
@@ -28,14 +27,12 @@ from volery.run.airfield import Airfield
 from volery.run.ending import Ending
 from volery.run.fences import fence_of
 from volery.run.platform import Platform, commanded_by, is_node
+from volery.run.serving import serve, serving
 from volery.run.setup import node_name
-from volery.vehicles import Drone, Rover, Vehicle, drivers
+from volery.vehicles import Drone, Rover, Vehicle
 
 PYTHON_ROS = ("rospy", "rclpy")
 """Languages whose files import interfaces of ROS."""
-
-GRAPH_DRIVER = "mavros"
-"""Components command vehicles over topics and services under MAVROS's names."""
 
 
 class Connected:
@@ -209,9 +206,8 @@ class Builder:
         return found
 
     def _vehicle(self, node: EmbeddedNode, name: str, interface: str) -> Drone | Rover:
-        open_driver = drivers.load(GRAPH_DRIVER).on_graph
-        assert open_driver is not None
-        driver = open_driver(self._kernel, node, name, {"namespace": f"/{name}"})
+        served = serving(self._autopilot(name), name)
+        driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace})
         truth = self._airfield.truth(name)
         vehicle = (
             Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
@@ -228,12 +224,16 @@ class Builder:
         commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
             if vehicle.name in commanded:
+                serving(vehicle.autopilot, vehicle.name)  # one that cannot be served is told before the start
                 yield partial(self._serve, vehicle.name, vehicle.processor)
+
+    def _autopilot(self, vehicle: str) -> str:
+        return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
 
     def _serve(self, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""
         place = Place(node_name(name), self._platform.processors[processor] if processor else None)
-        serve_vehicle(self._graph, self._airfield.link(name), name, place)
+        serve(self._graph, self._airfield, name, serving(self._autopilot(name), name), place)
 
 
 def _kind(connection: Connection) -> TargetKind | None:
