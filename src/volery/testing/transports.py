@@ -1,0 +1,52 @@
+"""Conformance of transports: named checks of what the node interface must do on any ROS graph.
+
+```python
+from volery.testing.transports import CHECKS, Site
+
+with kernel.adopt("checks"):
+    for name, check in CHECKS.items():
+        with Site(graph, name) as site:
+            check(site)
+```
+
+A check that finds fault raises ``BrokenError``. Where graphs differ on purpose, ``Traits`` says how, and the
+check demands what the trait promises.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from volery.graph.node import RosGraph
+from volery.testing import transports_graph, transports_services, transports_topics
+from volery.testing.checks import BrokenError
+from volery.testing.transports_site import CHECKS, EMBEDDED, ROS1, ROS2, Site, Traits, check
+
+__all__ = [
+    "CHECKS", "EMBEDDED", "ROS1", "ROS2", "Site", "Traits", "check", "run_checks",
+    "transports_graph", "transports_services", "transports_topics",
+]  # fmt: skip
+
+
+@contextmanager
+def no_fault(name: str) -> Iterator[list[str]]:
+    """Collect what the block finds fault with, in words."""
+    faults: list[str] = []
+    try:
+        yield faults
+    except BrokenError as error:
+        faults.append(f"{name}: {error}")
+    except Exception:
+        faults.append(f"{name}: {traceback.format_exc()}")
+
+
+def run_checks(graph: RosGraph, traits: Traits) -> dict[str, str]:
+    """All checks on one graph, within a task: what each finds fault with, in words, empty for none."""
+    found = {}
+    for name, body in CHECKS.items():
+        with no_fault(name) as faults, Site(graph, name, traits) as site:
+            body(site)
+        found[name] = "; ".join(faults)
+    return found

@@ -1,0 +1,249 @@
+"""What services, parameters and timers must do on any graph."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.graph.services import ServiceError
+from volery.kernel.task import Place
+from volery.messages import new, request, service
+from volery.testing.checks import demand, raising
+from volery.testing.transports_site import LIMIT, Site, check
+
+SET_BOOL, TRIGGER = "std_srvs/srv/SetBool", "std_srvs/srv/Trigger"
+
+
+def answered(success: bool, text: str = "") -> Any:
+    """A response of SetBool."""
+    return service(SET_BOOL).response(success=success, message=text)
+
+
+@check
+def a_service_answers(site: Site) -> None:
+    """A call comes back with what the handler returned for that request."""
+    server, caller = site.spinning(site.node("server")), site.node("caller")
+    server.serve("switch", SET_BOOL, lambda asked: answered(asked.data, f"was {asked.data}"))
+    client = caller.client("switch", SET_BOOL)
+    demand(client.wait(LIMIT), "the service is not found")
+    demand(caller.wait_for_service("switch", LIMIT), "wait_for_service does not find it")
+    demand(client.ready(), "it was found but is not ready")
+    for value in (True, False):
+        answer = client.call(request(SET_BOOL, data=value), LIMIT)
+        demand(answer == answered(value, f"was {value}"), f"answered {answer}")
+
+
+@check
+def a_node_serves_itself(site: Site) -> None:
+    """A node that another task spins can call its own service."""
+    node = site.spinning(site.node("node"))
+    node.serve("~switch", SET_BOOL, lambda asked: answered(True))
+    client = node.client("~switch", SET_BOOL)
+    demand(client.wait(LIMIT), "the service is not found")
+    demand(client.call(request(SET_BOOL), LIMIT).success, "no answer")
+
+
+@check
+def nobody_serves_it(site: Site) -> None:
+    """Calling what nobody serves is a ``ServiceError`` at once; waiting for it ends in time."""
+    caller = site.node("caller")
+    client = caller.client("nowhere", TRIGGER)
+    with raising(ServiceError, naming="nowhere"):
+        client.call(request(TRIGGER), 5 * S)
+    demand(not client.ready(), "it is said to be ready")
+    demand(not client.wait(100 * MS), "waiting says it is there")
+    demand(not caller.wait_for_service("nowhere", 100 * MS), "wait_for_service says it is there")
+
+
+@check
+def a_handler_that_raises(site: Site) -> None:
+    """What a handler raises comes out where its node spins; the caller gets a ``ServiceError``."""
+    server, caller = site.node("server"), site.node("caller")
+
+    def handle(asked: Any) -> Any:
+        raise ValueError("no such thing")
+
+    server.serve("broken", TRIGGER, handle)
+    raised: list[str] = []
+
+    def spin() -> None:
+        try:
+            server.spin()
+        except ValueError as error:
+            raised.append(str(error))
+
+    site.kernel.spawn(spin, "spins the server", Place(server.name))
+    client = caller.client("broken", TRIGGER)
+    demand(client.wait(LIMIT), "the service is not found")
+    with raising(ServiceError, naming="broken") as caught:
+        client.call(request(TRIGGER), S)
+    if site.traits.tells_failure:
+        demand("no such thing" in caught.text, f"the caller is not told why: {caught.text}")
+    site.until(caller, lambda: raised == ["no such thing"], "the error comes out of spin")
+
+
+@check
+def a_handler_that_returns_nonsense(site: Site) -> None:
+    """A handler that returns no response is a ``UsageError`` of its node, naming the service."""
+    server, caller = site.node("server"), site.node("caller")
+    server.serve("odd", TRIGGER, lambda asked: "yes")
+    raised: list[str] = []
+
+    def spin() -> None:
+        try:
+            server.spin()
+        except UsageError as error:
+            raised.append(str(error))
+
+    site.kernel.spawn(spin, "spins the server", Place(server.name))
+    client = caller.client("odd", TRIGGER)
+    demand(client.wait(LIMIT), "the service is not found")
+    with raising(ServiceError, naming="odd"):
+        client.call(request(TRIGGER), S)
+    site.until(caller, lambda: raised and "odd" in raised[0], "the error comes out of spin")
+
+
+@check
+def no_answer_in_time(site: Site) -> None:
+    """A server that does not spin: ``ServiceError`` when the time is over."""
+    server, caller = site.node("server"), site.node("caller")
+    server.serve("slow", TRIGGER, lambda asked: service(TRIGGER).response(success=True))
+    client = caller.client("slow", TRIGGER)
+    demand(client.wait(LIMIT), "the service is not found")
+    with raising(ServiceError, naming="no answer within"):
+        client.call(request(TRIGGER), 200 * MS)
+    site.spinning(server)
+    demand(client.call(request(TRIGGER), LIMIT).success, "it does not answer the next call")
+
+
+@check
+def a_server_that_leaves(site: Site) -> None:
+    """A caller whose server closes gets a ``ServiceError``; then the service is not ready."""
+    server, caller = site.node("server"), site.node("caller")
+    served = server.serve("leaving", TRIGGER, lambda asked: service(TRIGGER).response())
+    client = caller.client("leaving", TRIGGER)
+    demand(client.wait(LIMIT), "the service is not found")
+
+    def leave() -> None:
+        server.sleep(200 * MS)
+        served.close()
+
+    site.kernel.spawn(leave, "leaves", Place(server.name))
+    with raising(ServiceError, naming="leaving"):
+        client.call(request(TRIGGER), 3 * S)
+    site.until(caller, lambda: not client.ready(), "the service is not ready any more")
+
+
+@check
+def a_service_is_served_once(site: Site) -> None:
+    """Serving what another node serves is a ``UsageError`` that names it."""
+    one, two = site.node("one"), site.node("two")
+    one.serve("switch", TRIGGER, lambda asked: service(TRIGGER).response())
+    demand(two.wait_for_service("switch", LIMIT), "the service is not found")
+    with raising(UsageError, naming=one.name):
+        two.serve("switch", TRIGGER, lambda asked: service(TRIGGER).response())
+
+
+@check
+def a_request_of_another_type(site: Site) -> None:
+    """Calling with something else than the service's request is a ``UsageError``; so is an unknown type."""
+    node = site.node("node")
+    client = node.client("switch", SET_BOOL)
+    with raising(UsageError, naming="SetBool"):
+        client.call(new("std_msgs/msg/Bool"))
+    with raising(UsageError, naming="SetBol"):
+        node.client("switch", "std_srvs/srv/SetBol")
+
+
+@check
+def parameters_of_a_node(site: Site) -> None:
+    """Private parameters are set, read, found, replaced and removed."""
+    node = site.node("node")
+    values: dict[str, Any] = {"flag": True, "count": 3, "gain": 0.5, "text": "ü", "list": [1.5, 2.5]}
+    for name, value in values.items():
+        node.set_parameter(f"~{name}", value)
+    for name, value in values.items():
+        read = node.get_parameter(f"~{name}")
+        demand(read == value and type(read) is type(value), f"{name} is {read!r}, not {value!r}")
+    node.set_parameter("~count", 4)
+    demand(node.get_parameter(f"{node.name}/count") == 4, "the absolute name reads something else")
+    demand(node.has_parameter("~count"), "it is there, but is not found")
+    node.delete_parameter("~count")
+    demand(not node.has_parameter("~count"), "it was removed, but is found")
+
+
+@check
+def a_namespace_of_parameters(site: Site) -> None:
+    """A ``dict`` is a namespace: it sets and reads what is below it."""
+    node = site.node("node")
+    node.set_parameter("~gains", {"p": 1.5, "roll": {"d": 0.25}})
+    demand(node.get_parameter("~gains/roll/d") == 0.25, "a value below is not found")
+    node.set_parameter("~gains/p", 2.5)
+    read = node.get_parameter("~gains")
+    demand(read == {"p": 2.5, "roll": {"d": 0.25}}, f"the namespace reads {read}")
+    node.delete_parameter("~gains")
+    demand(not node.has_parameter("~gains/p"), "it was removed, but is found")
+
+
+@check
+def a_parameter_that_is_not_there(site: Site) -> None:
+    """Reading or removing it is a ``UsageError`` that names it; a default is taken instead, even ``None``."""
+    node = site.node("node")
+    with raising(UsageError, naming="nothing"):
+        node.get_parameter("~nothing")
+    with raising(UsageError, naming="nothing"):
+        node.delete_parameter("~nothing")
+    demand(node.get_parameter("~nothing", 7) == 7, "the default is not taken")
+    demand(node.get_parameter("~nothing", None) is None, "the default None is not taken")
+
+
+@check
+def a_parameter_of_another_node(site: Site) -> None:
+    """A node reads and sets another's parameters by their absolute names."""
+    one, two = site.spinning(site.node("one")), site.node("two")
+    one.set_parameter("~rate", 10)
+    site.until(two, lambda: two.get_parameter(f"{one.name}/rate", 0) == 10, "the other node reads it")
+    two.set_parameter(f"{one.name}/rate", 20)
+    demand(one.get_parameter("~rate") == 20, "what the other node has set is not read")
+
+
+@check
+def a_parameter_outside_of_nodes(site: Site) -> None:
+    """A relative name is below the namespace, for all nodes (in ROS 2: a ``UsageError`` that says why)."""
+    one, two = site.node("one"), site.node("two")
+    if not site.traits.global_parameters:
+        with raising(UsageError, naming="belong to nodes"):
+            one.set_parameter("shared", 1)
+        return
+    one.set_parameter("shared", 1)
+    demand(two.get_parameter(f"{site.space}/shared") == 1, "another node does not read it")
+    one.delete_parameter("shared")
+
+
+@check
+def a_timer_fires(site: Site) -> None:
+    """A timer calls back each period, not at once, and no more when it was cancelled."""
+    node = site.node("node")
+    ticks: list[int] = []
+    start = node.now()
+    timer = node.timer(100 * MS, lambda: ticks.append(node.now() - start))
+    site.spin_until(node, lambda: len(ticks) == 3, "it fires three times")
+    demand(ticks[0] >= 100 * MS and ticks[2] >= 300 * MS, f"it fired at {ticks} ns")
+    timer.cancel()
+    site.listen(node)
+    demand(len(ticks) == 3, "it fired after it was cancelled")
+
+
+@check
+def a_rate_keeps_a_loop(site: Site) -> None:
+    """A loop with a rate takes its period for each turn; ``sleep`` takes as long as it says."""
+    node = site.node("node")
+    rate = node.rate(50 * MS)
+    start = node.now()
+    for _ in range(4):
+        rate.sleep()
+    demand(node.now() - start >= 200 * MS, "four periods were over too soon")
+    start = node.now()
+    node.sleep(100 * MS)
+    demand(node.now() - start >= 100 * MS, "sleep was over too soon")
