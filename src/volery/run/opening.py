@@ -13,7 +13,8 @@ from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.links.shared import SharedLink
 from volery.run.airfield import Airfield
-from volery.run.simulated import HOME, Simulated, airfield_of, link_to, simulated
+from volery.run.serving import open_simulated
+from volery.run.simulated import HOME, Simulated, airfield_of, simulated
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import open_link
@@ -21,8 +22,6 @@ from volery.vehicles.driver import DriverFactory, drivers
 from volery.vehicles.limits import excludes_home
 
 GRAPHS = ("graph", "ros1", "ros2")
-SIMULATED = {"texts": "unrecorded"}
-"""Options of the driver of a simulated vehicle: its autopilot records its texts itself."""
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
 
 
@@ -80,11 +79,8 @@ def _check_home(wanted: Simulated, fence: Fence | None) -> None:
 def _simulated_vehicle(
     kernel: Kernel, airfield: Airfield, wanted: Simulated, kind: type[Vehicle], stated: Stated
 ) -> Vehicle:
-    name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-    open_driver = drivers.load(autopilot).on_link
-    if open_driver is None:
-        raise CapabilityError(f"{name}: {autopilot} is reached over a graph only")
-    driver = open_driver(kernel, link_to(kernel, airfield, wanted, stated.seed), name, SIMULATED)
+    driver = open_simulated(kernel, airfield, wanted, stated.seed)
+    name = wanted.vehicle.name
     return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=airfield.truth(name))
 
 

@@ -12,7 +12,8 @@ from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Link
-from volery.run.opening import KINDS, SIMULATED
+from volery.run.opening import KINDS
+from volery.run.serving import SIMULATED
 from volery.run.simulated import airfield_of, link_to, simulated
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
