@@ -19,6 +19,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame, Link
 from volery.links.mavlink import message_type
+from volery.links.parser import MAVLINK
 from volery.vehicles import Drone, Vehicle
 
 HOME = (-353632610, 1491652300, 584_000)  # degE7, degE7, mm AMSL
@@ -235,6 +236,7 @@ class Bench:
 
     peer: Any = FakeAutopilot
     opener: Any = staticmethod(open_driver)
+    codec: Any = MAVLINK
     standing = "HOLD"  # the mode in which a rover begins
 
     def __init__(
@@ -242,7 +244,7 @@ class Bench:
     ) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        self.link, theirs = in_process(self.kernel, name="radio")
+        self.link, theirs = in_process(self.kernel, name="radio", codec=self.codec)
         self.autopilot = self.peer(self.kernel, theirs, 2 if kind is Drone else 10)
         self.craft = self.autopilot.craft
         if kind is not Drone:

@@ -1,0 +1,54 @@
+"""Paparazzi rotorcraft: its sequences, written once, and two ways to reach it: pprzlink and pprzros topics.
+
+From public definitions of the protocol; not flown. ``modes.ASSUMED`` lists what is taken for granted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from volery.drivers.mavlink.options import check_options
+from volery.drivers.paparazzi.driver import Blocks, Paparazzi
+from volery.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
+from volery.drivers.paparazzi.uplink import Uplink
+from volery.kernel.api import Kernel
+from volery.links.link import Link
+from volery.links.pprz_aircraft import Aircraft, read_aircraft, stock_aircraft
+from volery.links.pprzlink import PPRZLINK
+from volery.vehicles.driver import DriverFactory
+
+__all__ = ["DRIVER", "Paparazzi", "open_driver"]
+
+OPTIONS = ("aircraft", "land", "start", "system", "takeoff", "texts")
+CARRIERS = ("baud", "uplink")
+"""Options that are not the driver's, but of what carries it."""
+
+
+def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> Paparazzi:
+    """A Paparazzi rotorcraft behind a pprzlink. It begins to listen and to send pings at once.
+
+    Options: ``aircraft``, the folder with its XML, else it is taken for the stock rotorcraft; ``system``, its
+    id, else the XML's, else the first that speaks; ``start``, ``takeoff`` and ``land``, other names of these
+    blocks of its flight plan; ``texts=unrecorded`` where it records its texts itself, as a simulated one.
+    """
+    check_options("paparazzi", options, *OPTIONS, *CARRIERS)
+    uplink = Uplink(kernel, link, name, _aircraft(options), options, looped=False)
+    return Paparazzi(kernel, uplink, _blocks(options))
+
+
+def _aircraft(options: Mapping[str, str]) -> Aircraft:
+    given = options.get("aircraft")
+    return read_aircraft(Path(given)) if given else stock_aircraft()
+
+
+def _blocks(options: Mapping[str, str]) -> Blocks:
+    return Blocks(
+        options.get("start", START_BLOCK),
+        options.get("takeoff", TAKEOFF_BLOCK),
+        options.get("land", LAND_BLOCK),
+    )
+
+
+DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK)
+"""Paparazzi on a pprzlink."""

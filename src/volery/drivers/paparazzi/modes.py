@@ -1,0 +1,56 @@
+"""Names of the rotorcraft firmware, and what the driver takes for granted about an aircraft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from volery.links.pprzlink_definitions import entry_value, message_type
+
+STATUS = "ROTORCRAFT_STATUS"
+
+KILL, FAILSAFE, HOME = "KILL", "FAILSAFE", "HOME"
+NAV, GUIDED = "NAV", "GUIDED"
+BY_ATTITUDE, BY_HEIGHT = "ATTITUDE_DIRECT", "ATTITUDE_Z_HOLD"
+
+NUMBERS: Mapping[str, int] = {
+    word: number for number, word in enumerate(message_type(STATUS).words("ap_mode"))
+}
+"""Of the modes."""
+
+GOOD_FIX = entry_value(STATUS, "gps_status", "3D")
+"""This or better."""
+
+NEEDS_CARE = message_type(STATUS).words("arming_status")[8:]
+"""Words of ``arming_status`` that say why it does not arm."""
+
+CANNOT_ARM = frozenset({"AHRS_NOT_ALLIGNED", "OUT_OF_GEOFENCE", "LOW_BATTERY"})
+"""Those that last until something is put right. The others are about a pilot's sticks."""
+
+# What the driver writes, by the names that an aircraft's XML gives a number.
+AUTO2 = "auto2"
+KILL_THROTTLE = "kill_throttle"
+MODE = "mode"
+
+START_BLOCK, TAKEOFF_BLOCK, LAND_BLOCK = "Start Engine", "Takeoff", "land here"
+"""Blocks of the stock rotorcraft plan; the options ``start``, ``takeoff`` and ``land`` name others."""
+
+PREPARING_BLOCKS = ("Wait GPS", "Geo init")
+"""While it is in these, the origin of its local frame is still to be set. A plan need not have them."""
+
+HOME_WAYPOINT = "HOME"
+
+ASSUMED: Mapping[str, str] = {
+    "GET_SETTING": "is answered with DL_VALUE: the numbers of 'mode' and 'kill_throttle' are checked so",
+    "SETTING of 'mode'": "KILL, FAILSAFE and HOME always; NAV and GUIDED while no transmitter is heard",
+    "SETTING of 'auto2'": "what the third position of the mode switch means, at once where it is in it",
+    "SETTING of 'kill_throttle'": "0 starts the motors in every mode but KILL, 1 stops them, in the air, too",
+    "RC_4CH": "counts as a transmitter; mode 2 is the third position of its switch; pitch is nose up +",
+    "GUIDED_SETPOINT_NED": "about the origin that INS_REF tells; stands until the next one",
+    "block 'Start Engine'": "starts the motors, in NAV",
+    "block 'Takeoff'": "climbs straight up to some 2 m",
+    "block 'land here'": "takes the touch-down point from where it is, descends, and stops the motors",
+    "FAILSAFE": "descends straight without a position, and becomes KILL on the ground",
+    "height above home": "is the height above the origin: block 'Geo init' sets it where the aircraft stands",
+    "ATTITUDE_Z_HOLD": "keeps the height with the throttle in the middle",
+}
+"""What is taken for granted, from public definitions and sources: no recording of a flight proves it."""
