@@ -115,7 +115,7 @@ class TransportGraph:
 
     def _leave(self, node: TransportNode) -> None:
         del self._nodes[node.name]
-        node.leave()
+        node.part()
 
     def warn(self, text: str) -> None:
         """Record what the client library says went wrong. From any thread."""

@@ -73,8 +73,14 @@ class TransportNode(LocalNode):
         self._self.why = why
         self.close()
 
-    def leave(self) -> None:
-        """Take it off the graph."""
+    def close(self) -> None:
+        """Leave the graph."""
+        if not self.closed:
+            self._wire.leave()
+        super().close()
+
+    def part(self) -> None:
+        """Take it off the graph, when all that it has made is closed."""
         self._wire.close()
 
     def _abroad(self, what: str, work: Callable[[], T]) -> T:

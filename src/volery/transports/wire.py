@@ -102,6 +102,9 @@ class Wire(Protocol):
     def delete_parameter(self, name: str) -> None:
         """Remove a parameter or a namespace; ``KeyError`` where there is none."""
 
+    def leave(self) -> None:
+        """All it has made is about to be closed, and it itself after that."""
+
     def close(self) -> None:
         """Leave the graph."""
 

@@ -33,7 +33,7 @@ class _ToTrace(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Pass it on, without the traceback that rospy may have put behind it."""
-        self._say(record.getMessage().strip().partition("\nTraceback")[0])
+        self._say(record.getMessage().strip().partition("Traceback")[0].rstrip(": \n"))
 
 
 class Ros1:

@@ -20,6 +20,8 @@ from volery.transports.ros1.rospy_copy import rospy_copy
 from volery.transports.wire import Arrived, Asked, Done, Parcel
 
 GOODBYE_S = 2.0
+Aside = Callable[[Callable[[], object]], None]
+"""Has something done beside the caller, who must not wait for a master that may be gone."""
 ANY = "*"
 """The type of a subscriber that takes whatever comes."""
 
@@ -27,7 +29,8 @@ ANY = "*"
 class Ros1Outlet:
     """A rospy publisher. ROS 1 latches the last message only, whatever the depth."""
 
-    def __init__(self, rospy: Any, topic: str, message_type: str, qos: QoS) -> None:
+    def __init__(self, rospy: Any, topic: str, message_type: str, qos: QoS, aside: Aside) -> None:
+        self._aside = aside
         self._type, self._class = message_type, message_carrier(message_type)
         self._counts = ros1_type(message_type).has_header
         self._sent = 0
@@ -53,13 +56,14 @@ class Ros1Outlet:
 
     def close(self) -> None:
         """Unregister."""
-        _aside(self._publisher.unregister)
+        self._aside(self._publisher.unregister)
 
 
 class Ros1Inlet:
     """A rospy subscriber."""
 
-    def __init__(self, rospy: Any, topic: str, message_type: str, arrived: Arrived) -> None:
+    def __init__(self, rospy: Any, topic: str, message_type: str, arrived: Arrived, aside: Aside) -> None:
+        self._aside = aside
         read = partial(from_ros1, message_type)
 
         def take(carrier: Any) -> None:
@@ -74,13 +78,14 @@ class Ros1Inlet:
 
     def close(self) -> None:
         """Unregister."""
-        _aside(self._subscriber.unregister)
+        self._aside(self._subscriber.unregister)
 
 
 class Ros1Served:
     """A rospy service: each request holds a thread of rospy until it is answered."""
 
-    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: Asked) -> None:
+    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: Asked, aside: Aside) -> None:
+        self._aside = aside
         carrier = service_carrier(kind)
         wanted, given = kind.request.__msgtype__, carrier._response_class
 
@@ -106,7 +111,7 @@ class Ros1Served:
 
     def close(self) -> None:
         """Unregister."""
-        _aside(partial(self._service.shutdown, "closed"))
+        self._aside(partial(self._service.shutdown, "closed"))
 
 
 class Ros1Caller:
@@ -157,7 +162,6 @@ def _in_words(error: Exception) -> str:
 
 
 def _aside(work: Callable[[], object]) -> None:
-    """Have it done, without waiting for a master that may be gone."""
     threading.Thread(target=work, daemon=True).start()
 
 
@@ -199,12 +203,12 @@ class Ros1Wire:
     def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros1Outlet:
         """Publish to a topic."""
         self._check_type(topic, message_type)
-        return Ros1Outlet(self.rospy, topic, message_type, qos)
+        return Ros1Outlet(self.rospy, topic, message_type, qos, self._while_there)
 
     def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Ros1Inlet:
         """Receive a topic. All that ROS 1 knows of QoS is the depth, which the house keeps."""
         self._check_type(topic, message_type)
-        return Ros1Inlet(self.rospy, topic, message_type, arrived)
+        return Ros1Inlet(self.rospy, topic, message_type, arrived, self._while_there)
 
     def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros1Served:
         """Offer a service."""
@@ -214,7 +218,7 @@ class Ros1Wire:
             if any(is_alive(self.master.find("lookupNode", user) or "") for user in users):
                 raise UsageError(f"node {self.name}: service {name} is served by {', '.join(users)} already")
         ros1_service(kind.name)
-        return Ros1Served(self.rospy, name, kind, asked)
+        return Ros1Served(self.rospy, name, kind, asked, self._while_there)
 
     def caller(self, name: str, kind: ServiceType) -> Ros1Caller:
         """Call a service."""
@@ -267,10 +271,17 @@ class Ros1Wire:
             for listener in registration.get_registration_listeners().listeners:
                 listener.publisher_update(topic, publishers)
 
+    def _while_there(self, work: Callable[[], object]) -> None:
+        """Unregister one thing. A node that leaves unregisters all by itself, and not twice at a time."""
+        if not self.closed:
+            _aside(work)
+
+    def leave(self) -> None:
+        """What it has made goes with it."""
+        self._closing = True
+
     def close(self) -> None:
         """Leave the graph: at once for this process, for the others as soon as the master answers."""
-        if self._closing:
-            return
         self._closing = True
         _aside(partial(self.rospy.core.signal_shutdown, "closed"))
         self._gone.wait(GOODBYE_S)

@@ -56,8 +56,9 @@ class Ros2Outlet:
 class Ros2Inlet:
     """An rclpy subscription of bytes.
 
-    Where whatever is offered is wanted, it begins with the most and asks for less as soon as a publisher
-    turns up that offers less: DDS itself would leave the two unconnected.
+    DDS leaves unconnected what does not fit, so where whatever is offered is wanted it is looked at again
+    whenever a publisher turns up: reliable unless one is not; with what is kept for those who come late if
+    all keep it. What is delivered twice over such a change is dropped by its time.
     """
 
     def __init__(self, node: Any, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> None:
@@ -66,51 +67,56 @@ class Ros2Inlet:
         self._read = partial(from_cdr, message_type)
         self._guard = threading.Lock()
         self._open = True
-        self._now = replace(
-            qos,
-            reliability=self._most(qos.reliability, RELIABLE, "reliability"),
-            durability=self._most(qos.durability, TRANSIENT_LOCAL, "durability"),
+        self._latest = self._repeated = (
+            0  # source times: of the last message, and of the last before a change
         )
+        self._now = self._fitting()
         self._subscription = self._subscribe()
 
-    def _most(self, wanted: str, most: str, policy: str) -> str:
-        """The most that all publishers known by now offer."""
-        if wanted != BEST_AVAILABLE:
-            return wanted
-        known = self._node.get_publishers_info_by_topic(self._topic)
-        offers = {getattr(one.qos_profile, policy).name.lower() for one in known}
-        least = BEST_EFFORT if policy == "reliability" else VOLATILE
-        return least if least in offers else most
+    def _fitting(self) -> QoS:
+        """The most that all publishers known by now offer, where that is wanted."""
+        offers = [one.qos_profile for one in self._node.get_publishers_info_by_topic(self._topic)]
+        reliability, durability = self._wanted.reliability, self._wanted.durability
+        if reliability == BEST_AVAILABLE:
+            unreliable = any(one.reliability.name == "BEST_EFFORT" for one in offers)
+            reliability = BEST_EFFORT if unreliable else RELIABLE
+        if durability == BEST_AVAILABLE:
+            kept = offers and all(one.durability.name == "TRANSIENT_LOCAL" for one in offers)
+            durability = TRANSIENT_LOCAL if kept else VOLATILE
+        return replace(self._wanted, reliability=reliability, durability=durability)
 
     def _subscribe(self) -> Any:
-        events = import_module("rclpy.event_handler")
+        callbacks = import_module("rclpy.event_handler").SubscriptionEventCallbacks
+        events = {"incompatible_qos": self._look_again}
+        if hasattr(callbacks(), "matched"):  # from Iron on
+            events["matched"] = self._look_again
         return self._node.create_subscription(
             rclpy_class(self._type),
             self._topic,
             self._take,
             profile(self._now),
             raw=True,
-            event_callbacks=events.SubscriptionEventCallbacks(incompatible_qos=self._incompatible),
+            event_callbacks=callbacks(**events),
         )
 
-    def _take(self, data: bytes) -> None:
-        self._arrived(Parcel(data, self._read, ""))
+    def _take(self, data: bytes, about: Any) -> None:
+        self._latest = at = about["source_timestamp"]
+        if at > self._repeated:
+            self._arrived(Parcel(data, self._read, ""))
 
-    def _incompatible(self, event: Any) -> None:
-        """A publisher offers less. Called within rclpy's wait, so what is to be done is done beside it."""
-        threading.Thread(target=self._ask_for_less, daemon=True).start()
+    def _look_again(self, event: Any) -> None:
+        """A publisher has turned up. Called within rclpy's wait, so what is to be done is done beside it."""
+        if BEST_AVAILABLE in (self._wanted.reliability, self._wanted.durability):
+            threading.Thread(target=self._adapt, daemon=True).start()
 
-    def _ask_for_less(self) -> None:
+    def _adapt(self) -> None:
         with self._guard:
-            less = replace(
-                self._now,
-                reliability=self._most(self._wanted.reliability, self._now.reliability, "reliability"),
-                durability=self._most(self._wanted.durability, self._now.durability, "durability"),
-            )
-            if self._open and less != self._now:
-                self._now = less
-                before, self._subscription = self._subscription, self._subscribe()
-                self._node.destroy_subscription(before)
+            fitting = self._fitting()
+            if self._open and fitting != self._now:
+                self._now = fitting
+                self._node.destroy_subscription(self._subscription)
+                self._repeated = self._latest
+                self._subscription = self._subscribe()
 
     def connected(self) -> int:
         """How many publishers there are that it hears."""
@@ -145,6 +151,7 @@ class Ros2Served:
             def done(answer: Message | None, problem: str) -> None:
                 if not answered.done():
                     answered.set_result(answer)
+                    node.executor.wake()  # it looks at what waits for a result only when it wakes
 
             asked(from_rclpy(kind.request.__msgtype__, request), done)
             answer = await answered

@@ -19,6 +19,7 @@ from volery.graph.graph import everything
 from volery.graph.node import QoS, ServiceState, TopicState
 from volery.kernel.api import Kernel
 from volery.messages import ServiceType
+from volery.transports.abroad import GLANCE_S
 from volery.transports.graph import TransportGraph
 from volery.transports.ros2.endpoints import (
     NoAnswerError,
@@ -78,7 +79,7 @@ class Ros2Wire:
 
     def has_service(self, name: str) -> bool:
         """Whether somebody is known to serve it."""
-        return any(known == name for known, _ in self._node.get_service_names_and_types())
+        return bool(self._node.count_services(name))
 
     def _parameters(self, name: str) -> tuple[OwnParameters | OtherParameters, str]:
         node, rest = owner(name, self.name, self._library.node_names())
@@ -91,13 +92,22 @@ class Ros2Wire:
 
     def set_parameter(self, name: str, value: Any) -> None:
         """Of this node, or of the one whose name begins it."""
-        of, rest = self._parameters(name)
+        try:
+            of, rest = self._parameters(name)
+        except KeyError:
+            raise UsageError(
+                f"parameter {name}: in ROS 2 parameters belong to nodes, and no node's name begins it; "
+                f"name one of your own with '~'"
+            ) from None
         of.set(rest, value)
 
     def delete_parameter(self, name: str) -> None:
         """Of this node."""
         of, rest = self._parameters(name)
         of.delete(rest)
+
+    def leave(self) -> None:
+        """Nothing need be known before."""
 
     def close(self) -> None:
         """Leave the graph."""
@@ -116,6 +126,7 @@ class Ros2:
         self._rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=no_signals)
         self._executor = import_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
         self._over = threading.Event()
+        self._left: set[str] = set()
         self.say: Callable[[str], None] = lambda text: None
         self._own = self._create(
             f"{HIDDEN}_{os.getpid()}", "/", enable_rosout=False, start_parameter_services=False
@@ -148,11 +159,20 @@ class Ros2:
         """Make a node."""
         full = names.node_name(name, namespace)
         self._wait_for_discovery()
-        if full in self.node_names():
+        if self._is_taken(full):
             raise UsageError(
                 f"a node named {full} is there already; choose another name or namespace for this one"
             )
         return Ros2Wire(self, name, namespace)
+
+    def _is_taken(self, full: str) -> bool:
+        """A node of ours that has just left is seen for a moment longer."""
+        end = time.monotonic() + DISCOVERY_S
+        while full in self.node_names():
+            if full not in self._left or time.monotonic() > end:
+                return True
+            time.sleep(GLANCE_S)
+        return False
 
     def make(self, name: str, namespace: str) -> Any:
         """A node of rclpy that is spun."""
@@ -162,6 +182,7 @@ class Ros2:
 
     def remove(self, node: Any) -> None:
         """A node leaves."""
+        self._left.add(names.join(node.get_namespace(), node.get_name()))
         self._executor.remove_node(node)
         with suppress(Exception):  # rclpy destroys what may be in use by its wait; it is gone either way
             node.destroy_node()

@@ -17,13 +17,10 @@ PATIENCE_S = 5.0
 
 
 def owner(name: str, own: str, others: list[str]) -> tuple[str, str]:
-    """Whose parameter it is, and its name there (empty for all of them); ``UsageError`` if nobody's."""
+    """Whose parameter it is, and its name there (empty for all of them); ``KeyError`` if nobody's."""
     candidates = [one for one in (own, *others) if name == one or name.startswith(f"{one}/")]
     if not candidates:
-        raise UsageError(
-            f"parameter {name}: in ROS 2 parameters belong to nodes, and no node's name begins it; "
-            f"name one of your own with '~'"
-        )
+        raise KeyError(name)
     node = max(candidates, key=len)
     return node, name[len(node) + 1 :].replace("/", ".")
 
