@@ -6,40 +6,27 @@ Units and signs are the messages' own.
 from __future__ import annotations
 
 from math import atan2, degrees, hypot, nan, pi
-from typing import Any
 
 from volery.autopilots.simulated.manoeuvres.points import bearing
 from volery.autopilots.simulated.mavlink.numbers import short, word
+from volery.autopilots.simulated.mavlink.telemetry import (
+    EPOCH_US,
+    Fields,
+    boot_ms,
+    boot_us,
+    heading_cdeg,
+)
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
-from volery.base.time import MS, US, S
-
-Fields = dict[str, Any]
+from volery.base.time import US, S
 
 NO_FIX_AFTER = int(9.64 * S)
 """From this uptime on the receiver is known."""
 FIX_AFTER = int(9.85 * S)
 """From this uptime on it has a fix."""
-EPOCH_US = 1_767_225_600_000_000
-"""Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
 GRAVITY_MILLI = 1000.0 / 9.80665
 ZERO_CELSIUS_RISE = 2850
 """What the recorded boards' thermometers show in flight [cdegC]."""
-
-
-def boot_ms(vehicle: Vehicle) -> int:
-    """``time_boot_ms``."""
-    return vehicle.uptime() // MS
-
-
-def boot_us(vehicle: Vehicle) -> int:
-    """``time_usec`` counted from boot."""
-    return vehicle.uptime() // US
-
-
-def heading_cdeg(yaw: float) -> int:
-    """0..35999."""
-    return round(degrees(yaw) * 100.0) % 36_000
 
 
 def _has_fix(vehicle: Vehicle) -> bool:
@@ -49,39 +36,6 @@ def _has_fix(vehicle: Vehicle) -> bool:
 def _cm(metres: float) -> int:
     """Millimetres, as a firmware that reckons in centimetres gives them."""
     return round(metres * 100.0) * 10
-
-
-def attitude(vehicle: Vehicle) -> Fields:
-    """ATTITUDE."""
-    estimate = vehicle.estimate
-    roll, pitch, yaw = estimate.attitude
-    p, q, r = estimate.rates
-    return {
-        "time_boot_ms": boot_ms(vehicle),
-        "roll": roll,
-        "pitch": pitch,
-        "yaw": yaw,
-        "rollspeed": p,
-        "pitchspeed": q,
-        "yawspeed": r,
-    }
-
-
-def attitude_quaternion(vehicle: Vehicle) -> Fields:
-    """ATTITUDE_QUATERNION."""
-    estimate = vehicle.estimate
-    w, x, y, z = estimate.quaternion
-    p, q, r = estimate.rates
-    return {
-        "time_boot_ms": boot_ms(vehicle),
-        "q1": w,
-        "q2": x,
-        "q3": y,
-        "q4": z,
-        "rollspeed": p,
-        "pitchspeed": q,
-        "yawspeed": r,
-    }
 
 
 def global_position(vehicle: Vehicle) -> Fields:

@@ -20,7 +20,7 @@ from volery.autopilots.ardupilot.copter import board, own_parameters, refuse_int
 from volery.autopilots.ardupilot.failsafes import RoverFailsafes
 from volery.autopilots.ardupilot.honoured import ROVER as HONOURED
 from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, set_mode, switch
-from volery.autopilots.ardupilot.motion import Fields, nav_controller
+from volery.autopilots.ardupilot.motion import nav_controller
 from volery.autopilots.ardupilot.status import (
     ACTIVE,
     ATTITUDE_CONTROL,
@@ -40,6 +40,7 @@ from volery.autopilots.simulated.manoeuvres.rover import GuidedRover, Manual, Re
 from volery.autopilots.simulated.mavlink.command_service import FAILED
 from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.autopilots.simulated.mavlink.telemetry import Fields
 from volery.autopilots.simulated.mode import Mode
 from volery.autopilots.simulated.parameters import Parameter, load
 from volery.autopilots.simulated.vehicle import Vehicle

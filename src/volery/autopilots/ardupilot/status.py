@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from volery.autopilots.ardupilot.motion import FIX_AFTER, NO_FIX_AFTER, boot_ms, boot_us
+from volery.autopilots.ardupilot.motion import FIX_AFTER, NO_FIX_AFTER
 from volery.autopilots.simulated.mavlink.numbers import short, word
+from volery.autopilots.simulated.mavlink.telemetry import Fields, boot_ms, boot_us
 from volery.autopilots.simulated.plan import Plan
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import S
-
-Fields = dict[str, Any]
 
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from volery.autopilots.ardupilot import motion, status
+from volery.autopilots.simulated.mavlink import telemetry
 from volery.autopilots.simulated.mavlink.dialect import Builder
 from volery.autopilots.simulated.vehicle import Vehicle
 
@@ -21,8 +22,8 @@ def nothing(_vehicle: Vehicle) -> None:
 BUILDERS: Mapping[str, Builder] = {
     "AHRS": motion.ahrs,
     "AHRS2": motion.ahrs2,
-    "ATTITUDE": motion.attitude,
-    "ATTITUDE_QUATERNION": motion.attitude_quaternion,
+    "ATTITUDE": telemetry.attitude,
+    "ATTITUDE_QUATERNION": telemetry.attitude_quaternion,
     "BATTERY_STATUS": status.battery_status,
     "DISTANCE_SENSOR": motion.distance_sensor,
     "EKF_STATUS_REPORT": status.ekf_status,

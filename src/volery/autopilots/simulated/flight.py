@@ -50,7 +50,8 @@ class Setpoint:
     ``yaw`` clockwise from north [rad] or ``yaw_rate`` [rad/s], neither: hold the present heading (rover
     DRIVE: neither drives straight on); ``climb`` m/s up; ``throttle`` 0..1 (rover -1..1), ``steering`` -1..1,
     right positive. Limits: ``speed`` in the plane (rover DRIVE: the speed itself comes from ``velocity[0]``,
-    forward), ``speed_up``, ``speed_down`` [m/s], ``accel`` in the plane, ``accel_z`` [m/s^2], ``tilt`` [rad].
+    forward), ``speed_up``, ``speed_down`` [m/s], ``accel`` in the plane, ``accel_z`` [m/s^2], ``tilt`` [rad],
+    ``jerk`` [m/s^3] (its default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z).
     """
 
     control: Control
@@ -69,6 +70,7 @@ class Setpoint:
     accel: float = 2.5
     accel_z: float = 1.0
     tilt: float = 0.5235987755982988
+    jerk: float = 5.0
 
     def row(self) -> tuple[float, ...]:
         """The values in the order of the command columns, from ``C_CONTROL`` on."""
@@ -93,6 +95,7 @@ class Setpoint:
             self.accel,
             self.accel_z,
             self.tilt,
+            self.jerk,
         )
 
 

@@ -47,8 +47,9 @@ C_SPEED_DOWN = WORLD + 17  # limit [m/s]
 C_ACCEL = WORLD + 18  # limit in the plane [m/s^2]
 C_ACCEL_Z = WORLD + 19  # limit [m/s^2]
 C_TILT = WORLD + 20  # limit [rad]
-C_AIDED = WORLD + 21  # 1: the estimator uses satellites; its origin is where it was when this became 1
-_K = WORLD + 22
+C_JERK = WORLD + 21  # limit of the target in the plane and in height [m/s^3]
+C_AIDED = WORLD + 22  # 1: the estimator uses satellites; its origin is where it was when this became 1
+_K = WORLD + 23
 
 # --- memory: what the estimator believes (visible through ``Estimate``) -------------------------------------
 K_POSITION = _K  # north, east, down about the world's origin [m]

@@ -17,6 +17,7 @@ from volery.autopilots.simulated.flight_columns import (
     C_ACCEL_Z,
     C_CLIMB,
     C_CONTROL,
+    C_JERK,
     C_PITCH,
     C_POSITION,
     C_ROLL,
@@ -69,7 +70,6 @@ _VELOCITY_GAIN = 2.0  # PSC_VELXY_P
 _VELOCITY_INTEGRAL = 1.0  # PSC_VELXY_I
 _CLIMB_GAIN = 5.0  # PSC_VELZ_P
 _CLIMB_INTEGRAL = 1.5
-_JERK = 5.0  # PSC_JERK_XY, PSC_JERK_Z [m/s^3]
 _SHAPING_GAIN = 2.5  # [1/s] of target speed
 _BRAKE_SHARE = 0.5  # of the acceleration limit: how a height is approached
 _PLANE_SHARE = 0.39  # the same for a point in the plane
@@ -145,7 +145,7 @@ def _stay(row: Array) -> None:
 @njit(cache=False)
 def _move_target(row: Array, axis: int, speed: float, accel: float) -> None:
     """Integrate one axis of the target towards a speed; *accel* is what the limits allow now."""
-    target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, _JERK * GUIDE_S)
+    target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, row[C_JERK] * GUIDE_S)
     row[K_TARGET_ACCEL + axis] = target_accel
     before = row[K_TARGET_VELOCITY + axis]
     row[K_TARGET_VELOCITY + axis] = before + target_accel * GUIDE_S
@@ -167,7 +167,7 @@ def _shape_plane(row: Array, control: int) -> None:
     dn = north - row[K_TARGET_VELOCITY]
     de = east - row[K_TARGET_VELOCITY + 1]
     gap = sqrt(dn * dn + de * de)
-    push = min(approach(gap, _SHAPING_GAIN, _JERK), limit)
+    push = min(approach(gap, _SHAPING_GAIN, row[C_JERK]), limit)
     scale = push / gap if gap > 1e-9 else 0.0
     _move_target(row, 0, north, dn * scale)
     _move_target(row, 1, east, de * scale)
@@ -189,7 +189,7 @@ def _shape_height(row: Array, control: int) -> None:
     else:
         down = -row[C_CLIMB]
     down = clip(down, -row[C_SPEED_UP], row[C_SPEED_DOWN])
-    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, _JERK)
+    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, row[C_JERK])
     _move_target(row, 2, down, clip(push, -limit, limit))
     ahead = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_HEIGHT_LEASH, _HEIGHT_LEASH)
     row[K_TARGET + 2] = row[K_POSITION + 2] + ahead

@@ -1,0 +1,137 @@
+"""PX4 1.14.0 on a multirotor: its modes and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.autopilots.px4 import boot, commands, missions, modes, radio, tuning
+from volery.autopilots.px4.commander import READY_AFTER, of
+from volery.autopilots.px4.events import LEAST_TAKEOFF, real
+from volery.autopilots.px4.flying import Descent, Hold, Offboard, Orbit, Position, Return, TakeOff
+from volery.autopilots.px4.honoured import COPTER as HONOURED
+from volery.autopilots.px4.mavlink import mavlink
+from volery.autopilots.px4.returning import tell_stage
+from volery.autopilots.px4.watching import on_step
+from volery.autopilots.simulated.dialect import Dialect
+from volery.autopilots.simulated.manoeuvres.mission import FlyMission
+from volery.autopilots.simulated.manoeuvres.pilot import AltitudeHold, Stabilize
+from volery.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.autopilots.simulated.mode import Manoeuvre, Mode
+from volery.autopilots.simulated.parameters import Parameter, load
+from volery.autopilots.simulated.vehicle import Vehicle
+from volery.base.time import MS, S
+
+QUADROTOR = 2
+"""MAV_TYPE."""
+
+INFO = 6
+
+
+def _take_off(vehicle: Vehicle) -> Manoeuvre:
+    """To the altitude of the command; at least MIS_TAKEOFF_ALT above where it stands."""
+    commander = of(vehicle)
+    here = vehicle.estimate.geodetic[2]
+    least = vehicle.parameters["MIS_TAKEOFF_ALT"]
+    amsl = commander.takeoff_amsl
+    if amsl is None or amsl < here + least:
+        amsl = here + least
+        if vehicle.armed:
+            vehicle.say(INFO, f"Using minimum takeoff altitude: {least:.2f} m\t")
+            commander.log.tell(LEAST_TAKEOFF, real(least))
+    return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
+
+
+def _orbit(vehicle: Vehicle) -> Manoeuvre:
+    asked = of(vehicle).orbit
+    centre, radius, speed = asked or (vehicle.estimate.position, 5.0, 1.0)
+    return Orbit(vehicle, centre, radius, speed)
+
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, AltitudeHold, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, Position, needs_position=True, pilot=True),
+        Mode(modes.ORBIT, "ORBIT", modes.BY_COMPUTER, _orbit, needs_position=True, armable=False),
+        Mode(modes.ACRO, "ACRO", modes.BY_RATES, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, Offboard, needs_position=True),
+        Mode(modes.STABILIZE, "STABILIZED", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.BY_ITSELF, _take_off, needs_position=True),
+        Mode(modes.LOITER, "AUTO.LOITER", modes.BY_ITSELF, Hold, needs_position=True),
+        Mode(
+            modes.MISSION,
+            "AUTO.MISSION",
+            modes.BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, missions.leg, lambda _vehicle: True),
+            needs_position=True,
+        ),
+        Mode(
+            modes.RTL,
+            "AUTO.RTL",
+            modes.BY_ITSELF,
+            lambda vehicle: Return(vehicle, tell_stage),
+            needs_position=True,
+            armable=False,
+        ),
+        Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Descent, armable=False),
+        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.BY_ITSELF, Hold, needs_position=True, armable=False),
+    )
+}
+
+
+def _on_step(vehicle: Vehicle) -> None:
+    on_step(vehicle)
+    manoeuvre = vehicle.manoeuvre
+    if vehicle.armed and not vehicle.landed and isinstance(manoeuvre, TakeOff) and manoeuvre.arrived():
+        _stay_here(vehicle)
+
+
+def _stay_here(vehicle: Vehicle) -> None:
+    """The take-off has ended: it stays at the height at which that was noticed."""
+    here = vehicle.estimate.position
+    of(vehicle).follow_up(modes.LOITER)
+    if isinstance(vehicle.manoeuvre, Hold):
+        vehicle.manoeuvre.point = here
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """The recorded list."""
+    return load("volery.autopilots.px4", "data/copter.parameters")
+
+
+COPTER = Dialect(
+    name="px4",
+    kind="multirotor",
+    face=partial(MavlinkFace, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
+    memory=boot.memory,
+    boot_mode=MODES[modes.LOITER],
+    boot_events=boot.EVENTS,
+    ready_after=boot.STREAMS,
+    origin_after=boot.HOME,
+    position_after=READY_AFTER,
+    local_position_after=boot.STREAMS,
+    on_warm=boot.stand,
+    on_warm_position=boot.on_position,
+    watch_every=1,
+    each_second=boot.nothing,
+    modes=MODES,
+    tuning=tuning.copter,
+    transmitter=(1500,) * 4 + (0,) * 12,
+    stands=True,
+    spool_time=1 * S,
+    takeoff_slew=0,
+    resigns_after=1500 * MS,
+    on_step=_on_step,
+    on_disarmed=boot.nothing,
+    throttle_centred=True,
+    first_item=0,
+    mission_item_done=missions.item_done,
+    mission_item_begins=missions.item_begins,
+    mission_ended=missions.ended,
+    mission_action=missions.act,
+    parameters=parameters,
+    own_parameters=boot.own_parameters,
+    honoured=HONOURED,
+)

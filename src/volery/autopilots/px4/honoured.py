@@ -1,0 +1,60 @@
+"""The parameters that change what a simulated PX4 does. All others are kept, listed and read back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_SHARED = {
+    "BAT_CRIT_THR": "critical level of the battery",
+    "BAT_EMERGEN_THR": "emergency level of the battery",
+    "BAT_LOW_THR": "low level of the battery",
+    "COM_DL_LOSS_T": "a ground station silent for longer is lost",
+    "COM_FAIL_ACT_T": "how long a failsafe holds before it acts",
+    "COM_LOW_BAT_ACT": "0 warns, 2 lands, 3 returns at the critical level; any but 0 lands in an emergency",
+    "COM_OBL_RC_ACT": "what follows when the stream of OFFBOARD ends",
+    "COM_OF_LOSS_T": "a stream silent for longer has ended",
+    "COM_RCL_EXCEPT": "bits 0, 1, 2: mission, hold, offboard go on without sticks",
+    "COM_RC_IN_MODE": "1, 2, 3: MANUAL_CONTROL counts",
+    "COM_RC_LOSS_T": "sticks silent for longer are lost",
+    "COM_RC_OVERRIDE": "bit 0: moving the sticks ends an automatic mode; bit 1: OFFBOARD, too",
+    "COM_RC_STICK_OV": "how far they must move",
+    "NAV_ACC_RAD": "radius within which a waypoint is reached",
+    "NAV_DLL_ACT": "what follows when the ground station is lost",
+    "NAV_RCL_ACT": "what follows when the sticks are lost",
+}
+
+COPTER: Mapping[str, str] = MappingProxyType(
+    {
+        **_SHARED,
+        "COM_DISARM_LAND": "disarms that long after landing; 0: never",
+        "COM_DISARM_PRFLT": "disarms that long after arming without a take-off; 0: never",
+        "MIS_TAKEOFF_ALT": "least height of a take-off",
+        "MPC_ACC_DOWN_MAX": "largest acceleration down",
+        "MPC_ACC_HOR": "acceleration in the plane",
+        "MPC_ACC_UP_MAX": "largest acceleration up",
+        "MPC_HOLD_DZ": "dead zone of the sticks",
+        "MPC_LAND_ALT1": "height below which it lands more slowly",
+        "MPC_LAND_ALT2": "height at which it lands at MPC_LAND_SPEED",
+        "MPC_LAND_ALT3": "height below which it lands at MPC_LAND_CRWL",
+        "MPC_LAND_CRWL": "landing speed close to the ground",
+        "MPC_LAND_SPEED": "landing speed",
+        "MPC_MAN_Y_MAX": "the pilot's turn rate",
+        "MPC_THR_HOVER": "thrust of a set-point that hovers",
+        "MPC_TILTMAX_AIR": "largest lean",
+        "MPC_TKO_RAMP_T": "how long a take-off takes to its full speed",
+        "MPC_TKO_SPEED": "climb of a take-off",
+        "MPC_VEL_MANUAL": "the pilot's largest speed",
+        "MPC_XY_CRUISE": "speed of the automatic modes",
+        "MPC_XY_VEL_MAX": "largest speed in the plane",
+        "MPC_Z_VEL_MAX_DN": "largest descent",
+        "MPC_Z_VEL_MAX_UP": "largest climb",
+        "MPC_Z_V_AUTO_DN": "landing speed while high",
+        "NAV_MC_ALT_RAD": "how close to its height a waypoint is reached",
+        "RTL_CONE_ANG": "lower return close to home; 0: always RTL_RETURN_ALT",
+        "RTL_DESCEND_ALT": "height over home at which the landing begins",
+        "RTL_MIN_DIST": "distance within which the cone counts",
+        "RTL_RETURN_ALT": "height of the return",
+    }
+)
+"""A multirotor's, and what each changes."""
