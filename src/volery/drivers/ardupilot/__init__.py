@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 from volery.drivers.ardupilot.driver import ArduPilot
 from volery.drivers.ardupilot.mavlink import MavlinkCommands
-from volery.drivers.ardupilot.mavros import OPTIONS as MAVROS_OPTIONS
-from volery.drivers.ardupilot.mavros import MavrosCommands, geoid_of
+from volery.drivers.ardupilot.mavros import MavrosCommands
+from volery.drivers.mavlink.mavros import namespace_and_geoid
 from volery.drivers.mavlink.options import OPTIONS, check_options
 from volery.graph import EmbeddedNode
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.vehicles.driver import DriverFactory
 
-__all__ = ["DRIVER", "MAVROS", "ArduPilot", "open_driver", "open_mavros"]
+__all__ = ["DRIVER", "ArduPilot", "open_driver", "open_mavros"]
 
 
 def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> ArduPilot:
@@ -32,13 +32,9 @@ def open_mavros(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[
 
     Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.
     """
-    check_options("mavros", options, *MAVROS_OPTIONS)
-    namespace = options.get("namespace", f"/{name}")
-    return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, namespace, geoid_of(options)))
+    where = namespace_and_geoid("ardupilot", name, options)
+    return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, *where))
 
 
 DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
 """ArduPilot on a MAVLink link; on a graph it goes by MAVROS's names."""
-
-MAVROS = DriverFactory(on_graph=open_mavros)
-"""Whatever flies behind a vehicle node with MAVROS's names."""

@@ -118,7 +118,8 @@ class Hearing(ABC):
         seen.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
         heading: int = fields["hdg"]
         if heading != _UNKNOWN_16:
-            seen.attitude = seen.attitude._replace(heading=heading / 100.0)
+            roll, pitch, _ = seen.attitude
+            seen.attitude = Attitude(roll, pitch, heading / 100.0)
 
     def _sys_status(self, fields: Fields) -> None:
         seen = self._seen

@@ -7,7 +7,9 @@ from typing import NamedTuple, Protocol
 
 from volery.base.position import Position
 from volery.base.time import Ns
+from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.mavlink.commands import Carrier
+from volery.links.mavlink import constant
 from volery.vehicles.driver import Sticks
 from volery.vehicles.telemetry import Velocity
 
@@ -18,6 +20,23 @@ class Setpoint(NamedTuple):
     velocity: Velocity
     yaw_rate: float = 0.0
     heading: float = nan
+
+
+CHANGES_MODE = float(constant("MAV_DO_REPOSITION_FLAGS_CHANGE_MODE"))
+"""In DO_REPOSITION: enter AUTO.LOITER for it. Without this PX4 refuses the command, and flies there."""
+NO_SPEED = -1.0
+"""In DO_REPOSITION: as fast as it would anyhow."""
+
+
+def stick_axes(sticks: Sticks, kind: str) -> dict[str, int]:
+    """As in MANUAL_CONTROL: 1000 either way, and throttle 0 to 1000 with its centre at 500."""
+    throttle = sticks.throttle if kind == DRONE_KIND else (sticks.throttle + 1.0) / 2.0
+    return {
+        "x": round(1000 * sticks.pitch),
+        "y": round(1000 * sticks.roll),
+        "z": round(1000 * throttle),
+        "r": round(1000 * sticks.yaw),
+    }
 
 
 class Commands(Carrier, Protocol):

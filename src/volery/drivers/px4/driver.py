@@ -42,7 +42,7 @@ from volery.drivers.px4 import modes
 from volery.drivers.px4.commands import Commands, Setpoint
 from volery.drivers.px4.items import items_of
 from volery.drivers.px4.modes import HOLD, OFFBOARD
-from volery.drivers.px4.offboard import STILL, Offboard
+from volery.drivers.px4.offboard import PERIOD, STILL, Offboard
 from volery.drivers.px4.silence import if_silent
 from volery.drivers.px4.stick_stream import StickStream
 from volery.kernel.api import Kernel
@@ -70,6 +70,7 @@ class PX4(Sequences):
         self._sticks = StickStream(kernel, commands)
         self._at_own_speed = True
         self._lifted_at: Position | None = None
+        self._stream = Repeat(PERIOD, self._offboard.repeat)
 
     @property
     def handover(self) -> str:
@@ -213,6 +214,7 @@ class PX4(Sequences):
             within=TURNED_WITHIN,
             mode=OFFBOARD,
             armed=True,
+            keep=self._stream,
         )
         return (*self._streamed(STILL._replace(heading=degrees), None), turn, *self._change(HOLD))
 
@@ -228,6 +230,7 @@ class PX4(Sequences):
             done=lambda _: self._offboard.entered(),
             skippable=False,
             leads_to=(HOLD,),
+            keep=self._stream,
         )
         return (*first, *self._let_go(), begin, enter)
 
@@ -288,9 +291,13 @@ class PX4(Sequences):
             send=self._sticks.centre,
             done=lambda _: self._sticks.settled(),
             within=5 * S,
-            keep=Repeat(100 * MS, self.telemetry.changed.notify),
+            keep=Repeat(PERIOD, self._centring),
         )
         return (centre,)
+
+    def _centring(self) -> None:
+        self._sticks.repeat()
+        self.telemetry.changed.notify()
 
     def stop(self) -> None:
         """No set-point and no stick is repeated any more."""
@@ -334,7 +341,9 @@ class PX4(Sequences):
 
     def _asks_for(self, mode: str) -> None:
         self._sticks.asks_for(mode)
-        if mode != OFFBOARD:
+        if mode == OFFBOARD:
+            self._offboard.asks()
+        else:
             self._offboard.leave()
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:

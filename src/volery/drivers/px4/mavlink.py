@@ -8,12 +8,11 @@ from math import isnan, nan, radians
 from volery.base.errors import UsageError
 from volery.base.position import Position
 from volery.base.time import Ns
-from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.conversation import Conversation, Firmware
 from volery.drivers.mavlink.items import GLOBAL, INT_FRAMES
 from volery.drivers.mavlink.vocabulary import VELOCITY_AND_YAW, VELOCITY_AND_YAW_RATE
-from volery.drivers.px4.commands import Setpoint
+from volery.drivers.px4.commands import CHANGES_MODE, NO_SPEED, Setpoint, stick_axes
 from volery.drivers.px4.hearing import Hearing
 from volery.drivers.px4.modes import MODES
 from volery.drivers.px4.silence import WANTED
@@ -30,8 +29,6 @@ PX4 = Firmware(
 )
 
 _LOCAL_NED = constant("MAV_FRAME_LOCAL_NED")
-_CHANGES_MODE = float(constant("MAV_DO_REPOSITION_FLAGS_CHANGE_MODE"))
-_OWN_SPEED = -1.0
 _NO_PITCH = -1.0
 
 
@@ -77,8 +74,8 @@ class MavlinkCommands(Conversation):
             "COMMAND_INT",
             frame=INT_FRAMES[GLOBAL],
             command=constant("MAV_CMD_DO_REPOSITION"),
-            param1=_OWN_SPEED,
-            param2=_CHANGES_MODE,
+            param1=NO_SPEED,
+            param2=CHANGES_MODE,
             param4=nan,
             x=round(goal.latitude * 1e7),
             y=round(goal.longitude * 1e7),
@@ -101,16 +98,9 @@ class MavlinkCommands(Conversation):
         )
 
     def sticks(self, sticks: Sticks) -> None:
-        """By MANUAL_CONTROL: 1000 either way, throttle 0 to 1000 with its centre at 500."""
-        throttle = sticks.throttle if self.telemetry.kind == DRONE_KIND else (sticks.throttle + 1.0) / 2.0
-        self._send(
-            "MANUAL_CONTROL",
-            target=self._system or 0,
-            x=round(1000 * sticks.pitch),
-            y=round(1000 * sticks.roll),
-            z=round(1000 * throttle),
-            r=round(1000 * sticks.yaw),
-        )
+        """By MANUAL_CONTROL."""
+        axes = stick_axes(sticks, self.telemetry.kind)
+        self._send("MANUAL_CONTROL", target=self._system or 0, **axes)
 
     def rewind(self) -> None:
         """By MISSION_SET_CURRENT."""

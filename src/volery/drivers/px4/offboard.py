@@ -27,16 +27,18 @@ STILL = Setpoint(Velocity(0.0, 0.0, 0.0))
 
 
 class Offboard:
-    """One stream. ``evicted``: somebody took the mode, into the one in which it would obey us."""
+    """One stream. Where the carrier has a cycle, ``repeat`` is the loop's and the caller's business."""
 
     def __init__(self, kernel: Kernel, commands: Commands) -> None:
-        self.evicted = False
+        self._evicted = False
+        self._streaming = False
         self._kernel = kernel
         self._commands = commands
         self._seen = commands.telemetry
         self._setpoint = STILL
         self._until: Ns | None = None
         self._began: Ns = 0
+        self._asked: Ns | None = None
         self._entered = False
         self._leaving = False
         self._asked_to_hold: Ns = 0
@@ -45,16 +47,34 @@ class Offboard:
         self._watch: Handle | None = None
 
     @property
+    def evicted(self) -> bool:
+        """Somebody took the mode, into the one in which it would obey us."""
+        if self._streaming and self._entered and self._seen.mode != OFFBOARD:
+            self._end()
+        return self._evicted
+
+    @property
     def holds(self) -> bool:
         """The mode is ours, and stays."""
-        return self._timer is not None and self._entered and not self._leaving and self._seen.mode == OFFBOARD
+        return self._streaming and self._entered and not self._leaving and self._seen.mode == OFFBOARD
 
     def entered(self) -> bool:
         """It is in OFFBOARD because it was asked: a heartbeat that is younger than its consent says so."""
-        answer = self._seen.answers.get(key.MODE)
-        agreed = answer is not None and answer.accepted and self._commands.beat > answer.at
-        self._entered = self._entered or (agreed and self._seen.mode == OFFBOARD)
+        if not self._entered and self._seen.mode == OFFBOARD:
+            agreed = self._agreed()
+            self._entered = agreed is not None and self._commands.beat > agreed
         return self._entered
+
+    def _agreed(self) -> Ns | None:
+        """MAVROS passes no answer on: there it is when the mode was asked for."""
+        if self._commands.cycle is not None:
+            return self._asked
+        answer = self._seen.answers.get(key.MODE)
+        return answer.at if answer is not None and answer.accepted else None
+
+    def asks(self) -> None:
+        """OFFBOARD is being commanded."""
+        self._asked = self._kernel.now()
 
     def begin(self, setpoint: Setpoint, lasting: Ns | None = None) -> None:
         """Stream it from now on; after *lasting* let it hold its place, in AUTO.LOITER."""
@@ -64,11 +84,18 @@ class Offboard:
         if not self.holds:
             self._entered = False
             self._began = now
+            self._asked = None
         self._leaving = False
+        self._streaming = True
         self._commands.setpoint(setpoint)
         if self._timer is None and self._commands.cycle is None:
             self._in_doubt = -1
             self._timer = self._kernel.every(PERIOD, self._tick)
+
+    def repeat(self) -> None:
+        """Once more, in the loop of a node."""
+        if self._commands.cycle is not None:
+            self._commands.setpoint(self._setpoint)
 
     def leave(self) -> None:
         """Another mode is being commanded: it goes on until that is seen, lest PX4 misses it meanwhile."""
@@ -78,7 +105,7 @@ class Offboard:
         """No set-point any more."""
         _cancel(self._timer)
         self._timer = None
-        self._entered = self._leaving = False
+        self._streaming = self._entered = self._leaving = False
 
     def close(self) -> None:
         """Nothing any more."""
@@ -115,12 +142,12 @@ class Offboard:
         taken = not self._leaving and not self._seen.failsafe and self._seen.mode == HOLD
         self.stop()
         if taken:
-            self.evicted = True
+            self._evicted = True
             self._watch = self._watch or self._kernel.every(PERIOD, self._wait_until_handed_back)
 
     def _wait_until_handed_back(self) -> None:
         if self._seen.mode != HOLD or not self._seen.armed:
-            self.evicted = False
+            self._evicted = False
             _cancel(self._watch)
         self._watch = None
 

@@ -59,6 +59,11 @@ class StickStream:
             self._centred_at = self._kernel.now()
             self.hold(self._centre)
 
+    def repeat(self) -> None:
+        """Once more, in the loop of a node."""
+        if self._commands.cycle is not None:
+            self._send()
+
     def settled(self) -> bool:
         """Centred for so long that they do not count as moving."""
         return self.held is None or self._kernel.now() - self._centred_at >= SETTLED

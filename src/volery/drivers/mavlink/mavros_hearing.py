@@ -9,6 +9,7 @@ from typing import Any
 from volery.base.frames import enu_to_ned
 from volery.base.geoid import Geoid
 from volery.base.position import AMSL, Position
+from volery.base.time import Ns
 from volery.drivers.mavlink.vocabulary import ACTIVE, FAILSAFE, ON_GROUND, UNDEFINED
 from volery.kernel.api import Kernel
 from volery.links.mavlink import entry_name
@@ -20,10 +21,19 @@ Handler = Callable[[Any], None]
 
 
 class MavrosHearing:
-    """Turns messages into telemetry. ``node_seen``: somebody publishes the state, be it of no autopilot."""
+    """Turns messages into telemetry. ``node_seen``: somebody publishes the state, be it of no autopilot.
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, geoid: Geoid) -> None:
+    *autopilot* is what flies behind the vehicle node, *resting* the mode in which its armed rovers stand;
+    ``beat`` is when the last state came.
+    """
+
+    def __init__(
+        self, kernel: Kernel, telemetry: Telemetry, geoid: Geoid, autopilot: str, resting: str
+    ) -> None:
         self.node_seen = False
+        self.beat: Ns = -1
+        self._autopilot = autopilot
+        self._resting = resting
         self._kernel = kernel
         self._seen = telemetry
         self._geoid = geoid
@@ -55,13 +65,14 @@ class MavrosHearing:
         if not message.connected:
             return
         seen = self._seen
-        seen.autopilot = "ArduPilot"
+        self.beat = self._kernel.now()
+        seen.autopilot = self._autopilot
         seen.mode = message.mode
         seen.armed = bool(message.armed)
         seen.status = entry_name("MAV_STATE", message.system_status).lower()
         seen.failsafe = message.system_status in FAILSAFE
         if seen.kind == "rover":
-            seen.flying = seen.armed and seen.mode != "HOLD"
+            seen.flying = seen.armed and seen.mode != self._resting
         elif self._landed_state == UNDEFINED:
             seen.flying = seen.armed and message.system_status == ACTIVE
         self._heard()
