@@ -3,36 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded import CodedLink
 from volery.run.airfield import Airfield
 from volery.run.simulated import Simulated, airfield_of
-from volery.vehicles.address import Address
+from volery.vehicles.address import Address, parse_listen
 from volery.vehicles.carriers import listen
-
-GROUND_STATION = "udp://127.0.0.1:14550"
-"""Where ground stations listen."""
 
 
 class Server:
     """One simulated vehicle, reachable at *address* in virtual time that passes *speed* times as fast as real
-    time.
+    time; ``None``: where those who fly its firmware usually listen.
 
     TCP serves any number of clients; UDP sends to a host, or answers the first who speaks. Raises
-    ``UsageError`` for an address that cannot be opened.
+    ``UsageError`` for an address that cannot be opened, and for a firmware that has no links.
     """
 
-    def __init__(self, wanted: Simulated, address: Address, *, speed: float = 1.0, seed: int = 1) -> None:
+    def __init__(
+        self, wanted: Simulated, address: Address | None, *, speed: float = 1.0, seed: int = 1
+    ) -> None:
         self.kernel = VirtualKernel(pace=speed)
         self.airfield: Airfield = airfield_of(self.kernel, [wanted], seed)
-        self._autopilot = self.airfield.autopilots[wanted.vehicle.name]
-        codec = self.airfield.codec(wanted.vehicle.name)
-        self.link: CodedLink = listen(self.kernel, address, joined=self._greet, codec=codec)
-        self._autopilot.connect(self.link)
+        name = wanted.vehicle.name
+        self._autopilot = self.airfield.autopilots[name]
+        codec = self.airfield.codec(name)
+        self.protocol = codec.name
+        usual = self.airfield.family(name).stations
+        stations = [(parse_listen(text), use) for text, use in usual] if address is None else [(address, "")]
+        self.addresses = [one for one, _ in stations]
+        self.links: list[CodedLink] = []
+        for place, (one, use) in enumerate(stations):
+            link = listen(self.kernel, one, joined=partial(self._greet, place), codec=codec)
+            self.links.append(link)
+            self._autopilot.connect(link, use=use)
 
-    def _greet(self) -> None:
-        self.link.send_bytes(self._autopilot.banner)
+    def _greet(self, place: int) -> None:
+        self.links[place].send_bytes(self._autopilot.banner)
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until the process is told to stop (``KeyboardInterrupt``). *ready* is called once it can be
@@ -42,5 +50,6 @@ class Server:
         try:
             self.kernel.run(FOREVER)
         finally:
-            self.link.close()
+            for link in self.links:
+                link.close()
             self.kernel.close("the server was stopped")

@@ -19,6 +19,10 @@ DEFAULT_BAUD = 57_600
 ANYWHERE = "0.0.0.0"
 """``udp://:PORT`` means just this: whoever speaks first."""
 
+SENDS_FROM = "from"
+"""Option of a UDP address with a host: the port that is sent from, and listened at."""
+LAST_PORT = 65_535
+
 
 def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, shared: bool = False) -> CodedLink:
     """The link to an autopilot at *address* (tcp, udp, serial), in the words of *codec*; *shared*: to all
@@ -49,15 +53,23 @@ def listen(
     joined: Callable[[], None] | None = None,
     codec: Codec = MAVLINK,
 ) -> CodedLink:
-    """Where an autopilot serves: tcp clients connect; udp sends to a host or answers the first speaker."""
+    """Where an autopilot serves: tcp clients connect; udp sends to a host or answers the first speaker.
+
+    A UDP address with a host may say with option ``from`` which port is sent from, and listened at.
+    """
     if address.carrier == "tcp":
+        address.only()
         return TcpServer(kernel, address.host, _port(address), address.text, joined=joined, codec=codec)
+    address.only(SENDS_FROM)
     return _udp(kernel, address, codec)
 
 
 def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
     if address.host:
-        return UdpLink(kernel, ANYWHERE, 0, (address.host, _port(address)), address.text, codec=codec)
+        ours = address.number(SENDS_FROM, 0)
+        if not 0 <= ours <= LAST_PORT or ours != int(ours):
+            raise UsageError(f"{address}: {SENDS_FROM}={ours:g} is no port; 1 to {LAST_PORT} are")
+        return UdpLink(kernel, ANYWHERE, int(ours), (address.host, _port(address)), address.text, codec=codec)
     return UdpLink(kernel, ANYWHERE, _port(address), None, address.text, codec=codec)
 
 

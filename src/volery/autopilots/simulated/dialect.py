@@ -134,6 +134,17 @@ class Dialect:
     """Parameters that change what the vehicle does, and what they change."""
 
 
+class Station(NamedTuple):
+    """An address where somebody usually listens to a firmware, and what the firmware has that link for."""
+
+    address: str
+    use: str = ""
+
+
+GROUND_STATION = Station("udp://127.0.0.1:14550")
+"""Where ground stations of MAVLink listen."""
+
+
 @dataclass(frozen=True)
 class Family:
     """A firmware: its dialects by kind of vehicle, and the codec of its links; without one it is reached over
@@ -143,6 +154,8 @@ class Family:
     name: str
     kinds: Mapping[str, Dialect]
     codec: Codec | None = MAVLINK
+    stations: tuple[Station, ...] = (GROUND_STATION,)
+    """Where one that is served speaks, unless it is told otherwise."""
 
 
 dialects: Registry[Family] = Registry("volery.autopilots", "simulated autopilot")
