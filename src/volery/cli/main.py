@@ -164,6 +164,7 @@ def vehicle(
     ] = None,
     kind: Annotated[str, typer.Option(help="multirotor or rover.")] = "multirotor",
     sensors: Annotated[str, typer.Option(help="consumer or rtk.")] = "consumer",
+    system: Annotated[int | None, typer.Option(help="Its system id, by default 1.")] = None,
     seed: Seed = 1,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -172,7 +173,7 @@ def vehicle(
     from volery.cli import vehicle as command
 
     output = Output(quiet, False, debug)
-    wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed)
+    wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed, system)
     run_command(output, lambda: command.vehicle(output, wanted))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import cos, pi, radians, sin
 
 from volery.autopilots.simulated.autopilot import Autopilot
@@ -33,7 +33,10 @@ SAMPLING_PERIOD: Ns = 200 * MS
 
 
 class Airfield:
-    """Simulated vehicles, by name, in the order of the model."""
+    """Simulated vehicles, by name, in the order of the model.
+
+    Their system ids count from 1, except for those that *systems* states.
+    """
 
     def __init__(
         self,
@@ -42,6 +45,8 @@ class Airfield:
         frame: LocalFrame,
         wind: WindModel,
         seed: int,
+        *,
+        systems: Mapping[str, int] | None = None,
     ) -> None:
         self._kernel = kernel
         self.frame = frame
@@ -53,14 +58,15 @@ class Airfield:
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, Autopilot] = {}
         self._families: dict[str, Family] = {}
-        for system, (vehicle, flight) in enumerate(zip(vehicles, flights, strict=True), start=1):
+        ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
+        for vehicle, flight in zip(vehicles, flights, strict=True):
             self.flights[vehicle.name] = flight
             family = self._families[vehicle.name] = dialects.load(vehicle.autopilot)
             self.autopilots[vehicle.name] = Autopilot(
                 kernel,
                 flight,
                 family,
-                system=system,
+                system=ids[vehicle.name],
                 parameters=vehicle.parameters,
                 warm=vehicle.started == "warm",
                 name=vehicle.name,
@@ -108,6 +114,15 @@ class Airfield:
         """Record the state of every vehicle now."""
         for autopilot in self.autopilots.values():
             self._kernel.record(autopilot.state())
+
+
+def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
+    """Distinct system ids. Raises ``UsageError`` if two are stated to be the same."""
+    taken = list(stated.values())
+    if len(set(taken)) < len(taken):
+        raise UsageError(f"system ids {sorted(taken)}: each vehicle needs one of its own")
+    free = (number for number in range(1, 256) if number not in taken)
+    return {name: stated[name] if name in stated else next(free) for name in names}
 
 
 def wind_of(model: WindModel) -> Wind:

@@ -19,7 +19,7 @@ from volery.vehicles.address import Address
 HOME = Position(46.0825, -103.8995, AMSL(900))
 """Where simulated vehicles stand unless an address or a mission says otherwise."""
 
-OPTIONS = ("heading", "home", "kind", "sensors", "start", "wind", "wire", *FAULT_OPTIONS)
+OPTIONS = ("heading", "home", "kind", "sensors", "start", "system", "wind", "wire", *FAULT_OPTIONS)
 """What may follow ``sim:AUTOPILOT?``."""
 
 CARRIERS = ("values", "bytes")
@@ -36,6 +36,7 @@ class Simulated:
     frame: LocalFrame
     wind: Wind
     faults: WireFaults | None = None
+    system: int | None = None
 
     @property
     def home(self) -> Position:
@@ -48,8 +49,8 @@ def simulated(address: Address, name: str, kind: str = "multirotor", home: Posit
     """Read a ``sim:`` address; *kind* and *home* hold unless it says otherwise.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
-    ``start=warm|cold``, ``wind=SPEED,FROM_DEG,GUSTS``, ``wire=values|bytes`` and, through bytes, the faults
-    of ``volery.links.wire``. Raises ``UsageError``.
+    ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``wire=values|bytes`` and, through
+    bytes, the faults of ``volery.links.wire``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
     stated = address.numbers("home", 3)
@@ -66,7 +67,17 @@ def simulated(address: Address, name: str, kind: str = "multirotor", home: Posit
         started=_one_of(address, "start", STARTS, "cold"),
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
-    return Simulated(vehicle, LocalFrame(latitude, longitude, amsl), wind, _faults(address))
+    frame = LocalFrame(latitude, longitude, amsl)
+    return Simulated(vehicle, frame, wind, _faults(address), _system(address))
+
+
+def _system(address: Address) -> int | None:
+    given = address.options.get("system")
+    if given is None:
+        return None
+    if not given.isdecimal() or not 1 <= int(given) <= 250:
+        raise UsageError(f"{address}: system={given!r} is no system id from 1 to 250")
+    return int(given)
 
 
 def _one_of(address: Address, option: str, valid: tuple[str, ...], default: str) -> str:
@@ -90,7 +101,8 @@ def airfield_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Airfi
     """A world with these vehicles in it: its origin and its wind are the first one's."""
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
-    return Airfield(kernel, vehicles, first.frame, first.wind, seed)
+    systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
+    return Airfield(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
 
 
 def _placed(vehicle: Vehicle, frame: LocalFrame) -> Vehicle:

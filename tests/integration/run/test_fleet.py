@@ -1,0 +1,225 @@
+"""Several vehicles at once in one process: simulated in one world, and out there on sockets."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from volery import AMSL, AboveHome, Drone, Fence, Fleet, Limits, Position, Rover, connect_fleet
+from volery.base.errors import (
+    CapabilityError,
+    FleetError,
+    OutOfBounds,
+    Overridden,
+    Refused,
+    UsageError,
+)
+from volery.base.time import S
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.run.simulated import airfield_of, simulated
+from volery.vehicles.address import parse
+
+HOME = Position(46.0825, -103.8995, AMSL(900))
+NORTH = Position(46.0828, -103.8995, AboveHome(12.0))
+WARM = "start=warm"
+
+
+@pytest.fixture
+def pair() -> Iterator[Fleet]:
+    with connect_fleet({"left": f"sim:ardupilot?{WARM}", "right": f"sim:ardupilot?{WARM}"}) as fleet:
+        yield fleet
+
+
+def test_group_operations(pair: Fleet) -> None:
+    assert list(pair) == ["left", "right"]
+    assert len(pair) == 2
+    assert "left" in pair
+    pair.wait_ready()
+    pair.takeoff(10)
+    heights = pair.each(lambda drone: drone.altitude.metres)
+    assert list(heights) == ["left", "right"]
+    assert all(height == pytest.approx(10.0, abs=0.5) for height in heights.values())
+    pair.hold()
+    pair.each(lambda drone: drone.goto(NORTH))
+    pair.return_home()
+    assert not any(drone.armed for drone in pair.values())
+
+
+def test_they_fly_at_once_not_one_after_the_other(pair: Fleet) -> None:
+    pair.takeoff(10)
+    kernel = pair["left"].kernel
+    start = kernel.now()
+    pair["left"].goto(NORTH)
+    alone = kernel.now() - start
+    start = kernel.now()
+    pair.each(lambda drone: drone.goto(Position(NORTH.latitude, -103.8990, AboveHome(12.0))))
+    assert kernel.now() - start < 2 * alone
+
+
+def test_what_some_cannot_do_the_others_do(pair: Fleet) -> None:
+    pair["right"].limits = Limits(highest=8.0)
+    with pytest.raises(FleetError) as caught:
+        pair.takeoff(10)
+    assert str(caught.value).startswith("take off to 10 m: 1 failed: right: take off to 10 m: 10 m above")
+    assert isinstance(caught.value.failed["right"], OutOfBounds)
+    assert pair["left"].altitude.metres == pytest.approx(10.0, abs=0.5)
+    with pytest.raises(FleetError) as caught:
+        pair.each(lambda vehicle: 1 // 0, "divide")
+    assert list(caught.value.failed) == ["left", "right"]
+    assert "left: ZeroDivisionError" in str(caught.value)
+
+
+def test_errors_can_be_picked_by_kind(pair: Fleet) -> None:
+    picked: list[str] = []
+    try:
+        pair.each(lambda drone: drone.goto(NORTH))
+    except* Refused as group:
+        picked = [str(error) for error in group.exceptions]
+    assert len(picked) == 2
+    assert "takeoff(height) first" in picked[0]
+
+
+def test_landing_ends_what_others_have_under_way(pair: Fleet) -> None:
+    pair.takeoff(10)
+    kernel = pair["left"].kernel
+    raised: list[Exception] = []
+
+    def go_far() -> None:
+        try:
+            pair["left"].goto(Position(46.0900, -103.8995, AboveHome(12.0)), speed=2.0)
+        except Overridden as error:
+            raised.append(error)
+
+    kernel.spawn(go_far, "far", kernel.current().place)  # type: ignore[union-attr]
+    sleep(kernel, 3 * S)
+    pair.land()
+    assert [type(error) for error in raised] == [Overridden]
+    assert not any(drone.armed for drone in pair.values())
+
+
+def test_drones_and_rovers_in_one_fleet() -> None:
+    urls = {"air": f"sim:ardupilot?{WARM}", "ground": f"sim:ardupilot?{WARM}"}
+    with connect_fleet(urls, {"ground": Rover}) as fleet:
+        fleet.takeoff(8)
+        assert isinstance(fleet["air"], Drone)
+        assert fleet["air"].flying
+        assert isinstance(fleet["ground"], Rover)
+        fleet.land()
+        assert not fleet["air"].armed
+
+
+def test_each_has_a_system_id_of_its_own() -> None:
+    stated = {"a": "sim:ardupilot", "b": "sim:ardupilot?system=1", "c": "sim:ardupilot"}
+    wanted = [simulated(parse(url), name) for name, url in stated.items()]
+    airfield = airfield_of(VirtualKernel(), wanted, 1)
+    assert [one.vehicle.system for one in airfield.autopilots.values()] == [2, 1, 3]
+
+
+@pytest.mark.parametrize(
+    ("urls", "error", "says"),
+    [
+        ({}, UsageError, "a fleet of no vehicles"),
+        ({"a": "sim:ardupilo"}, UsageError, r"ardupilo.*did you mean 'ardupilot'"),
+        (
+            {"a": "ardupilot+tcp://127.0.0.1:5760", "b": "sim:ardupilot"},
+            CapabilityError,
+            "simulated and real vehicles do not share a clock",
+        ),
+        (
+            {"a": "ardupilot+udp://:45123", "b": "px4+udp://:45123"},
+            UsageError,
+            r"a and b are behind the same udp address; .*\?system=1",
+        ),
+        (
+            {"a": "ardupilot+udp://:45123?system=2", "b": "px4+udp://:45123?system=2"},
+            UsageError,
+            "say which is which",
+        ),
+        (
+            {"a": "ardupilot+udp://:45123?system=1", "b": "paparazzi+udp://:45123?system=2"},
+            UsageError,
+            "one link carries one protocol, not MAVLink or pprzlink",
+        ),
+        ({"a": "sim:ardupilot?system=3", "b": "sim:ardupilot?system=3"}, UsageError, "one of its own"),
+        ({"a": "sim:ardupilot?system=0"}, UsageError, "no system id from 1 to 250"),
+    ],
+)
+def test_fleets_that_make_no_sense(urls: dict[str, str], error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says), connect_fleet(urls):
+        pass
+
+
+def test_a_vehicle_that_is_not_in_it(pair: Fleet) -> None:
+    with pytest.raises(UsageError, match=r"no vehicle 'lft' in the fleet .did you mean 'left'"):
+        pair["lft"]
+    with pytest.raises(UsageError, match="a fleet of no vehicles"):
+        Fleet({})
+
+
+def test_a_fence_for_all_that_excludes_home() -> None:
+    fence = Fence(((10.0, 10.0), (10.0, 11.0), (11.0, 11.0)))
+    with (
+        pytest.raises(UsageError, match="a: the fence excludes home"),
+        connect_fleet({"a": "sim:ardupilot"}, fence=fence),
+    ):
+        pass
+
+
+# -- on sockets
+
+
+def free_port(kind: int) -> int:
+    with socket.socket(socket.AF_INET, kind) as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+@contextmanager
+def served(*listening: tuple[str, int]) -> Iterator[None]:
+    """``volery vehicle`` at each address, with each system id, in a process of its own."""
+    start = [sys.executable, "-c", "from volery.cli.main import main; main()", "vehicle", "--speed", "4"]
+    processes: list[subprocess.Popen[Any]] = []
+    try:
+        for url, system in listening:
+            command = [*start, "--listen", url, "--system", str(system)]
+            processes.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT))
+        for one in processes:
+            assert one.stdout is not None
+            assert b"serving" in one.stdout.readline()
+        yield
+    finally:
+        for one in processes:
+            one.terminate()
+        for one in processes:
+            one.communicate(timeout=20)
+
+
+@pytest.mark.integration
+def test_four_on_sockets_two_of_them_behind_one_port() -> None:
+    one, other = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
+    port = free_port(socket.SOCK_DGRAM)
+    urls = {
+        "a": f"ardupilot+tcp://127.0.0.1:{one}",
+        "b": f"ardupilot+tcp://127.0.0.1:{other}",
+        "c": f"ardupilot+udp://:{port}?system=7",
+        "d": f"ardupilot+udp://:{port}?system=8",
+    }
+    there = f"udp://127.0.0.1:{port}"
+    with (
+        served((f"tcp://127.0.0.1:{one}", 1), (f"tcp://127.0.0.1:{other}", 1), (there, 7), (there, 8)),
+        connect_fleet(urls) as fleet,
+    ):
+        fleet.wait_ready()
+        fleet.takeoff(6)
+        assert all(drone.altitude.metres > 5.0 for drone in fleet.values())
+        fleet["c"].goto(Position(46.08258, -103.8995, AboveHome(6.0)))
+        assert fleet["d"].position.latitude == pytest.approx(46.0825, abs=3e-5)  # it was not meant
+        fleet.land()
+        assert not any(drone.armed for drone in fleet.values())
