@@ -10,7 +10,7 @@ STATUS = "ROTORCRAFT_STATUS"
 
 KILL, FAILSAFE, HOME = "KILL", "FAILSAFE", "HOME"
 NAV, GUIDED = "NAV", "GUIDED"
-BY_ATTITUDE, BY_HEIGHT = "ATTITUDE_DIRECT", "ATTITUDE_Z_HOLD"
+BY_ATTITUDE, BY_HEIGHT = "ATTITUDE_DIRECT", "ATTITUDE_RC_CLIMB"
 
 NUMBERS: Mapping[str, int] = {
     word: number for number, word in enumerate(message_type(STATUS).words("ap_mode"))
@@ -51,6 +51,7 @@ ASSUMED: Mapping[str, str] = {
     "block 'land here'": "takes the touch-down point from where it is, descends, and stops the motors",
     "FAILSAFE": "descends straight without a position, and becomes KILL on the ground",
     "height above home": "is the height above the origin: block 'Geo init' sets it where the aircraft stands",
-    "ATTITUDE_Z_HOLD": "keeps the height with the throttle in the middle",
+    "ATTITUDE_RC_CLIMB": "keeps the height with the throttle in the middle, climbs and sinks by it else; "
+    "ATTITUDE_Z_HOLD keeps the height at which it began whatever the throttle says",
 }
 """What is taken for granted, from public definitions and sources: no recording of a flight proves it."""
