@@ -199,7 +199,7 @@ def test_sticks_are_a_transmitter_in_the_third_position(bench: Make) -> None:
         "yaw": 127,
     }
     assert len(at.autopilot.sent("RC_4CH")) >= 30
-    assert 9.0 in at.autopilot.written("auto2")
+    assert 6.0 in at.autopilot.written("auto2")
     assert at.craft.mode == "GUIDED"
 
 
