@@ -234,8 +234,8 @@ def disarming_in_the_air(stage: Stage) -> str:
 @check(needs=UP, flies=True)
 def two_flows_of_control(stage: Stage) -> None:
     """Of two tasks that command one vehicle at a time, the second is told so, and the first goes on."""
-    stage.later(4.0, lambda: stage.drone.takeoff(10))
-    stage.drone.wait_ready()
+    stage.drone.wait_ready()  # first: until it is ready the other one could not even begin
+    stage.later(1.0, lambda: stage.drone.takeoff(10))
     stage.until(lambda: stage.drone.armed, 60.0, "the first task never got it armed")
     with raising(UsageError, naming=stage.name):
         stage.drone.wait_ready()
