@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from volery.drivers.mavlink.options import check_options
-from volery.drivers.paparazzi.driver import Blocks, Paparazzi
+from volery.drivers.paparazzi.driver import Paparazzi
+from volery.drivers.paparazzi.ground import Blocks
 from volery.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
 from volery.drivers.paparazzi.uplink import Uplink
 from volery.kernel.api import Kernel

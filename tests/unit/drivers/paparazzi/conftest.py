@@ -27,6 +27,7 @@ AIRCRAFT = 7
 NAMES = {number: name for name, number in NUMBERS.items()}
 FIRST_STEADY_BLOCK, START, TAKEOFF, STANDBY, LAND_HERE, FLARE, LANDED = 2, 3, 4, 5, 13, 15, 16
 OTHER_SETTING = 1.0
+FARTHEST_M = 150.0
 
 
 @dataclass
@@ -191,8 +192,11 @@ class FakePaparazzi:
         if fields["flags"] == 0:
             craft.north, craft.east, craft.up = fields["x"], fields["y"], -fields["z"]
             craft.psi, craft.velocity = fields["yaw"], (0.0, 0.0, 0.0)
+            craft.flying = craft.armed and craft.up > 0.0
         elif fields["flags"] == 0xE0:
             craft.velocity = fields["x"], fields["y"], -fields["z"]
+        elif fields["flags"] == 0x40:
+            craft.north, craft.east, craft.velocity = fields["x"], fields["y"], (0.0, 0.0, -fields["z"])
 
     def _rc_4ch(self, fields: dict[str, Any]) -> None:
         self.sticks_at = self.kernel.now()
@@ -227,6 +231,10 @@ class FakePaparazzi:
             craft.east + east / 10,
             craft.up + up / 10,
         )
+        if craft.mode == "GUIDED" and craft.up < 0.0:
+            craft.up, craft.velocity, craft.flying = 0.0, (0.0, 0.0, 0.0), False
+        if craft.mode == "NAV" and craft.flying and craft.north**2 + craft.east**2 > FARTHEST_M**2:
+            self.enter("HOME")
         if craft.mode == "NAV" and craft.armed:
             if craft.block == TAKEOFF:
                 craft.up, craft.flying = craft.up + 0.1, True

@@ -145,6 +145,28 @@ def test_the_landing_block_is_entered_before_nav(bench: Make) -> None:
     assert order.index("block 13") < len(order) - 1 - order[::-1].index("NAV")
 
 
+def test_far_from_home_it_lands_and_takes_off_without_the_plan(bench: Make) -> None:
+    """In NAV it would go home by itself."""
+    at = bench()
+    far = Position(LATITUDE + 250.0 / 111_106.0, LONGITUDE, AboveHome(12.0))
+    heights: list[float] = []
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.goto(far)
+        drone.land()
+        heights.append(at.craft.up)
+        drone.takeoff(7)
+        heights.append(at.craft.up)
+        drone.return_home()
+
+    at.fly(mission)
+    assert heights == pytest.approx([0.0, 7.0], abs=0.05)
+    assert (at.craft.north, at.craft.east, at.craft.up) == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
+    assert not at.craft.armed
+    assert {fields["flags"] for fields in at.autopilot.sent("GUIDED_SETPOINT_NED")} == {0, 0x40}
+
+
 def test_without_a_fix_it_comes_down_all_the_same(bench: Make) -> None:
     at = bench()
 
