@@ -21,7 +21,7 @@ from volery.links.mavlink import message_type
 
 HOME = (454671168, -737578362, 32_575)  # degE7, degE7, mm AMSL
 ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
-SET_MODE, ARM, CLIMB, SPEED, GO, INTERVAL, ASK = 176, 400, 22, 178, 192, 511, 512
+SET_MODE, ARM, CLIMB, SPEED, GO, INTERVAL, ASK, GET_HOME = 176, 400, 22, 178, 192, 511, 512, 410
 HEALTHY, UNHEALTHY = 840990783, 572555327
 LOST_AFTER = S  # COM_OF_LOSS_T
 NORTH_M, EAST_M = 1.1113e-2, 0.7812e-2  # metres in 1e-7 degrees here
@@ -159,6 +159,10 @@ class FakePx4:
     def _gps_raw_int(self) -> None:
         self.say("GPS_RAW_INT", fix_type=3, satellites_visible=10)
 
+    def _local_position_ned(self) -> None:
+        north, east, up = self.craft.velocity
+        self.say("LOCAL_POSITION_NED", x=self.craft.north, y=self.craft.east, vx=north, vy=east, vz=-up)
+
     def _mission_current(self) -> None:
         self.say("MISSION_CURRENT", seq=0, mission_state=0)
 
@@ -203,6 +207,9 @@ class FakePx4:
             self.setpoint, self.streamed_at = fields, self.kernel.now()
         elif frame.name == "MANUAL_CONTROL":
             self._take_sticks(fields)
+        elif frame.name == "SET_MODE":
+            number = fields["custom_mode"]
+            self._command(SET_MODE, {"param2": number >> 16 & 0xFF, "param3": number >> 24})
         elif frame.name == "PARAM_REQUEST_READ" and fields["param_id"] in self.parameters:
             self._tell_parameter(fields["param_id"])
         elif frame.name in {"MISSION_COUNT", "MISSION_ITEM_INT"}:
@@ -254,14 +261,19 @@ class FakePx4:
             CLIMB: self._climb,
             GO: self._go,
             SPEED: lambda _: ACCEPTED,
+            GET_HOME: self._tell_home,
         }
         obey = obeying.get(command)
         return UNSUPPORTED if obey is None else obey(fields)
 
     def _interval(self, fields: dict[str, Any]) -> int:
         known = ("GLOBAL_POSITION_INT", "SYS_STATUS", "ESTIMATOR_STATUS", "EXTENDED_SYS_STATE")
-        known = (*known, "HOME_POSITION", "GPS_RAW_INT", "MISSION_CURRENT")
+        known = (*known, "HOME_POSITION", "GPS_RAW_INT", "MISSION_CURRENT", "LOCAL_POSITION_NED")
         self.streams.update(name for name in known if message_type(name).id == int(fields["param1"]))
+        return ACCEPTED
+
+    def _tell_home(self, _: dict[str, Any]) -> int:
+        self._home_position()
         return ACCEPTED
 
     def _version(self, _: dict[str, Any]) -> int:
@@ -348,7 +360,7 @@ class FakePx4:
     def commands(self) -> list[int]:
         """The commands that it heard, requests for messages left out."""
         heard = [frame.fields["command"] for frame in self.heard if frame.name.startswith("COMMAND_")]
-        return [command for command in heard if command not in {INTERVAL, ASK}]
+        return [command for command in heard if command not in {INTERVAL, ASK, GET_HOME}]
 
 
 @pytest.fixture

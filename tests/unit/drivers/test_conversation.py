@@ -1,0 +1,114 @@
+"""What every MAVLink driver finds out: the firmware's version, what it does in silence, who else is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from volery.base.errors import CapabilityError, LinkGarbled, UsageError
+from volery.base.time import S
+from volery.drivers.ardupilot import open_driver
+from volery.drivers.ardupilot.silence import if_silent
+from volery.drivers.mavlink.inquiries import value_of
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.links.in_process import in_process
+from volery.vehicles import Rover
+
+Make = Callable[..., Any]
+ARM = 400
+
+
+def test_firmware_that_is_too_old_is_refused_before_anything_moves(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = 0x030602FF
+
+    def later(drone: Any) -> None:
+        sleep(at.kernel, 3 * S)
+        drone.takeoff(10)
+
+    for mission in (lambda drone: drone.takeoff(10), later):
+        with pytest.raises(CapabilityError, match=r"craft_1: ArduPilot 3\.6\.2 flies here.*4\.0 or newer"):
+            at.fly(mission)
+    assert ARM not in at.autopilot.commands()
+
+
+def test_one_that_does_not_tell_its_version_is_flown(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = 0
+    at.fly(lambda drone: drone.takeoff(10))
+    assert at.craft.armed
+
+
+def test_parameters_are_asked_for_until_they_come(bench: Make) -> None:
+    at = bench()
+    driver = at.vehicle._driver
+    at.kernel.run(3 * S)
+    assert driver.if_silent() == ""
+    at.autopilot.parameters = {"FS_GCS_ENABLE": 0.0, "GUID_TIMEOUT": 3.0, "SYSID_MYGCS": 255.0}
+    at.kernel.run(15 * S)
+    assert driver.if_silent() == (
+        "it does not miss its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there; "
+        "a velocity ends after 3 s"
+    )
+    asked = [fields["param_id"] for fields in at.autopilot.sent("PARAM_REQUEST_READ")]
+    assert 2 <= asked.count("GUID_TIMEOUT") <= 5
+    assert asked.count("FS_OPTIONS") == 5  # this one has none
+    at.kernel.run(60 * S)
+    assert len(at.autopilot.sent("PARAM_REQUEST_READ")) == len(asked)
+
+
+def test_parameters_that_another_station_reads_are_nothing_to_us(bench: Make) -> None:
+    at = bench(Rover)
+    at.kernel.run(2 * S)
+    for number in range(50):
+        at.autopilot.say("PARAM_VALUE", param_id=f"OTHER_{number}", param_value=1.0, param_type=9)
+    at.kernel.run(3 * S)
+    assert not at.vehicle._driver._commands._read
+
+
+def test_failsafes_in_words() -> None:
+    words = if_silent("drone", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "SYSID_MYGCS": 255, "FS_OPTIONS": 2})
+    assert words == "5 s after the last heartbeat it returns home (RTL); a mission goes on"
+    words = if_silent("rover", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "FS_ACTION": 2, "SYSID_MYGCS": 254})
+    assert words == (
+        "5 s after the last heartbeat it stops (HOLD) (it listens for system 254, not for this program)"
+    )
+    assert if_silent("submarine", {}) == ""
+
+
+def test_whole_numbers_of_px4_lie_in_the_bytes_of_a_float() -> None:
+    two = {"param_value": 2.802596928649634e-45, "param_type": 6}
+    assert value_of(two, bytewise=True) == 2.0
+    assert value_of({"param_value": 2.0, "param_type": 6}, bytewise=False) == 2.0
+    assert value_of({"param_value": 0.5, "param_type": 9}, bytewise=True) == 0.5
+
+
+def test_a_px4_is_named(bench: Make) -> None:
+    at = bench()
+    at.autopilot.mute = True
+    told = {"type": 2, "autopilot": 12, "base_mode": 81, "custom_mode": 0, "system_status": 3}
+
+    def beat() -> None:
+        at.autopilot.mute = False
+        at.autopilot.say("HEARTBEAT", **told)
+        at.autopilot.mute = True
+
+    at.kernel.every(S, beat)
+    with pytest.raises(LinkGarbled, match="a PX4 speaks here, not an ArduPilot"):
+        at.fly(lambda drone: drone.wait_heard(within=5))
+
+
+def test_options_are_checked() -> None:
+    kernel = VirtualKernel()
+    ours, _ = in_process(kernel)
+    for options, wrong in (
+        ({"rat": "5"}, "the ardupilot driver has no option 'rat'"),
+        ({"rate": "fast"}, "rate='fast' is no rate"),
+        ({"system": "0"}, "system='0' is no system id"),
+        ({"texts": "some"}, "there is recorded or unrecorded"),
+    ):
+        with pytest.raises(UsageError, match=wrong):
+            open_driver(kernel, ours, "craft_1", options)
