@@ -100,9 +100,11 @@ class MessageType:
     def unpack(self, payload: bytes) -> dict[str, Any]:
         """The fields of a payload, which may be shorter (zeros were cut off) or longer (a newer sender)."""
         size = self._struct.size
-        values = self._struct.unpack(payload[:size].ljust(size, b"\0"))
+        if len(payload) != size:
+            payload = payload[:size].ljust(size, b"\0")
+        values = self._struct.unpack(payload)
         if self._plain:
-            return dict(zip(self._names, values, strict=True))
+            return dict(zip(self._names, values))  # noqa: B905  # as long, by construction; strict costs
         fields: dict[str, Any] = {}
         place = 0
         for field in self._fields:

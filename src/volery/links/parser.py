@@ -6,6 +6,8 @@ arrive.
 
 from __future__ import annotations
 
+import struct
+
 from volery.links.codec import Codec, Heard
 from volery.links.evidence import Evidence
 from volery.links.link import Frame
@@ -24,6 +26,9 @@ from volery.links.mavlink import (
 )
 
 _STARTS = frozenset((STX, STX_V1))
+_AROUND = HEADER.size + CHECKSUM.size
+_WHAT_COUNTS = struct.Struct("<xBBxxBBHB")
+"""Of ``HEADER``: length, what one must understand, system, component, id low, high."""
 
 Octets = bytes | bytearray
 
@@ -86,31 +91,52 @@ class Parser:
 
     def __init__(self) -> None:
         self.heard = Heard()
-        self._buffer = bytearray()
+        self._rest = b""  # what may become a frame
         self._evidence = Evidence(self.heard)
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames completed by *data*, in order, MAVLink 1 frames among them. Never raises."""
         self.heard.octets += len(data)
-        self._buffer += data
-        buffer = self._buffer
+        octets = self._rest + data if self._rest else data
         frames: list[Frame] = []
-        place = 0
-        while place < len(buffer):
-            if buffer[place] not in _STARTS:
-                self._evidence.note(buffer[place])
-                place += 1
-                continue
-            head = _head(buffer, place)
-            if head is None or place + head.length > len(buffer):
+        place, size = 0, len(octets)
+        while place < size:
+            taken = self._usual(octets, place, frames) or self._unusual(octets, place, frames)
+            if not taken:
                 break
-            place += self._take(head, frames)
-        del buffer[:place]
+            place += taken
+        self._rest = octets[place:]
         return frames
+
+    def _usual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
+        """A whole unsigned MAVLink 2 frame of a known kind, as nearly all are: its length; 0 if none is."""
+        if octets[start] != STX or len(octets) - start < _AROUND:
+            return 0
+        size, incompatible, system, component, low, high = _WHAT_COUNTS.unpack_from(octets, start)
+        kind = message_type_of(low | high << 16)
+        end = start + HEADER.size + size
+        if incompatible or kind is None or size > kind.size or end + CHECKSUM.size > len(octets):
+            return 0
+        body = octets[start + 1 : end]
+        if kind.checksum(body) != octets[end] | octets[end + 1] << 8:
+            return 0
+        self.heard.frames += 1
+        frames.append(Frame(kind.name, kind.unpack(body[HEADER.size - 1 :]), system, component))
+        return size + _AROUND
+
+    def _unusual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
+        """Anything else: how many bytes of it are dealt with; 0 while it may become a frame."""
+        if octets[start] not in _STARTS:
+            self._evidence.note(octets[start])
+            return 1
+        head = _head(octets, start)
+        if head is None or start + head.length > len(octets):
+            return 0
+        return self._take(octets, head, frames)
 
     def reset(self) -> None:
         """Forget a half-received frame: the connection behind it is gone."""
-        self._buffer.clear()
+        self._rest = b""
 
     def problem(self) -> str:
         """What is wrong with what arrives, in words; empty if MAVLink 2 does, or nothing at all."""
@@ -129,12 +155,12 @@ class Parser:
             )
         return f"{heard.octets} bytes arrive but no MAVLink: another protocol, or the wrong baud rate"
 
-    def _take(self, head: _Head, frames: list[Frame]) -> int:
+    def _take(self, octets: bytes, head: _Head, frames: list[Frame]) -> int:
         """How many bytes are dealt with."""
-        if not head.length or not head.whole(self._buffer):
+        if not head.length or not head.whole(octets):
             if head.length and head.kind is not None:
                 self.heard.corrupt += 1
-            self._evidence.note(self._buffer[head.start])
+            self._evidence.note(octets[head.start])
             return 1
         if head.kind is None:
             self.heard.unknown += 1
@@ -143,7 +169,7 @@ class Parser:
             self.heard.frames_v1 += 1
         else:
             self.heard.frames += 1
-        payload = bytes(self._buffer[head.payload : head.start + head.length - head.trailer])
+        payload = octets[head.payload : head.start + head.length - head.trailer]
         frames.append(Frame(head.kind.name, head.kind.unpack(payload), head.system, head.component))
         return head.length
 
