@@ -112,6 +112,7 @@ class Parser:
         """A whole unsigned MAVLink 2 frame of a known kind, as nearly all are: its length; 0 if none is."""
         if octets[start] != STX or len(octets) - start < _AROUND:
             return 0
+        size: int
         size, incompatible, system, component, low, high = _WHAT_COUNTS.unpack_from(octets, start)
         kind = message_type_of(low | high << 16)
         end = start + HEADER.size + size

@@ -1,0 +1,259 @@
+"""Hostile bytes: frames spoiled in every way that noise, bugs or malice might, from a seeded stream.
+
+Most have a right checksum nevertheless: what only noise has spoiled never gets past a parser. ``besiege``
+hands them to a driver whose program goes on flying; nothing but errors of this project may come of it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from random import Random
+
+from volery.base.errors import VoleryError
+from volery.base.position import AboveHome, Position
+from volery.base.seeds import stream
+from volery.base.time import MS
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.links.coded import CodedLink
+from volery.links.mavlink import CHECKSUM, HEADER, message_type_of
+from volery.links.pprzlink import checksum as pprz_checksum
+from volery.vehicles import Drone
+from volery.vehicles.driver import drivers
+
+Seal = Callable[[bytearray], bytes]
+"""Makes the checksum of a frame right again, whatever else is wrong with it."""
+
+AWKWARD = (0x00, 0x01, 0x7F, 0x80, 0xFE, 0xFF, 0x99, 0xFD)
+AWKWARD_FLOATS = tuple(
+    struct.pack("<f", value) for value in (float("nan"), float("inf"), float("-inf"), 3.4e38, -0.0, 1e-42)
+)
+PAYLOAD = {"MAVLink": HEADER.size, "pprzlink": 6}
+"""Where in a frame the payload begins."""
+ENDS = {"MAVLink": CHECKSUM.size, "pprzlink": 2}
+SENDER = {"MAVLink": 5, "pprzlink": 2}
+"""Where the sender's system id stands."""
+
+
+def seal_mavlink(frame: bytearray) -> bytes:
+    """With the length byte and the checksum that its bytes call for."""
+    if len(frame) < HEADER.size + CHECKSUM.size:
+        return bytes(frame)
+    body = frame[: -CHECKSUM.size]
+    body[1] = (len(body) - HEADER.size) % 256
+    kind = message_type_of(body[7] | body[8] << 8 | body[9] << 16)
+    return bytes(body) + CHECKSUM.pack(kind.checksum(bytes(body[1:])) if kind is not None else 0)
+
+
+def seal_pprzlink(frame: bytearray) -> bytes:
+    """With the length byte and the checksum that its bytes call for."""
+    body = frame[:-2]
+    if len(body) < PAYLOAD["pprzlink"]:
+        return bytes(frame)
+    body[1] = (len(body) + 2) % 256
+    return bytes(body) + pprz_checksum(body[1:])
+
+
+SEALS: Mapping[str, Seal] = {"MAVLink": seal_mavlink, "pprzlink": seal_pprzlink}
+
+
+class Mutator:
+    """An endless stream of spoiled frames made of *frames* of one protocol (``MAVLink``, ``pprzlink``)."""
+
+    def __init__(self, protocol: str, frames: Sequence[bytes], random: Random) -> None:
+        self._frames = [bytearray(frame) for frame in frames]
+        self._seal = SEALS[protocol]
+        self._payload, self._end, self._sender = PAYLOAD[protocol], ENDS[protocol], SENDER[protocol]
+        self._random = random
+        ways: tuple[tuple[Callable[[bytearray], bytes], int], ...] = (
+            (bytes, 20),
+            (self._bits_turned, 2),
+            (self._cut_short, 1),
+            (self._bytes_put_in, 1),
+            (self._two_in_one, 1),
+            (self._noise, 1),
+            (self._length_wrong, 1),
+            (self._some_bytes_awkward, 5),
+            (self._all_bytes_awkward, 1),
+            (self._floats_awkward, 4),
+            (self._payload_random, 2),
+            (self._another_kind, 2),
+            (self._another_sender, 1),
+            (self._payload_shorter, 2),
+        )
+        self._ways = [way for way, weight in ways for _ in range(weight)]
+
+    def __iter__(self) -> Iterator[bytes]:
+        choice = self._random.choice
+        while True:
+            yield choice(self._ways)(choice(self._frames)[:])
+
+    # -- spoiled on the wire
+
+    def _bits_turned(self, frame: bytearray) -> bytes:
+        for _ in range(self._random.randint(1, 4)):
+            frame[self._random.randrange(len(frame))] ^= 1 << self._random.randrange(8)
+        return bytes(frame)
+
+    def _cut_short(self, frame: bytearray) -> bytes:
+        return bytes(frame[: self._random.randrange(len(frame))])
+
+    def _bytes_put_in(self, frame: bytearray) -> bytes:
+        place = self._random.randrange(len(frame))
+        return bytes(frame[:place] + self._random.randbytes(self._random.randint(1, 20)) + frame[place:])
+
+    def _two_in_one(self, frame: bytearray) -> bytes:
+        other = self._random.choice(self._frames)
+        return bytes(
+            frame[: self._random.randrange(len(frame))] + other[self._random.randrange(len(other)) :]
+        )
+
+    def _noise(self, frame: bytearray) -> bytes:
+        return self._random.randbytes(len(frame))
+
+    def _length_wrong(self, frame: bytearray) -> bytes:
+        frame[1] = self._random.randrange(256)
+        return bytes(frame)
+
+    # -- whole on the wire, and wrong
+
+    def _inside(self, frame: bytearray) -> range:
+        return range(self._payload, max(self._payload, len(frame) - self._end))
+
+    def _some_bytes_awkward(self, frame: bytearray) -> bytes:
+        places = self._inside(frame)
+        for _ in range(min(self._random.randint(1, 6), len(places))):
+            frame[self._random.choice(places)] = self._random.choice(AWKWARD)
+        return self._seal(frame)
+
+    def _all_bytes_awkward(self, frame: bytearray) -> bytes:
+        octet = self._random.choice(AWKWARD)
+        for place in self._inside(frame):
+            frame[place] = octet
+        return self._seal(frame)
+
+    def _floats_awkward(self, frame: bytearray) -> bytes:
+        places = self._inside(frame)[:-3:4]
+        for _ in range(min(self._random.randint(1, 4), len(places))):
+            place = self._random.choice(places)
+            frame[place : place + 4] = self._random.choice(AWKWARD_FLOATS)
+        return self._seal(frame)
+
+    def _payload_random(self, frame: bytearray) -> bytes:
+        places = self._inside(frame)
+        frame[places.start : places.stop] = self._random.randbytes(len(places))
+        return self._seal(frame)
+
+    def _another_kind(self, frame: bytearray) -> bytes:
+        """The payload of one message under the name of another."""
+        other = self._random.choice(self._frames)
+        return self._seal(other[: self._payload] + frame[self._payload :])
+
+    def _another_sender(self, frame: bytearray) -> bytes:
+        frame[self._sender] = self._random.randrange(256)
+        return self._seal(frame)
+
+    def _payload_shorter(self, frame: bytearray) -> bytes:
+        places = self._inside(frame)
+        keep = self._random.randint(0, len(places))
+        return self._seal(frame[: self._payload + keep] + frame[places.stop :])
+
+
+class Besieged(CodedLink):
+    """A link on which nobody listens, and everything arrives."""
+
+    def _transmit(self, data: bytes) -> None:
+        """Nobody is there."""
+
+
+@dataclass
+class Siege:
+    """What came of it. ``heard`` counts whole frames; ``ended`` how each operation ended, by name."""
+
+    fed: int = 0
+    heard: int = 0
+    ended: dict[str, int] = field(default_factory=dict)
+
+
+AT_ONCE = 20
+"""Frames between two looks at the clock: a hundred milliseconds of a busy link."""
+PASSES = 100 * MS
+
+
+def besiege(
+    driver: str,
+    frames: Sequence[bytes],
+    count: int,
+    *,
+    seed: int = 1,
+    after: Callable[[int], None] = lambda fed: None,
+) -> Siege:
+    """Hand *count* frames, made of *frames*, to *driver*, while a program flies by what they say.
+
+    *after* is told how many have been fed, now and then. Any exception that is none of this project's, in the
+    parser, in the driver or in the program's calls, leaves it.
+    """
+    kernel = VirtualKernel()
+    factory = drivers.load(driver)
+    assert factory.on_link is not None, "hostile bytes need a link"
+    link = Besieged(kernel, "siege", factory.codec)
+    opened = factory.on_link(kernel, link, "craft", {})
+    drone = Drone(kernel, "craft", opened)
+    random = stream(seed, f"hostile/{driver}")
+    result = Siege()
+    kernel.spawn(lambda: _fly_on(kernel, drone, result), "program", Place("program"))
+    portion: list[bytes] = []
+    for data in Mutator(factory.codec.name, frames, random):
+        portion.append(data)
+        result.fed += 1
+        if len(portion) < AT_ONCE and result.fed < count:
+            continue
+        _arrive(link, b"".join(portion), random)
+        portion.clear()
+        kernel.run(kernel.now() + PASSES)
+        after(result.fed)
+        if result.fed >= count:
+            break
+    result.heard = link.heard.frames
+    drone.close()
+    kernel.close()
+    return result
+
+
+def _arrive(link: Besieged, data: bytes, random: Random) -> None:
+    """In portions that know nothing of frames."""
+    place = 0
+    while place < len(data):
+        size = random.randint(1, 400)
+        link.arrived(data[place : place + size])
+        place += size
+
+
+def _fly_on(kernel: VirtualKernel, drone: Drone, result: Siege) -> None:
+    """One operation after the other, for ever; what is refused is tried again."""
+    tries: tuple[Callable[[], object], ...] = (
+        lambda: drone.wait_ready(within=2.0),
+        drone.arm,
+        lambda: drone.takeoff(10.0),
+        lambda: drone.goto(Position(drone.home.latitude, drone.home.longitude, AboveHome(20.0))),
+        lambda: drone.set_velocity(north=1.0),
+        lambda: drone.set_heading(90.0),
+        drone.hold,
+        lambda: drone.manual_control(0.0, 0.0, 0.5, 0.0),
+        drone.altitude_hold,
+        drone.return_home,
+        drone.land,
+        drone.disarm,
+    )
+    while True:
+        for attempt in tries:
+            outcome = "done"
+            try:
+                attempt()
+            except VoleryError as error:
+                outcome = type(error).__name__
+            result.ended[outcome] = result.ended.get(outcome, 0) + 1
+            sleep(kernel, 50 * MS)
