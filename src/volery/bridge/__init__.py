@@ -1,10 +1,11 @@
-"""The bridge: one vehicle on the graph, under MAVROS's names.
+"""The bridge: one vehicle on the graph, under MAVROS's names, or under pprzros's.
 
-Knows the graph, messages and links (MAVLink frames as values); translates between them as MAVROS does, and
+Knows the graph, messages and links (frames as values); translates between them as MAVROS and pprzros do, and
 no more: it waits for nothing to be done and repeats no command. It must not know worlds, simulated
 autopilots or drivers.
 """
 
+from volery.bridge.pprzros import PprzrosNode, serve_pprzros
 from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions, serve_vehicle
 
-__all__ = ["VehicleNode", "VehicleNodeOptions", "serve_vehicle"]
+__all__ = ["PprzrosNode", "VehicleNode", "VehicleNodeOptions", "serve_pprzros", "serve_vehicle"]

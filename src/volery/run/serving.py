@@ -3,6 +3,7 @@
 | the autopilot's links speak | its node | its names |
 |---|---|---|
 | MAVLink | ``bridge.VehicleNode`` | MAVROS's, under ``/<vehicle>`` |
+| pprzlink | ``bridge.PprzrosNode`` | pprzros's, under ``/<vehicle>`` |
 | nothing: it is on the graph itself | its own | its SDK's, where its driver looks for them |
 """
 
@@ -12,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from volery.base.errors import CapabilityError
-from volery.bridge import serve_vehicle
+from volery.bridge import serve_pprzros, serve_vehicle
 from volery.cost import Price
 from volery.graph import Graph
 from volery.graph.node import NodeId
@@ -26,7 +27,7 @@ from volery.vehicles.driver import Driver, Opener, drivers
 Serve = Callable[[Graph, Link, str, Place], object]
 """``serve(graph, link, vehicle, place)``."""
 
-NODES: Mapping[str, Serve] = {"MAVLink": serve_vehicle}
+NODES: Mapping[str, Serve] = {"MAVLink": serve_vehicle, "pprzlink": serve_pprzros}
 """By the codec's name."""
 
 
