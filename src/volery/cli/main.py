@@ -19,6 +19,8 @@ app = typer.Typer(
 )
 model_app = typer.Typer(help="Look at a model without running it.", no_args_is_help=True)
 app.add_typer(model_app, name="model")
+bag_app = typer.Typer(help="Recordings of ROS topics: rosbag 1, rosbag 2 and MCAP.", no_args_is_help=True)
+app.add_typer(bag_app, name="bag")
 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but what is wrong.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
@@ -43,6 +45,11 @@ Listen = Annotated[
 ]
 Scenario = Annotated[str | None, typer.Option(help="A scenario of the model.")]
 Allocation = Annotated[str | None, typer.Option(help="An allocation of the model; by default its first.")]
+OnGraph = Annotated[str, typer.Option("--graph", metavar="ros1|ros2", help="The graph.")]
+Topics = Annotated[
+    list[str] | None, typer.Option("--topic", metavar="NAME", help="Only this topic; may be repeated.")
+]
+Recording = Annotated[Path, typer.Argument(help="A .bag or .mcap file, or the folder of a rosbag 2.")]
 Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a model.yaml.")]
 
 
@@ -215,6 +222,87 @@ def conformance(
         run_command(output, lambda: command.show_checks(output, names, kind))
     wanted = command.Wanted(url, names, kind, allow_flight, second, seed, out)
     run_command(output, lambda: command.check(output, wanted))
+
+
+@app.command()
+def graph(
+    source: Annotated[
+        str, typer.Argument(metavar="ros1|ros2|FOLDER", help="A real graph, or the folder of a run.")
+    ],
+    within: Annotated[float, typer.Option(help="Count the rates of a real graph for so many seconds.")] = 2.0,
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it.")] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Show the nodes, topics, rates and connections of a ROS graph."""
+    from volery.cli import graph as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.graph(output, command.Wanted(source, within, svg)))
+
+
+@bag_app.command("info")
+def bag_info(recording: Recording, as_json: Json = False, debug: Debug = False) -> None:
+    """List what was recorded."""
+    from volery.cli import bag as command
+
+    output = Output(False, as_json, debug)
+    run_command(output, lambda: command.info(output, recording))
+
+
+@bag_app.command("play")
+def bag_play(
+    recording: Recording,
+    on: OnGraph = "ros1",
+    rate: Annotated[float, typer.Option(help="Recorded seconds per second.")] = 1.0,
+    topics: Topics = None,
+    after: Annotated[float, typer.Option(help="Begin so many recorded seconds from the start.")] = 0.0,
+    clock: Annotated[bool, typer.Option("--clock", help="Publish the recorded time on /clock.")] = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Play a recording into a real graph."""
+    from volery.cli import bag as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(on, tuple(topics or ()), rate, after, clock)
+    run_command(output, lambda: command.play_bag(output, recording, wanted))
+
+
+@bag_app.command("record")
+def bag_record(
+    out: Annotated[Path, typer.Argument(help="NAME.bag for a rosbag 1; else the folder of a rosbag 2.")],
+    on: OnGraph = "ros1",
+    topics: Topics = None,
+    seconds: Annotated[float | None, typer.Option(help="How long; else until Ctrl-C.")] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Record a real graph: every topic as it appears, or those that are named."""
+    from volery.cli import bag as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(on, tuple(topics or ()))
+    run_command(output, lambda: command.record(output, out, wanted, seconds))
+
+
+@bag_app.command("convert")
+def bag_convert(
+    recording: Recording,
+    out: Annotated[Path, typer.Argument(help="NAME.bag for a rosbag 1; else the folder of a rosbag 2.")],
+    topics: Topics = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Write a recording, or the trace of a run, in another format."""
+    from volery.cli import bag as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.convert(output, recording, out, tuple(topics or ())))
 
 
 @model_app.command("check")

@@ -14,7 +14,6 @@ from volery.messages.bags import Bag
 
 _DEPTH = 100
 _CLOCK_PERIOD: Ns = 10 * MS
-_OURS = "/volery/"
 _LATCHED = frozenset({"/tf_static", "/robot_description", "/map"})
 """Topics that late subscribers get, too, by ROS's own conventions."""
 
@@ -28,8 +27,9 @@ class Playing:
     """How a recording is played.
 
     ``rate``: recorded seconds per second. ``topics``: only these; ``None``: all that can be read, but for
-    what a run says of itself (``/volery/...``). ``after``: begin so many recorded seconds from the start. ``clock``: publish the recorded time on ``/clock``.
-    ``told`` is told, for each message, how many have been played and its recorded time.
+    what a run says of itself (``/volery/...``). ``after``: begin so many recorded seconds from the start.
+    ``clock``: publish the recorded time on ``/clock``. ``told`` is told, for each message, how many have been
+    played and its recorded time.
     """
 
     rate: float = 1.0
@@ -76,8 +76,7 @@ def _advertise(node: Node, bag: Bag, how: Playing) -> dict[str, Publisher]:
             raise UsageError(f"{bag.path} has no topic {name!r}{hint}; it has {choices(there)}")
         if name in bag.unreadable:
             raise UsageError(f"{bag.path}: {name} cannot be played: {bag.unreadable[name]}")
-    usual = {name for name in there if not name.startswith(_OURS)} - bag.unreadable.keys()
-    wanted = set(how.topics) if how.topics is not None else usual
+    wanted = set(bag.usual if how.topics is None else how.topics)
     if how.clock:
         wanted -= {CLOCK}
     return {
@@ -95,4 +94,3 @@ def _wait(node: Node, started: Ns, elapsed: Ns, rate: float) -> None:
 def _clock(at: Ns) -> object:
     seconds, rest = divmod(at, S)
     return new("rosgraph_msgs/msg/Clock", clock=new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest))
-

@@ -27,6 +27,9 @@ from volery.messages.message import Message
 from volery.messages.ros1 import from_ros1, our_name
 from volery.messages.store import store
 
+OF_THE_RUN = "/volery/"
+"""How the topics begin on which a run's trace keeps what is no ROS message."""
+
 ROSBAG1, ROSBAG2, MCAP = "rosbag 1", "rosbag 2", "MCAP"
 _SUFFIXES = {".bag": ROSBAG1, ".mcap": MCAP, ".db3": ROSBAG2}
 
@@ -62,6 +65,14 @@ class Bag:
     end: Ns
     complete: bool
     unreadable: dict[str, str]
+
+    @property
+    def usual(self) -> list[str]:
+        """The topics that are meant where none is named: all that can be read, but for what a run says of
+        itself.
+        """
+        names = (topic.name for topic in self.topics if not topic.name.startswith(OF_THE_RUN))
+        return [name for name in names if name not in self.unreadable]
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """The messages of *topics* (of all that can be read), in the order of time."""

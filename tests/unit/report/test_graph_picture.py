@@ -1,0 +1,58 @@
+"""A graph's picture, of a graph that is there and of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from volery.base.errors import UsageError
+from volery.graph.node import ServiceState
+from volery.graph.portrait import Portrait, TopicLine
+from volery.report.graph_of_run import graph_of_run
+from volery.report.graph_picture import picture
+from volery.testing.sample_run import sample_events, sample_setup
+from volery.trace.mcap_writer import McapWriter
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def words(svg: str) -> list[str]:
+    return [text.text for text in etree.fromstring(svg.encode()).iter(f"{SVG}text")]
+
+
+def test_every_node_topic_and_rate_is_in_the_picture() -> None:
+    seen = Portrait(
+        ("/camera", "/lonely", "/viewer"),
+        (
+            TopicLine("/image", "sensor_msgs/msg/Image", ("/camera",), ("/viewer",), 29.97),
+            TopicLine("/odd<&>", "std_msgs/msg/Empty", ("/camera", "/viewer"), (), None),
+        ),
+        (ServiceState("/start", "std_srvs/srv/Empty", "/camera"),),
+    )
+    svg = picture(seen)
+    found = words(svg)
+    assert {"/camera", "/viewer", "/lonely", "/image", "/odd<&>", "30 Hz"} <= set(found)
+    assert found.count("/viewer") == 2  # it publishes and subscribes
+    assert svg.count('class="wire"') == 4
+
+
+def test_an_empty_graph() -> None:
+    assert words(picture(Portrait((), (), ()))) == ["publishes", "topic", "subscribes"]
+
+
+def test_the_graph_of_a_run(tmp_path: Path) -> None:
+    writer = McapWriter(tmp_path / "trace.mcap", sample_setup(), [], lambda name: "string data\n")
+    for event in sample_events(seconds=10.0):
+        writer(event)
+    writer.close()
+    seen = graph_of_run(tmp_path)
+    assert seen.topics
+    for line in seen.topics:
+        assert set(line.publishers) | set(line.subscribers) <= set(seen.nodes)
+
+
+def test_a_folder_without_a_run(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="cannot read"):
+        graph_of_run(tmp_path)
