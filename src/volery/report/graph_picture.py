@@ -102,7 +102,8 @@ def _boxes(
         yield f'<text x="{x + 12:.1f}" y="{y + 4:.1f}">{escape(name)}</text>'
         note = notes.get(name, "") if notes else ""
         if note:
-            yield f'<text class="rate" x="{x + width - 8:.1f}" y="{y + 4:.1f}" text-anchor="end">{note}</text>'
+            at = f'x="{x + width - 8:.1f}" y="{y + 4:.1f}" text-anchor="end"'
+            yield f'<text class="rate" {at}>{note}</text>'
 
 
 def _rate(topic: TopicLine) -> str:
