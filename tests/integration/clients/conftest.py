@@ -36,17 +36,19 @@ def a_free_port(kind: int = socket.SOCK_STREAM) -> int:
         return int(free.getsockname()[1])
 
 
-def served(carrier: str, speed: float, *options: str) -> Served:
+def served(
+    carrier: str, speed: float, *options: str, autopilot: str = "ardupilot", query: str = ""
+) -> Served:
     """Start ``volery vehicle`` and wait for the line that says it can be reached."""
     port = a_free_port(socket.SOCK_DGRAM if carrier == "udp" else socket.SOCK_STREAM)
-    where = ("--listen", f"{carrier}://{HERE}:{port}", "--speed", str(speed))
-    command = [*COMMAND, "vehicle", "ardupilot", *where, *options]
+    where = ("--listen", f"{carrier}://{HERE}:{port}{query}", "--speed", str(speed))
+    command = [*COMMAND, "vehicle", autopilot, *where, *options]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, text=True)
     assert process.stdout is not None
     ready, _, _ = select.select([process.stdout], [], [], WITHIN_S)
     line = process.stdout.readline() if ready else ""
-    if "serving ardupilot" not in line:
+    if f"serving {autopilot}" not in line:
         process.kill()
         process.wait()
         pytest.fail(f"the server said {line!r} instead of that it serves")
@@ -65,11 +67,14 @@ def ended(process: subprocess.Popen[str]) -> int:
 
 @pytest.fixture
 def serve() -> Iterator[Callable[..., Served]]:
-    """``serve(carrier, speed, *options)``: vehicles that end with the test, each as Ctrl-C ends it."""
+    """``serve(carrier, speed, *options)``: vehicles that end with the test, each as Ctrl-C ends it.
+
+    ``autopilot`` is which, ``query`` what follows the address that it is served at.
+    """
     running: list[Served] = []
 
-    def start(carrier: str = "tcp", speed: float = 20.0, *options: str) -> Served:
-        running.append(served(carrier, speed, *options))
+    def start(carrier: str = "tcp", speed: float = 20.0, *options: str, **about: str) -> Served:
+        running.append(served(carrier, speed, *options, **about))
         return running[-1]
 
     try:
