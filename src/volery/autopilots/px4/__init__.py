@@ -3,9 +3,14 @@ it is.
 """
 
 from volery.autopilots.px4.copter import COPTER
-from volery.autopilots.simulated.dialect import Family
+from volery.autopilots.px4.rover import ROVER
+from volery.autopilots.px4.tables import ONBOARD, STATION
+from volery.autopilots.simulated.dialect import Family, Station
 
-DIALECT = Family("px4", {"multirotor": COPTER})
+STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
+"""As the firmware's own simulator has them: for programs, and for ground stations."""
+
+DIALECT = Family("px4", {"multirotor": COPTER, "rover": ROVER}, stations=STATIONS)
 """The firmware, by kind of vehicle."""
 
 __all__ = ["DIALECT"]

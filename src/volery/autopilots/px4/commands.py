@@ -32,15 +32,16 @@ CHANGE_MODE = 1
 SPEED_OVER_GROUND = (0, 1)
 
 
-def _whole(value: float) -> int:
+def whole(value: float) -> int:
+    """The nearest integer; -1 for what is no number."""
     return round(value) if isfinite(value) else -1
 
 
 def on_set_mode(vehicle: Vehicle, command: Command) -> int:
     """DO_SET_MODE: main and sub-mode. On the ground everything is accepted; nonsense changes nothing."""
-    if not _whole(command.param1) & CUSTOM_MODE_ENABLED:
+    if not whole(command.param1) & CUSTOM_MODE_ENABLED:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
-    main, sub = _whole(command.param2), _whole(command.param3)
+    main, sub = whole(command.param2), whole(command.param3)
     if not 0 <= main <= 255 or not 0 <= sub <= 255:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
     return switch(vehicle, modes.custom_mode(main, sub))
@@ -59,7 +60,7 @@ def switch(vehicle: Vehicle, number: int) -> int:
 
 def on_arm(vehicle: Vehicle, command: Command) -> int:
     """COMPONENT_ARM_DISARM."""
-    force = _whole(command.param2) == FORCE
+    force = whole(command.param2) == FORCE
     if command.param1 == 1.0:
         return of(vehicle).arm(force)
     if command.param1 == 0.0:
@@ -118,7 +119,7 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
     if point is None or not vehicle.has_position:
         return DENIED
     heading = None if isnan(command.param4) else command.param4
-    flagged = _whole(command.param2) == CHANGE_MODE
+    flagged = whole(command.param2) == CHANGE_MODE
     if not flagged:
         holding = vehicle.manoeuvre
         if vehicle.mode.number == modes.LOITER and vehicle.armed and isinstance(holding, Hold):
@@ -142,7 +143,7 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
     """DO_CHANGE_SPEED: over the ground."""
-    if _whole(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
+    if whole(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
         vehicle.speed = command.param2
     return ACCEPTED
 

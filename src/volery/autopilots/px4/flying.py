@@ -1,14 +1,17 @@
 """How PX4's multirotor flies what it is told: set-points, take-off, landing, return, circle, sticks.
 
-OFFBOARD has no planned path: a point is chased at a speed proportional to what is left, up to MPC_XY_VEL_MAX,
-and the velocity loop lags: so a leg is quick, and ends two metres too far. The automatic modes plan theirs.
+OFFBOARD has no planned path: a point is chased at a speed proportional to what is left, up to MPC_XY_VEL_MAX.
+The recorded airframe has much drag, against which the velocity loop's integral builds up: so a speed is
+reached slowly, and a long leg ends two metres too far. A reference velocity that obeys the same gains and
+the same drag shows the same. The automatic modes plan their path.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import atan2, cos, dist, exp, hypot, isfinite, pi, sin
+from itertools import pairwise
+from math import atan2, cos, dist, hypot, isfinite, pi, sin
 
 from volery.autopilots.px4.offboard import AttitudeTarget, Target
 from volery.autopilots.simulated.flight import Control, Setpoint
@@ -22,17 +25,26 @@ from volery.base.time import Ns, to_seconds
 JERK = 60.0
 """Of set-points that are flown as they come [m/s^3]."""
 
+CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
+"""Share of MPC_TKO_SPEED over the time since the motors came up, in MPC_TKO_RAMP_T: as recorded."""
+
 JERK_AUTO = 4.0
 """MPC_JERK_AUTO [m/s^3]."""
 
-PUSH = 9.0
-"""Acceleration in the plane that OFFBOARD reached in the recordings [m/s^2]."""
+PUSH = 7.0
+"""Acceleration in the plane at which OFFBOARD starts, in the recordings [m/s^2]."""
 
-BRAKE = 5.5
-"""The same when it slows down: less than the last metres ask for, hence the overshoot [m/s^2]."""
+VELOCITY_GAIN, VELOCITY_INTEGRAL = 1.8, 0.4
+"""MPC_XY_VEL_P_ACC [1/s], MPC_XY_VEL_I_ACC [1/s^2]."""
 
-TOP_SPEED = 10.2
-"""At which a long leg was flown in the recordings, of MPC_XY_VEL_MAX = 12 [m/s]."""
+DRAG = 1.0
+"""Of the recorded airframe, by its mass (SIH_KDV / SIH_MASS) [1/s]."""
+
+LAG = 0.6
+"""By which the inner loops here follow a velocity later than the recorded airframe did [s]."""
+
+SUBSTEP = 0.02
+"""In which the reference velocity is reckoned [s]."""
 
 CRUISE_SHARE = 0.84
 """Of MPC_XY_CRUISE: legs asked for at 5 m/s were flown at 4.0 to 4.2."""
@@ -48,11 +60,13 @@ class Pursue(Manoeuvre):
         super().__init__(vehicle)
         self._aim: Target | None = None
         self._velocity: Vector = (0.0, 0.0, 0.0)
+        self._integral = (0.0, 0.0)
         self._last: Ns = 0
 
     def enter(self) -> None:
         """With the speed that it has; stop where it can."""
         self._velocity = self.vehicle.estimate.velocity
+        self._integral = (DRAG * self._velocity[0], DRAG * self._velocity[1])
         self._last = self.vehicle.kernel.now()
         self._aim = None
 
@@ -87,7 +101,7 @@ class Pursue(Manoeuvre):
                 speed=tuning.speed,
                 speed_up=tuning.speed_up,
                 speed_down=tuning.speed_down,
-                accel=PUSH,
+                accel=2.0 * PUSH,
                 accel_z=tuning.accel_z,
                 tilt=tuning.tilt,
                 jerk=JERK,
@@ -95,26 +109,34 @@ class Pursue(Manoeuvre):
         )
 
     def _chased(self, aim: Target, passed: float) -> Vector:
-        """The velocity to fly now."""
+        """The velocity to fly now: what the recorded airframe would have come to."""
         north, east = self._wanted(aim, 0), self._wanted(aim, 1)
-        speed = hypot(north, east)
-        most = self.vehicle.tuning.speed
+        speed, most = hypot(north, east), self.vehicle.tuning.speed
         if speed > most:
             north, east = north * most / speed, east * most / speed
-        before = self._velocity
-        slower = hypot(north, east) < hypot(before[0], before[1])
-        reach = (BRAKE if slower else PUSH) * passed
-        dn, de = north - before[0], east - before[1]
-        gap = hypot(dn, de)
-        share = min(1.0 - exp(-2.2 * passed), reach / gap) if gap > 1e-9 else 0.0
-        return before[0] + dn * share, before[1] + de * share, self._wanted(aim, 2)
+        for _ in range(max(1, round(passed / SUBSTEP))):
+            self._follow(north, east)
+        return self._velocity[0], self._velocity[1], self._wanted(aim, 2)
+
+    def _follow(self, north: float, east: float) -> None:
+        """One substep of velocity loop and drag."""
+        vn, ve, _ = self._velocity
+        gn, ge = self._integral
+        dn, de = north - vn, east - ve
+        an = VELOCITY_GAIN * dn + gn - DRAG * vn
+        ae = VELOCITY_GAIN * de + ge - DRAG * ve
+        push = hypot(an, ae)
+        share = PUSH / push if push > PUSH else 1.0
+        self._velocity = (vn + an * share * SUBSTEP, ve + ae * share * SUBSTEP, 0.0)
+        self._integral = (gn + VELOCITY_INTEGRAL * dn * SUBSTEP, ge + VELOCITY_INTEGRAL * de * SUBSTEP)
 
     def _wanted(self, aim: Target, axis: int) -> float:
         place, speed, push = aim.position[axis], aim.velocity[axis], aim.acceleration[axis]
         wanted = speed if isfinite(speed) else 0.0
         if isfinite(place):
             gain = 0.95 if axis < 2 else 1.0  # MPC_XY_P, MPC_Z_P
-            wanted += gain * (place - self.vehicle.estimate.position[axis])
+            ahead = LAG * self._velocity[axis] if axis < 2 else 0.0
+            wanted += gain * (place - self.vehicle.estimate.position[axis] - ahead)
         elif isfinite(push) and not isfinite(speed):
             wanted = self._velocity[axis] + push * 0.45
         return wanted
@@ -220,8 +242,12 @@ class TakeOff(Hold):
         if self._began is None:
             self._began = now
         parameters = self.vehicle.parameters
-        ramp = max(0.1, parameters["MPC_TKO_RAMP_T"])
-        share = min(1.0, max(0.1, to_seconds(now - self._began) / ramp))
+        along = to_seconds(now - self._began) / max(0.1, parameters["MPC_TKO_RAMP_T"])
+        share = next(
+            interpolated(along, low, high)
+            for low, high in pairwise(CLIMB_RAMP)
+            if along <= high[0] or high is CLIMB_RAMP[-1]
+        )
         return replace(super().towards(point), speed_up=share * parameters["MPC_TKO_SPEED"])
 
     def arrived(self, passing: bool = False) -> bool:

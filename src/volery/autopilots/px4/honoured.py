@@ -58,3 +58,6 @@ COPTER: Mapping[str, str] = MappingProxyType(
     }
 )
 """A multirotor's, and what each changes."""
+
+ROVER: Mapping[str, str] = MappingProxyType({**_SHARED, "GND_SPEED_TRIM": "speed"})
+"""A rover's, and what each changes."""

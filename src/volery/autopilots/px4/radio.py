@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from volery.autopilots.px4 import events, modes, offboard
 from volery.autopilots.px4.commander import Commander, of
-from volery.autopilots.px4.flying import Offboard
 from volery.autopilots.px4.joystick import deflection, move_channels
 from volery.autopilots.px4.watching import OFFBOARD_LOST
 from volery.autopilots.simulated.mavlink.texts import GROUND_STATION
@@ -17,6 +16,15 @@ Hear = Callable[[Vehicle, dict[str, Any], int], None]
 
 FROM_JOYSTICK = (1, 2, 3)
 """Values of COM_RC_IN_MODE with which MANUAL_CONTROL counts."""
+
+
+@runtime_checkable
+class Follower(Protocol):
+    """A manoeuvre of OFFBOARD."""
+
+    def take(self, target: offboard.Target | offboard.AttitudeTarget | None) -> None:
+        """A set-point came."""
+
 
 OVERRIDE_AUTOMATIC, OVERRIDE_OFFBOARD = 1, 2
 """Bits of COM_RC_OVERRIDE."""
@@ -52,7 +60,8 @@ def _override(commander: Commander) -> None:
     number = vehicle.mode.number
     by_itself = number in modes.AUTOMATIC and may & OVERRIDE_AUTOMATIC
     by_computer = number == modes.OFFBOARD and may & OVERRIDE_OFFBOARD
-    if vehicle.landed or not (by_itself or by_computer):
+    resting = vehicle.dialect.stands and vehicle.landed
+    if resting or not (by_itself or by_computer):
         return
     if commander.joystick.moved(vehicle.parameters["COM_RC_STICK_OV"] / 100.0):
         commander.pilot_takes_over()
@@ -65,9 +74,9 @@ def _take(vehicle: Vehicle, target: offboard.Target | offboard.AttitudeTarget | 
     commander.stream.take(target, vehicle.kernel.now())
     if commander.failsafe == OFFBOARD_LOST and vehicle.armed:
         commander.give_back()
-    if isinstance(vehicle.manoeuvre, Offboard):
+    if isinstance(vehicle.manoeuvre, Follower):
         vehicle.manoeuvre.take(target)
-        if vehicle.armed and not vehicle.landed:
+        if vehicle.armed and not (vehicle.dialect.stands and vehicle.landed):
             vehicle.act()
 
 
@@ -95,3 +104,6 @@ COPTER: Mapping[str, Hear] = {
     "SET_POSITION_TARGET_LOCAL_NED": on_local_target,
 }
 """What a multirotor hears."""
+
+ROVER: Mapping[str, Hear] = COPTER
+"""What a rover hears: it makes nothing of attitudes."""

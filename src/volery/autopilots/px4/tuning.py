@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import radians
 
-from volery.autopilots.px4.flying import TOP_SPEED
 from volery.autopilots.simulated.parameters import Parameters
 from volery.autopilots.simulated.sticks import Travel
 from volery.autopilots.simulated.tuning import StickMap, Tuning
@@ -13,9 +12,6 @@ SLOWEST, FASTEST = 0.1, 100.0
 """Bounds of a speed or an acceleration [m/s, m/s^2]: a parameter beyond them stops or flings nothing."""
 
 STICKS = StickMap(1, 2, 3, 4, (Travel(1000, 1500, 2000, 0),) * 4)
-
-RECORDED_TOP = 12.0
-"""MPC_XY_VEL_MAX of the recordings."""
 
 
 def _moving(value: float) -> float:
@@ -28,7 +24,7 @@ def copter(parameters: Parameters) -> Tuning:
     tilt = radians(min(80.0, max(5.0, p["MPC_TILTMAX_AIR"])))
     return Tuning(
         sticks=STICKS,
-        speed=_moving(p["MPC_XY_VEL_MAX"]) * TOP_SPEED / RECORDED_TOP,
+        speed=_moving(p["MPC_XY_VEL_MAX"]),
         speed_up=_moving(p["MPC_Z_VEL_MAX_UP"]),
         speed_down=_moving(p["MPC_Z_VEL_MAX_DN"]),
         accel=_moving(p["MPC_ACC_HOR"]),
