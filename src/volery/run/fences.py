@@ -10,7 +10,7 @@ from volery.vehicles import Fence, Zone
 
 
 def fence_of(environment: Environment) -> Fence | None:
-    """Out of every no-fly zone; ``None`` if there is none. Checked before a command, never in the air."""
+    """Out of every no-fly zone; ``None`` if there is none. Checked before a command and on the way."""
     if not environment.no_fly_zones:
         return None
     return Fence(no_fly=tuple(_zone(prism, environment) for prism in environment.no_fly_zones))
