@@ -1,4 +1,4 @@
-"""A real ROS master, real ROS 2, and what talks to them beside us. Without them tests skip, in CI they fail."""
+"""Real ROS 1 and ROS 2, and what talks to them beside us. Without them tests skip; in CI they fail."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from volery.graph.node import ServiceState, TopicState
 from volery.kernel.api import Kernel
 from volery.messages.ros1 import our_name
 from volery.transports.graph import TransportGraph
-from volery.transports.ros1.master import URI_VARIABLE, Master, uri_of_master
+from volery.transports.ros1.master import URI_VARIABLE, Master, TopicTypes, uri_of_master
 from volery.transports.ros1.roscore import Roscore, master_answers
 from volery.transports.ros1.wire import Ros1Wire, is_reachable
 
@@ -45,6 +45,7 @@ class Ros1:
 
     def __init__(self, master: Master, core: Roscore | None) -> None:
         self._master, self._core = master, core
+        self._types = TopicTypes(master)
         self._wires: list[Ros1Wire] = []
         self._guard = threading.Lock()
         self._over = threading.Event()
@@ -64,7 +65,7 @@ class Ros1:
 
     def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Wire:
         """Register a node."""
-        made = Ros1Wire(self._master, name, namespace, lost)
+        made = Ros1Wire(self._types, name, namespace, lost)
         with self._guard:
             self._wires.append(made)
         return made

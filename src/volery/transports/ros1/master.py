@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import os
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -16,6 +18,7 @@ DEFAULT_URI = "http://localhost:11311"
 URI_VARIABLE = "ROS_MASTER_URI"
 PATIENCE_S = 3.0
 FOUND = 1
+FRESH_S = 0.5
 
 
 class _Impatient(Transport):
@@ -74,6 +77,29 @@ class Master:
             ) from error
         except (Fault, RpcError, ValueError, TypeError) as error:
             raise LinkError(f"what answers at {self.uri} is no ROS master: {error}") from error
+
+
+class TopicTypes:
+    """What type each topic carries, asked for as a whole: so it is kept for a moment."""
+
+    def __init__(self, master: Master) -> None:
+        self.master = master
+        self._guard = threading.Lock()
+        self._known: dict[str, str] = {}
+        self._asked = -FRESH_S
+
+    def of(self, topic: str) -> str:
+        """Its type, empty for a topic that nobody has."""
+        with self._guard:
+            if time.monotonic() - self._asked > FRESH_S:
+                self._known = dict(self.master.value("getTopicTypes"))
+                self._asked = time.monotonic()
+            return self._known.get(topic, "")
+
+    def note(self, topic: str, kind: str) -> None:
+        """Somebody here carries *kind* on it from now on."""
+        with self._guard:
+            self._known.setdefault(topic, kind)
 
 
 def is_alive(node_uri: str) -> bool:

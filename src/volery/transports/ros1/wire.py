@@ -15,7 +15,7 @@ from volery.graph.node import TRANSIENT_LOCAL, QoS
 from volery.messages import Message, ServiceType, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.messages.ros1 import cdr_to_ros1
 from volery.transports.ros1.classes import message_carrier, service_carrier
-from volery.transports.ros1.master import Master, is_alive
+from volery.transports.ros1.master import Master, TopicTypes, is_alive
 from volery.transports.ros1.rospy_copy import rospy_copy
 from volery.transports.wire import Arrived, Asked, Done, Parcel
 
@@ -168,7 +168,8 @@ def _aside(work: Callable[[], object]) -> None:
 class Ros1Wire:
     """See ``volery.transports.wire.Wire``."""
 
-    def __init__(self, master: Master, name: str, namespace: str, lost: Callable[[str], None]) -> None:
+    def __init__(self, types: TopicTypes, name: str, namespace: str, lost: Callable[[str], None]) -> None:
+        self._types, master = types, types.master
         self.name = names.node_name(name, namespace)
         self.master = Master(master.uri, self.name)
         self._check_free()
@@ -191,14 +192,15 @@ class Ros1Wire:
             )
 
     def _check_type(self, topic: str, message_type: str) -> None:
-        wanted = ros1_type(message_type).name
-        for name, carried in self.master.value("getTopicTypes"):
-            if name == topic and carried not in (wanted, ANY):
-                publishers, subscribers, _ = self.master.value("getSystemState")
-                users = [user for at, who in (*publishers, *subscribers) if at == topic for user in who]
+        wanted, carried = ros1_type(message_type).name, self._types.of(topic)
+        if carried not in (wanted, ANY, ""):
+            publishers, subscribers, _ = self.master.value("getSystemState")
+            users = [user for at, who in (*publishers, *subscribers) if at == topic for user in who]
+            if users:
                 raise UsageError(
                     f"node {self.name}: topic {topic} carries {carried} (of {', '.join(users)}), not {wanted}"
                 )
+        self._types.note(topic, wanted)
 
     def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros1Outlet:
         """Publish to a topic."""

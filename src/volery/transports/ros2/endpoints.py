@@ -206,11 +206,11 @@ class Ros2Caller:
 
 def check_type(node: Any, topic: str, message_type: str, who: str) -> None:
     """``UsageError`` if the topic is known to carry another type: DDS would leave them unconnected."""
-    for name, kinds in node.get_topic_names_and_types():
-        if name == topic and message_type not in kinds:
-            ends = (*node.get_publishers_info_by_topic(name), *node.get_subscriptions_info_by_topic(name))
-            users = sorted({f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in ends})
-            raise UsageError(
-                f"node {who}: topic {topic} carries {' and '.join(kinds)} "
-                f"(of {', '.join(users)}), not {message_type}"
-            )
+    ends = (*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic))
+    others = [one for one in ends if one.topic_type != message_type]
+    if others:
+        users = sorted({f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in others})
+        raise UsageError(
+            f"node {who}: topic {topic} carries {others[0].topic_type} "
+            f"(of {', '.join(users)}), not {message_type}"
+        )
