@@ -22,6 +22,7 @@ from volery.testing.stage_simulated import SimulatedStage
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
+from volery.vehicles.driver import drivers
 
 LONGEST: Ns = 15 * MINUTE
 """A call that is not over by then hangs: no time-out of these short flights is longer."""
@@ -85,7 +86,9 @@ class _Trying:
         self._names = autopilot, fault, phase
         self._fault: Fault = FAULTS[fault]
         self._program = PHASES[phase]
-        self._stage = SimulatedStage(parse(f"sim:{autopilot}?wire=bytes"), Drone, seed)
+        wired = drivers.load(autopilot).on_link is not None
+        address = parse(f"sim:{autopilot}{'?wire=bytes' if wired else ''}")
+        self._stage = SimulatedStage(address, Drone, seed)
         self._name = self._stage.name_of_vehicle
         self._seen = Seen()
         self._after = Seen()  # from the fault on

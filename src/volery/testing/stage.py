@@ -21,8 +21,8 @@ from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
 from volery.links.link import Frame, Link
 from volery.links.mavlink import constant
+from volery.testing.access import Hand
 from volery.testing.checks import ImpossibleError, demand
-from volery.testing.tap import Tap
 from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.driver import Driver
 from volery.vehicles.perform import Performer
@@ -59,7 +59,7 @@ class Commander:
     def moves_home(self, place: Position) -> None:
         """Have it return to *place* (AMSL) from now on. ``ImpossibleError`` if nobody can ask for that."""
         if self._protocol != "MAVLink" or self._link is None:
-            raise ImpossibleError(f"home cannot be moved over {self._protocol or 'a graph'}")
+            raise ImpossibleError(f"home cannot be moved over {self._protocol}")
         fields = {
             "target_system": 0,
             "command": constant("MAV_CMD_DO_SET_HOME"),
@@ -142,8 +142,8 @@ class Stage(ABC):
 
     @property
     @abstractmethod
-    def tap(self) -> Tap:
-        """The hand on the link. Raises ``ImpossibleError`` where there is none."""
+    def tap(self) -> Hand:
+        """The hand on the wire."""
 
     def other(self) -> Commander:
         """A second commander, who hears the vehicle. Raises ``ImpossibleError`` where there can be none."""

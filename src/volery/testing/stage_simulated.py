@@ -7,21 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 from volery.autopilots.simulated.flight import Flight
-from volery.base.errors import CapabilityError, UsageError
+from volery.base.errors import UsageError
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Link
 from volery.run.opening import KINDS
-from volery.run.serving import SIMULATED
-from volery.run.simulated import airfield_of, link_to, simulated
+from volery.run.simulated import airfield_of, simulated
+from volery.testing.access import Hand, access_to
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
-from volery.testing.tap import Tap
 from volery.trace.events import Event
 from volery.vehicles import Vehicle
 from volery.vehicles.address import Address
-from volery.vehicles.driver import Driver, drivers
 
 HUNG_AFTER: Ns = 30 * MINUTE
 """A check that is not over after so much simulated time hangs."""
@@ -50,26 +47,16 @@ class SimulatedStage(Stage):
         all_wanted = [self._wanted, _beside(self._wanted)] if neighbour else [self._wanted]
         self.airfield = airfield_of(self.kernel, all_wanted, seed)
         self._kind = kind
-        self._factory = drivers.load(address.driver)
-        self.link = link_to(self.kernel, self.airfield, self._wanted, seed)
-        self._tap = Tap(self.link)
-        self._neighbour = ""
-        if neighbour:
-            self._neighbour = all_wanted[1].vehicle.name
-            self._tap.share(self.airfield.link(self._neighbour))
-        self.driver = self._opened(self._tap, self.name_of_vehicle)
+        self._neighbour = all_wanted[1].vehicle.name if neighbour else ""
+        self._access = access_to(self.kernel, self.airfield, self._wanted, seed, self._neighbour)
+        self.link = self._access.link
+        self.driver = self._access.first()
         self.drone = self._kind(self.kernel, self.name_of_vehicle, self.driver)
 
     @property
     def name_of_vehicle(self) -> str:
         """As the simulation calls it."""
         return self._wanted.vehicle.name
-
-    def _opened(self, link: Link, name: str, **options: str) -> Driver:
-        open_driver = self._factory.on_link
-        if open_driver is None:
-            raise CapabilityError(f"{name} is reached over a graph only")
-        return open_driver(self.kernel, link, name, {**SIMULATED, **options})
 
     def perform(self, body: Callable[[], str | None]) -> str | None:
         """Run *body* as a task: returns and raises what it does; ``TimeoutError`` if it hangs."""
@@ -92,17 +79,16 @@ class SimulatedStage(Stage):
         return found
 
     @property
-    def tap(self) -> Tap:
-        """The hand on the link."""
-        return self._tap
+    def tap(self) -> Hand:
+        """The hand on the wire."""
+        return self._access.hand
 
     def _commander(self) -> Commander:
-        link = self.airfield.link(self.name_of_vehicle)
-        driver = self._opened(link, self.name_of_vehicle)
-        return Commander(self.kernel, driver, link, self._factory.codec.name)
+        driver, link = self._access.another(self.name_of_vehicle)
+        return Commander(self.kernel, driver, link, self._access.protocol)
 
     def another_program(self) -> Any:
-        """On a new link."""
+        """On a new link, or as another node."""
         return self._program()
 
     def of_system(self, system: int) -> Any:
@@ -113,7 +99,7 @@ class SimulatedStage(Stage):
             raise ImpossibleError(f"the driver takes no system id: {error}") from None
 
     def _program(self, **options: str) -> Any:
-        driver = self._opened(self.airfield.link(self.name_of_vehicle), self.name_of_vehicle, **options)
+        driver, _ = self._access.another(self.name_of_vehicle, **options)
         return self._kind(self.kernel, self.name_of_vehicle, driver)
 
     @property
@@ -123,10 +109,10 @@ class SimulatedStage(Stage):
 
     @property
     def neighbour(self) -> Any:
-        """On a link of its own."""
+        """On a link of its own, or as a node of its own."""
         if not self._neighbour:
             raise ImpossibleError("it is alone")
-        driver = self._opened(self.airfield.link(self._neighbour), self._neighbour)
+        driver, _ = self._access.another(self._neighbour)
         self._others.append(Commander(self.kernel, driver))
         return self._kind(self.kernel, self._neighbour, driver)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.base.errors import Failsafe, LinkSilent, Overridden, VehicleError
+from volery.base.errors import Failsafe, LinkGarbled, LinkSilent, Overridden, VehicleError
 from volery.base.time import S
 from volery.testing.checks import ImpossibleError, check, demand, raising
 from volery.testing.stage import Stage
@@ -115,7 +115,7 @@ def wrong_system_id(stage: Stage) -> str:
     """A driver that was told of another system id hears nobody, and says so."""
     stranger = stage.of_system(77)
     try:
-        with raising(LinkSilent, naming=stage.name) as caught:
+        with raising(LinkSilent, LinkGarbled, naming=stage.name) as caught:
             stranger.wait_heard(5.0)
     finally:
         stranger.close()

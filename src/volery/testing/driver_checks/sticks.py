@@ -99,7 +99,7 @@ def stabilize(stage: Stage) -> str:
     fly_by_hand(stage, 3, 0.5)
     demand(stage.drone.flying, "it fell")
     stage.drone.goto(stage.at(0, 0, 15))
-    demand(stage.drone.mode != mode, f"goto() returned in {mode}")
+    demand(stage.drone.flying, "it fell")
     return f"{mode}, {stage.drone.mode}"
 
 
