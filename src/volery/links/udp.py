@@ -24,8 +24,9 @@ Endpoint = tuple[str, int]
 class UdpLink(CodedLink):
     """Datagrams to and from one peer.
 
-    With *peer* ``None`` it binds ``host:port`` and waits: the first who speaks is the peer. Else it sends to
-    *peer* from any free port (``port`` 0) and hears whoever answers from that host.
+    With *peer* ``None`` it binds ``host:port`` and waits: the first who speaks is the peer, and is answered
+    where it speaks from, or at port *answers_to* there. Else it sends to *peer* from any free port (``port``
+    0) and hears whoever answers from that host.
     ``self.port`` is the local port. Raises ``UsageError`` if one cannot bind there or there is no such host.
     """
 
@@ -38,7 +39,9 @@ class UdpLink(CodedLink):
         name: str = "",
         *,
         codec: Codec = MAVLINK,
+        answers_to: int | None = None,
     ) -> None:
+        self._answers_to = answers_to
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
@@ -77,9 +80,13 @@ class UdpLink(CodedLink):
         return sender == self._peer
 
     def _transmit(self, data: bytes) -> None:
-        if self._peer is not None:
-            with suppress(OSError):
-                self._socket.sendto(data, self._peer)
+        if self._peer is None:
+            return
+        host, port = self._peer
+        if self._fixed is None and self._answers_to is not None:
+            port = self._answers_to
+        with suppress(OSError):
+            self._socket.sendto(data, (host, port))
 
     def _trouble(self) -> str:
         if self._closed or self._heard_at >= 0:

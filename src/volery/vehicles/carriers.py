@@ -16,11 +16,15 @@ from volery.links.udp_server import UdpServer
 from volery.vehicles.address import Address
 
 DEFAULT_BAUD = 57_600
+USUAL_BAUD = {"pprzlink": 115_200}
+"""By protocol, where another one is usual."""
 ANYWHERE = "0.0.0.0"
 """``udp://:PORT`` means just this: whoever speaks first."""
 
 SENDS_FROM = "from"
 """Option of a UDP address with a host: the port that is sent from, and listened at."""
+ANSWERS_TO = "uplink"
+"""Option of a UDP address without: the port at which whoever speaks listens, if it speaks from another."""
 LAST_PORT = 65_535
 
 
@@ -36,10 +40,12 @@ def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, share
         return TcpClient(kernel, address.host, _port(address), address.text, codec)
     if address.carrier == "udp":
         if shared and not address.host:
+            if ANSWERS_TO in address.options:
+                raise UsageError(f"{address}: {ANSWERS_TO} is for one vehicle behind a port, not for several")
             return UdpServer(kernel, ANYWHERE, _port(address), address.text, codec=codec)
         return _udp(kernel, address, codec)
     if address.carrier == "serial":
-        baud = address.number("baud", DEFAULT_BAUD)
+        baud = address.number("baud", USUAL_BAUD.get(codec.name, DEFAULT_BAUD))
         if baud <= 0 or baud != int(baud):
             raise UsageError(f"{address}: baud={baud:g} is no baud rate; usual are 57600, 115200 and 921600")
         return SerialLine(kernel, address.path, int(baud), address.text, codec)
@@ -66,11 +72,18 @@ def listen(
 
 def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
     if address.host:
-        ours = address.number(SENDS_FROM, 0)
-        if not 0 <= ours <= LAST_PORT or ours != int(ours):
-            raise UsageError(f"{address}: {SENDS_FROM}={ours:g} is no port; 1 to {LAST_PORT} are")
-        return UdpLink(kernel, ANYWHERE, int(ours), (address.host, _port(address)), address.text, codec=codec)
-    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text, codec=codec)
+        ours = _port_option(address, SENDS_FROM)
+        return UdpLink(kernel, ANYWHERE, ours, (address.host, _port(address)), address.text, codec=codec)
+    theirs = _port_option(address, ANSWERS_TO) or None
+    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text, codec=codec, answers_to=theirs)
+
+
+def _port_option(address: Address, name: str) -> int:
+    """0 if it is not given."""
+    port = address.number(name, 0)
+    if not 0 <= port <= LAST_PORT or port != int(port):
+        raise UsageError(f"{address}: {name}={port:g} is no port; 1 to {LAST_PORT} are")
+    return int(port)
 
 
 def _port(address: Address) -> int:

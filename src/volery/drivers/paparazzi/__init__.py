@@ -22,7 +22,7 @@ from volery.vehicles.driver import DriverFactory
 __all__ = ["DRIVER", "Paparazzi", "open_driver"]
 
 OPTIONS = ("aircraft", "land", "start", "system", "takeoff", "texts")
-CARRIERS = ("baud", "uplink")
+CARRIERS = ("baud", "from", "uplink")
 """Options that are not the driver's, but of what carries it."""
 
 

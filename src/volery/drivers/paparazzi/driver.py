@@ -118,7 +118,7 @@ class Paparazzi:
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""
-        return (self._pieces.start_motors(),)
+        return (self._pieces.know_settings(), self._pieces.start_motors())
 
     def disarm(self, force: bool) -> Sequence[Step]:
         """Paparazzi itself would stop the motors in the air, too: without *force* it is not asked to."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, Position
-from volery.base.time import Ns
+from volery.base.time import MS, Ns
 from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.paparazzi.modes import (
     CANNOT_ARM,
@@ -18,21 +18,25 @@ from volery.drivers.paparazzi.modes import (
     HOME_WAYPOINT,
     NEEDS_CARE,
     PREPARING_BLOCKS,
+    START,
     STATUS,
 )
 from volery.kernel.api import Kernel
 from volery.links.pprz_aircraft import Aircraft
 from volery.links.pprzlink_definitions import entry_name
 from volery.trace.events import Text
-from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
+from volery.vehicles.telemetry import Answer, Attitude, Battery, Said, Telemetry, Velocity
 
 Fields = Mapping[str, Any]
 
 POSITION, SPEED, ANGLE = 1 / 2**8, 1 / 2**19, 1 / 2**12
 """Metres, metres per second and radians of one count in ROTORCRAFT_FP."""
 
-OTHER_KINDS = {"PPRZ_MODE": "plane", "ROVER_STATUS": "Paparazzi rover"}
-"""What sends this message is no rotorcraft."""
+KINDS = {STATUS: DRONE_KIND, "PPRZ_MODE": "plane", "ROVER_STATUS": "Paparazzi rover"}
+"""What sends this message is of this kind."""
+
+EFFECT: Ns = 300 * MS
+"""So long after motors were told to start, a status that says why they do not is the answer to that."""
 
 NOTICE, WARNING = 5, 4
 
@@ -69,6 +73,7 @@ class Hearing:
         self.ours: frozenset[str] = frozenset()
         self._asked_mode = ""
         self.settled = False  # the numbers of settings were checked
+        self.starting: Ns | None = None  # since when motors are to start
         self.values: dict[int, tuple[Ns, float]] = {}
         self.block: tuple[Ns, int] = (-1, -1)
         self.good_fix = False
@@ -92,11 +97,12 @@ class Hearing:
         }
 
     def hear(self, name: str, fields: Fields) -> bool:
-        """Take note of a message of our aircraft."""
-        self._seen.heard = self._kernel.now()
-        self._seen.autopilot = "Paparazzi"
-        if name in OTHER_KINDS and not self._seen.kind:
-            self._seen.kind = OTHER_KINDS[name]
+        """Take note of a message of our aircraft. It is heard of once it has told what kind it is."""
+        seen = self._seen
+        if name in KINDS and not seen.kind:
+            seen.kind, seen.autopilot = KINDS[name], "Paparazzi"
+        if seen.kind:
+            seen.heard = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False
@@ -119,13 +125,12 @@ class Hearing:
     def judge_readiness(self) -> None:
         """It knows where it is, its attitude is aligned, and its settings are the ones that we write."""
         seen = self._seen
-        seen.armable = self.settled and bool(self._arming) and self._arming not in CANNOT_ARM
+        seen.armable = bool(self._arming) and self._arming not in CANNOT_ARM
         placed = self._origin_is_set and seen.position is not None
-        seen.ready = seen.armable and self.good_fix and placed
+        seen.ready = seen.armable and self.settled and self.good_fix and placed
 
     def _status(self, fields: Fields) -> None:
         seen = self._seen
-        seen.kind = DRONE_KIND
         seen.mode = entry_name(STATUS, "ap_mode", fields["ap_mode"])
         seen.armed = bool(fields["ap_motors_on"])
         seen.flying = bool(fields["ap_in_flight"]) and seen.armed
@@ -140,7 +145,13 @@ class Hearing:
 
     def _hear_arming(self, word: str) -> None:
         self._seen.status = word.lower().replace("_", " ")
-        if word != self._arming and word in NEEDS_CARE:
+        now = self._kernel.now()
+        began = self.starting
+        refused = began is not None and now - began >= EFFECT and word in CANNOT_ARM and not self._seen.armed
+        if refused:
+            self.starting = None
+            self._seen.answers[START] = Answer(now, False, word)
+        if refused or (word != self._arming and word in NEEDS_CARE):
             self.say(WARNING, f"arming status: {self._seen.status}")
         self._arming = word
 

@@ -26,6 +26,9 @@ NEEDS_CARE = message_type(STATUS).words("arming_status")[8:]
 CANNOT_ARM = frozenset({"AHRS_NOT_ALLIGNED", "OUT_OF_GEOFENCE", "LOW_BATTERY"})
 """Those that last until something is put right. The others are about a pilot's sticks."""
 
+START = "start of the motors"
+"""Key of the only refusal that there is: the arming status after they were told to start."""
+
 # What the driver writes, by the names that an aircraft's XML gives a number.
 AUTO2 = "auto2"
 KILL_THROTTLE = "kill_throttle"

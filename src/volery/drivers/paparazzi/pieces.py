@@ -7,8 +7,8 @@ from math import radians
 from volery.base.errors import CapabilityError, Refused
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, S
-from volery.drivers.mavlink.sequences import at_once
-from volery.drivers.paparazzi.modes import GUIDED, KILL
+from volery.drivers.mavlink.sequences import at_once, nothing
+from volery.drivers.paparazzi.modes import GUIDED, KILL, START
 from volery.drivers.paparazzi.setpoints import Setpoints
 from volery.drivers.paparazzi.uplink import STOP, Setpoint, Uplink
 from volery.kernel.api import Action, Kernel
@@ -16,6 +16,8 @@ from volery.vehicles.driver import Step
 
 CHANGED_WITHIN: Ns = 8 * S
 """Of a mode; and of the motors. ROTORCRAFT_STATUS comes each 1.2 s where nothing changes."""
+
+SETTLED_WITHIN: Ns = 10 * S
 
 TRANSMITTER = (
     "if a transmitter is on, put its mode switch into the third position (AUTO2) or switch it off: "
@@ -59,6 +61,17 @@ class Pieces:
         """No sticks any more."""
         return at_once("let go of the sticks", self.setpoints.release)
 
+    def know_settings(self) -> Step:
+        """Nothing is written before."""
+        return Step(
+            ask="tell its settings",
+            send=nothing,
+            done=lambda seen: self.hearing.settled,
+            within=SETTLED_WITHIN,
+            skippable=True,
+            advice="it must answer GET_SETTING, and number its settings as in its XML: aircraft=PATH",
+        )
+
     def start_motors(self) -> Step:
         """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""
 
@@ -73,7 +86,8 @@ class Pieces:
             done=lambda seen: seen.armed,
             within=CHANGED_WITHIN,
             skippable=True,
-            again=S,
+            answer=START,
+            again=3 * S,
             advice=ARMING,
         )
 

@@ -175,6 +175,7 @@ class Uplink:
 
     def motors(self, on: bool) -> None:
         """Start or stop them."""
+        self.hearing.starting = self._kernel.now() if on and self.hearing.settled else None
         self.setting(KILL_THROTTLE, 0.0 if on else 1.0)
 
     def emergency(self, command: int) -> None:
@@ -223,7 +224,7 @@ class Uplink:
         if self.telemetry.heard >= 0:
             return None
         if self._stranger:
-            return LinkGarbled(f"aircraft {self._stranger} speaks here, not {self._wanted}")
+            return LinkSilent(f"aircraft {self._stranger} speaks here, not {self._wanted}")
         return LinkSilent("no Paparazzi aircraft was heard")
 
     def close(self) -> None:

@@ -286,6 +286,20 @@ def test_with_unaligned_attitude_it_is_not_ready(bench: Make) -> None:
     assert at.autopilot.sent("BLOCK") == []
 
 
+def test_arming_is_refused_in_the_words_of_the_arming_status(bench: Make) -> None:
+    at = bench()
+    at.craft.arming = "AHRS_NOT_ALLIGNED"
+    with pytest.raises(Refused, match=r"AHRS_NOT_ALLIGNED.: arming status: ahrs not alligned"):
+        at.fly(lambda drone: drone.arm())
+
+
+def test_from_kill_it_is_armed_by_way_of_guided(bench: Make) -> None:
+    at = bench()
+    at.craft.mode = "KILL"
+    at.fly(lambda drone: drone.arm())
+    assert (at.craft.mode, at.craft.armed) == ("GUIDED", True)
+
+
 def test_a_transmitter_that_is_on_decides(bench: Make) -> None:
     at = bench()
     at.craft.mode, at.autopilot.transmitter = "ATTITUDE_DIRECT", True
