@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -168,7 +171,7 @@ def test_options_that_make_no_sense(fly: Any, options: tuple[str, ...], says: st
     [
         ("FENCE = 5", BAD, "FENCE is 5; state it as volery.Fence(...)"),
         ("LIMITS = 120", BAD, "LIMITS is 120; state it as volery.Limits(...)"),
-        ("LIMITS = Limits(battery_reserve=20)", FAILED, "a share from 0 to below 1, as 0.2 (up.py:15)"),
+        ("LIMITS = Limits(battery_reserve=20)", FAILED, "give a share from 0 to below 1, as 0.2"),
     ],
 )
 def test_missions_that_state_nonsense(fly: Any, line: str, status: int, says: str) -> None:
@@ -228,3 +231,26 @@ def test_a_fence_as_a_map_editor_writes_it(tmp_path: Path) -> None:
         ("hole 1 of site", None),
         ("polygon 2", AboveHome(20.0)),
     ]
+
+
+# -- what answers is not what was expected
+
+
+@pytest.mark.integration
+def test_an_autopilot_of_another_make_answers(fly: Any) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    command = [sys.executable, "-c", "from volery.cli.main import main; main()", "vehicle", "ardupilot"]
+    listen = ["--listen", f"tcp://127.0.0.1:{port}"]
+    with subprocess.Popen([*command, *listen], stdout=subprocess.PIPE) as served:
+        try:
+            assert served.stdout is not None
+            assert b"serving" in served.stdout.readline()
+            status, said = fly(url=f"px4+tcp://127.0.0.1:{port}")
+            assert status == FAILED
+            assert "px4: an ArduPilot speaks here, not a PX4" in said
+            status, said = fly(url=f"paparazzi+tcp://127.0.0.1:{port}")
+            assert status == FAILED
+            assert "MAVLink arrives, not pprzlink" in said
+        finally:
+            served.terminate()
