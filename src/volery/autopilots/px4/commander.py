@@ -211,7 +211,15 @@ class Commander:
     @property
     def armable(self) -> bool:
         """Whether the checks let it arm in the wished mode."""
-        return self.ready and self.vehicle.dialect.modes[self.wished].armable and self.can_fly(self.wished)
+        mode = self.vehicle.dialect.modes[self.wished]
+        return self._fit(mode.needs_position) and mode.armable and self.can_fly(self.wished)
+
+    def _fit(self, to_go_by_position: bool) -> bool:
+        """COM_ARM_WO_GPS: by sticks it also arms without a position."""
+        if self.ready:
+            return True
+        allowed = self.vehicle.parameters["COM_ARM_WO_GPS"] != 0.0
+        return not to_go_by_position and allowed and self.checks().attitude
 
     def _throttle_is_high(self) -> bool:
         if not self.joystick.valid or self.wished not in modes.NEEDS_STICKS:

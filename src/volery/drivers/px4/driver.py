@@ -185,9 +185,17 @@ class PX4(Sequences):
         return altitude.metres
 
     def hold(self) -> Sequence[Step]:
-        """It is sent to where it is: that stops it in AUTO.LOITER as well as in any other mode."""
-        stop = Step(
-            ask="stop",
+        """It is sent to where it is: that stops it in AUTO.LOITER as well as in any other mode.
+
+        Once more when it stands, for by then it has gone a bit further.
+        """
+        stop = self._stopped("stop")
+        stay = self._stopped("stay")
+        return (*self._let_go(), stop, stay)
+
+    def _stopped(self, ask: str) -> Step:
+        return Step(
+            ask=ask,
             send=self._stay,
             done=lambda seen: seen.mode == HOLD and standing(seen),
             within=STOPPED_WITHIN,
@@ -196,7 +204,6 @@ class PX4(Sequences):
             enters=HOLD,
             armed=self.telemetry.kind == DRONE_KIND,
         )
-        return (*self._let_go(), stop)
 
     def _stay(self) -> None:
         self._reposition(self._here("hold"))

@@ -1,0 +1,336 @@
+"""The driver against the simulated PX4, in virtual time: whole flights, on good wires and bad ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import hypot
+from typing import Any
+
+import pytest
+
+from volery.autopilots.simulated.autopilot import Autopilot
+from volery.autopilots.simulated.flight import make_world
+from volery.base.errors import Failsafe, LinkLost, Overridden, Refused
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.registry import Registry
+from volery.base.seeds import stream
+from volery.base.time import HOUR, MS, S
+from volery.drivers.px4 import open_driver
+from volery.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.links.in_process import in_process
+from volery.links.link import Frame, Link
+from volery.links.wire import WireFaults, wire
+from volery.trace.events import Operation, Text
+from volery.vehicles import ChangeSpeed, Drone, Land, ReturnHome, TakeOff, Waypoint
+from volery.world.specs import Multirotor
+
+FRAME = LocalFrame(46.0825, -103.8995, 900.0)
+dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")
+
+
+def at(east: float, north: float, height: float = 10.0) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
+    return Position(latitude, longitude, AboveHome(height))
+
+
+class Field:
+    """One simulated PX4, its driver, and a second station that plays the pilot."""
+
+    def __init__(
+        self,
+        *,
+        warm: bool = True,
+        faults: WireFaults | None = None,
+        parameters: dict[str, float] | None = None,
+    ) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(record=self.events.append)
+        _, (self.flight,) = make_world(self.kernel.now, [Multirotor()], seed=7, frame=FRAME)
+        dialect = dialects.load("px4")
+        self.autopilot = Autopilot(
+            self.kernel, self.flight, dialect, warm=warm, name="craft_1", parameters=parameters
+        )
+        self._pilot, theirs = in_process(self.kernel, name="pilot")
+        self.autopilot.connect(theirs)
+        self.driver = open_driver(self.kernel, self._connect(faults), "craft_1", {"texts": "unrecorded"})
+        self.vehicle = Drone(self.kernel, "craft_1", self.driver, truth=self.truth)
+
+    def _connect(self, faults: WireFaults | None) -> Link:
+        if faults is None:
+            ours, theirs = in_process(self.kernel, 2 * MS)
+        else:
+            ours, theirs = wire(self.kernel, "radio", faults, stream(7, "radio"))
+        self.autopilot.connect(theirs)
+        return ours
+
+    def truth(self) -> Position:
+        latitude, longitude, amsl = FRAME.from_enu(self.flight.truth().position)
+        return Position(latitude, longitude, AMSL(amsl))
+
+    def fly(self, mission: Callable[[Drone], Any]) -> Any:
+        outcome: list[Any] = []
+
+        def body() -> None:
+            try:
+                outcome.append(mission(self.vehicle))
+            except Exception as error:
+                outcome.append(error)
+
+        self.kernel.spawn(body, "mission", Place("mission"))
+        while not outcome and self.kernel.now() < HOUR:
+            self.kernel.run(self.kernel.now() + S)
+        (found,) = outcome
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def pilot_chooses(self, mode: str, after_s: float = 0.0) -> None:
+        number = MODES[mode]
+        stated = {"param1": 1.0, "param2": float(number.main), "param3": float(number.sub)}
+        fields = {"target_system": 1, "target_component": 1, "command": 176, **stated}
+        frame = Frame("COMMAND_LONG", fields, 254, 190)
+        self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
+
+    def operations(self) -> list[Operation]:
+        return [event for event in self.events if isinstance(event, Operation)]
+
+
+def test_a_square() -> None:
+    field = Field()
+
+    def square(drone: Drone) -> None:
+        drone.takeoff(10)
+        drone.goto(at(0, 50))
+        drone.goto(at(50, 50, 15), speed=5.0)
+        drone.land()
+
+    field.fly(square)
+    *flown, landed = field.operations()
+    assert [one.operation for one in flown] == ["takeoff", "goto", "goto"]
+    assert all(one.outcome == "ok" for one in (*flown, landed))
+    assert all(one.estimate_horizontal <= 0.6 and one.estimate_vertical <= 0.3 for one in flown)
+    assert not field.vehicle.telemetry.armed
+
+
+def test_from_switching_on_it_waits_for_a_position() -> None:
+    field = Field(warm=False)
+    field.fly(lambda drone: drone.takeoff(5))
+    assert field.kernel.now() > 8 * S
+
+
+def test_arming_too_early_is_refused_for_the_reasons_in_its_report() -> None:
+    field = Field(warm=False)
+
+    def early(drone: Drone) -> None:
+        sleep(field.kernel, 5 * S)
+        drone.arm()
+
+    with pytest.raises(Refused, match=r"Arming check: no valid .*estimate"):
+        field.fly(early)
+
+
+def test_returning_home_and_a_mission_on_board() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.wait_ready()
+        items = [TakeOff(8), Waypoint(at(0, 20, 8)), ChangeSpeed(3.0), Waypoint(at(20, 20, 8)), ReturnHome()]
+        drone.upload_mission(items)
+        drone.start_mission(within=300)
+        assert not drone.armed
+        drone.takeoff(10)
+        drone.goto(at(15, 0))
+        drone.return_home()
+
+    field.fly(mission)
+    home = field.truth()
+    east, north, _ = FRAME.to_enu(home.latitude, home.longitude, home.altitude.metres)
+    assert hypot(east, north) < 2.0
+
+
+def test_a_mission_that_ends_in_the_air_and_starts_over() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> list[float]:
+        drone.wait_ready()
+        drone.upload_mission([TakeOff(8), Waypoint(at(0, 10, 8)), Waypoint(at(0, 25, 8))])
+        ended = []
+        for _ in range(2):
+            drone.start_mission(within=120)
+            ended.append(FRAME.to_enu(drone.position.latitude, drone.position.longitude, 900.0)[1])
+        drone.upload_mission([Land()])
+        drone.start_mission(within=120)
+        return ended
+
+    ended = field.fly(mission)
+    assert all(north == pytest.approx(25, abs=3.5) for north in ended)
+    assert not field.vehicle.telemetry.armed
+
+
+def test_velocity_hold_and_heading() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        for _ in range(50):
+            drone.set_velocity(north=3.0)
+            sleep(field.kernel, 100 * MS)
+        drone.hold()
+        held = drone.position
+        sleep(field.kernel, 8 * S)
+        now = drone.position
+        assert abs(now.latitude - held.latitude) * 111_000 < 1.5
+        drone.set_heading(135)
+        assert drone.attitude.heading == pytest.approx(135, abs=4)
+        assert drone.mode == HOLD
+        drone.land()
+
+    field.fly(mission)
+    assert all(one.outcome == "ok" for one in field.operations())
+
+
+def test_a_velocity_ends_in_hold_when_the_program_is_busy() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        drone.set_velocity(north=2.0, lasting=5.0)
+        sleep(field.kernel, 3 * S)
+        assert drone.mode == OFFBOARD
+        sleep(field.kernel, 6 * S)
+        assert drone.mode == HOLD
+        assert drone.status == "active"
+        drone.land()
+
+    field.fly(mission)
+
+
+def test_altitude_hold_without_satellites() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.wait_ready()
+        field.flight.block_gps()
+        sleep(field.kernel, 20 * S)
+        drone.manual_control(0, 0, 0, 0)
+        drone.altitude_hold()
+        for _ in range(80):
+            drone.manual_control(0, 0, 0.8, 0)
+            sleep(field.kernel, 100 * MS)
+        assert drone.flying
+        drone.manual_control(0, 0, 0.5, 0)
+        sleep(field.kernel, 2 * S)
+        drone.land()
+
+    field.fly(mission)
+    assert not field.vehicle.telemetry.armed
+
+
+def test_from_sticks_to_a_goal_and_back() -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        for _ in range(30):
+            drone.manual_control(0.4, 0, 0.5, 0)
+            if drone.mode != "ALTCTL":
+                drone.altitude_hold()
+            sleep(field.kernel, 100 * MS)
+        drone.goto(at(0, 30))
+        sleep(field.kernel, 10 * S)
+        assert (drone.mode, drone.status) == (HOLD, "active")  # sticks are not missed
+        drone.land()
+
+    field.fly(mission)
+    assert all(one.outcome == "ok" for one in field.operations())
+
+
+@pytest.mark.parametrize("mode", [LAND, "AUTO.RTL"])
+def test_a_pilot_takes_over(mode: str) -> None:
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        field.pilot_chooses(mode, 3.0)
+        for _ in range(100):
+            drone.set_velocity(north=1.0)
+            sleep(field.kernel, 100 * MS)
+
+    with pytest.raises(Overridden, match=mode):
+        field.fly(mission)
+    field.kernel.run(field.kernel.now() + 3 * S)
+    assert field.vehicle.telemetry.mode == mode
+
+
+def test_a_failsafe_for_a_missed_stream_is_not_fought() -> None:
+    cut = WireFaults(cuts=((40 * S, 43 * S),))
+    field = Field(faults=cut, parameters={"COM_OBL_RC_ACT": 3.0})
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        while True:
+            drone.set_velocity(north=0.5, lasting=60.0)
+            sleep(field.kernel, S)
+
+    with pytest.raises(Failsafe, match=r"AUTO\.RTL"):
+        field.fly(mission)
+    field.kernel.run(field.kernel.now() + 5 * S)
+    assert field.vehicle.telemetry.mode == "AUTO.RTL"
+
+
+def test_a_link_that_drops_in_flight_and_returns() -> None:
+    field = Field(faults=WireFaults(cuts=((30 * S, 60 * S),)))
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        with pytest.raises(LinkLost):
+            drone.goto(at(0, 200), speed=3.0)
+        sleep(field.kernel, 40 * S)
+        drone.goto(at(0, 0))
+        drone.land()
+
+    field.fly(mission)
+
+
+def test_a_bad_wire() -> None:
+    faults = WireFaults(drop=0.03, flip=1e-4, duplicate=0.05, reorder=0.05)
+    field = Field(faults=faults)
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        drone.goto(at(10, 10))
+        drone.set_velocity(up=0.5, lasting=2.0)
+        sleep(field.kernel, 3 * S)
+        drone.land()
+
+    field.fly(mission)
+    assert all(one.outcome == "ok" for one in field.operations())
+
+
+def test_what_it_will_do_if_its_commander_falls_silent() -> None:
+    field = Field(parameters={"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 4.0})
+    field.kernel.run(5 * S)
+    assert field.driver.if_silent() == (
+        "10 s after the last heartbeat it returns home; a velocity ends after 1 s in AUTO.LAND; "
+        "0.5 s after the last sticks it returns home"
+    )
+
+
+def test_the_same_flight_twice() -> None:
+    def flown() -> list[str]:
+        field = Field()
+
+        def mission(drone: Drone) -> None:
+            drone.takeoff(5)
+            drone.set_velocity(east=1.0, lasting=2.0)
+            sleep(field.kernel, 4 * S)
+            drone.land()
+
+        field.fly(mission)
+        return [repr(event) for event in field.events if isinstance(event, Operation | Text)]
+
+    assert flown() == flown()
