@@ -13,7 +13,8 @@ from volery.graph.parameters import Parameters
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
-from volery.trace.events import Charge, Record
+from volery.messages import Message, from_cdr, to_cdr
+from volery.trace.events import Charge, Record, ignore
 
 if TYPE_CHECKING:
     from volery.graph.services import EmbeddedService
@@ -25,7 +26,11 @@ Records = Callable[[str], bool]
 
 @dataclass(eq=False)
 class Context:
-    """One graph, seen by its members. ``changed`` is notified whenever somebody comes or goes."""
+    """One graph, seen by its members. ``changed`` is notified whenever somebody comes or goes.
+
+    ``unrecorded``: nothing of it goes to the stream of events. ``as_bytes``: what is sent has made the trip
+    through its bytes.
+    """
 
     kernel: Kernel
     price: Price
@@ -37,11 +42,21 @@ class Context:
     parameters: Parameters = field(default_factory=Parameters)
     topics: dict[str, Topic] = field(default_factory=dict)
     services: dict[str, EmbeddedService] = field(default_factory=dict)
+    unrecorded: bool = False
+    as_bytes: bool = False
 
     @property
     def record(self) -> Record:
         """The stream that events go to."""
-        return self.kernel.record
+        return ignore if self.unrecorded else self.kernel.record
+
+    def sent(self, message: Message) -> Message:
+        """A copy of *message*, as it is sent."""
+        if not self.as_bytes:
+            copied: Message = message.copy()
+            return copied
+        arriving: Message = from_cdr(message.__msgtype__, to_cdr(message))
+        return arriving
 
     def stamp(self) -> Ns:
         """ROS time, without being an interaction point."""
@@ -81,7 +96,8 @@ class Member:
         cost = context.price(who, call, x)
         caller, background = cost.caller, cost.background
         kind = _KINDS.get(call) or f"ros:{call}"
-        kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
+        if not context.unrecorded:
+            kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
         if kernel.current() is None:
             background += caller
         else:

@@ -32,19 +32,44 @@ def everything(topic_name: str) -> bool:
     return True
 
 
+def _nothing(topic_name: str) -> bool:
+    return False
+
+
 class Graph:
     """One ROS graph.
 
     *records* says for which topics the content of messages is recorded. *epoch* is what ROS time is at the
     kernel's zero: 0 in virtual time, the Unix time in ns on the wall clock. ``/clock`` ticks each 10 ms of
     the kernel's time while somebody subscribes to it.
+
+    *unrecorded*: nothing of it is recorded at all; for a graph that is no part of a system, such as the wire
+    to a simulated vehicle. *as_bytes*: messages make the trip through their bytes, so that they have the
+    digits that a transport carries, and no more.
     """
 
     def __init__(
-        self, kernel: Kernel, price: Price, carry: Carry, *, records: Records = everything, epoch: Ns = 0
+        self,
+        kernel: Kernel,
+        price: Price,
+        carry: Carry,
+        *,
+        records: Records = everything,
+        epoch: Ns = 0,
+        unrecorded: bool = False,
+        as_bytes: bool = False,
     ) -> None:
         self.kernel = kernel
-        self._context = Context(kernel, price, carry, records, epoch, Signal(kernel, "the ROS graph"))
+        self._context = Context(
+            kernel,
+            price,
+            carry,
+            _nothing if unrecorded else records,
+            epoch,
+            Signal(kernel, "the ROS graph"),
+            unrecorded=unrecorded,
+            as_bytes=as_bytes,
+        )
         self._context.listen_to_clock = Clock(self._context).listen
         self._nodes: dict[str, EmbeddedNode] = {}
 

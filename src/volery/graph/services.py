@@ -95,7 +95,7 @@ class EmbeddedService:
             raise
         with self.member.context.kernel:
             self._pending.remove(exchange)
-            content = answer.copy()
+            content = self.member.context.sent(answer)
             self._send_back(exchange, exchange.succeed, content, cdr_size(content))
 
     def _send_back(self, exchange: Exchange, end: Any, content: Any, size: int) -> None:
@@ -129,7 +129,7 @@ class EmbeddedClient:
         with context.kernel as kernel:
             start = kernel.now()
             server = self._server(request)
-            exchange = Exchange(self._member, request.copy(), self.name)
+            exchange = Exchange(self._member, context.sent(request), self.name)
             context.carry(
                 self._member.id,
                 server.member.id,

@@ -101,7 +101,7 @@ class EmbeddedPublisher:
             self.member.pay("publish", float(len(self._targets)))
             if not (self._targets or self._recorded or self._keeps):
                 return
-            content = message.copy()
+            content = context.sent(message)
             sent = kernel.now()
             size = self._record(content, sent)
             if self._keeps:
@@ -175,7 +175,8 @@ class EmbeddedSubscription:
         if not self._open:
             return
         now = self._context.kernel.now()
-        self._context.record(Message(sent, now, self.topic, publisher, self.member.name, size))
+        if not self._context.unrecorded:
+            self._context.record(Message(sent, now, self.topic, publisher, self.member.name, size))
         queue = self._queue
         if len(queue) == self.qos.depth:
             queue.popleft()  # its place in the group goes to the next oldest

@@ -13,14 +13,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from volery.base.errors import CapabilityError
+from volery.base.seeds import stream
 from volery.bridge import serve_pprzros, serve_vehicle
-from volery.cost import Price
 from volery.graph import Graph
-from volery.graph.node import NodeId
-from volery.kernel.api import Action, Kernel
+from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
-from volery.run.airfield import LINK_DELAY, Airfield
+from volery.links.wire import WireFaults
+from volery.run.airfield import Airfield
+from volery.run.graph_wire import GraphWire, private_graph
 from volery.run.simulated import Simulated, link_to
 from volery.vehicles.driver import Driver, Opener, drivers
 
@@ -62,33 +63,39 @@ def serve(graph: Graph, airfield: Airfield, vehicle: str, how: Serving, place: P
     NODES[codec.name](graph, airfield.link(vehicle), vehicle, place)
 
 
-def quiet_graph(kernel: Kernel) -> Graph:
-    """A graph for vehicles that a script commands: its calls cost nothing, messages take as long as over a
-    serial line, nothing is recorded.
-    """
+class PrivateGraph:
+    """A graph that holds a simulated vehicle and those who command it, as a link would join them."""
 
-    def carry(_one: NodeId, _other: NodeId, _size: int, _sure: bool, deliver: Action, _lost: Action) -> None:
-        kernel.call_at(kernel.now() + LINK_DELAY, deliver)
+    def __init__(self, kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int) -> None:
+        self._kernel = kernel
+        self._vehicle = wanted.vehicle.name
+        self._how = serving(wanted.vehicle.autopilot, self._vehicle)
+        self._wire = GraphWire(kernel, stream(seed, f"wire/{self._vehicle}"), wanted.faults)
+        self.graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
+        serve(self.graph, airfield, self._vehicle, self._how, Place(self._vehicle))
 
-    return Graph(kernel, lambda node, call, x: FREE, carry, records=lambda topic: False)
+    def suffer(self, faults: WireFaults) -> None:
+        """From now on this happens to what passes, in both directions."""
+        self._wire.suffer(faults)
+
+    def open(self, commander: str = "commander", **options: str) -> Driver:
+        """A driver of the vehicle, on a node called *commander*."""
+        place = Place(f"{commander} of {self._vehicle}")
+        node = self.graph.node(commander, f"/{self._vehicle}", place=place)
+        stated = {"namespace": self._how.namespace, **options}
+        return self._how.open_driver(self._kernel, node, self._vehicle, stated)
+
+
+def on_links(airfield: Airfield, wanted: Simulated) -> bool:
+    """Whether a script reaches this vehicle over a link; else over a graph."""
+    factory = drivers.load(wanted.vehicle.autopilot)
+    return airfield.family(wanted.vehicle.name).codec is not None and factory.on_link is not None
 
 
 def open_simulated(kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int) -> Driver:
-    """The driver of a simulated vehicle for a script: on a link, or on a graph that holds the two alone.
-
-    Raises ``CapabilityError`` for faults of a wire where there is none.
-    """
-    vehicle, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-    factory = drivers.load(autopilot)
-    if airfield.family(vehicle).codec is not None and factory.on_link is not None:
+    """The driver of a simulated vehicle for a script: on a link, or on a graph that holds the two alone."""
+    open_on_link = drivers.load(wanted.vehicle.autopilot).on_link
+    if open_on_link is not None and on_links(airfield, wanted):
         link = link_to(kernel, airfield, wanted, seed)
-        return factory.on_link(kernel, link, vehicle, SIMULATED)
-    if wanted.faults is not None:
-        raise CapabilityError(f"{vehicle}: {autopilot} is reached over a graph: there is no wire to it")
-    how, graph = serving(autopilot, vehicle), quiet_graph(kernel)
-    serve(graph, airfield, vehicle, how, Place(vehicle))
-    node = graph.node("commander", f"/{vehicle}", place=Place(f"commander of {vehicle}"))
-    return how.open_driver(kernel, node, vehicle, {"namespace": how.namespace})
-
-
-FREE = Price(0, 0)
+        return open_on_link(kernel, link, wanted.vehicle.name, SIMULATED)
+    return PrivateGraph(kernel, airfield, wanted, seed).open()

@@ -78,7 +78,8 @@ class Carrier:
     def _take(self, work: Work) -> None:
         """House code."""
         self._arrived.append(work)
-        self._due.notify()
+        if len(self._arrived) == 1:
+            self._due.notify()
 
     def _run(self) -> None:
         """The node's own loop: take in what has come, send what is due."""

@@ -88,7 +88,7 @@ class Hearing:
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True
         self._status = message.data
-        if self.aircraft:
+        if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
             self._seen.heard = self._kernel.now()
 
     def _display_mode(self, message: Any) -> None:
