@@ -12,14 +12,16 @@ from volery.drivers.mavlink.options import check_options
 from volery.drivers.paparazzi.driver import Paparazzi
 from volery.drivers.paparazzi.ground import Blocks
 from volery.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
+from volery.drivers.paparazzi.pprzros import PprzrosLink
 from volery.drivers.paparazzi.uplink import Uplink
+from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.links.pprz_aircraft import Aircraft, read_aircraft, stock_aircraft
 from volery.links.pprzlink import PPRZLINK
 from volery.vehicles.driver import DriverFactory
 
-__all__ = ["DRIVER", "Paparazzi", "open_driver"]
+__all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 
 OPTIONS = ("aircraft", "land", "start", "system", "takeoff", "texts")
 CARRIERS = ("baud", "from", "uplink")
@@ -34,8 +36,20 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
     blocks of its flight plan; ``texts=unrecorded`` where it records its texts itself, as a simulated one.
     """
     check_options("paparazzi", options, *OPTIONS, *CARRIERS)
-    uplink = Uplink(kernel, link, name, _aircraft(options), options, looped=False)
+    uplink = Uplink(kernel, link, name, _aircraft(options), options)
     return Paparazzi(kernel, uplink, _blocks(options))
+
+
+def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Paparazzi:
+    """A Paparazzi rotorcraft behind the pprzros bridge, commanded by *node*. It begins to listen at once.
+
+    Options: ``namespace`` of the bridge, else the root, where ``/pprzros/to_ros`` and ``/pprzros/from_ros``
+    are; and those of ``open_driver``.
+    """
+    check_options("paparazzi", options, *OPTIONS, "namespace")
+    aircraft, blocks = _aircraft(options), _blocks(options)
+    link = PprzrosLink(kernel, node, options.get("namespace", "/"))
+    return Paparazzi(kernel, Uplink(kernel, link, name, aircraft, options), blocks)
 
 
 def _aircraft(options: Mapping[str, str]) -> Aircraft:
@@ -51,5 +65,5 @@ def _blocks(options: Mapping[str, str]) -> Blocks:
     )
 
 
-DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK)
-"""Paparazzi on a pprzlink."""
+DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK, on_graph=open_pprzros)
+"""Paparazzi on a pprzlink; on a graph it goes by pprzros's names."""

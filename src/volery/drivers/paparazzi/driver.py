@@ -54,26 +54,16 @@ _NOTHING: frozenset[Capability] = frozenset()
 class Paparazzi:
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean.
 
-    Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*. *go_round* is one round of the
-    loop of the node that carries it, *take_in* what that node does without waiting.
+    Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*.
     """
 
     handover = GUIDED
     comes_down = frozenset({FAILSAFE})
+    cycle: Action | None = None
 
-    def __init__(
-        self,
-        kernel: Kernel,
-        uplink: Uplink,
-        blocks: Blocks,
-        *,
-        go_round: Action | None = None,
-        take_in: Action = nothing,
-    ) -> None:
+    def __init__(self, kernel: Kernel, uplink: Uplink, blocks: Blocks) -> None:
         self.name = uplink.telemetry.name
         self.telemetry = uplink.telemetry
-        self.cycle = go_round
-        self._take_in = take_in
         self._uplink = uplink
         self._pieces = Pieces(kernel, uplink)
         self._setpoints = self._pieces.setpoints
@@ -85,8 +75,7 @@ class Paparazzi:
         return CAN if self.telemetry.kind == DRONE_KIND else _NOTHING
 
     def look(self) -> None:
-        """Take in what has arrived."""
-        self._take_in()
+        """What arrives is taken in by itself."""
 
     def if_silent(self) -> str:
         """From its flight plan, as far as that says it."""

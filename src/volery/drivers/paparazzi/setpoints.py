@@ -51,7 +51,7 @@ class Setpoints:
                 self.unfollow()
                 self.stand_still()
 
-        self._following = self._uplink.pulse.every(VELOCITY_PERIOD, repeat)
+        self._following = self._kernel.every(VELOCITY_PERIOD, repeat)
 
     def unfollow(self) -> None:
         """No velocity is repeated any more."""
@@ -65,7 +65,7 @@ class Setpoints:
         """Keep sending these."""
         self.held = sticks
         if self._refresh is None:
-            self._refresh = self._uplink.pulse.every(STICKS_PERIOD, self._send_sticks)
+            self._refresh = self._kernel.every(STICKS_PERIOD, self._send_sticks)
 
     def hold_any(self) -> None:
         """Sticks that were never set are in the middle in the air, and idle on the ground."""

@@ -14,7 +14,6 @@ from volery.base.time import Ns, S
 from volery.drivers.mavlink.options import recorded, system
 from volery.drivers.paparazzi.hearing import Hearing
 from volery.drivers.paparazzi.modes import AUTO2, KILL_THROTTLE, MODE, NUMBERS, STATUS
-from volery.drivers.paparazzi.pulse import Pulse
 from volery.kernel.api import Kernel
 from volery.links.codec import Heard
 from volery.links.link import Frame, Link
@@ -55,25 +54,14 @@ class Setpoint(NamedTuple):
 
 
 class Uplink:
-    """Talks to one rotorcraft: the first that speaks, or the one that option ``system`` or its XML names.
-
-    *looped*: the carrier is a node, in whose loop ``pulse.beat`` is called.
-    """
+    """Talks to one rotorcraft: the first that speaks, or the one that option ``system`` or its XML names."""
 
     def __init__(
-        self,
-        kernel: Kernel,
-        link: Link,
-        name: str,
-        aircraft: Aircraft,
-        options: Mapping[str, str],
-        *,
-        looped: bool,
+        self, kernel: Kernel, link: Link, name: str, aircraft: Aircraft, options: Mapping[str, str]
     ) -> None:
         self.telemetry = Telemetry(kernel, name)
         self.hearing = Hearing(kernel, self.telemetry, aircraft, record=recorded(options))
         self.aircraft = aircraft
-        self.pulse = Pulse(kernel, looped=looped)
         self._kernel = kernel
         self._link = link
         self._wanted = system(options) or aircraft.system
@@ -85,7 +73,7 @@ class Uplink:
         self._checked = {one.name: one for one in (self._find(MODE), self._find(KILL_THROTTLE)) if one}
         self._unchecked = set(self._checked)
         link.receive(self._receive)
-        self._ping = self.pulse.every(PING_PERIOD, self._tick)
+        self._ping = kernel.every(PING_PERIOD, self._tick)
 
     def _find(self, name: str) -> Setting | None:
         return next((one for one in self.aircraft.settings if one.name == name), None)

@@ -1,0 +1,161 @@
+"""The same driver over pprzros's topics on the embedded graph, behind a bridge, with a scripted aircraft."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from volery.base.errors import LinkSilent, UsageError
+from volery.base.position import AboveHome, Position
+from volery.base.time import MS, S
+from volery.bridge import serve_pprzros
+from volery.drivers.paparazzi import open_pprzros
+from volery.graph import Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
+from volery.links.in_process import in_process
+from volery.links.link import Frame
+from volery.links.pprz_message import TYPE, to_message
+from volery.links.pprzlink import PPRZLINK
+from volery.messages import new
+from volery.trace.events import Operation
+from volery.vehicles import Drone
+
+LATITUDE, LONGITUDE = 43.4622222, 1.2733333
+NEAR = Position(LATITUDE + 0.0003, LONGITUDE, AboveHome(12.0))
+
+
+class Free:
+    caller = 0
+    background = 0
+
+
+class OnGraph:
+    """A scripted aircraft, the bridge's node, and a node that commands."""
+
+    def __init__(self, peer: Any, *, bridged: bool = True) -> None:
+        self.events: list[Any] = []
+        self.kernel = VirtualKernel(record=self.events.append)
+        link, theirs = in_process(self.kernel, MS, "radio", PPRZLINK)
+        self.aircraft = peer(self.kernel, theirs)
+        self.graph = Graph(self.kernel, lambda node, call, x: Free(), self._carry)
+        if bridged:
+            serve_pprzros(self.graph, link, "bee", Place("bridge"))
+
+    def _carry(self, one: Any, other: Any, size: int, sure: bool, deliver: Any, lost: Any) -> None:
+        self.kernel.call_at(self.kernel.now() + MS, deliver)
+
+    def fly(self, mission: Callable[[Any], Any], **options: str) -> Any:
+        outcome: list[Any] = []
+
+        def body() -> None:
+            try:
+                node = self.graph.node("control")
+                driver = open_pprzros(self.kernel, node, "bee", {"namespace": "/bee", **options})
+                outcome.append(mission(Drone(self.kernel, "bee", driver)))
+            except Exception as error:
+                outcome.append(error)
+
+        self.kernel.spawn(body, "mission", Place("mission"))
+        while not outcome:
+            self.kernel.run(self.kernel.now() + S)
+        (found,) = outcome
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+
+@pytest.fixture
+def peer(bench: Any) -> Any:
+    return bench.peer
+
+
+def test_a_mission(peer: Any) -> None:
+    at = OnGraph(peer)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.goto(NEAR)
+        drone.return_home()
+
+    at.fly(mission)
+    craft = at.aircraft.craft
+    assert (craft.armed, craft.up) == (False, 0.0)
+    outcomes = [(one.operation, one.outcome) for one in at.events if isinstance(one, Operation)]
+    assert outcomes == [("takeoff", "ok"), ("goto", "ok"), ("return_home", "ok")]
+
+
+def test_a_velocity_ends_although_the_component_does_something_else(peer: Any) -> None:
+    """Paparazzi itself would fly on for ever."""
+    at = OnGraph(peer)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.set_velocity(2.0, lasting=2.0)
+        sleep(at.kernel, 5 * S)
+
+    at.fly(mission)
+    assert at.aircraft.craft.velocity == (0.0, 0.0, 0.0)
+
+
+def test_sticks_go_on_although_the_component_does_something_else(peer: Any) -> None:
+    at = OnGraph(peer)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.manual_control(0.0, 0.0, 0.5, 0.0)
+        drone.altitude_hold()
+        before = len(at.aircraft.sent("RC_4CH"))
+        sleep(at.kernel, 5 * S)
+        assert len(at.aircraft.sent("RC_4CH")) >= before + 40
+
+    at.fly(mission)
+
+
+def test_no_bridge(peer: Any) -> None:
+    at = OnGraph(peer, bridged=False)
+    with pytest.raises(LinkSilent, match="nobody publishes /bee/pprzros/to_ros; start pprzros"):
+        at.fly(lambda drone: drone.wait_heard())
+
+
+def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
+    at = OnGraph(peer, bridged=False)
+
+    def babble() -> None:
+        node = at.graph.node("babbler")
+        publisher = node.advertise("/bee/pprzros/to_ros", TYPE)
+        for _ in range(20):
+            sleep(at.kernel, S)
+            publisher.publish(new(TYPE, msg_name="NO_SUCH_MESSAGE", sender_id=7, data=[1, 2, 3]))
+
+    at.kernel.spawn(babble, "babbler", Place("babbler"))
+    with pytest.raises(LinkSilent, match="is not understood: pprzlink has no message 'NO_SUCH_MESSAGE'"):
+        at.fly(lambda drone: drone.wait_heard())
+
+
+def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
+    at = OnGraph(peer, bridged=False)
+    heard: list[Any] = []
+
+    def bridge() -> None:
+        node = at.graph.node("pprzros")
+        publisher = node.advertise("/pprzros/to_ros", TYPE)
+        node.subscribe("/pprzros/from_ros", TYPE, heard.append, group=(group := node.group()))
+        status = Frame("ROTORCRAFT_STATUS", {"ap_mode": 13}, 7, 0)
+        while not heard:
+            sleep(at.kernel, S)
+            publisher.publish(to_message(status, at.kernel.now()))
+            group.spin_once(0)
+
+    at.kernel.spawn(bridge, "bridge", Place("bridge"))
+    at.fly(lambda drone: drone.wait_heard(), namespace="/")
+    assert heard[0].msg_name == "PING"
+
+
+def test_options_that_make_no_sense(peer: Any) -> None:
+    at = OnGraph(peer)
+    with pytest.raises(UsageError, match="the paparazzi driver has no option 'uplink'"):
+        at.fly(lambda drone: drone.wait_heard(), uplink="4243")
