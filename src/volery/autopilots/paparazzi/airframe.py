@@ -6,7 +6,9 @@ defaults where those make sense for the simulated body, and assumptions else (do
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import radians
+from typing import NamedTuple
 
 from volery.autopilots.simulated.flight import Flight
 from volery.autopilots.simulated.parameters import REAL32, Parameter, Parameters
@@ -22,41 +24,51 @@ FARTHEST_M = stock_aircraft().farthest or 150.0
 """From HOME in NAV, by the flight plan."""
 SLOWEST = 0.1
 
-_VALUES = {
-    "MODE_STARTUP": 13.0,
-    MANUAL_SWITCH: 4.0,
-    AUTO1_SWITCH: 12.0,
-    AUTO2_SWITCH: 13.0,
-    "MAX_DIST_FROM_HOME": FARTHEST_M,
-    "FAILSAFE_MODE_DISTANCE": 1.5 * FARTHEST_M,
-    "FAILSAFE_DESCENT_SPEED": 1.5,
-    "FAILSAFE_ON_BAT_CRITICAL": 0.0,
-    "CRITIC_BAT_LEVEL": 0.0,
-    "GEOFENCE_DATALINK_LOST_TIME": 0.0,
-    "GEOFENCE_MAX_ALTITUDE": 0.0,
-    "GPS_TIMEOUT": 2.0,
-    "RC_LOST_TIME": 0.5,
-    "RC_REALLY_LOST_TIME": 1.0,
-    "GUIDANCE_H_REF_MAX_SPEED": 5.0,
-    "GUIDANCE_H_REF_MAX_ACCEL": 2.5,
-    "GUIDANCE_V_REF_MAX_CLIMB": 2.5,
-    "GUIDANCE_V_REF_MAX_DESCENT": 1.5,
-    "GUIDANCE_V_REF_MAX_ACCEL": 1.0,
-    "STABILIZATION_ATTITUDE_SP_MAX_PHI": 30.0,
-    "STABILIZATION_ATTITUDE_SP_MAX_R": 90.0,
-    "ARRIVED_AT_WAYPOINT": 3.0,
-    "NAV_CLIMB_VSPEED": 0.5,
-    "NAV_DESCEND_VSPEED": -0.8,
-    "DEFAULT_CIRCLE_RADIUS": 5.0,
+
+class Figure(NamedTuple):
+    """A figure of the airframe, and what it is."""
+
+    value: float
+    what: str
+
+
+FIGURES: Mapping[str, Figure] = {
+    "MODE_STARTUP": Figure(13.0, "mode after switching on: NAV"),
+    MANUAL_SWITCH: Figure(4.0, "mode at the transmitter's MANUAL: ATTITUDE_DIRECT"),
+    AUTO1_SWITCH: Figure(12.0, "mode at AUTO1: HOVER_Z_HOLD"),
+    AUTO2_SWITCH: Figure(13.0, "mode at AUTO2, the setting `auto2`: NAV"),
+    "MAX_DIST_FROM_HOME": Figure(FARTHEST_M, "m from HOME at which NAV becomes HOME"),
+    "FAILSAFE_MODE_DISTANCE": Figure(
+        1.5 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
+    ),
+    "FAILSAFE_DESCENT_SPEED": Figure(1.5, "m/s in FAILSAFE"),
+    "FAILSAFE_ON_BAT_CRITICAL": Figure(0.0, "1: a critical battery is FAILSAFE, and keeps motors off"),
+    "CRITIC_BAT_LEVEL": Figure(0.0, "V that are critical; 3.1 V a cell of its battery"),
+    "GEOFENCE_DATALINK_LOST_TIME": Figure(0.0, "s of silence after which NAV becomes HOME; 0: never"),
+    "GEOFENCE_MAX_ALTITUDE": Figure(0.0, "m above the origin at which NAV becomes HOME; 0: none"),
+    "GPS_TIMEOUT": Figure(2.0, "s without a fix after which satellites are lost"),
+    "RC_LOST_TIME": Figure(0.5, "s without sticks: LOST"),
+    "RC_REALLY_LOST_TIME": Figure(1.0, "s without sticks: REALLY_LOST, in modes of sticks FAILSAFE"),
+    "GUIDANCE_H_REF_MAX_SPEED": Figure(5.0, "m/s in the plane"),
+    "GUIDANCE_H_REF_MAX_ACCEL": Figure(2.5, "m/s^2 in the plane"),
+    "GUIDANCE_V_REF_MAX_CLIMB": Figure(2.5, "m/s up"),
+    "GUIDANCE_V_REF_MAX_DESCENT": Figure(1.5, "m/s down"),
+    "GUIDANCE_V_REF_MAX_ACCEL": Figure(1.0, "m/s^2 up and down"),
+    "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(30.0, "degrees of lean"),
+    "STABILIZATION_ATTITUDE_SP_MAX_R": Figure(90.0, "degrees/s of turn by stick"),
+    "ARRIVED_AT_WAYPOINT": Figure(3.0, "m from a waypoint at which the plan goes on"),
+    "NAV_CLIMB_VSPEED": Figure(0.5, "m/s up in block Takeoff"),
+    "NAV_DESCEND_VSPEED": Figure(-0.8, "m/s up in block flare"),
+    "DEFAULT_CIRCLE_RADIUS": Figure(5.0, "m; clockwise if positive"),
 }
-"""Metres, m/s, m/s^2, degrees, seconds, volts, numbers of modes. Zero switches a geofence off."""
+"""By name. The model's ``parameters`` of a vehicle replace them."""
 
 _FULL = Travel(1000.0, 1500.0, 2000.0, 0.0)
 
 
 def parameters() -> tuple[Parameter, ...]:
     """All of them."""
-    return tuple(Parameter(name, REAL32, value) for name, value in _VALUES.items())
+    return tuple(Parameter(name, REAL32, figure.value) for name, figure in FIGURES.items())
 
 
 def own_parameters(_system: int, flight: Flight) -> dict[str, float]:

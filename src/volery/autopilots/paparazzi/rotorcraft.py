@@ -114,5 +114,5 @@ ROTORCRAFT = Dialect(
     on_disarmed=_nothing,
     parameters=airframe.parameters,
     own_parameters=airframe.own_parameters,
-    honoured={},
+    honoured={name: figure.what for name, figure in airframe.FIGURES.items()},
 )
