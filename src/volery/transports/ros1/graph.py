@@ -33,7 +33,9 @@ class _ToTrace(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Pass it on, without the traceback that rospy may have put behind it."""
-        self._say(record.getMessage().strip().partition("Traceback")[0].rstrip(": \n"))
+        text = record.getMessage().strip().partition("Traceback")[0].rstrip(": \n")
+        topic = record.threadName or ""  # what connects a subscriber is named after its topic
+        self._say(f"{topic}: {text}" if topic.startswith("/") else text)
 
 
 class Ros1:

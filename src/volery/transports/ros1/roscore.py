@@ -115,11 +115,22 @@ class Roscore:
 
 
 def _end(process: subprocess.Popen[bytes], how: int) -> None:
-    """End the process and what it has started: its session."""
+    """End the process and what it has started: each in a session of its own, so they are looked up first."""
+    started = _descendants(process.pid)
     with suppress(ProcessLookupError):
         process.send_signal(how)
     with suppress(subprocess.TimeoutExpired):
         process.wait(GONE_S)
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+    for pid in (process.pid, *started):
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
     process.wait()
+
+
+def _descendants(pid: int) -> list[int]:
+    """The processes that *pid* has started, and those that they have started."""
+    children: list[int] = []
+    for listed in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            children += [int(one) for one in listed.read_text().split()]
+    return [*children, *(deeper for child in children for deeper in _descendants(child))]

@@ -192,6 +192,7 @@ class Ros1Wire:
             )
 
     def _check_type(self, topic: str, message_type: str) -> None:
+        self.master.value("getPid")  # rospy would wait for a master that is gone
         wanted, carried = ros1_type(message_type).name, self._types.of(topic)
         if carried not in (wanted, ANY, ""):
             publishers, subscribers, _ = self.master.value("getSystemState")
@@ -214,6 +215,7 @@ class Ros1Wire:
 
     def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros1Served:
         """Offer a service."""
+        self.master.value("getPid")
         if self.master.find("lookupService", name) is not None:
             _, _, services = self.master.value("getSystemState")
             users = [user for at, who in services if at == name for user in who]
