@@ -61,7 +61,7 @@ class Commander:
         if self._protocol != "MAVLink" or self._link is None:
             raise ImpossibleError(f"home cannot be moved over {self._protocol}")
         fields = {
-            "target_system": 0,
+            "target_system": self.seen.system,
             "command": constant("MAV_CMD_DO_SET_HOME"),
             "frame": constant("MAV_FRAME_GLOBAL"),
             "x": round(place.latitude * 1e7),

@@ -69,6 +69,7 @@ class Telemetry:
         self.heard: Ns = -1
         self.kind = ""  # "drone", "rover", or the autopilot's own word for anything else
         self.autopilot = ""
+        self.system = 0  # its id, where the protocol has one
         self.mode = ""
         self.status = ""
         self.armed = False

@@ -156,6 +156,7 @@ class Conversation:
             return False
         self._system, self._component = frame.system, frame.component
         self._stranger = ""
+        self.telemetry.system = frame.system
         return True
 
     def _hear_answer(self, frame: Frame) -> bool:
