@@ -6,7 +6,6 @@ north, up about the local origin.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import Enum
 from math import atan2, cos, dist, hypot, pi, radians, sin
 from typing import NamedTuple
@@ -196,23 +195,24 @@ class Navigation:
         east, north = second[0] - first[0], second[1] - first[1]
         length = hypot(east, north) or 1.0
         aside = -north / length * radius, east / length * radius
-        legs: tuple[tuple[Vector, Vector], ...] = (
-            (_beside(first, aside, 1.0), _beside(second, aside, 1.0)),
-            (_beside(second, aside, -1.0), _beside(first, aside, -1.0)),
-        )
-        start, end = legs[self._oval_leg // 2]
+        there = _beside(first, aside, 1.0), _beside(second, aside, 1.0)
+        back = _beside(second, aside, -1.0), _beside(first, aside, -1.0)
         if self._oval_leg % 2 == 0:
-            if self._past(start, end):
-                self._oval_leg = (self._oval_leg + 1) % 4
+            start, end = there if self._oval_leg == 0 else back
+            done = self._past(start, end)
             self.fly_route(start, end)
-            return
-        centre, ends_at = (second, legs[1][0]) if self._oval_leg == 1 else (first, legs[0][0])
-        here = self.position
-        towards = (here[0] - centre[0]) * (ends_at[0] - centre[0])
-        towards += (here[1] - centre[1]) * (ends_at[1] - centre[1])
-        if towards > 0.9 * abs(radius) * hypot(here[0] - centre[0], here[1] - centre[1]):
+        else:
+            centre, end = (second, back[0]) if self._oval_leg == 1 else (first, there[0])
+            done = self._faces(centre, end)
+            self.fly_circle(centre, radius)
+        if done:
             self._oval_leg = (self._oval_leg + 1) % 4
-        self.fly_circle(centre, radius)
+
+    def _faces(self, centre: Vector, end: Vector) -> bool:
+        """Whether it is in the direction of *end*, seen from the centre of a circle: within 26 degrees."""
+        away = self.position[0] - centre[0], self.position[1] - centre[1]
+        towards = end[0] - centre[0], end[1] - centre[1]
+        return away[0] * towards[0] + away[1] * towards[1] > 0.9 * hypot(*away) * hypot(*towards)
 
     def _past(self, start: Vector, end: Vector) -> bool:
         here = self.position
@@ -221,6 +221,3 @@ class Navigation:
 
 def _beside(point: Vector, aside: tuple[float, float], share: float) -> Vector:
     return point[0] + share * aside[0], point[1] + share * aside[1], point[2]
-
-
-MakeNavigation = Callable[[Vehicle], Navigation]
