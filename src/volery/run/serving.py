@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from volery.base.errors import CapabilityError
 from volery.base.seeds import stream
@@ -69,7 +69,8 @@ class PrivateGraph:
     def __init__(self, kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int) -> None:
         self._kernel = kernel
         self._vehicle = wanted.vehicle.name
-        self._how = serving(wanted.vehicle.autopilot, self._vehicle)
+        how = serving(wanted.vehicle.autopilot, self._vehicle)
+        self._how = replace(how, namespace=f"/{self._vehicle}/{wanted.names}") if wanted.names else how
         self._wire = GraphWire(kernel, stream(seed, f"wire/{self._vehicle}"), wanted.faults)
         self.graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
         serve(self.graph, airfield, self._vehicle, self._how, Place(self._vehicle))

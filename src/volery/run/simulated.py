@@ -19,7 +19,19 @@ from volery.vehicles.address import Address
 HOME = Position(46.0825, -103.8995, AMSL(900))
 """Where simulated vehicles stand unless an address or a mission says otherwise."""
 
-OPTIONS = ("heading", "home", "kind", "sensors", "start", "system", "wind", "wire", *FAULT_OPTIONS)
+OPTIONS = (
+    "heading",
+    "home",
+    "kind",
+    "names",
+    "parameters",
+    "sensors",
+    "start",
+    "system",
+    "wind",
+    "wire",
+    *FAULT_OPTIONS,
+)
 """What may follow ``sim:AUTOPILOT?``."""
 
 CARRIERS = ("values", "bytes")
@@ -29,7 +41,8 @@ CARRIERS = ("values", "bytes")
 class Simulated:
     """What a ``sim:`` address describes: a vehicle in a world of its own, and the wire to it.
 
-    ``faults`` is ``None`` where frames travel as values.
+    ``faults`` is ``None`` where frames travel as values. ``names`` are those of its node, where its autopilot
+    is reached over a graph and has more than one set of them.
     """
 
     vehicle: Vehicle
@@ -37,6 +50,7 @@ class Simulated:
     wind: Wind
     faults: WireFaults | None = None
     system: int | None = None
+    names: str = ""
 
     @property
     def home(self) -> Position:
@@ -49,8 +63,9 @@ def simulated(address: Address, name: str, kind: str = "multirotor", home: Posit
     """Read a ``sim:`` address; *kind* and *home* hold unless it says otherwise.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
-    ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``wire=values|bytes`` and, through
-    bytes, the faults of ``volery.links.wire``. Raises ``UsageError``.
+    ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the
+    autopilot, ``names`` of its node on a graph, ``wire=values|bytes`` and, through bytes, the faults of
+    ``volery.links.wire``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
     stated = address.numbers("home", 3)
@@ -65,10 +80,25 @@ def simulated(address: Address, name: str, kind: str = "multirotor", home: Posit
         heading_deg=address.number("heading", 0.0),
         sensors=_one_of(address, "sensors", SENSOR_SETS, "consumer"),
         started=_one_of(address, "start", STARTS, "cold"),
+        parameters=_parameters(address),
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)
-    return Simulated(vehicle, frame, wind, _faults(address), _system(address))
+    names = address.options.get("names", "")
+    return Simulated(vehicle, frame, wind, _faults(address), _system(address), names)
+
+
+def _parameters(address: Address) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for part in filter(None, address.options.get("parameters", "").split(",")):
+        name, colon, value = part.partition(":")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            colon = ""
+        if not colon or not name:
+            raise UsageError(f"{address}: parameters={part!r} should be NAME:VALUE, joined by commas")
+    return found
 
 
 def _system(address: Address) -> int | None:

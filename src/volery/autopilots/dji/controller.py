@@ -45,11 +45,12 @@ class Controller:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
+        self._activates_itself = False
         self.reset()
 
     def reset(self) -> None:
         """As it is switched on."""
-        self.activated = False
+        self.activated = self._activates_itself
         self.sdk = False
         self.reference: tuple[float, float, float] | None = None
         """Degrees and metres AMSL about which the local position counts."""
@@ -112,6 +113,10 @@ class Controller:
         """Any key will do."""
         self.activated = True
         return True
+
+    def activate_by_itself(self) -> None:
+        """Its node activates whenever it is switched on."""
+        self._activates_itself = self.activated = True
 
     def obtain(self, wanted: bool) -> bool:
         """Give a program the authority, or take it back. The pilot's switch decides."""

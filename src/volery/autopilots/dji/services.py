@@ -104,7 +104,7 @@ class Services:
     def _new(self) -> tuple[Served, ...]:
         asked, package = self._controller, f"{NEW_NAMES}/srv"
         yes_no = self._yes_no
-        asked.activate()  # that node activates when it starts
+        asked.activate_by_itself()
         return (
             yes_no("flight_task_control", f"{package}/FlightTaskControl", self._flight_task),
             yes_no(
