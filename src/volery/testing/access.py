@@ -13,7 +13,8 @@ from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
 from volery.run.airfield import LINK_DELAY, Airfield
-from volery.run.serving import FREE, SIMULATED, serve, serving
+from volery.run.graph_wire import FREE
+from volery.run.serving import SIMULATED, serve, serving
 from volery.run.simulated import Simulated, link_to
 from volery.testing.tap import Tap
 from volery.vehicles.driver import Driver, drivers
