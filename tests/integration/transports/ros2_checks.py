@@ -1,0 +1,108 @@
+"""Run in an environment with rclpy: all checks of transports, then faults; prints what was found as JSON."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from dataclasses import replace
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import S
+from volery.graph import QoS
+from volery.kernel.wall import WallKernel
+from volery.messages import new
+from volery.testing.checks import demand, raising
+from volery.testing.transports import ROS2, Site, no_fault, run_checks
+from volery.trace.events import Text
+from volery.transports.ros2 import carried, ros2_graph
+
+STRING = "std_msgs/msg/String"
+
+
+def a_type_without_support(site: Site, texts: list[str]) -> None:
+    with raising(UsageError, naming="mavros_msgs") as caught:
+        site.node("node").advertise("state", "mavros_msgs/msg/State")
+    demand("no type support" in caught.text and "colcon" in caught.text, caught.text)
+
+
+def a_type_with_other_fields(site: Site, texts: list[str]) -> None:
+    with raising(UsageError, naming="sensor_msgs/msg/Range") as caught:
+        site.node("node").advertise("range", "sensor_msgs/msg/Range")
+    demand("variance" in caught.text, caught.text)
+
+
+def a_flood(site: Site, texts: list[str]) -> None:
+    speaker, listener = site.node("speaker"), site.node("listener")
+    heard: list[str] = []
+    kept = QoS(depth=10)
+    subscription: Any = listener.subscribe("chat", STRING, lambda one: heard.append(one.data), kept)
+    publisher = speaker.advertise("chat", STRING, kept)
+    site.until(speaker, publisher.subscribers, "they connect")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    block = "x" * 10_000
+    for _ in range(5_000):
+        publisher.publish(new(STRING, data=block))
+    publisher.publish(new(STRING, data="end"))
+    site.until(speaker, lambda: b"end" in subscription._queue[-1].data, "the last has come")
+    demand(len(subscription._queue) <= 10, f"{len(subscription._queue)} messages wait")
+    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    demand(grown < 60, f"memory has grown by {grown:.0f} MB")
+    site.spin_until(listener, lambda: heard[-1:] == ["end"], "the newest are heard")
+
+
+def a_message_that_is_none(site: Site, texts: list[str]) -> None:
+    speaker, listener = site.node("speaker"), site.node("listener")
+    heard: list[Any] = []
+    subscription: Any = listener.subscribe("imu", "sensor_msgs/msg/Imu", heard.append)
+    publisher: Any = speaker.advertise("imu", "sensor_msgs/msg/Imu")
+    site.until(speaker, publisher.subscribers, "they connect")
+    for data in (b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 20):
+        publisher._outlet.send(data)
+    publisher.publish(new("sensor_msgs/msg/Imu"))
+    site.spin_until(listener, lambda: heard, "the good one arrives")
+    demand(subscription.garbled == 2, f"{subscription.garbled} of 2 were found out")
+    told = [text for text in texts if "/imu" in text and "dropped" in text]
+    demand(len(told) == 2, f"told {told}")
+
+
+def a_thousand_topics(site: Site, texts: list[str]) -> None:
+    speaker, listener = site.node("speaker"), site.node("listener")
+    heard: list[str] = []
+    publishers = [speaker.advertise(f"t{number}", STRING) for number in range(500)]
+    for number in range(500):
+        listener.subscribe(f"t{number}", STRING, lambda one: heard.append(one.data))
+    site.until(speaker, lambda: all(one.subscribers() for one in publishers), "all connect", 60 * S)
+    for number, publisher in enumerate(publishers):
+        publisher.publish(new(STRING, data=str(number)))
+    site.spin_until(listener, lambda: len(heard) == 500, "all are heard")
+
+
+FAULTS = (
+    a_type_without_support,
+    a_type_with_other_fields,
+    a_flood,
+    a_message_that_is_none,
+    a_thousand_topics,
+)
+
+
+def main() -> None:
+    texts: list[str] = []
+    kernel = WallKernel(lambda event: texts.append(event.text) if isinstance(event, Text) else None)
+    with kernel.adopt("checks"):
+        graph = ros2_graph(kernel)
+        found = run_checks(graph, replace(ROS2, carries=carried))
+        for body in FAULTS:
+            name = body.__name__.replace("_", "-")
+            with no_fault(name) as faults, Site(graph, f"fault-{name}", ROS2) as site:
+                body(site, texts)
+            found[f"fault-{name}"] = "; ".join(faults)
+        graph.close()
+    found["the-end"] = ", ".join(kernel.close())
+    json.dump(found, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""Real rclpy, Jazzy and Kilted, each in an environment and processes of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from volery.testing.transports import CHECKS
+
+from .conftest import HERE, lacking
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
+
+DISTRIBUTIONS = ("jazzy", "kilted")
+FAULTS = (
+    "fault-a-type-without-support",
+    "fault-a-type-with-other-fields",
+    "fault-a-flood",
+    "fault-a-message-that-is-none",
+    "fault-a-thousand-topics",
+    "the-end",
+)
+_DOMAINS = iter(range(20 + os.getpid() % 180, 230))
+
+
+def python_of(distribution: str) -> str:
+    found = Path(sys.prefix) / f"ros2-{distribution}" / "bin" / "python"
+    if not found.exists():
+        lacking(f"no environment with ROS 2 {distribution} (scripts/ros2-venv {sys.prefix} {distribution})")
+    return str(found)
+
+
+def surroundings(domain: int) -> dict[str, str]:
+    """Loopback, a domain of one's own, and nothing of what another rclpy has left behind."""
+    leaked = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+    kept = {key: value for key, value in os.environ.items() if key not in leaked}
+    return {**kept, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+@cache
+def findings(distribution: str) -> dict[str, str]:
+    """What the checks have found, by their names."""
+    done = subprocess.run(
+        [python_of(distribution), str(HERE / "ros2_checks.py")],
+        env=surroundings(next(_DOMAINS)),
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    found: dict[str, str] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("check", [*CHECKS, *FAULTS])
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_ros2(distribution: str, check: str) -> None:
+    assert findings(distribution)[check] == ""
+
+
+@contextmanager
+def our_node(distribution: str, domain: int) -> Iterator[list[str]]:
+    """Our node in a process of its own; gives the types that it takes."""
+    process = subprocess.Popen(
+        [python_of(distribution), str(HERE / "ros2_ours.py")],
+        env=surroundings(domain),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline() == "ready\n"
+        names = []
+        while not names or names[-1] != "std_msgs/msg/UInt8MultiArray":  # the last of them
+            names.append(process.stdout.readline().strip())
+        yield names
+        process.stdin.write("x")
+        process.stdin.flush()
+        assert process.wait(20) == 0
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("jazzy", "jazzy"), ("kilted", "kilted"), ("jazzy", "kilted")])
+def test_plain_rclpy_exchanges_all_types_with_us(ours: str, theirs: str) -> None:
+    domain = next(_DOMAINS)
+    with our_node(ours, domain) as names:
+        done = subprocess.run(
+            [python_of(theirs), str(HERE / "rclpy_peer.py"), *names],
+            env=surroundings(domain),
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr[-3000:]
+    found: dict[str, Any] = json.loads(done.stdout)
+    assert len(names) > 80
+    assert found["changed"] == []
+    assert found["answer"] == [True, "by volery"]
+    assert found["report"] == ["True by rclpy"]
+    assert found["rate"] == 10
+    assert {"/drone_1/mavros", "/peer"} <= set(found["nodes"])
+    assert found["topics"]["/back/sensor_msgs/msg/Imu"] == ["sensor_msgs/msg/Imu"]
+    assert "/drone_1/arm" in found["served"]
