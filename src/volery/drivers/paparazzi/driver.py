@@ -208,7 +208,7 @@ class Paparazzi:
         return (self._pieces.change(BY_ATTITUDE),)
 
     def altitude_hold(self) -> Sequence[Step]:
-        """ATTITUDE_Z_HOLD, with the sticks held."""
+        """ATTITUDE_RC_CLIMB, with the sticks held."""
         self._setpoints.hold_any()
         return (self._pieces.change(BY_HEIGHT),)
 
