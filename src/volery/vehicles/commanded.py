@@ -50,6 +50,8 @@ Truth = Callable[[], Position]
 
 HEARD_WITHIN_S = 10.0
 RETURN_OF_LINK_S = 30.0
+TOLD_ANEW_S = 2.0
+"""After a link has returned everything that counts has been said again within this time."""
 MEASURED_WITHIN_S = 10.0
 STICKS_FRESH: Ns = S
 """A stick sample that is older is none to begin flying by hand with."""
@@ -203,11 +205,12 @@ class Commanded:
             raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
 
     def _wait_for_link(self) -> None:
-        """If it is lost at this moment, give it time to return."""
-        if self._performer.silent() and not self._performer.wait(
-            lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)
-        ):
+        """If it is lost at this moment, give it time to return, and then to say what it does meanwhile."""
+        if not self._performer.silent():
+            return
+        if not self._performer.wait(lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)):
             raise LinkLost(f"{self.name}: the link did not return; nobody knows whether it has come to rest")
+        self._performer.wait(lambda: False, from_seconds(TOLD_ANEW_S))
 
     def _in_flight(self, asked: str) -> None:
         """It flies, and if it has strayed since the last call, that is told first."""

@@ -44,7 +44,9 @@ class Joystick:
         self.heard_at: Ns = NEVER
         self.valid = False
         self.lost_when_armed = True
-        """Whether they were missing when it was armed: then their absence is no failsafe."""
+        """Whether they were missing when it was armed and have not come since: then their absence is no
+        failsafe.
+        """
         self._rested = Deflection()
         self._moved = False
 
@@ -64,6 +66,7 @@ class Joystick:
         if not self.valid:
             self._rested = given
         self.now, self.heard_at, self.valid = given, now, True
+        self.lost_when_armed = False
         return away
 
     def moved(self, share: float) -> bool:
