@@ -103,8 +103,9 @@ class Performer:
         self._kept = ""
 
     def lose(self) -> None:
-        """Somebody else has it."""
+        """Somebody else has it: nothing is sent to it any more, no set-point and no stick either."""
         self.commanded = self._kept = ""
+        self._driver.stop()
 
     def check_ours(self, asked: str) -> None:
         """Raise ``Overridden`` if it flies in a mode that this program did not command."""
@@ -301,11 +302,13 @@ class _Attempt:
             return ""
         if self._stopped is not None and not self._changed:
             raise self._stopped
+        taken = bool(self._changed) and (self._seen.flying or self._seen.failsafe)
+        if taken:
+            self._owner.lose()
         self._hear_reasons()
         if not self._changed:
             raise self._refused()
-        if self._seen.flying or self._seen.failsafe:
-            self._owner.lose()
+        if taken:
             raise self._taken(self._changed)
         return self._changed
 

@@ -70,8 +70,12 @@ class Dji:
 
     @property
     def handover(self) -> str:
-        """It hovers and takes commands: by position, or without one in ATTITUDE."""
+        """It hovers and takes commands: by position, or without one in ATTITUDE. In ``NAVI_SDK_CTRL``, which
+        no pilot can choose, it obeys a computer already: another node of ours has had it.
+        """
         seen = self.telemetry
+        if seen.mode == SDK:
+            return SDK
         return DisplayMode.ATTITUDE.name if seen.mode == DisplayMode.ATTITUDE.name else WAITS
 
     @property
@@ -243,7 +247,7 @@ class Dji:
             leads_to=(WAITS,),
             armed=True,
         )
-        return (*self._free(), *self._authority(), step)
+        return (*self._free(), *self._authority(), step, self._now("hover", self._stream.stop))
 
     def _aim(self, aim: Point | Moving | ByHand) -> None:
         self._hearing.asked = SDK
