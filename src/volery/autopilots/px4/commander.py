@@ -69,6 +69,10 @@ class Commander:
         self.hold_until: Ns = NEVER
         self.after_hold = 0
         self.station_seen: Ns = NEVER
+        self.ground = 0.0
+        """Down about the estimator's origin of the ground where it was armed."""
+        self.lifted_at: Ns = NEVER
+        """When it left the ground."""
         self.flying = False
         self.took_off = False
         self.landed_at: Ns = NEVER
@@ -77,6 +81,11 @@ class Commander:
         self.last_step: Ns = NEVER
 
     # -- what there is
+
+    @property
+    def above_ground(self) -> float:
+        """Metres above where it was armed: the ground is flat."""
+        return self.ground - self.vehicle.estimate.position[2]
 
     @property
     def ready(self) -> bool:
@@ -203,6 +212,8 @@ class Commander:
         self.joystick.lost_when_armed = not self.joystick.valid
         self.joystick.rest()
         self.took_off = False
+        self.lifted_at = NEVER
+        self.ground = vehicle.estimate.position[2]
         vehicle.arm()
         vehicle.say(INFO, "Armed by external command\t")
         self.log.tell(events.ARMED, events.BY_COMMAND)
@@ -224,7 +235,7 @@ class Commander:
     def _throttle_is_high(self) -> bool:
         if not self.joystick.valid or self.wished not in modes.NEEDS_STICKS:
             return False
-        by_thrust = self.wished in (modes.MANUAL, modes.STABILIZE, modes.ACRO)
+        by_thrust = self.vehicle.dialect.stands and self.wished in (modes.MANUAL, modes.STABILIZE, modes.ACRO)
         return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
 
     def disarm(self, force: bool) -> int:

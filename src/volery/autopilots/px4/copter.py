@@ -75,7 +75,7 @@ MODES = {
             armable=False,
         ),
         Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Descent, armable=False),
-        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.BY_ITSELF, Hold, needs_position=True, armable=False),
+        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.BY_COMPUTER, Hold, needs_position=True, armable=False),
     )
 }
 
@@ -121,7 +121,7 @@ COPTER = Dialect(
     transmitter=(1500,) * 4 + (0,) * 12,
     stands=True,
     spool_time=1 * S,
-    takeoff_slew=0,
+    takeoff_slew=200 * MS,
     resigns_after=1500 * MS,
     on_step=_on_step,
     on_disarmed=boot.nothing,

@@ -18,15 +18,16 @@ from volery.autopilots.simulated.flight import Control, Setpoint
 from volery.autopilots.simulated.manoeuvres.pilot import ByPilot
 from volery.autopilots.simulated.manoeuvres.points import Land, ToPoint
 from volery.autopilots.simulated.mode import Manoeuvre
+from volery.autopilots.simulated.sticks import NEVER
 from volery.autopilots.simulated.vehicle import Vehicle
-from volery.base.frames import Vector, quaternion_to_euler
+from volery.base.frames import Vector, quaternion_to_euler, wrap
 from volery.base.time import Ns, to_seconds
 
 JERK = 60.0
 """Of set-points that are flown as they come [m/s^3]."""
 
 CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
-"""Share of MPC_TKO_SPEED over the time since the motors came up, in MPC_TKO_RAMP_T: as recorded."""
+"""Share of a climb rate over the time since it left the ground, in MPC_TKO_RAMP_T: as recorded."""
 
 JERK_AUTO = 4.0
 """MPC_JERK_AUTO [m/s^3]."""
@@ -49,8 +50,26 @@ SUBSTEP = 0.02
 CRUISE_SHARE = 0.84
 """Of MPC_XY_CRUISE: legs asked for at 5 m/s were flown at 4.0 to 4.2."""
 
+ACCEL_SHARE = 0.67
+"""Of MPC_ACC_HOR: how a leg begins and ends in the recordings."""
+
+ALIGNED, SPEED_ASIDE = 0.35, 0.5
+"""A leg is flown in earnest once the nose is that close to its direction [rad]; before, that fast [m/s]."""
+
 SINK_BLIND = 0.7
 """MPC_LAND_SPEED: how it sinks in POSCTL without sticks [m/s]."""
+
+
+def climb_share(vehicle: Vehicle) -> float:
+    """How much of its climb rate it may use: little just after it has left the ground."""
+    lifted = vehicle.memory.lifted_at
+    if lifted == NEVER:
+        return CLIMB_RAMP[0][1]
+    along = to_seconds(vehicle.kernel.now() - lifted) / max(0.1, vehicle.parameters["MPC_TKO_RAMP_T"])
+    for low, high in pairwise(CLIMB_RAMP):
+        if along <= high[0]:
+            return interpolated(along, low, high)
+    return 1.0
 
 
 class Pursue(Manoeuvre):
@@ -99,7 +118,7 @@ class Pursue(Manoeuvre):
                 yaw=self._aim.yaw if rate is None else None,
                 yaw_rate=rate,
                 speed=tuning.speed,
-                speed_up=tuning.speed_up,
+                speed_up=climb_share(vehicle) * tuning.speed_up,
                 speed_down=tuning.speed_down,
                 accel=2.0 * PUSH,
                 accel_z=tuning.accel_z,
@@ -144,6 +163,8 @@ class Pursue(Manoeuvre):
 
 class Offboard(Manoeuvre):
     """Whatever the stream of set-points says. Attitudes are flown as they are."""
+
+    slow_start = True
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
@@ -199,14 +220,22 @@ class Hold(ToPoint):
             Control.POSITION,
             position=point,
             yaw=self.yaw if vehicle.yaw_target is None else vehicle.yaw_target,
-            speed=CRUISE_SHARE * (self.speed or vehicle.speed or vehicle.parameters["MPC_XY_CRUISE"]),
+            speed=self._cruise(),
             speed_up=tuning.speed_up,
             speed_down=tuning.speed_down,
-            accel=tuning.accel,
+            accel=ACCEL_SHARE * tuning.accel,
             accel_z=tuning.accel_z,
             tilt=tuning.tilt,
             jerk=JERK_AUTO,
         )
+
+    def _cruise(self) -> float:
+        """Speed in the plane; slow until the nose points along the leg."""
+        vehicle = self.vehicle
+        speed = CRUISE_SHARE * (self.speed or vehicle.speed or vehicle.parameters["MPC_XY_CRUISE"])
+        if self.yaw is None or abs(wrap(self.yaw - vehicle.estimate.attitude[2])) < ALIGNED:
+            return speed
+        return min(speed, SPEED_ASIDE)
 
     def near(self, sideways: float, height: float) -> bool:
         """Whether it is that close to the point."""
@@ -225,7 +254,6 @@ class TakeOff(Hold):
     def __init__(self, vehicle: Vehicle, down: float) -> None:
         super().__init__(vehicle)
         self.down = down
-        self._began: Ns | None = None
 
     def enter(self) -> None:
         """From where it stands."""
@@ -238,17 +266,8 @@ class TakeOff(Hold):
 
     def towards(self, point: Vector) -> Setpoint:
         """Slowly at first."""
-        now = self.vehicle.kernel.now()
-        if self._began is None:
-            self._began = now
-        parameters = self.vehicle.parameters
-        along = to_seconds(now - self._began) / max(0.1, parameters["MPC_TKO_RAMP_T"])
-        share = next(
-            interpolated(along, low, high)
-            for low, high in pairwise(CLIMB_RAMP)
-            if along <= high[0] or high is CLIMB_RAMP[-1]
-        )
-        return replace(super().towards(point), speed_up=share * parameters["MPC_TKO_SPEED"])
+        share = climb_share(self.vehicle)
+        return replace(super().towards(point), speed_up=share * self.vehicle.parameters["MPC_TKO_SPEED"])
 
     def arrived(self, passing: bool = False) -> bool:
         """Within NAV_MC_ALT_RAD, or above."""
@@ -269,7 +288,7 @@ class Descent(Land):
 
     def sink(self) -> float:
         """Metres per second down at the present height."""
-        p, height = self.vehicle.parameters, self.vehicle.height
+        p, height = self.vehicle.parameters, self.vehicle.memory.above_ground
         middle = p["MPC_LAND_SPEED"]
         if height > p["MPC_LAND_ALT2"]:
             return interpolated(
@@ -422,6 +441,8 @@ def curve(stick: float, dead: float) -> float:
 class Position(ByPilot):
     """POSCTL: sticks are accelerations against a drag; let go, it brakes and stays."""
 
+    slow_start = True
+
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._velocity = (0.0, 0.0)
@@ -475,10 +496,10 @@ class Position(ByPilot):
                 Control.VELOCITY if self._held is None else Control.POSITION_CLIMB,
                 position=self._held or (0.0, 0.0, 0.0),
                 velocity=(north, east, -climb),
-                climb=climb,
+                climb=min(climb, climb_share(vehicle) * tuning.speed_up),
                 yaw_rate=curve(sticks.yaw, dead) * tuning.pilot_yaw_rate,
                 speed=tuning.speed,
-                speed_up=tuning.speed_up,
+                speed_up=climb_share(vehicle) * tuning.speed_up,
                 speed_down=tuning.speed_down,
                 accel=tuning.accel,
                 accel_z=tuning.accel_z,

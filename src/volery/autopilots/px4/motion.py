@@ -270,7 +270,7 @@ def origin(vehicle: Vehicle) -> Fields | None:
 
 def distance_sensor(vehicle: Vehicle) -> Fields:
     """DISTANCE_SENSOR, looking down: the recorded airframe has one that reaches 100 m."""
-    height = max(0.0, vehicle.height)
+    height = max(0.0, of(vehicle).above_ground)
     return {
         "time_boot_ms": boot_ms(vehicle),
         "max_distance": 10_000,

@@ -27,7 +27,7 @@ from volery.base.time import Ns
 CRITICAL = 2
 """MAV_SEVERITY."""
 
-FORCE, NO_YAW, NO_YAW_RATE = 1 << 9, 1 << 10, 1 << 11
+NO_YAW, NO_YAW_RATE = 1 << 10, 1 << 11
 """Bits of ``type_mask``."""
 
 ATTITUDE_IGNORED, THRUST_IGNORED, YAW_RATE_IGNORED = 1 << 7, 1 << 6, 1 << 2
@@ -120,9 +120,9 @@ def local_target(vehicle: Vehicle, fields: dict[str, Any], log: Log) -> Target |
         log.tell(FRAME_UNSUPPORTED)
         return None
     place = _masked((fields["x"], fields["y"], fields["z"]), mask, 0)
-    target = None if mask & FORCE else _target(fields, ABSENT if frame == BODY_NED else place)
+    target = _target(fields, ABSENT if frame == BODY_NED else place)
     if target is None:
-        vehicle.say(CRITICAL, f"{message} {'force not supported' if mask & FORCE else 'invalid'}\t")
+        vehicle.say(CRITICAL, f"{message} invalid\t")
         log.tell(SETPOINT_INVALID)
         return None
     if frame == BODY_NED:
@@ -142,9 +142,9 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: Log) -> Target 
         return None
     altitude = fields["alt"] if isfinite(fields["alt"]) else 0.0
     place = vehicle.point(frame, fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, altitude)
-    target = None if mask & FORCE else _target(fields, _masked(place, mask, 0))
+    target = _target(fields, _masked(place, mask, 0))
     if target is None:
-        vehicle.say(CRITICAL, f"{message} {'force not supported' if mask & FORCE else 'invalid'}\t")
+        vehicle.say(CRITICAL, f"{message} invalid\t")
         log.tell(SETPOINT_INVALID)
     return target
 

@@ -40,7 +40,7 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     """HEARTBEAT; *kind* is a MAV_TYPE."""
     commander, mode = of(vehicle), vehicle.mode
     base = mode.base_mode
-    if mode.number == modes.OFFBOARD and not vehicle.armed and not commander.stream_alive():
+    if mode.number == modes.OFFBOARD and commander.stream.target is None:
         base = modes.CUSTOM
     state = ACTIVE if vehicle.armed else STANDBY
     if vehicle.armed and commander.failsafe:

@@ -8,7 +8,7 @@ from volery.autopilots.px4 import events, modes
 from volery.autopilots.px4.commander import CRITICAL, INFO, Commander, of
 from volery.autopilots.simulated.sticks import NEVER
 from volery.autopilots.simulated.vehicle import Vehicle
-from volery.base.time import Ns, from_seconds, to_seconds
+from volery.base.time import MS, Ns, from_seconds, to_seconds
 
 WARNING = 4
 """MAV_SEVERITY."""
@@ -41,6 +41,9 @@ OUTRANKS = {
 }
 """A failsafe replaces only a lesser one."""
 
+NOTICED_LATER = 145 * MS
+"""Sticks silent for COM_RC_LOSS_T = 0.5 s were missed 0.63 to 0.65 s after the last sample."""
+
 RECOVERY = 0.25
 """Seconds of Hold that come back for each second without a failsafe, as recorded."""
 
@@ -65,7 +68,8 @@ def on_step(vehicle: Vehicle) -> None:
 
 def _notice_silence(commander: Commander, now: Ns) -> None:
     vehicle, sticks = commander.vehicle, commander.joystick
-    if sticks.valid and now - sticks.heard_at > vehicle.seconds_parameter("COM_RC_LOSS_T"):
+    patience = vehicle.seconds_parameter("COM_RC_LOSS_T") + NOTICED_LATER
+    if sticks.valid and now - sticks.heard_at > patience:
         sticks.valid = False
         vehicle.sticks.release()
         commander.log.tell(events.STICKS_LOST)
@@ -80,9 +84,12 @@ def _notice_ground(commander: Commander, now: Ns) -> None:
         return
     flying = not vehicle.estimate.landed and not vehicle.landed
     if flying and not commander.flying:
-        commander.took_off = True
+        commander.took_off, commander.lifted_at = True, now
         vehicle.say(INFO, "Takeoff detected\t")
         commander.log.tell(events.TAKEOFF_DETECTED)
+    elif commander.flying and not vehicle.armed and vehicle.estimate.landed:
+        flying = False  # it fell: nothing is said
+        vehicle.landed = True
     elif commander.flying and vehicle.landed:
         flying = False
         commander.landed_at = now
