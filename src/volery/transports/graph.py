@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from time import time_ns
@@ -17,10 +17,11 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
 from volery.trace.events import Text
+from volery.transports import clock
 from volery.transports.abroad import abroad
 from volery.transports.node import TransportNode
 from volery.transports.topics import WARNING
-from volery.transports.wire import Library
+from volery.transports.wire import Library, Wire
 
 if TYPE_CHECKING:
 
@@ -116,6 +117,32 @@ class TransportGraph:
     def _leave(self, node: TransportNode) -> None:
         del self._nodes[node.name]
         node.part()
+
+    def tell_clock(self, name: str = "clock") -> None:
+        """Publish ``/clock`` from a node *name*, for others to use as their time.
+
+        On ROS 1 ``/use_sim_time`` is set, which nodes read when they start; on ROS 2 each node is told by
+        its own parameter ``use_sim_time``.
+        """
+        self._keep_time(name, clock.tell)
+
+    def follow_clock(self, name: str = "clock_listener") -> None:
+        """Let the kernel's time be what ``/clock`` says, heard by a node *name*.
+
+        Until it says something, time stands still. ``UsageError`` for a kernel that keeps its own time.
+        """
+        self._keep_time(name, clock.follow)
+
+    def _keep_time(self, name: str, way: Callable[[Context, Wire], Callable[[], None]]) -> None:
+        node = self.node(name)
+        telling = way is clock.tell
+
+        def begin() -> Callable[[], None]:
+            if telling:
+                self._library.announce_clock()
+            return way(self._context, node.wire)
+
+        node.keep(abroad(self.kernel, "/clock", begin))
 
     def warn(self, text: str) -> None:
         """Record what the client library says went wrong. From any thread."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
@@ -48,6 +48,10 @@ class TransportMember(Member):
             raise UsageError(f"node {self.name} has left the graph{f': {self.why}' if self.why else ''}")
 
 
+class _Ends(NamedTuple):
+    close: Callable[[], None]
+
+
 class TransportNode(LocalNode):
     """See ``volery.graph.node.Node``. Made by a transport's graph."""
 
@@ -67,6 +71,15 @@ class TransportNode(LocalNode):
         """It is on the graph."""
         self._wire = wire
         self._context.changed.notify()
+
+    @property
+    def wire(self) -> Wire:
+        """Its side of the client library."""
+        return self._wire
+
+    def keep(self, close: Callable[[], None]) -> None:
+        """Something more that ends with it."""
+        self._keep(_Ends(close))
 
     def thrown_out(self, why: str) -> None:
         """It has lost its place on the graph. House code."""

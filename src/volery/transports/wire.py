@@ -127,5 +127,8 @@ class Library(Protocol):
     def services(self) -> list[ServiceState]:
         """What services there are, by name."""
 
+    def announce_clock(self) -> None:
+        """Nodes that start from now on are to take their time from ``/clock``, where that can be said."""
+
     def close(self) -> None:
         """Nothing of it runs any longer."""

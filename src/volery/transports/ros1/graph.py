@@ -118,6 +118,10 @@ class Ros1:
         _, (_, _, services) = self._state()
         return [ServiceState(name, "", nodes[0] if nodes else "") for name, nodes in sorted(services)]
 
+    def announce_clock(self) -> None:
+        """By the parameter that every node reads when it starts."""
+        self._master.value("setParam", "/use_sim_time", True)
+
     def close(self) -> None:
         """Stop watching, and the roscore if it is ours."""
         self._over.set()

@@ -216,6 +216,9 @@ class Ros2:
                     servers[service] = (kinds[0], names.join(space, name))
         return [ServiceState(name, kind, server) for name, (kind, server) in sorted(servers.items())]
 
+    def announce_clock(self) -> None:
+        """There is no word for it: each node has a parameter of its own."""
+
     def close(self) -> None:
         """Nothing is spun any longer."""
         self._over.set()
