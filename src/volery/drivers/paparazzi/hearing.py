@@ -156,8 +156,9 @@ class Hearing:
         self._arming = word
 
     def _reference(self, fields: Fields) -> None:
-        """All zero: no origin has been set."""
-        if not (fields["lat0"] or fields["lon0"]):
+        """All zero: no origin has been set. Off the globe: garbled on the way."""
+        latitude, longitude = fields["lat0"], fields["lon0"]
+        if not (latitude or longitude) or abs(latitude) > 90 * 10**7 or abs(longitude) > 180 * 10**7:
             return
         self.origin = Origin(fields)
         self._origin_is_set = self.block[1] >= 0 and self.block[1] not in self._preparing
