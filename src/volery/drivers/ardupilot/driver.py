@@ -19,7 +19,7 @@ from volery.drivers.ardupilot.items import items_of
 from volery.drivers.ardupilot.modes import GUIDED
 from volery.drivers.ardupilot.setpoints import VELOCITY_PERIOD, Setpoints
 from volery.drivers.ardupilot.silence import if_silent
-from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, ROVER_NEAR_M, STANDING_M_S, at, distance, standing
+from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, STANDING_M_S, at, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.sequences import (
@@ -140,18 +140,7 @@ class ArduPilot(Sequences):
         if self.telemetry.kind == DRONE_KIND:
             return self._until_disarmed("RTL", "return home and land", within)
 
-        def home(seen: Telemetry) -> bool:
-            return seen.home is not None and distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
-
-        come = Step(
-            ask="return home",
-            send=nothing,
-            done=lambda seen: home(seen) and standing(seen),
-            within=within,
-            mode="RTL",
-            leads_to=("HOLD",),
-            armed=True,
-        )
+        come = self._comes_home("RTL", "HOLD", within)
         return (*self._change("RTL"), at_once("let go of the sticks", self._setpoints.release), come)
 
     def land(self, within: Ns) -> Sequence[Step]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
@@ -193,9 +194,10 @@ class Conversation:
     def _hear_parameter(self, fields: Mapping[str, Any]) -> bool:
         """Somebody else may be listing all of them."""
         name: str = fields["param_id"]
-        if name not in self._wanted():
+        value = value_of(fields, self.firmware.bytewise)
+        if name not in self._wanted() or not isfinite(value):
             return False
-        self._read[name] = value_of(fields, self.firmware.bytewise)
+        self._read[name] = value
         self._inquiries.answered(name)
         return True
 

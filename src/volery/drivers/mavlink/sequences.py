@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from volery.base.errors import CapabilityError, LinkError, UsageError
 from volery.base.time import MINUTE, Ns, S
+from volery.drivers.arrival import ROVER_NEAR_M, distance, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Carrier, Item
 from volery.kernel.api import Action
@@ -205,6 +206,22 @@ class Sequences:
             enters=mode,
         )
         return (step,)
+
+    def _comes_home(self, mode: str, resting: str, within: Ns) -> Step:
+        """A rover in *mode*, until it stands near home; there it may go over to *resting*."""
+
+        def home(seen: Telemetry) -> bool:
+            return seen.home is not None and distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
+
+        return Step(
+            ask="return home",
+            send=nothing,
+            done=lambda seen: home(seen) and standing(seen),
+            within=within,
+            mode=mode,
+            leads_to=(resting,),
+            armed=True,
+        )
 
     def _at_speed(self, speed: float, mode: str) -> Sequence[Step]:
         step = Step(

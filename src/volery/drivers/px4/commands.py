@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import nan
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.mavlink.commands import Carrier
+from volery.drivers.mavlink.items import GLOBAL, INT_FRAMES
 from volery.links.mavlink import constant
 from volery.vehicles.driver import Sticks
 from volery.vehicles.telemetry import Velocity
@@ -22,10 +23,24 @@ class Setpoint(NamedTuple):
     heading: float = nan
 
 
-CHANGES_MODE = float(constant("MAV_DO_REPOSITION_FLAGS_CHANGE_MODE"))
+_CHANGES_MODE = float(constant("MAV_DO_REPOSITION_FLAGS_CHANGE_MODE"))
 """In DO_REPOSITION: enter AUTO.LOITER for it. Without this PX4 refuses the command, and flies there."""
-NO_SPEED = -1.0
+_NO_SPEED = -1.0
 """In DO_REPOSITION: as fast as it would anyhow."""
+
+
+def reposition_fields(goal: Position) -> dict[str, Any]:
+    """DO_REPOSITION as the fields of a COMMAND_INT; the altitude of *goal* is AMSL."""
+    return {
+        "frame": INT_FRAMES[GLOBAL],
+        "command": constant("MAV_CMD_DO_REPOSITION"),
+        "param1": _NO_SPEED,
+        "param2": _CHANGES_MODE,
+        "param4": nan,
+        "x": round(goal.latitude * 1e7),
+        "y": round(goal.longitude * 1e7),
+        "z": goal.altitude.metres,
+    }
 
 
 def stick_axes(sticks: Sticks, kind: str) -> dict[str, int]:

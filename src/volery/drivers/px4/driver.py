@@ -25,7 +25,7 @@ from math import isfinite
 from volery.base.errors import UsageError, VehicleError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import MINUTE, MS, Ns, S
-from volery.drivers.arrival import DRONE_KIND, ROVER_KIND, ROVER_NEAR_M, at, distance, standing
+from volery.drivers.arrival import DRONE_KIND, ROVER_KIND, at, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.sequences import (
@@ -246,18 +246,7 @@ class PX4(Sequences):
         if self.telemetry.kind == DRONE_KIND:
             return self._until_disarmed(modes.RTL, "return home and land", within)
 
-        def home(seen: Telemetry) -> bool:
-            return seen.home is not None and distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
-
-        come = Step(
-            ask="return home",
-            send=nothing,
-            done=lambda seen: home(seen) and standing(seen),
-            within=within,
-            mode=modes.RTL,
-            leads_to=(HOLD,),
-            armed=True,
-        )
+        come = self._comes_home(modes.RTL, HOLD, within)
         return (*self._let_go(), *self._change(modes.RTL), come)
 
     def land(self, within: Ns) -> Sequence[Step]:

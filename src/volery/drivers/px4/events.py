@@ -132,6 +132,7 @@ class ArmingChecks:
     """Those that fail now, put together from reports."""
 
     def __init__(self) -> None:
+        self.reported = False
         self._failing: tuple[Event, ...] = ()
         self._report: list[Event] | None = None
 
@@ -143,6 +144,7 @@ class ArmingChecks:
         if self._report is None:
             return False
         if event.id == REPORT_ENDS:
+            self.reported = True
             self._failing = tuple(self._report)
             self._report = None
         elif event.id in SAID:

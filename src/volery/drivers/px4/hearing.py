@@ -56,5 +56,7 @@ class Hearing(hearing.Hearing):
 
     def say_failing_checks(self) -> None:
         """It refused to arm: PX4 says why in its last report, which may have come long before."""
+        if not self._checks.reported:
+            self.say(WARNING, "Arming check: not all are done yet")
         for reason in self._checks.reasons(self._seen.mode):
             self.say(WARNING, f"Arming check: {reason}")

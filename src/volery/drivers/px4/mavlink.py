@@ -10,9 +10,8 @@ from volery.base.position import Position
 from volery.base.time import Ns
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.conversation import Conversation, Firmware
-from volery.drivers.mavlink.items import GLOBAL, INT_FRAMES
 from volery.drivers.mavlink.vocabulary import VELOCITY_AND_YAW, VELOCITY_AND_YAW_RATE
-from volery.drivers.px4.commands import CHANGES_MODE, NO_SPEED, Setpoint, stick_axes
+from volery.drivers.px4.commands import Setpoint, reposition_fields, stick_axes
 from volery.drivers.px4.hearing import Hearing
 from volery.drivers.px4.modes import MODES
 from volery.drivers.px4.silence import WANTED
@@ -70,17 +69,7 @@ class MavlinkCommands(Conversation):
 
     def reposition(self, goal: Position) -> None:
         """By DO_REPOSITION."""
-        self._send_to(
-            "COMMAND_INT",
-            frame=INT_FRAMES[GLOBAL],
-            command=constant("MAV_CMD_DO_REPOSITION"),
-            param1=NO_SPEED,
-            param2=CHANGES_MODE,
-            param4=nan,
-            x=round(goal.latitude * 1e7),
-            y=round(goal.longitude * 1e7),
-            z=goal.altitude.metres,
-        )
+        self._send_to("COMMAND_INT", **reposition_fields(goal))
 
     def setpoint(self, setpoint: Setpoint) -> None:
         """By SET_POSITION_TARGET_LOCAL_NED in frame 1: PX4 takes only that and 8."""

@@ -13,14 +13,12 @@ from volery.base.frames import heading_to_yaw
 from volery.base.geoid import Geoid
 from volery.base.position import Position
 from volery.base.time import Ns
-from volery.drivers.mavlink.items import GLOBAL, INT_FRAMES
 from volery.drivers.mavlink.mavros import Behind, MavrosCarrier, clockwise
 from volery.drivers.mavlink.vocabulary import VELOCITY_AND_YAW, VELOCITY_AND_YAW_RATE
-from volery.drivers.px4.commands import CHANGES_MODE, NO_SPEED, Setpoint, stick_axes
+from volery.drivers.px4.commands import Setpoint, reposition_fields, stick_axes
 from volery.drivers.px4.modes import HOLD
 from volery.graph import EmbeddedNode
 from volery.kernel.api import Kernel
-from volery.links.mavlink import constant
 from volery.messages import new, request
 from volery.vehicles.driver import Sticks
 
@@ -51,17 +49,7 @@ class MavrosCommands(MavrosCarrier):
 
     def reposition(self, goal: Position) -> None:
         """``cmd/command_int`` with DO_REPOSITION, which is not answered."""
-        asked = request(
-            "mavros_msgs/srv/CommandInt",
-            frame=INT_FRAMES[GLOBAL],
-            command=constant("MAV_CMD_DO_REPOSITION"),
-            param1=NO_SPEED,
-            param2=CHANGES_MODE,
-            param4=nan,
-            x=round(goal.latitude * 1e7),
-            y=round(goal.longitude * 1e7),
-            z=goal.altitude.metres,
-        )
+        asked = request("mavros_msgs/srv/CommandInt", **reposition_fields(goal))
         self._call(self._whole, asked)
 
     def setpoint(self, setpoint: Setpoint) -> None:
