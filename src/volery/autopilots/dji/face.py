@@ -14,15 +14,15 @@ from volery.autopilots.dji.services import Services
 from volery.autopilots.dji.telemetry import FAST, REFERENCE, SLOW, USUAL, Topic, topics
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.errors import UsageError
-from volery.base.time import Ns
+from volery.base.time import MS, Ns
 from volery.graph import Node, Publisher, RosGraph, Work
 from volery.kernel.api import Action, Handle
 from volery.kernel.task import Place
 from volery.messages.dji import NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
 from volery.trace.events import Text
 
-LOOK_EVERY = 10
-"""Rounds of a package of data between two looks at who listens."""
+LOOK_EVERY: Ns = 200 * MS
+"""How often it is looked who listens."""
 
 JOY = "sensor_msgs/msg/Joy"
 
@@ -30,15 +30,16 @@ JOY = "sensor_msgs/msg/Joy"
 class _Package:
     """Topics of one period."""
 
-    def __init__(self, face: DjiFace, listed: list[tuple[Topic, Publisher]]) -> None:
+    def __init__(self, face: DjiFace, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
         self._face = face
+        self._looks_every = max(1, LOOK_EVERY // period)
         self._listed = listed
         self._wanted: list[tuple[Topic, Publisher]] = []
         self._round = 0
 
     def publish(self) -> None:
         """What is wanted, once. House code."""
-        if self._round % LOOK_EVERY == 0:
+        if self._round % self._looks_every == 0:
             self._wanted = [one for one in self._listed if one[1].subscribers()]
         self._round += 1
         if not self._wanted or not self._face.speaks:
@@ -108,7 +109,7 @@ class DjiFace:
         for topic in topics(package):
             publisher = node.advertise(f"{package}/{topic.name}", topic.type, topic.qos)
             listed[topic.period].append((topic, publisher))
-        self._packages = {period: _Package(self, some) for period, some in listed.items()}
+        self._packages = {period: _Package(self, period, some) for period, some in listed.items()}
         self._reference = node.advertise(f"{package}/{REFERENCE.name}", REFERENCE.type, REFERENCE.qos)
 
     def _publish_reference(self) -> None:

@@ -1,0 +1,499 @@
+"""The simulated DJI node: topics, authority, tasks, set-points, missions, what it does by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, hypot, pi, radians
+from typing import Any
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.kernel.task import Place
+from volery.messages import new
+
+Make = Callable[..., Any]
+
+GO_HOME, TAKE_OFF, LAND = 1, 4, 6
+
+
+def test_it_publishes_at_the_rates_of_its_packages_what_somebody_hears(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.hear("attitude", "gps_position", "battery_state", "imu")
+        yard.wait(2.0)
+        before = dict(yard.counts)
+        yard.wait(1.0)
+        assert yard.counts["attitude"] - before["attitude"] == 100
+        assert yard.counts["gps_position"] - before["gps_position"] == 50
+        assert yard.counts["battery_state"] - before["battery_state"] == 5
+        fix = yard.seen["gps_position"]
+        assert (fix.latitude, fix.longitude) == pytest.approx((46.0, -103.0), abs=1e-4)
+        assert fix.altitude == pytest.approx(900.0, abs=3.0)
+        assert yard.seen["imu"].linear_acceleration.z == pytest.approx(9.8, abs=0.5)
+        assert 15_000.0 < yard.seen["battery_state"].voltage < 60_000.0  # millivolts
+        assert yard.seen["battery_state"].percentage == 100.0
+
+    yard.run(body)
+
+
+def test_a_cold_one_boots_before_it_speaks_and_gains_its_position_later(apron: Make) -> None:
+    yard = apron(warm=False)
+
+    def body() -> None:
+        yard.hear("flight_status", "gps_health", "gps_position")
+        yard.wait(2.5)
+        assert "flight_status" not in yard.seen
+        yard.wait(2.0)
+        assert (yard.seen["flight_status"].data, yard.seen["gps_health"].data) == (0, 0)
+        assert yard.seen["gps_position"].status.status == -1
+        assert not yard.call("set_local_pos_ref", "SetLocalPosRef").result
+        yard.activate()
+        assert not yard.task(TAKE_OFF)
+        yard.wait(25.0)
+        assert yard.seen["gps_health"].data > 3
+        assert yard.call("set_local_pos_ref", "SetLocalPosRef").result
+
+    yard.run(body)
+
+
+def test_the_local_position_counts_from_the_reference_once_it_is_set(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.hear("local_position", "local_frame_ref")
+        yard.wait(1.0)
+        assert "local_position" not in yard.seen
+        yard.fly()
+        assert yard.call("set_local_pos_ref", "SetLocalPosRef").result
+        yard.keep_sending(6.0, "ENUvelocity_yawrate", 2.0, 1.0, 0.0, 0.0)
+        point = yard.seen["local_position"].point
+        assert (point.x, point.y) == pytest.approx((yard.place[0], yard.place[1]), abs=0.6)
+        assert yard.seen["local_frame_ref"].latitude == pytest.approx(46.0, abs=1e-5)
+
+    yard.run(body)
+
+
+def test_tasks_need_no_authority_motors_and_setpoints_do(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.wait(0.5)
+        assert not yard.authority()  # not activated
+        yard.activate()
+        assert not yard.motors(True)
+        assert yard.task(TAKE_OFF)
+        yard.until(lambda: yard.mode == 6 and yard.status == 2)
+        yard.keep_sending(2.0, "ENUvelocity_yawrate", 3.0, 0.0, 0.0, 0.0)
+        assert hypot(yard.place[0], yard.place[1]) < 0.5
+        assert yard.authority()
+        yard.keep_sending(2.0, "ENUvelocity_yawrate", 3.0, 0.0, 0.0, 0.0)
+        assert yard.place[0] > 2.0
+        assert yard.authority(False)
+        yard.wait(0.2)
+        assert yard.mode == 6
+
+    yard.run(body)
+
+
+def test_a_takeoff_starts_the_motors_and_goes_to_its_fixed_height(apron: Make) -> None:
+    yard = apron()
+    modes: list[int] = []
+
+    def body() -> None:
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.status == 0
+        assert yard.task(TAKE_OFF)
+        while yard.mode != 6:
+            if not modes or modes[-1] != yard.mode:
+                modes.append(yard.mode)
+            yard.wait(0.1)
+        assert modes == [41, 11]  # ENGINE_START, AUTO_TAKEOFF
+        yard.wait(3.0)
+        assert yard.place[2] == pytest.approx(1.2, abs=0.3)
+        assert not yard.task(TAKE_OFF)  # it flies already
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(("aircraft", "expected"), [(0, [0, 1, 2, 0]), (2, [1, 2, 3, 4, 5, 1])])
+def test_flight_status_has_the_numbers_of_the_aircraft(
+    apron: Make, aircraft: int, expected: list[int]
+) -> None:
+    """A3: stopped, on the ground, in the air. M100: on the ground, taking off, in the air, landing, landed."""
+    yard = apron(parameters={"AIRCRAFT": aircraft})
+    seen: list[int] = []
+
+    def note() -> None:
+        if not seen or seen[-1] != yard.status:
+            seen.append(yard.status)
+
+    def body() -> None:
+        yard.hear("display_mode", "flight_status")
+        yard.wait(0.5)
+        yard.activate()
+        note()
+        assert yard.task(TAKE_OFF)
+        for _ in range(100):
+            yard.wait(0.1)
+            note()
+        assert yard.task(LAND)
+        for _ in range(150):
+            yard.wait(0.1)
+            note()
+
+    yard.run(body)
+    if aircraft == 2:
+        assert seen == expected
+        assert "display_mode" not in yard.seen  # an M100 has none
+        assert yard.counts["flight_status"] > 100
+    else:
+        assert [*dict.fromkeys(seen[:3]), seen[-1]] == expected
+
+
+def test_a_position_is_a_remaining_offset_and_an_absolute_height(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        goal = (8.0, -6.0)
+        for _ in range(50 * 14):
+            east, north, _ = yard.place
+            yard.send("ENUposition_yaw", goal[0] - east, goal[1] - north, 5.0, pi / 2.0)
+            yard.wait(0.02)
+        assert yard.mode == 17
+        assert yard.place == pytest.approx((8.0, -6.0, 5.0), abs=0.6)
+        assert abs(yard.flight.look().attitude[2]) < 0.1  # north
+
+    yard.run(body)
+
+
+def test_the_same_offset_sent_again_and_again_is_never_reached(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(8.0, "ENUposition_yaw", 3.0, 0.0, 1.2, 0.0)
+        assert yard.place[0] > 8.0
+
+    yard.run(body)
+
+
+def test_setpoints_that_are_not_fed_end_in_a_hover(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(3.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
+        assert yard.mode == 17
+        yard.wait(0.8)
+        assert yard.mode == 6
+        yard.wait(5.0)
+        assert hypot(*yard.flight.truth().velocity[:2]) < 0.4
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(
+    ("flag", "axes", "moves"),
+    [
+        (0x49, (0.0, 2.0, 0.0, 0.0), (0.0, 1.0)),  # velocity over ground: north
+        (0x4B, (2.0, 0.0, 0.0, 0.0), (0.0, 1.0)),  # velocity of the body, whose nose is north: forward
+        (0x4B, (0.0, 2.0, 0.0, 0.0), (-1.0, 0.0)),  # left
+        (0x0B, (radians(10.0), 0.0, 0.0, 0.0), (1.0, 0.0)),  # roll: right
+        (0x0B, (0.0, radians(10.0), 0.0, 0.0), (0.0, 1.0)),  # pitch of FLU: nose down
+        (0x1B, (0.0, radians(10.0), 1.2, 0.0), (0.0, 1.0)),  # the same, at a height
+    ],
+)
+def test_the_flag_says_how_the_numbers_are_meant(
+    apron: Make, flag: int, axes: tuple[float, ...], moves: tuple[float, float]
+) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        start = yard.place
+        yard.keep_sending(3.0, "generic", *axes, float(flag))
+        east, north = yard.place[0] - start[0], yard.place[1] - start[1]
+        away = hypot(east, north)
+        assert away > 2.0
+        assert (east / away, north / away) == pytest.approx(moves, abs=0.25)
+        assert yard.place[2] == pytest.approx(start[2], abs=0.6)
+
+    yard.run(body)
+
+
+def test_half_thrust_about_carries_it(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(3.0, "ENUvelocity_yawrate", 0.0, 0.0, 2.0, 0.0)
+        start = yard.place[2]
+        yard.keep_sending(1.5, "generic", 0.0, 0.0, 50.0, 0.0, float(0x2B))
+        assert abs(yard.place[2] - start) < 3.0
+        yard.keep_sending(1.0, "generic", 0.0, 0.0, 80.0, 0.0, float(0x2B))
+        assert yard.flight.truth().velocity[2] > 1.0
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(
+    ("topic", "axes"),
+    [
+        ("ENUposition_yaw", ()),
+        ("ENUposition_yaw", (1.0, 2.0)),
+        ("ENUvelocity_yawrate", (float("nan"), 0.0, 0.0, 0.0)),
+        ("ENUvelocity_yawrate", (0.0, float("inf"), 0.0, 0.0)),
+        ("generic", (1.0, 1.0, 1.0, 1.0)),
+        ("generic", (1.0, 1.0, 1.0, 1.0, 300.0)),
+        ("generic", (1.0, 1.0, 1.0, 1.0, float("nan"))),
+        ("generic", (1.0, 1.0, 50.0, 1.0, float(0xE1))),
+    ],
+)
+def test_setpoints_that_make_no_sense_have_no_effect(
+    apron: Make, topic: str, axes: tuple[float, ...]
+) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(0.5, topic, *axes)
+        assert yard.mode == 6
+
+    yard.run(body)
+
+
+def test_the_mode_switch_takes_the_authority_and_gives_none(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.hear("rc")
+        yard.fly()
+        yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
+        before = yard.seen["rc"].axes[4]
+        yard.autopilot.vehicle.sticks.transmitter[4] = 1000
+        yard.wait(0.3)
+        assert yard.seen["rc"].axes[4] != before
+        yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
+        assert yard.mode == 6
+        assert not yard.authority()
+        yard.autopilot.vehicle.sticks.transmitter[4] = 2000
+        yard.wait(0.3)
+        yard.keep_sending(0.5, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
+        assert yard.mode == 6  # it must be asked for again
+        assert yard.authority()
+
+    yard.run(body)
+
+
+def test_going_home_climbs_comes_back_and_stops_the_motors(apron: Make) -> None:
+    yard = apron()
+    highest = 0.0
+
+    def body() -> None:
+        nonlocal highest
+        yard.fly()
+        yard.keep_sending(8.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
+        assert yard.place[0] > 15.0
+        assert yard.task(GO_HOME)
+        assert yard.mode == 15
+        for _ in range(1500):
+            yard.wait(0.1)
+            highest = max(highest, yard.place[2])
+            if yard.status == 0:
+                break
+        assert yard.status == 0
+        assert highest == pytest.approx(30.0, abs=1.0)
+        assert hypot(yard.place[0], yard.place[1]) < 1.0
+
+    yard.run(body)
+
+
+def test_near_home_going_home_is_landing_and_a_setpoint_ends_it(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(3.0, "ENUvelocity_yawrate", 0.0, 0.0, 2.0, 0.0)
+        assert yard.task(GO_HOME)
+        assert yard.mode == 12
+        yard.keep_sending(0.5, "ENUvelocity_yawrate", 0.0, 0.0, 0.0, 0.0)
+        assert yard.mode == 17
+
+    yard.run(body)
+
+
+def test_a_low_battery_sends_it_home_and_a_setpoint_does_not_stop_it(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.keep_sending(6.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
+        yard.flight.drain_battery(0.25)
+        yard.until(lambda: yard.mode == 15, within=3.0)
+        yard.keep_sending(0.5, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
+        assert yard.mode == 15
+        yard.flight.drain_battery(0.08)
+        yard.until(lambda: yard.mode == 33, within=3.0)
+        yard.until(lambda: yard.status == 0)
+
+    yard.run(body)
+    assert "battery critical" in yard.texts()
+
+
+def test_motors_that_turn_for_nothing_stop(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.authority()
+        assert yard.motors(True)
+        assert yard.status == 1
+        yard.wait(9.0)
+        assert yard.status == 1
+        yard.wait(2.0)
+        assert yard.status == 0
+
+    yard.run(body)
+
+
+def test_without_satellites_it_holds_its_attitude_only(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.fly()
+        yard.flight.block_gps()
+        yard.until(lambda: yard.mode == 1, within=15.0)
+        yard.keep_sending(1.0, "ENUvelocity_yawrate", 3.0, 0.0, 0.0, 0.0)
+        assert abs(yard.flight.look().attitude[0]) < 0.1
+        assert not yard.task(GO_HOME)
+        assert yard.task(LAND)
+        yard.until(lambda: yard.status == 0)
+
+    yard.run(body)
+
+
+def _mission(package: str, *places: tuple[float, float, float], finish: int = 0, **fields: Any) -> Any:
+    task = new(f"{package}/MissionWaypointTask", velocity_range=10.0, idle_velocity=5.0, **fields)
+    task.action_on_finish, task.mission_exec_times = finish, 1
+    for east, north, up in places:
+        degrees_east = east / (111_195.0 * cos(radians(46.0)))
+        task.mission_waypoint.append(
+            new(
+                f"{package}/MissionWaypoint",
+                latitude=46.0 + north / 111_195.0,
+                longitude=-103.0 + degrees_east,
+                altitude=up,
+            )
+        )
+    return task
+
+
+def test_a_mission_is_flown_from_point_to_point_and_what_follows_it(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        task = _mission("dji_sdk", (0.0, 12.0, 6.0), (15.0, 12.0, 6.0), finish=2)
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task).result
+        assert yard.call("mission_status", "MissionStatus").waypoint_mission_count == 1
+        assert not yard.call("mission_waypoint_action", "MissionWpAction", action=0).result  # on the ground
+        yard.fly()
+        assert yard.call("mission_waypoint_action", "MissionWpAction", action=0).result
+        yard.wait(2.0)
+        assert yard.mode == 14
+        assert yard.call("mission_waypoint_action", "MissionWpAction", action=2).result  # pause
+        assert yard.mode == 6
+        assert yard.call("mission_waypoint_action", "MissionWpAction", action=3).result  # resume
+        yard.until(lambda: hypot(yard.place[0], yard.place[1] - 12.0) < 1.0)
+        assert yard.call("mission_waypoint_setSpeed", "MissionWpSetSpeed", speed=3.0).result
+        assert yard.call("mission_waypoint_getSpeed", "MissionWpGetSpeed").speed == 3.0
+        assert not yard.call("mission_waypoint_setSpeed", "MissionWpSetSpeed", speed=20.0).result
+        yard.until(lambda: yard.mode == 12)
+        assert (yard.place[0], yard.place[1]) == pytest.approx((15.0, 12.0), abs=1.0)
+        yard.until(lambda: yard.status == 0)
+        info = yard.call("mission_waypoint_getInfo", "MissionWpGetInfo").waypoint_task
+        assert len(info.mission_waypoint) == 2
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(
+    ("places", "changes", "why"),
+    [
+        (1, {}, "waypoints"),
+        (2, {"velocity_range": 20.0}, "speeds"),
+        (2, {"idle_velocity": 1.0}, "speeds"),
+        (2, {"idle_velocity": float("nan")}, "speeds"),
+        (100, {}, "waypoints"),
+    ],
+)
+def test_missions_that_make_no_sense_are_refused(
+    apron: Make, places: int, changes: dict[str, float], why: str
+) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.wait(0.5)
+        task = _mission("dji_sdk", *[(float(number), 0.0, 5.0) for number in range(places)])
+        for name, value in changes.items():
+            setattr(task, name, value)
+        response = yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task)
+        assert (response.result, response.ack_data) == (False, 1)
+
+    yard.run(body)
+    assert any(why in text for text in yard.texts())
+
+
+def test_the_vehicle_node_of_4_1_has_its_services_beside_its_topics(apron: Make) -> None:
+    yard = apron("dji_osdk_ros")
+
+    def task(number: int) -> bool:
+        return bool(yard.call("/flight_task_control", "FlightTaskControl", task=number).result)
+
+    def steer(**command: float) -> None:
+        for _ in range(100):
+            yard.call("/joystick_action", "JoystickAction", joystickCommand=command)
+            yard.wait(0.02)
+
+    def body() -> None:
+        yard.hear("flight_status", "gps_position")
+        yard.wait(0.5)
+        assert yard.call(
+            "/obtain_release_control_authority", "ObtainControlAuthority", enable_obtain=True
+        ).result
+        assert task(TAKE_OFF)
+        yard.until(lambda: yard.mode == 6 and yard.status == 2)
+        assert not task(8)  # the motors are not stopped in the air
+        yard.call("/set_joystick_mode", "SetJoystickMode", horizontal_mode=1, yaw_mode=1, stable_mode=1)
+        steer(x=3.0, y=0.0, z=1.0, yaw=0.0)  # x is north here
+        assert yard.place[1] > 3.0
+        assert abs(yard.place[0]) < 1.0
+        assert yard.call("/emergency_brake", "EmergencyBrake").result
+        assert yard.mode == 6
+        assert yard.call("/set_go_home_altitude", "SetGoHomeAltitude", altitude=25).result
+        assert not yard.call("/set_go_home_altitude", "SetGoHomeAltitude", altitude=5).result
+        assert task(LAND)
+        assert task(14)  # out of the landing
+        assert yard.mode == 6
+        assert yard.call("/kill_switch", "KillSwitch", enable=True).result
+        assert yard.status == 0
+
+    yard.run(body)
+
+
+def test_where_it_may_join_a_graph(apron: Make) -> None:
+    yard = apron()
+    with pytest.raises(UsageError, match="on a graph already"):
+        yard.autopilot.join(yard.graph, "/other/dji_sdk", Place("d"))
+    other = apron()
+    other.autopilot.face.hang_up()
+    with pytest.raises(UsageError, match="dji_sdk or dji_osdk_ros"):
+        other.autopilot.join(other.graph, "/d/mavros", Place("d"))
+    with pytest.raises(UsageError, match="over a graph"):
+        yard.autopilot.connect(None)
