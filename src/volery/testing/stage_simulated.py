@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import UsageError
 from volery.base.time import MINUTE, Ns, S
@@ -19,12 +20,33 @@ from volery.testing.stage import Commander, Stage
 from volery.trace.events import Event
 from volery.vehicles import Vehicle
 from volery.vehicles.address import Address
+from volery.vehicles.driver import Driver
 
 HUNG_AFTER: Ns = 30 * MINUTE
 """A check that is not over after so much simulated time hangs."""
 
+THROTTLE, MODE_SWITCH = 2, 4
+"""Channels of a transmitter, from 0."""
+SWITCH_AWAY, THROTTLE_DOWN = 1000, 1100
+"""Pulses: the switch out of the place in which programs may fly, the stick nearly down."""
+
 AWAY_DEG = 0.0005
 """How far east of the vehicle its neighbour stands: about 40 m."""
+
+
+class Pilot(Commander):
+    """Where all programs share one node, the other party is the pilot: he takes the vehicle by his mode
+    switch and brings it down by his throttle.
+    """
+
+    def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: Autopilot) -> None:
+        super().__init__(kernel, driver, protocol="a graph")
+        self._channels = autopilot.vehicle.sticks.transmitter
+
+    def lands_it(self) -> None:
+        """By hand."""
+        self._channels[MODE_SWITCH] = SWITCH_AWAY
+        self._channels[THROTTLE] = THROTTLE_DOWN
 
 
 class SimulatedStage(Stage):
@@ -84,6 +106,9 @@ class SimulatedStage(Stage):
         return self._access.hand
 
     def _commander(self) -> Commander:
+        if self.link is None:
+            driver, _ = self._access.another(self.name_of_vehicle)
+            return Pilot(self.kernel, driver, self.airfield.autopilots[self.name_of_vehicle])
         driver, link = self._access.another(self.name_of_vehicle)
         return Commander(self.kernel, driver, link, self._access.protocol)
 
