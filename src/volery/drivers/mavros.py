@@ -1,4 +1,4 @@
-"""Whatever flies behind a vehicle node with MAVROS's names: an ArduPilot unless the address says otherwise."""
+"""Whatever flies behind a vehicle node with MAVROS's names: an ArduPilot unless the address says another."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_a_takeoff_starts_the_motors_and_goes_to_its_fixed_height(apron: Make) -
 def test_flight_status_has_the_numbers_of_the_aircraft(
     apron: Make, aircraft: int, expected: list[int]
 ) -> None:
-    """A3: stopped, on the ground, in the air. M100: on the ground, taking off, in the air, landing, landed."""
+    """A3: stopped, on the ground, in the air. M100: ground, taking off, in the air, landing, landed."""
     yard = apron(parameters={"AIRCRAFT": aircraft})
     seen: list[int] = []
 
