@@ -7,8 +7,6 @@ the user asks for a mode, moves the sticks or disarms.
 
 from __future__ import annotations
 
-import struct
-
 from volery.autopilots.px4 import events, modes
 from volery.autopilots.px4.joystick import Joystick
 from volery.autopilots.px4.offboard import Stream
@@ -62,6 +60,8 @@ class Commander:
         """Whether AUTO.LAND stands for the blind descent without a position."""
         self.takeoff_amsl: float | None = None
         """Altitude of the next take-off, where one was commanded."""
+        self.least_height = 0.0
+        """Of the next take-off, where that was raised to the least one; 0: it was not."""
         self.orbit: tuple[Vector, float, float] | None = None
         """Centre, radius, speed of a circle."""
         self.delay_left = -1.0
@@ -109,6 +109,7 @@ class Commander:
             sticks=self.joystick.valid,
             mission=len(vehicle.plan) > 0,
             offboard=self.stream_alive(),
+            mode=vehicle.armed or vehicle.dialect.modes[self.wished].armable,
         )
 
     def can_fly(self, number: int) -> bool:
@@ -132,6 +133,8 @@ class Commander:
             return ACCEPTED if not vehicle.armed else UNSUPPORTED
         if vehicle.armed and not self.can_fly(number):
             vehicle.say(CRITICAL, f"Switching to {modes.WORDS[number]} is currently not available\t")
+            group = OFFBOARD_IN_EVENTS if number == modes.OFFBOARD else POSITION_IN_EVENTS
+            self.log.tell(events.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
             return TEMPORARILY_REJECTED
         self._take_wish(number)
         return ACCEPTED
@@ -217,7 +220,15 @@ class Commander:
         vehicle.arm()
         vehicle.say(INFO, "Armed by external command\t")
         self.log.tell(events.ARMED, events.BY_COMMAND)
+        self.tell_least_height()
         return ACCEPTED
+
+    def tell_least_height(self) -> None:
+        """Once, if the take-off that begins was raised to the least height."""
+        if self.least_height and self.wished == modes.TAKEOFF:
+            self.vehicle.say(INFO, f"Using minimum takeoff altitude: {self.least_height:.2f} m\t")
+            self.log.tell(events.LEAST_TAKEOFF, events.real(self.least_height))
+        self.least_height = 0.0
 
     @property
     def armable(self) -> bool:
@@ -275,13 +286,6 @@ class Commander:
             self.reported, self.reported_at = found, now
             for event, arguments in events.report(found):
                 self.log.tell(event, arguments)
-
-    def failsafe_arguments(self, action: int, seconds: int | None = None) -> bytes:
-        """Of the events that tell of a failsafe."""
-        wished = OFFBOARD_IN_EVENTS if self.wished == modes.OFFBOARD else POSITION_IN_EVENTS
-        if seconds is None:
-            return struct.pack("<HBBB", 0, wished, 0, action)
-        return struct.pack("<HBBBBBB", 0, wished, 0, 6, seconds, 0, 1)
 
 
 OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3

@@ -6,7 +6,6 @@ from functools import cache, partial
 
 from volery.autopilots.px4 import boot, commands, missions, modes, radio, tuning
 from volery.autopilots.px4.commander import READY_AFTER, of
-from volery.autopilots.px4.events import LEAST_TAKEOFF, real
 from volery.autopilots.px4.flying import Descent, Hold, Offboard, Orbit, Position, Return, TakeOff
 from volery.autopilots.px4.honoured import COPTER as HONOURED
 from volery.autopilots.px4.mavlink import mavlink
@@ -24,8 +23,6 @@ from volery.base.time import MS, S
 QUADROTOR = 2
 """MAV_TYPE."""
 
-INFO = 6
-
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
     """To the altitude of the command; at least MIS_TAKEOFF_ALT above where it stands."""
@@ -35,9 +32,9 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
     amsl = commander.takeoff_amsl
     if amsl is None or amsl < here + least:
         amsl = here + least
+        commander.least_height = least
         if vehicle.armed:
-            vehicle.say(INFO, f"Using minimum takeoff altitude: {least:.2f} m\t")
-            commander.log.tell(LEAST_TAKEOFF, real(least))
+            commander.tell_least_height()
     return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
 
 

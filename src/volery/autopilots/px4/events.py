@@ -43,6 +43,7 @@ FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
 STICKS_LOST = Event(0x0155CD44, 0x62)
 STICKS_BACK = Event(0x010AE2BD, 0x66)
 PILOT_TOOK_OVER = Event(0x010EAC3F, 0x66)
+MODE_REFUSED = Event(0x01A04397, 0x62)
 FRAME_UNSUPPORTED = Event(0x01B04541, 0x33)
 SETPOINT_INVALID = Event(0x015637A5, 0x33)
 
@@ -53,6 +54,7 @@ NO_GLOBAL_POSITION = Event(0x0198C273, 0x33)
 NO_MISSION = Event(0x0105C2D9, 0x66)
 NO_OFFBOARD_SIGNAL = Event(0x012F1DC7, 0x33)
 NO_STICKS = Event(0x0106ED29, 0x44)
+MODE_NOT_ARMABLE = Event(0x011C8F61, 0x66)
 STILL_STARTING = Event(0x0167C97B, 0x66)
 SENSORS_SUMMARY = Event(0x011D3727, 0x88)
 
@@ -94,6 +96,8 @@ class Checks(NamedTuple):
     sticks: bool
     mission: bool
     offboard: bool
+    mode: bool
+    """Whether the wished mode is one that may be armed."""
 
 
 def _modes(checks: Checks) -> int:
@@ -132,6 +136,8 @@ def report(checks: Checks) -> list[tuple[Event, bytes]]:
         found.append((NO_OFFBOARD_SIGNAL, bytes.fromhex("0040000014")))
     if not checks.sticks:
         found.append((NO_STICKS, bytes.fromhex("ffffffff07")))
+    if not checks.mode:
+        found.append((MODE_NOT_ARMABLE, bytes.fromhex("20303c0014")))
     if not checks.started:
         found.append((STILL_STARTING, bytes.fromhex("ffffffff0c")))
     sensors = 0x80 * checks.sticks | 0x08 * checks.position | 0x02

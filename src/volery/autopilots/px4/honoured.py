@@ -9,6 +9,7 @@ _SHARED = {
     "BAT_CRIT_THR": "critical level of the battery",
     "BAT_EMERGEN_THR": "emergency level of the battery",
     "BAT_LOW_THR": "low level of the battery",
+    "COM_ARM_WO_GPS": "any value but 0: modes that need no position may be armed without one",
     "COM_DL_LOSS_T": "a ground station silent for longer is lost",
     "COM_FAIL_ACT_T": "how long a failsafe holds before it acts",
     "COM_LOW_BAT_ACT": "0 warns, 2 lands, 3 returns at the critical level; any but 0 lands in an emergency",

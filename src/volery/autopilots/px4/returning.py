@@ -16,11 +16,11 @@ def tell_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
     heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
     if stage == "climb":
         vehicle.say(INFO, "RTL HOME activated\t")
+        log.tell(events.RETURN_ACTIVATED)
         if not vehicle.armed:
             return
         vehicle.say(INFO, "RTL: landing at home position.\t")
         vehicle.say(INFO, f"RTL: climb to {heights}")
-        log.tell(events.RETURN_ACTIVATED)
         log.tell(events.RETURN_HOME)
         log.tell(events.RETURN_CLIMB, figures)
     elif stage == "return":

@@ -1,0 +1,297 @@
+"""Commands, parameters, streams, boot, sticks: who answers what."""
+
+from __future__ import annotations
+
+import re
+import struct
+from itertools import pairwise
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import volery.autopilots
+from volery.autopilots.px4 import DIALECT, events
+from volery.autopilots.simulated.parameters import REAL32
+
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+NOT_SENT = {
+    "LINK_NODE_STATUS",
+    "OPEN_DRONE_ID_LOCATION",
+    "OPEN_DRONE_ID_SYSTEM",
+    "TIME_ESTIMATE_TO_TARGET",
+    "UTM_GLOBAL_POSITION",
+}
+
+ON_THE_GROUND = [
+    ("unknown command", (31999,), UNSUPPORTED),
+    ("unknown message", (512, 999), DENIED),
+    ("interval of an unknown message", (511, 999, 100000), FAILED),
+    ("loiter", (17,), UNSUPPORTED),
+    ("yaw", (115, 90, 20, 1), UNSUPPORTED),
+    ("pause", (193, 0), UNSUPPORTED),
+    ("guided", (92, 1), UNSUPPORTED),
+    ("reboot", (246, 1), DENIED),
+    ("a mode that is none", (176, 1, 99), ACCEPTED),
+    ("a mode without its flag", (176, 0, 4, 3), ACCEPTED),
+    ("OFFBOARD without a stream", (176, 1, 6), ACCEPTED),
+    ("disarm, disarmed", (400, 0), ACCEPTED),
+    ("version", (520, 1), ACCEPTED),
+    ("mission start without a mission", (300,), DENIED),
+    ("home here", (179, 1), ACCEPTED),
+]
+
+
+@pytest.mark.parametrize(
+    ("command", "result"), [row[1:] for row in ON_THE_GROUND], ids=[row[0] for row in ON_THE_GROUND]
+)
+def test_commands_on_the_ground(command: tuple[float, ...], result: int, bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.command(int(command[0]), *command[1:]) == result
+
+
+@pytest.mark.parametrize("wrong", [{"target_system": 7}, {"target_component": 42}, {"target_system": 0}])
+def test_a_wrong_target_is_told_so(wrong: dict[str, int], bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.command(400, 1, **wrong) == FAILED
+    assert not rig.vehicle.armed
+
+
+def test_component_0_is_served(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.command(400, 1, target_component=0) == ACCEPTED
+
+
+def test_set_mode_is_acknowledged_as_command_176(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    rig.send("SET_MODE", target_system=1, base_mode=1, custom_mode=0x04040000)
+    rig.run(0.05)
+    assert (rig.latest["COMMAND_ACK"]["command"], rig.latest["COMMAND_ACK"]["result"]) == (176, ACCEPTED)
+
+
+def test_an_accepted_mode_shows_at_the_next_heartbeat_only(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    beats = len(rig.of("HEARTBEAT"))
+    assert rig.mode(4, 4) == ACCEPTED
+    assert rig.latest["HEARTBEAT"]["custom_mode"] != 0x04040000 or len(rig.of("HEARTBEAT")) == beats + 1
+    rig.run(1.0)
+    assert rig.latest["HEARTBEAT"]["custom_mode"] == 0x04040000
+    times = [one.at for one in rig.of("HEARTBEAT")]
+    assert all(after - before == pytest.approx(1.0) for before, after in pairwise(times))
+
+
+def test_every_recorded_mode_has_its_bits(facts: dict[str, Any]) -> None:
+    modes = DIALECT.kinds["multirotor"].modes
+    for number, base in facts["modes"]:
+        unstreamed = number == 0x00060000 and base == 1
+        assert unstreamed or modes[number].base_mode == base & ~128
+
+
+def test_why_arming_is_refused_only_events_say(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.mode(3) == ACCEPTED
+    start = rig.now
+    assert rig.command(400, 1) == REJECTED
+    rig.run(3.0)
+    assert rig.texts(start) == []
+    assert not rig.vehicle.armed
+
+
+def test_cold_it_may_be_armed_when_the_recorded_one_could(facts: dict[str, Any], bench: Any) -> None:
+    rig = bench(warm=False)
+    recorded = facts["boot"]["offboard-api"]
+    rig.run(recorded["armable"] - 1.0)
+    assert rig.command(400, 1) == REJECTED
+    rig.run(1.5)
+    assert rig.command(400, 1) == ACCEPTED
+    assert rig.of("HEARTBEAT")[0].at == pytest.approx(recorded["first_heartbeat"], abs=0.15)
+    for name, at in recorded["first"].items():
+        assert rig.of(name)[0].at == pytest.approx(at, abs=0.3)
+
+
+def test_the_reports_of_a_boot_are_the_recorded_ones(facts: dict[str, Any], bench: Any) -> None:
+    rig = bench(warm=False)
+    rig.run(9.0)
+    ours = [
+        [one.fields["id"], one.fields["log_levels"], bytes(one.fields["arguments"]).rstrip(b"\0").hex()]
+        for one in rig.of("EVENT")
+    ]
+    recorded = facts["boot"]["auto-gcs"]["events"]
+    assert ours == [event[1:] for event in recorded]
+    for one, event in zip(rig.of("EVENT"), recorded, strict=True):
+        assert one.at == pytest.approx(event[0], abs=0.15)
+
+
+def test_words_wait_for_a_ground_station(bench: Any) -> None:
+    rig = bench(beats=False)
+    rig.ready()
+    assert rig.command(400, 1) == ACCEPTED
+    rig.run(1.0)
+    assert rig.texts() == []
+    assert events.ARMED.id in rig.events()
+    rig.beat()
+    rig.run(1.1)
+    assert rig.texts() == ["Armed by external command\t"]
+
+
+@pytest.mark.parametrize("use", ["onboard", "station"])
+def test_each_kind_of_link_gets_the_recorded_streams(use: str, facts: dict[str, Any], bench: Any) -> None:
+    rig = bench(use=use)
+    rig.run(2.0)
+    start = rig.now
+    rig.run(20.0)
+    for name, rate in facts["streams"][use].items():
+        if name in NOT_SENT or name in (
+            "MISSION_CURRENT",
+            "POSITION_TARGET_GLOBAL_INT",
+            "ORBIT_EXECUTION_STATUS",
+        ):
+            continue
+        count = len([one for one in rig.of(name) if one.at > start])
+        assert count == pytest.approx(rate * 20.0, rel=0.03, abs=1.01), name
+
+
+def test_parameters_are_listed_as_recorded(facts: dict[str, Any], bench: Any) -> None:
+    rig, recorded = bench(), facts["parameters"]
+    rig.ready()
+    rig.send("PARAM_REQUEST_LIST", target_system=1, target_component=1)
+    rig.run(1.5)
+    values = rig.of("PARAM_VALUE")
+    assert [[one.fields["param_id"], one.fields["param_index"]] for one in values[:3]] == recorded["first"]
+    assert len(values) == recorded["count"] + 1
+    assert sorted({one.fields["param_type"] for one in values}) == recorded["types"]
+    assert values[-1].at - values[0].at == pytest.approx(recorded["seconds"], abs=0.1)
+
+
+def whole(number: int) -> float:
+    """An integer as its bytes in the place of a real number."""
+    (value,) = struct.unpack("<f", struct.pack("<i", number))
+    return float(value)
+
+
+def test_integers_travel_as_bytes_and_types_must_match(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+
+    def tell(name: str, kind: int, value: float) -> int:
+        before = len(rig.of("PARAM_VALUE"))
+        rig.send(
+            "PARAM_SET",
+            target_system=1,
+            target_component=1,
+            param_id=name,
+            param_type=kind,
+            param_value=value,
+        )
+        rig.run(0.1)
+        return len(rig.of("PARAM_VALUE")) - before
+
+    assert tell("COM_OBL_RC_ACT", 6, whole(4)) == 1
+    assert rig.vehicle.parameters["COM_OBL_RC_ACT"] == 4.0
+    assert rig.latest["PARAM_VALUE"]["param_value"] == whole(4)
+    assert tell("COM_OBL_RC_ACT", 9, 3.0) == 0
+    assert tell("NO_SUCH_NAME", 9, 3.0) == 0
+    assert rig.vehicle.parameters["COM_OBL_RC_ACT"] == 4.0
+
+
+def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> None:
+    room = Path(volery.autopilots.__file__).parent / "px4"
+    source = "".join(
+        path.read_text(encoding="utf-8") for path in sorted(room.glob("*.py")) if path.name != "honoured.py"
+    )
+    read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
+    read |= set(re.findall(r'seconds_parameter\("([A-Z0-9_]+)"', source))
+    read |= {"BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"}
+    stated = set(DIALECT.kinds["multirotor"].honoured) | set(DIALECT.kinds["rover"].honoured)
+    assert stated == read
+    for dialect in DIALECT.kinds.values():
+        assert set(dialect.honoured) <= {parameter.name for parameter in dialect.parameters()}
+    assert REAL32 == 9
+
+
+# --- sticks -----------------------------------------------------------------------------------
+
+
+def test_posctl_needs_sticks_and_a_throttle_that_is_not_high(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    rig.mode(3)
+    assert rig.command(400, 1) == REJECTED
+    rig.sticks(z=1000)
+    rig.run(0.5)
+    assert rig.command(400, 1) == REJECTED
+    assert rig.texts()[-1] == "Arming denied: throttle above center\t"
+    rig.sticks(z=500)
+    rig.run(0.5)
+    assert rig.command(400, 1) == ACCEPTED
+
+
+def in_posctl(rig: Any) -> None:
+    rig.ready()
+    rig.sticks()
+    rig.run(0.5)
+    rig.mode(3)
+    assert rig.command(400, 1) == ACCEPTED
+    rig.run(1.5)
+    rig.sticks(z=1000)
+    rig.run_until(lambda: rig.height > 8.0)
+    rig.sticks()
+    rig.run(3.0)
+
+
+def test_lost_sticks_hold_then_return_and_only_movement_brings_the_pilot_back(bench: Any) -> None:
+    rig = bench()
+    in_posctl(rig)
+    rig.stop_stream()
+    last = rig.now
+    rig.run(2.0)
+    text = "Failsafe activated, entering Hold for 5 seconds\t"
+    assert rig.said_at(text, last) - last == pytest.approx(0.65, abs=0.12)
+    assert rig.vehicle.mode.name == "AUTO.LOITER"
+    rig.run(4.5)
+    assert rig.vehicle.mode.name == "AUTO.RTL"
+    rig.sticks()
+    rig.run(1.0)
+    assert rig.vehicle.mode.name == "AUTO.RTL"
+    rig.sticks(x=1000)
+    rig.run(0.5)
+    assert rig.vehicle.mode.name == "POSCTL"
+    assert events.PILOT_TOOK_OVER.id in rig.events(last)
+
+
+def test_in_hold_moving_the_sticks_takes_over_but_not_in_offboard(bench: Any) -> None:
+    rig = bench()
+    in_posctl(rig)
+    rig.mode(4, 3)
+    rig.run(1.0)
+    rig.sticks(x=800)
+    rig.run(0.5)
+    assert rig.vehicle.mode.name == "POSCTL"
+    assert rig.texts()[-1] == "Pilot took over using sticks\t"
+
+
+def test_disarming_in_the_air_needs_force(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    assert rig.command(400, 0) == REJECTED
+    assert rig.texts()[-1] == "Disarming denied! Not landed\t"
+    assert rig.command(400, 0, 21196) == ACCEPTED
+    assert not rig.vehicle.armed
+
+
+def test_reposition_without_its_flag_is_refused_and_flown(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    place = {"x": round((latitude + 1e-4) * 1e7), "y": round(longitude * 1e7), "z": amsl, "param4": nan}
+    assert rig.command_int(192, param1=-1, **place) == UNSUPPORTED
+    before = rig.ned[0]
+    rig.run(5.0)
+    assert rig.ned[0] > before + 3.0

@@ -1,0 +1,159 @@
+"""How it flies: take-off, a leg, landing, returning, against the recorded figures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+OFFBOARD, POSCTL, LOITER, RTL, LAND = 0x00060000, 0x00030000, 0x03040000, 0x05040000, 0x06040000
+
+
+def test_takeoff_is_noticed_and_ends_short(facts: dict[str, Any], bench: Any) -> None:
+    rig, recorded = bench(), facts["flight"]
+    rig.ready()
+    start = rig.vehicle.estimate.geodetic[2]
+    assert rig.command(22, -1, 0, 0, float("nan"), float("nan"), float("nan"), start + 10.0) == 0
+    assert not rig.vehicle.armed
+    armed = rig.now
+    assert rig.command(400, 1) == 0
+    up = rig.run_until(lambda: rig.vehicle.mode.name == "AUTO.LOITER")
+    assert rig.said_at("Takeoff detected\t") - armed == pytest.approx(recorded["takeoff_detected"], abs=0.3)
+    assert up == pytest.approx(recorded["takeoff"], abs=1.2)
+    rig.run(10.0)
+    assert rig.height == pytest.approx(recorded["hover_after_10_m"], abs=0.7)
+    assert rig.height < 9.7
+
+
+def test_a_leg_in_offboard_is_quick_and_ends_too_far(facts: dict[str, Any], bench: Any) -> None:
+    rig, recorded = bench(), facts["flight"]["leg"]
+    rig.airborne()
+    rig.offboard(x=0.0, y=0.0, z=-9.0)
+    rig.run(6.0)
+    rig.stream(x=50.0, y=0.0, z=-9.0)
+    reached = rig.run_until(lambda: rig.ned[0] > 49.5)
+    farthest = 0.0
+    for _ in range(60):
+        rig.run(0.1)
+        farthest = max(farthest, rig.ned[0] - 50.0)
+    assert reached == pytest.approx(recorded["within_half_a_metre"], abs=0.25)
+    assert farthest == pytest.approx(recorded["overshoot"], abs=0.5)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_landing_takes_as_long_as_recorded(place: int, facts: dict[str, Any], bench: Any) -> None:
+    rig, recorded = bench(), facts["flight"]["landings"][place]
+    rig.airborne()
+    rig.offboard(x=0.0, y=0.0, z=rig.ned[2] + rig.height - recorded["from"])
+    rig.run(12.0)
+    assert rig.height == pytest.approx(recorded["from"], abs=0.3)
+    start = rig.now
+    assert rig.mode(4, 6) == 0
+    rig.stop_stream()
+    rig.run_until(lambda: not rig.vehicle.armed)
+    landed = rig.said_at("Landing detected\t", start)
+    assert landed - start == pytest.approx(recorded["seconds"], abs=2.5)
+    rig.run(0.2)
+    assert rig.said_at("Disarmed by landing\t", start) - landed == pytest.approx(
+        recorded["to_disarm"], abs=0.15
+    )
+
+
+def test_disarms_ten_seconds_after_arming_without_a_takeoff(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    start = rig.now
+    assert rig.command(400, 1) == 0
+    rig.run_until(lambda: not rig.vehicle.armed)
+    assert rig.now - start == pytest.approx(10.0, abs=0.2)
+    rig.run(0.1)
+    assert rig.texts()[-1] == "Disarmed by auto preflight disarming\t"
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, POSCTL), (3, RTL), (4, LAND), (5, LOITER)])
+def test_loss_of_the_stream_and_its_return(action: int, mode: int, facts: dict[str, Any], bench: Any) -> None:
+    rig = bench(parameters={"COM_OBL_RC_ACT": action})
+    rig.airborne()
+    rig.offboard(z=-9.0)
+    rig.run(2.0)
+    rig.stop_stream()
+    last = rig.now
+    rig.run(4.0)
+    recorded = [loss["silence"] for loss in facts["losses"]]
+    silence = rig.said_at("Failsafe activated\t", last) - last
+    assert min(recorded) - 0.1 <= silence <= max(recorded) + 0.1
+    assert rig.latest["HEARTBEAT"]["custom_mode"] == mode
+    assert rig.latest["HEARTBEAT"]["system_status"] == 5
+    rig.stream(z=-9.0)
+    rig.run(1.2)
+    assert rig.latest["HEARTBEAT"]["custom_mode"] == OFFBOARD
+    assert rig.latest["HEARTBEAT"]["system_status"] == 4
+
+
+def test_without_sticks_posctl_sinks(facts: dict[str, Any], bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    rig.offboard(z=-9.0)
+    rig.run(2.0)
+    rig.stop_stream()
+    rig.run(3.0)
+    high = rig.height
+    rig.run(5.0)
+    assert (high - rig.height) / 5.0 == pytest.approx(facts["flight"]["sink_without_sticks"], abs=0.1)
+
+
+@pytest.mark.parametrize(("rate", "keeps"), [(1.2, True), (0.8, False)])
+def test_a_slow_stream(rate: float, keeps: bool, bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    rig.offboard(z=-9.0)
+    rig.stream(rate=rate, z=-9.0)
+    start = rig.now
+    rig.run(8.0)
+    lost = [text for text in rig.texts(start) if text == "Failsafe activated\t"]
+    assert bool(lost) is not keeps
+    if not keeps:
+        assert len(lost) >= 4  # it comes back with every set-point, and goes again
+
+
+def test_offboard_is_accepted_at_the_first_setpoint_and_not_before(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    assert rig.mode(6) == 1
+    assert rig.texts()[-1] == "Switching to OFFBOARD is currently not available\t"
+    rig.stream(rate=2.0)
+    rig.run(0.02)
+    assert rig.mode(6) == 0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"coordinate_frame": 7}, "SET_POSITION_TARGET_LOCAL_NED coordinate frame 7 unsupported\t"),
+        ({"coordinate_frame": 9}, "SET_POSITION_TARGET_LOCAL_NED coordinate frame 9 unsupported\t"),
+        ({"type_mask": 4095}, "SET_POSITION_TARGET_LOCAL_NED invalid\t"),
+    ],
+)
+def test_what_is_not_understood_is_told_each_time_and_does_not_count(
+    fields: dict[str, int], words: str, bench: Any
+) -> None:
+    rig = bench()
+    rig.airborne()
+    start = rig.now
+    rig.stream(rate=10.0, **fields)
+    rig.run(1.05)
+    assert rig.texts(start).count(words) == 11
+    assert rig.mode(6) == 1
+
+
+def test_velocities_in_the_body_frame_turn_with_the_nose(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    heading = rig.vehicle.estimate.attitude[2]
+    before = rig.ned
+    rig.offboard(coordinate_frame=8, type_mask=1479, vx=2.0, yaw_rate=0.35)
+    rig.run(4.0)
+    away = (rig.ned[0] - before[0], rig.ned[1] - before[1])
+    assert away[0] > 1.5
+    assert away[1] > 0.5
+    assert rig.vehicle.estimate.attitude[2] > heading + 0.7
