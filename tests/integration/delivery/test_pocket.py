@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from volery import Options, simulate
+from volery.base.errors import ModelError
 from volery.trace.events import Call, Message
 from volery.trace.reader import Reading
 
@@ -97,3 +98,31 @@ def test_a_slow_computer_on_board_is_late_for_its_pictures():
     assert (
         landing.deadline_misses > 20
     )  # each of its pictures; the rest of its activations wait for the ground
+
+
+# -- the same components, whatever flies
+
+AUTOPILOT = "environment.vehicles.{}.autopilot={}"
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "paparazzi", "dji"])
+def test_the_same_parcel_with_another_autopilot(autopilot):
+    run = pocket(overrides=[AUTOPILOT.format("drone_1", autopilot)])
+    assert run.error is None
+    assert states(run) == {"parcel-1": THE_WAY}
+    assert [name for name, one in run.record.requirements.items() if not one.met] == []
+    assert all(vehicle.landed for vehicle in run.record.vehicles.values())
+
+
+def test_all_four_autopilots_in_one_service():
+    mixed = {"drone_1": "dji", "drone_2": "paparazzi", "rover_north": "px4"}
+    assigned = [AUTOPILOT.format(name, autopilot) for name, autopilot in mixed.items()]
+    run = pocket(overrides=assigned)
+    assert run.error is None
+    assert states(run) == {"parcel-1": THE_WAY}
+    assert all(vehicle.landed for vehicle in run.record.vehicles.values())
+
+
+def test_an_autopilot_that_there_is_not():
+    with pytest.raises(ModelError, match=r"'px5'.*ardupilot.*dji.*paparazzi.*px4"):
+        pocket(overrides=[AUTOPILOT.format("drone_1", "px5")])
