@@ -7,10 +7,13 @@ from their import on, so both work side by side.
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import sys
 import threading
+from contextlib import suppress
 from importlib.util import find_spec
+from socket import SHUT_RDWR
 from types import ModuleType
 from typing import Any
 
@@ -44,6 +47,40 @@ def rospy_copy() -> Any:
             sys.modules.update(before)
     made.core.configure_logging = lambda *ignored, **ignored_too: None
     return made
+
+
+class Listening:
+    """The servers of a copy's node, whose threads rospy leaves behind when it ends, one of them busy."""
+
+    def __init__(self, rospy: Any) -> None:
+        self._rospy = rospy
+        start = rospy.impl.init.start_node
+
+        def start_and_keep(*arguments: Any, **options: Any) -> Any:
+            node = start(*arguments, **options)
+            server, node_shutdown = node.server, node.shutdown
+
+            def shutdown(reason: str) -> None:
+                node.is_shutdown = True
+                server.shutdown()  # ends its thread's loop before the socket goes
+                node_shutdown(reason)
+
+            node.shutdown = shutdown
+            return node
+
+        rospy.impl.init.start_node = start_and_keep
+
+    def end(self) -> None:
+        """Accept no more connections; what is left of the copy may go."""
+        server = self._rospy.impl.tcpros_base._tcpros_server
+        accepting = server.tcp_ros_server if server is not None else None
+        if accepting is not None and accepting.server_sock is not None:
+            accepting.is_shutdown = True
+            with suppress(OSError):
+                accepting.server_sock.shutdown(SHUT_RDWR)  # wakes the thread that waits in accept
+            accepting.server_sock.close()
+        self._rospy.core._xmlrpc_cache.clear()
+        atexit.unregister(self._rospy.core._ros_atexit)
 
 
 def _take_out() -> dict[str, ModuleType]:

@@ -16,7 +16,7 @@ from volery.messages import Message, ServiceType, from_ros1, ros1_service, ros1_
 from volery.messages.ros1 import cdr_to_ros1
 from volery.transports.ros1.classes import message_carrier, service_carrier
 from volery.transports.ros1.master import Master, TopicTypes, is_alive
-from volery.transports.ros1.rospy_copy import rospy_copy
+from volery.transports.ros1.rospy_copy import Listening, rospy_copy
 from volery.transports.wire import Arrived, Asked, Done, Parcel
 
 GOODBYE_S = 2.0
@@ -176,11 +176,13 @@ class Ros1Wire:
         self.rospy = rospy = rospy_copy()
         # what rospy would read from its command line: the namespace that the node's name is resolved in
         rospy.names._set_caller_id(names.join(namespace, "unnamed"))
+        listening = Listening(rospy)
         rospy.init_node(name, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
         self._closing = False
         self._gone = threading.Event()
-        rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
         rospy.core.add_preshutdown_hook(lambda reason: None if self._closing else lost(_thrown_out(reason)))
+        rospy.core.add_preshutdown_hook(lambda reason: self._gone.set())  # runs when all is unregistered
+        rospy.core.add_preshutdown_hook(lambda reason: listening.end())
 
     def _check_free(self) -> None:
         """A second node of a name would make the master end the first."""
