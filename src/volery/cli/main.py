@@ -172,6 +172,9 @@ def vehicle(
     kind: Annotated[str, typer.Option(help="multirotor or rover.")] = "multirotor",
     sensors: Annotated[str, typer.Option(help="consumer or rtk.")] = "consumer",
     system: Annotated[int | None, typer.Option(help="Its system id, by default 1.")] = None,
+    graph: Annotated[
+        str, typer.Option(metavar="ros1|ros2", help="Serve it as a node of that graph, where it has one.")
+    ] = "",
     seed: Seed = 1,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -180,7 +183,7 @@ def vehicle(
     from volery.cli import vehicle as command
 
     output = Output(quiet, False, debug)
-    wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed, system)
+    wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed, system, graph)
     run_command(output, lambda: command.vehicle(output, wanted))
 
 

@@ -8,8 +8,8 @@ from volery.base.errors import UsageError
 from volery.cli.clients import CLIENTS
 from volery.cli.console import Output
 from volery.cli.endings import OK
-from volery.run.serve import Server
-from volery.run.simulated import simulated
+from volery.run.serve import NodeServer, Server, has_links
+from volery.run.simulated import Simulated, simulated
 from volery.vehicles.address import Address, parse, parse_listen
 
 
@@ -25,6 +25,7 @@ class Wanted:
     sensors: str
     seed: int
     system: int | None = None
+    graph: str = ""
 
 
 def vehicle(output: Output, wanted: Wanted) -> int:
@@ -32,10 +33,34 @@ def vehicle(output: Output, wanted: Wanted) -> int:
     if not 0.0 < wanted.speed < float("inf"):
         raise UsageError(f"--speed {wanted.speed:g}: simulated seconds per second, above 0")
     described = simulated(_address(wanted), wanted.autopilot)
+    if wanted.graph or not has_links(wanted.autopilot):
+        return _as_node(output, wanted, described)
     listen = None if wanted.listen is None else parse_listen(wanted.listen)
     server = Server(described, listen, speed=wanted.speed, seed=wanted.seed)
     try:
         server.run(lambda: output.show(*how_to_connect(server, wanted)))
+    except KeyboardInterrupt:
+        output.note("stopped")
+    return OK
+
+
+def _as_node(output: Output, wanted: Wanted, described: Simulated) -> int:
+    """On a real ROS graph."""
+    if not wanted.graph or wanted.listen is not None:
+        name = wanted.autopilot
+        raise UsageError(
+            f"{name}: a simulated {name} is reached over a graph, not over links: serve it on real ROS with "
+            f"--graph ros1 (a roscore must run) or --graph ros2, or fly it right here: --on sim:{name}"
+        )
+    server = NodeServer(described, wanted.graph, speed=wanted.speed, seed=wanted.seed)
+    below = server.namespace
+    said = [
+        f"serving {wanted.autopilot} on {wanted.graph} at {wanted.speed:g}× real time; Ctrl-C stops it",
+        f"  its topics      {below}/...",
+        f"  volery          volery fly MISSION.py --on {wanted.autopilot}+{wanted.graph}://{below}",
+    ]
+    try:
+        server.run(lambda: output.show(*said))
     except KeyboardInterrupt:
         output.note("stopped")
     return OK

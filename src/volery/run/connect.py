@@ -96,4 +96,5 @@ def _opened(urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated:
     finally:
         for vehicle in opened.vehicles:
             vehicle.close()
+        opened.leave()
         kernel.close()

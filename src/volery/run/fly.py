@@ -140,6 +140,7 @@ class _Flight:
         finally:
             for vehicle in self._opened.vehicles:
                 vehicle.close()
+            self._opened.leave()
             if self._opened.airfield is not None:
                 self._opened.airfield.record_states()
             record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())

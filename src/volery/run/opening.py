@@ -7,22 +7,29 @@ from dataclasses import dataclass
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
 from volery.base.position import Position
-from volery.kernel.api import Kernel
+from volery.graph import RosGraph
+from volery.kernel.api import Action, Kernel
+from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.links.shared import SharedLink
 from volery.run.airfield import Airfield
+from volery.run.graphs import GRAPHS, open_graph
 from volery.run.serving import open_simulated
 from volery.run.simulated import HOME, Simulated, airfield_of, simulated
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import open_link
-from volery.vehicles.driver import DriverFactory, drivers
+from volery.vehicles.driver import Driver, DriverFactory, drivers
 from volery.vehicles.limits import excludes_home
 
-GRAPHS = ("graph", "ros1", "ros2")
+EMBEDDED = "graph"
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
+
+
+def _nothing() -> None:
+    """There is no graph to leave."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,8 @@ class Opened:
     kernel: VirtualKernel | WallKernel
     vehicles: tuple[Vehicle, ...]
     airfield: Airfield | None = None
+    leave: Action = _nothing
+    """Leave the graphs that lead to them; once they are closed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,21 +104,51 @@ def _open_real(
             raise CapabilityError(
                 f"{address}: simulated and real vehicles do not share a clock; fly them apart"
             )
-        if address.carrier in GRAPHS:
-            raise CapabilityError(f"{address}: vehicles on a graph are commanded by components of a model")
+        if address.carrier == EMBEDDED:
+            raise CapabilityError(
+                f"{address}: vehicles on the embedded graph are commanded by components of a model; "
+                f"on real ROS it is {address.driver}+ros1:// or {address.driver}+ros2://"
+            )
     kernel = WallKernel()
-    ways = _Ways(kernel, addresses)
+    by_graph = {name: one for name, one in addresses.items() if one.carrier in GRAPHS}
+    ways = _Ways(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
+    graphs = _Graphs(kernel)
     try:
         vehicles = []
         for name, address in addresses.items():
-            open_driver = drivers.load(address.driver).on_link
-            assert open_driver is not None, "seen by _Ways"
-            driver = open_driver(kernel, ways.to(name), name, _for_driver(address))
+            driver = graphs.driver(name, address) if name in by_graph else ways.driver(name, address)
             vehicles.append(kinds[name](kernel, name, driver, limits=stated.limits, fence=stated.fence))
     except VoleryError:
         ways.close()
+        graphs.close()
         raise
-    return Opened(kernel, tuple(vehicles))
+    return Opened(kernel, tuple(vehicles), leave=graphs.close)
+
+
+class _Graphs:
+    """Real ROS graphs, each opened once, with a node of ours for each vehicle."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+        self._open: dict[str, RosGraph] = {}
+
+    def driver(self, name: str, address: Address) -> Driver:
+        """The driver of the vehicle called *name*; the address's path is where its names are."""
+        open_driver = drivers.load(address.driver).on_graph
+        if open_driver is None:
+            raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
+        if address.carrier not in self._open:
+            self._open[address.carrier] = open_graph(self._kernel, address.carrier)
+        node = self._open[address.carrier].node(f"volery_{name}", anonymous=True, place=Place(name))
+        namespace = address.path.rstrip("/")
+        stated = {"namespace": namespace} if namespace else {}
+        return open_driver(self._kernel, node, name, {**stated, **address.options})
+
+    def close(self) -> None:
+        """Leave them."""
+        for graph in self._open.values():
+            graph.close()
+        self._open.clear()
 
 
 class _Ways:
@@ -148,6 +187,12 @@ class _Ways:
 
     def _factory(self, address: Address) -> DriverFactory:
         return drivers.load(address.driver)
+
+    def driver(self, name: str, address: Address) -> Driver:
+        """The driver of the vehicle called *name*."""
+        open_driver = self._factory(address).on_link
+        assert open_driver is not None, "seen when the ways were made"
+        return open_driver(self._kernel, self.to(name), name, _for_driver(address))
 
     def to(self, name: str) -> Link:
         """The link for the driver of the vehicle called *name*."""

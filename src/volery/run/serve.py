@@ -1,16 +1,26 @@
-"""``serve``: a simulated vehicle for ground stations, MAVSDK, MAVProxy or a script of your own."""
+"""``serve``: a simulated vehicle for ground stations, MAVSDK, MAVProxy, nodes or a script of your own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
 
+from volery.autopilots.simulated.dialect import dialects
+from volery.base.errors import UsageError
+from volery.kernel.task import Place
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded import CodedLink
 from volery.run.airfield import Airfield
+from volery.run.graphs import open_graph
+from volery.run.serving import serving
 from volery.run.simulated import Simulated, airfield_of
 from volery.vehicles.address import Address, parse_listen
 from volery.vehicles.carriers import listen
+
+
+def has_links(autopilot: str) -> bool:
+    """Whether a simulated *autopilot* is reached over links; else over a graph."""
+    return dialects.load(autopilot).codec is not None
 
 
 class Server:
@@ -52,4 +62,34 @@ class Server:
         finally:
             for link in self.links:
                 link.close()
+            self.kernel.close("the server was stopped")
+
+
+class NodeServer:
+    """One simulated vehicle as a node of a real ROS graph (``ros1``, ``ros2``), under *namespace*; by default
+    as its own node is called on a real aircraft.
+
+    Raises ``UsageError`` for a firmware that speaks on links, and what ``open_graph`` raises.
+    """
+
+    def __init__(
+        self, wanted: Simulated, graph: str, namespace: str = "", *, speed: float = 1.0, seed: int = 1
+    ) -> None:
+        self.kernel = VirtualKernel(pace=speed)
+        self.airfield: Airfield = airfield_of(self.kernel, [wanted], seed)
+        name = wanted.vehicle.name
+        if self.airfield.family(name).codec is not None:
+            raise UsageError(f"{name}: a simulated {wanted.vehicle.autopilot} is no node; it speaks on links")
+        usual = serving(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
+        self.namespace = namespace or usual
+        self.graph = open_graph(self.kernel, graph)
+        self.airfield.autopilots[name].join(self.graph, self.namespace, Place(name))
+
+    def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """See ``Server.run``."""
+        ready()
+        try:
+            self.kernel.run(FOREVER)
+        finally:
+            self.graph.close()
             self.kernel.close("the server was stopped")

@@ -7,7 +7,8 @@ from typing import Any
 from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import CapabilityError, UsageError
 from volery.kernel.wall import WallKernel
-from volery.run.opening import GRAPHS
+from volery.run.graphs import GRAPHS
+from volery.run.opening import EMBEDDED
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
 from volery.testing.tap import Tap
@@ -31,8 +32,8 @@ class RealStage(Stage):
         self.drone = kind(self.kernel, address.driver, self.driver)
 
     def _open(self, address: Address, **more: str) -> tuple[Tap, Driver]:
-        if address.carrier in GRAPHS:
-            raise CapabilityError(f"{address}: vehicles on a graph are commanded by components of a model")
+        if address.carrier in (EMBEDDED, *GRAPHS):
+            raise CapabilityError(f"{address}: the checks reach real vehicles over bytes only")
         factory = drivers.load(address.driver)
         if factory.on_link is None:
             raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
