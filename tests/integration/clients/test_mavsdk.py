@@ -1,4 +1,4 @@
-"""MAVSDK for Python at a served vehicle: what works, and what fails as at an ArduPilot of its own."""
+"""MAVSDK for Python at served vehicles: what works, and what fails as at a real ArduPilot and a real PX4."""
 
 from __future__ import annotations
 
@@ -45,17 +45,23 @@ async def first(stream: AsyncIterator[Any], holds: Callable[[Any], bool] = lambd
 
 
 @asynccontextmanager
-async def connected(address: str, port: int) -> AsyncIterator[Any]:
-    """A ``System`` that has found the vehicle; its server is a child, which ends here whatever happens."""
+async def connected(address: str, port: int, idle: str = "DISARM_DELAY") -> AsyncIterator[Any]:
+    """A ``System`` that has found the vehicle; its server is a child, which ends here whatever happens.
+
+    *idle* is the parameter after which an armed vehicle that does nothing disarms.
+    """
     from mavsdk import System
 
     drone = System(port=port)
     try:
         await soon(drone.connect(system_address=address))
         await first(drone.core.connection_state(), lambda state: state.is_connected)
-        for rate in ASKED:
-            await soon(getattr(drone.telemetry, f"set_rate_{rate}")(5.0))
-        await soon(drone.param.set_param_int("DISARM_DELAY", 0))  # a busy client is no idle pilot
+        if idle == "DISARM_DELAY":
+            for rate in ASKED:
+                await soon(getattr(drone.telemetry, f"set_rate_{rate}")(5.0))
+            await soon(drone.param.set_param_int(idle, 0))  # a busy client is no idle pilot
+        else:
+            await soon(drone.param.set_param_float(idle, 0.0))
         yield drone
     finally:
         server = drone._server_process  # it has no public name, and outlives a test that fails
@@ -213,3 +219,103 @@ def test_what_fails_as_at_a_real_ardupilot(serve: Callable[..., Any], free_port:
         "mission": "UNSUPPORTED",
         "offboard": "accepted",
     }
+
+
+# --- PX4 --------------------------------------------------------------------------------------
+
+PX4_IDLE = "COM_DISARM_PRFLT"
+PX4_SPEED = 4.0
+"""MAVSDK sends its set-points twenty times a second of real time: more than one a second must remain."""
+
+
+def px4(serve: Callable[..., Any]) -> str:
+    return f"udpin://127.0.0.1:{serve('udp', PX4_SPEED, autopilot='px4').port}"
+
+
+async def flies_px4(address: str, port: int) -> None:
+    from mavsdk.offboard import PositionNedYaw, VelocityBodyYawspeed
+
+    async with connected(address, port, PX4_IDLE) as drone:
+        telemetry, action, offboard = drone.telemetry, drone.action, drone.offboard
+        await until_ready(drone)
+        await soon(action.set_takeoff_altitude(6.0))
+        await soon(action.arm())
+        await soon(action.takeoff())
+        await first(telemetry.in_air(), bool)
+        up = await first(telemetry.position(), lambda position: position.relative_altitude_m > 5.0)
+        await first(telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        goal = HOME_LATITUDE + NORTH
+        await soon(action.goto_location(goal, HOME_LONGITUDE, up.absolute_altitude_m + 3.0, 0.0))
+        await first(telemetry.position(), lambda position: abs(position.latitude_deg - goal) < 1e-5)
+        await soon(offboard.set_position_ned(PositionNedYaw(10.0, 5.0, -8.0, 0.0)))
+        await soon(offboard.start())
+        await first(telemetry.flight_mode(), lambda mode: str(mode) == "OFFBOARD")
+        await first(telemetry.position_velocity_ned(), lambda seen: abs(seen.position.north_m - 10.0) < 1.0)
+        await soon(offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0)))
+        await soon(offboard.stop())
+        await first(telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await soon(action.land())
+        await first(telemetry.armed(), lambda armed: not armed)
+        assert not await first(telemetry.in_air(), lambda flying: not flying)
+
+
+def test_a_flight_of_px4(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(flies_px4(px4(serve), free_port()))
+
+
+async def plans_px4(address: str, port: int) -> None:
+    from mavsdk.mission import MissionItem, MissionPlan
+
+    still = (MissionItem.CameraAction.NONE, MissionItem.VehicleAction.NONE)
+    rest = (5.0, True, nan, nan, still[0], nan, nan, nan, nan, nan, still[1])
+    points = [(HOME_LATITUDE + NORTH * share, HOME_LONGITUDE, 6.0) for share in (0.5, 1.0)]
+    plan = MissionPlan([MissionItem(*point, *rest) for point in points])
+    async with connected(address, port, PX4_IDLE) as drone:
+        await until_ready(drone)
+        await soon(drone.mission.set_return_to_launch_after_mission(True))
+        await soon(drone.mission.upload_mission(plan))
+        kept = (await soon(drone.mission.download_mission())).mission_items
+        assert [round(one.latitude_deg, 7) for one in kept] == [round(point[0], 7) for point in points]
+        await soon(drone.action.arm())
+        await soon(drone.mission.start_mission())
+        await first(drone.telemetry.in_air(), bool)
+        await first(drone.mission.mission_progress(), lambda done: done.current == 1)
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "RETURN_TO_LAUNCH")
+        assert await soon(drone.mission.is_mission_finished())
+
+
+def test_a_mission_of_px4(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    asyncio.run(plans_px4(px4(serve), free_port()))
+
+
+async def fails_px4(address: str, port: int) -> dict[str, str]:
+    from mavsdk.action import ActionError
+    from mavsdk.offboard import OffboardError
+    from mavsdk.param import ParamError
+
+    found = {}
+    async with connected(address, port, PX4_IDLE) as drone:
+        found["arm while it boots"] = await refused(drone.action.arm(), ActionError)
+        await until_ready(drone)
+        found["offboard without a set-point"] = await refused(drone.offboard.start(), OffboardError)
+        found["reboot"] = await refused(drone.action.reboot(), ActionError)
+        await refused(drone.param.get_param_float("NO_SUCH_NAME"), ParamError)
+        assert await soon(drone.param.get_param_int("COM_OBL_RC_ACT")) == 0
+        await soon(drone.param.set_param_int("COM_OBL_RC_ACT", 5))
+        assert await soon(drone.param.get_param_int("COM_OBL_RC_ACT")) == 5
+        version = await soon(drone.info.get_version())
+        assert (version.flight_sw_major, version.flight_sw_minor, version.flight_sw_patch) == (1, 14, 0)
+        await soon(drone.action.arm())
+        await soon(drone.action.takeoff())
+        await first(drone.telemetry.in_air(), bool)
+        found["disarm in the air"] = await refused(drone.action.disarm(), ActionError)
+        await soon(drone.action.kill())
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+    return found
+
+
+def test_what_fails_as_at_a_real_px4(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
+    results = asyncio.run(fails_px4(px4(serve), free_port()))
+    assert results["offboard without a set-point"] == "NO_SETPOINT_SET"
+    assert results["arm while it boots"] in {"COMMAND_DENIED", "FAILED"}
+    assert set(results.values()) & {"SUCCESS"} == set()

@@ -48,7 +48,7 @@ def mavlink(kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, Hea
         home_told=("GPS_GLOBAL_ORIGIN",),
         texts=TEXTS,
         parameter_habits=PARAMETERS,
-        upload_habits=UploadHabits(missions.asks_with, received="", keeps_old=True),
+        upload_habits=UploadHabits(missions.asks_with, received="", turns_to_integers=True, keeps_old=True),
         wrong_target=FAILED,
         reads_nan=True,
         messages=builders(kind),

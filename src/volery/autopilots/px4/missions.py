@@ -155,6 +155,36 @@ class LandAt(Manoeuvre):
         (self._going or self._landing).step()
 
 
+class Going(Hold):
+    """To an item's place; from the ground straight up to its height first."""
+
+    slow_start = True
+
+    def __init__(self, vehicle: Vehicle, point: Vector, yaw: float | None) -> None:
+        super().__init__(vehicle, point, yaw)
+        self._climbing: TakeOff | None = TakeOff(vehicle, point[2]) if vehicle.landed else None
+
+    def enter(self) -> None:
+        """Whichever comes first."""
+        super().enter()
+        if self._climbing is not None:
+            self._climbing.enter()
+
+    def wants_to_fly(self) -> bool:
+        """A mission does."""
+        return True
+
+    def step(self) -> None:
+        """Climb, then go."""
+        if self._climbing is not None and self._climbing.arrived():
+            self._climbing = None
+        self.taking_off = self._climbing is not None
+        if self._climbing is not None:
+            self._climbing.step()
+        else:
+            super().step()
+
+
 def leg(vehicle: Vehicle, item: Item, _goes_on: bool) -> Leg:
     """The leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
@@ -171,9 +201,8 @@ def leg(vehicle: Vehicle, item: Item, _goes_on: bool) -> Leg:
 def _go(vehicle: Vehicle, item: Item) -> Leg:
     p = vehicle.parameters
     point = vehicle.estimate.position if item.command == DELAY else item_point(vehicle, item)
-    away = Hold(vehicle, point)
-    far = not away.near(p["NAV_ACC_RAD"], 1e9)
-    going = Hold(vehicle, point, bearing(vehicle.estimate.position, point) if far else None)
+    far = not Hold(vehicle, point).near(p["NAV_ACC_RAD"], 1e9)
+    going = Going(vehicle, point, bearing(vehicle.estimate.position, point) if far else None)
     reach = item.param2 if item.command == WAYPOINT and item.param2 > 0.0 else p["NAV_ACC_RAD"]
     stay = from_seconds(max(0.0, item.param1)) if item.command in (WAYPOINT, LOITER_TIME, DELAY) else 0
     if item.command == LOITER_UNLIMITED:

@@ -187,6 +187,7 @@ ROVER = Dialect(
     on_disarmed=boot.nothing,
     throttle_centred=True,
     first_item=0,
+    actions_count=True,
     mission_item_done=missions.item_done,
     mission_item_begins=missions.item_begins,
     mission_ended=missions.ended,

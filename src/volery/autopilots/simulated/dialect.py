@@ -116,6 +116,8 @@ class Dialect:
     """Whether the throttle stick rests in its middle."""
     first_item: int = 1
     """Number of the first mission item that is flown: 1 where item 0 is home."""
+    actions_count: bool = False
+    """Whether an item that does not navigate is told to be done, too."""
     guided_arrived: Act = _nothing
     """A rover has reached the point that it was sent to."""
     guided_stale: Act = _nothing

@@ -177,6 +177,8 @@ class FlyMission(Manoeuvre):
             self._held.append(item)
         else:
             self._do(item)
+            if self.vehicle.dialect.actions_count:
+                self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
         return index + 1
 
     def _jump(self, index: int, item: Item) -> int:

@@ -50,5 +50,7 @@ class UploadHabits(NamedTuple):
     """The message that asks for an item, by its number."""
     received: str = "Flight plan received"
     """Said when it is complete; nothing if empty."""
+    turns_to_integers: bool = False
+    """Whether a peer that acknowledges a question as unsupported is asked by MISSION_REQUEST_INT instead."""
     keeps_old: bool = False
     """Whether the mission on board stays until the new one is complete."""

@@ -24,6 +24,7 @@ MISSION, FENCE, RALLY = 0, 1, 2
 MOST_ITEMS = 724
 ASK_AGAIN: Ns = 1 * S
 GIVE_UP: Ns = 8 * S
+REQUEST_INT = "MISSION_REQUEST_INT"
 GUIDED_ITEM = 2
 """``current`` of an item that is no part of a mission: go there now."""
 
@@ -35,6 +36,8 @@ class _Upload:
     latest: Ns
     items: list[Item] = field(default_factory=list)
     reminder: Handle | None = None
+    by_integers: bool = False
+    """Whether the peer refused to be asked otherwise."""
 
 
 class MissionService:
@@ -74,7 +77,7 @@ class MissionService:
             self._upload = None
             return
         asked = len(upload.items)
-        request = self._dialect.upload_habits.asks_with(asked)
+        request = REQUEST_INT if upload.by_integers else self._dialect.upload_habits.asks_with(asked)
         upload.peer.answer(request, seq=asked, mission_type=MISSION)
         upload.reminder = self._kernel.call_at(self._kernel.now() + ASK_AGAIN, self._ask)
 
@@ -207,7 +210,14 @@ class MissionService:
             )
 
     def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_ACK: a download has ended. Nothing to do."""
+        """MISSION_ACK: a download has ended, or the question for an item is not understood."""
+        upload = self._upload
+        refused = upload is not None and fields["type"] == UNSUPPORTED and not upload.by_integers
+        if upload is not None and refused and self._dialect.upload_habits.turns_to_integers:
+            upload.by_integers = True
+            if upload.reminder is not None:
+                upload.reminder.cancel()
+            self._ask()
 
     def _acknowledge(self, peer: Peer, result: int, kind: int = MISSION) -> None:
         peer.answer("MISSION_ACK", type=result, mission_type=kind)
