@@ -8,7 +8,7 @@ offsets; and the authority is the pilot's to take at any time.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isfinite, radians
+from math import radians
 
 from volery.base.errors import CapabilityError, LinkError, OutOfBounds, Refused, UsageError
 from volery.base.frames import heading_to_yaw
@@ -288,7 +288,7 @@ class Dji:
         return self._to_point(f"reach {goal}", there, at(goal, False), within)
 
     def hold(self) -> Sequence[Step]:
-        """Zero velocity until it stands; then the point where it stands."""
+        """Zero velocity until it stands; then it hovers by itself."""
         brake = Step(
             ask="stop",
             send=lambda: self._follow(STILL, 0.0, STOPPED_WITHIN),
@@ -298,15 +298,7 @@ class Dji:
             leads_to=(WAITS, DisplayMode.ATTITUDE.name),
             armed=True,
         )
-        return (*self._free(), *self._authority(), brake, self._now("stay", self._stay))
-
-    def _stay(self) -> None:
-        height = self.telemetry.above_home
-        point = self._over_here(height) if isfinite(height) and self.telemetry.ready else None
-        if point is not None:
-            self._aim(point)
-        else:
-            self._stream.stop()
+        return (*self._free(), *self._authority(), brake, self._now("hover", self._stream.stop))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Streamed for as long as it lasts; then it stops."""
