@@ -14,6 +14,7 @@ from volery.autopilots.px4.mavlink import mavlink
 from volery.autopilots.px4.offboard import AttitudeTarget, Target
 from volery.autopilots.px4.watching import on_step
 from volery.autopilots.simulated.dialect import Dialect
+from volery.autopilots.simulated.flight import Control, Setpoint
 from volery.autopilots.simulated.manoeuvres.guided import Turn
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission
 from volery.autopilots.simulated.manoeuvres.rover import (
@@ -112,7 +113,15 @@ def _course(north: float, east: float, otherwise: float) -> float:
 
 
 class StickDrive(Manual):
-    """MANUAL, and POSCTL with or without sticks: without them it stands."""
+    """MANUAL, and POSCTL with or without sticks: without them it brakes and stands."""
+
+    def step(self) -> None:
+        """Pass the sticks on."""
+        if of(self.vehicle).joystick.valid:
+            super().step()
+        else:
+            accel = self.vehicle.tuning.accel
+            self.vehicle.drive(Setpoint(Control.DRIVE, speed=self.vehicle.tuning.speed, accel=accel))
 
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:

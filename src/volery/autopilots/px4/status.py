@@ -179,8 +179,3 @@ def autopilot_version(vehicle: Vehicle) -> Fields:
         "middleware_custom_version": GIT_HASH,
         "uid": UID + vehicle.system - 1,
     }
-
-
-def protocol_version(_vehicle: Vehicle) -> Fields:
-    """PROTOCOL_VERSION."""
-    return {"version": 200, "min_version": 100, "max_version": 200}

@@ -94,7 +94,6 @@ BUILDERS: Mapping[str, Builder] = {
     "PING": status.ping,
     "POSITION_TARGET_GLOBAL_INT": motion.global_target,
     "POSITION_TARGET_LOCAL_NED": motion.position_target,
-    "PROTOCOL_VERSION": status.protocol_version,
     "SCALED_PRESSURE": motion.pressure,
     "SERVO_OUTPUT_RAW": status.servo_output,
     "SYSTEM_TIME": motion.system_time,

@@ -1,0 +1,102 @@
+"""Failsafes without a recording: what the firmware's parameters are documented to do, and no hang."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+LAND, RTL, LOITER = "AUTO.LAND", "AUTO.RTL", "AUTO.LOITER"
+
+
+def hovering(rig: Any) -> float:
+    rig.airborne()
+    rig.run(1.0)
+    at: float = rig.now
+    return at
+
+
+@pytest.mark.parametrize(("action", "mode"), [(2, LAND), (3, RTL)])
+def test_a_critical_battery_holds_and_then_acts(action: int, mode: str, bench: Any) -> None:
+    rig = bench(parameters={"COM_LOW_BAT_ACT": action})
+    since = hovering(rig)
+    rig.flight.drain_battery(0.06)
+    rig.run(1.0)
+    assert rig.vehicle.mode.name == LOITER
+    assert "Critical battery level\t" in rig.texts(since)
+    rig.run(5.5)
+    assert rig.vehicle.mode.name == mode
+    assert rig.latest["HEARTBEAT"]["system_status"] == 5
+
+
+def test_a_battery_that_only_warns(bench: Any) -> None:
+    rig = bench(parameters={"COM_LOW_BAT_ACT": 0})
+    since = hovering(rig)
+    rig.flight.drain_battery(0.06)
+    rig.run(8.0)
+    assert rig.vehicle.mode.name == LOITER
+    assert "Critical battery level\t" in rig.texts(since)
+
+
+def test_without_a_position_it_sinks_level_and_reports_land(bench: Any) -> None:
+    rig = bench()
+    since = hovering(rig)
+    rig.flight.block_gps()
+    rig.run_until(lambda: rig.vehicle.mode.name == LAND, within=20.0)
+    rig.run(0.2)
+    assert "Failsafe activated\t" in rig.texts(since)
+    rig.run_until(lambda: not rig.vehicle.armed, within=60.0)
+
+
+def test_a_lost_ground_station_counts_only_where_it_is_asked_for(bench: Any) -> None:
+    still = bench(beats=False)
+    beating = [still.kernel.every(10**9, lambda: still.send("HEARTBEAT", type=6, autopilot=8))]
+    hovering(still)
+    beating[0].cancel()
+    still.run(20.0)
+    assert still.vehicle.mode.name == LOITER
+
+
+def test_a_lost_ground_station_brings_it_home(bench: Any) -> None:
+    rig = bench(beats=False, parameters={"NAV_DLL_ACT": 2})
+    beating = rig.kernel.every(10**9, lambda: rig.send("HEARTBEAT", type=6, autopilot=8))
+    hovering(rig)
+    beating.cancel()
+    rig.run(9.0)
+    assert rig.vehicle.mode.name == LOITER
+    rig.run(8.0)
+    assert rig.vehicle.mode.name == RTL
+    rig.run_until(lambda: not rig.vehicle.armed, within=120.0)
+
+
+def test_the_user_may_leave_a_failsafe(bench: Any) -> None:
+    rig = bench(parameters={"COM_OBL_RC_ACT": 3})
+    rig.airborne()
+    rig.offboard(z=-9.0)
+    rig.run(2.0)
+    rig.stop_stream()
+    rig.run(3.0)
+    assert rig.vehicle.mode.name == RTL
+    assert rig.mode(4, 3) == 0
+    rig.run(2.0)
+    assert rig.vehicle.mode.name == LOITER
+    rig.stream(z=-9.0)
+    rig.run(1.0)
+    assert rig.vehicle.mode.name == LOITER  # another wish is another wish
+
+
+def test_a_rover_drives_where_the_stream_says_and_stops_without_it(bench: Any) -> None:
+    rig = bench("rover")
+    rig.ready()
+    rig.stream(x=15.0, y=5.0, z=0.0)
+    rig.run(0.1)
+    assert rig.mode(6) == 0
+    assert rig.command(400, 1) == 0
+    rig.run(4.0)
+    assert rig.ned[0] > 4.0
+    rig.stop_stream()
+    rig.run(4.0)
+    stopped = rig.ned
+    rig.run(2.0)
+    assert abs(rig.ned[0] - stopped[0]) < 0.3
+    assert rig.latest["HEARTBEAT"]["type"] == 10
