@@ -20,10 +20,15 @@ from volery.cli.main import app
 from volery.cost import catalogue
 from volery.model.schema import schema
 from volery.requirements.observables import OBSERVABLES
+from volery.testing.driver_checks import GROUPS
+from volery.testing.driver_conformance import chosen
+from volery.testing.faults import FAULTS
+from volery.testing.phases import PHASES
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"
 CONFORMANCE = ROOT / "tests" / "conformance" / "ardupilot"
+MARKS = {"passed": "✓", "failed": "✗", "declared missing": "–", "not possible here": "·"}
 MADE = "<!-- made by scripts/generate_docs.py; do not edit -->\n\n"
 
 
@@ -123,6 +128,70 @@ def ardupilot_checks() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _trials() -> dict[str, Any]:
+    """What scripts/gather_trials.py has found."""
+    found: dict[str, Any] = json.loads((REFERENCE / "trials.json").read_text(encoding="utf-8"))
+    return found
+
+
+def conformance() -> str:
+    """What each simulated autopilot's driver does of what is demanded of all."""
+    found = _trials()
+    outcomes = {name: {one["check"]: one for one in of["checks"]} for name, of in found.items()}
+    lines = [
+        "# Conformance of the drivers\n",
+        "What `volery conformance sim:AUTOPILOT` finds, check by check; run it over your own vehicle or",
+        "driver. `scripts/gather_trials.py` flies them anew.\n",
+        "✓ passed, ✗ failed, – declared missing before anything moves, · not possible there (see below).",
+    ]
+    for group in GROUPS:
+        of_group = [one for one in chosen() if one.group == group]
+        if of_group:
+            lines += [f"\n## {group.capitalize()}\n", f"| check | {' | '.join(found)} | what it demands |"]
+            lines.append("|---|" + ":-:|" * len(found) + "---|")
+        for one in of_group:
+            marks = [MARKS[outcomes[name][one.name]["outcome"]] for name in found]
+            lines.append(f"| `{one.name}` | {' | '.join(marks)} | {one.demands} |")
+    lines += ["\n## What is missing, and what is not possible there\n"]
+    for name in found:
+        for check, one in outcomes[name].items():
+            if one["why"]:
+                lines.append(f"- {name}, `{check}`: {one['outcome']}: {one['why']}.")
+    return "\n".join(lines) + "\n"
+
+
+def faults() -> str:
+    """What came of each fault in each phase of a flight."""
+    lines = [
+        "# Faults, and what comes of them\n",
+        "One fault in one phase of a flight of each simulated autopilot, through bytes, in virtual time. The",
+        "first line of a cell is what the caller saw: `done`, or the error that the call raised; the second",
+        "what the aircraft did from the fault on, by its modes, until the program's end had brought it down.",
+        "`scripts/gather_trials.py` flies them anew.\n",
+        "Of every cell holds: no call hung; what ended done was done, by the vehicle's own truth; any other",
+        "end is an error that names the vehicle; nothing was done twice; nobody else's mode was fought; at",
+        "last it stood on the ground, disarmed.\n",
+        "| fault | what happens |",
+        "|---|---|",
+        *(f"| {name} | {fault.words} |" for name, fault in FAULTS.items()),
+        "\n| phase | when |",
+        "|---|---|",
+        *(f"| {name} | {program.__doc__} |" for name, program in PHASES.items()),
+    ]
+    for name, of in _trials().items():
+        cells = {(one["fault"], one["phase"]): one for one in of["faults"]}
+        lines += [f"\n## {name}\n", f"| fault | {' | '.join(PHASES)} |", "|---" * (len(PHASES) + 1) + "|"]
+        for fault in FAULTS:
+            row = [_cell(cells[fault, phase]) for phase in PHASES]
+            lines.append(f"| {fault} | {' | '.join(row)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(one: dict[str, Any]) -> str:
+    broken = f"<br>**{one['broken']}**" if one["broken"] else ""
+    return f"{one['caller']}<br>{' → '.join(one['aircraft'])}{broken}"
+
+
 def pages() -> dict[str, str]:
     """File name and content."""
     return {
@@ -131,6 +200,8 @@ def pages() -> dict[str, str]:
         "command-line.md": MADE + command_line(),
         "ardupilot-parameters.md": MADE + ardupilot_parameters(),
         "ardupilot-checks.md": MADE + ardupilot_checks(),
+        "conformance.md": MADE + conformance(),
+        "faults.md": MADE + faults(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
 

@@ -17,7 +17,7 @@ from volery.cli.console import Output
 from volery.cli.endings import FAILED, OK
 from volery.run.recording import make_folder
 from volery.testing.checks import Check
-from volery.testing.conformance import Outcome, Report, Result, Show, chosen, conformance
+from volery.testing.driver_conformance import Outcome, Report, Result, Show, chosen, conformance
 
 STYLES = {
     Outcome.PASSED: "green",

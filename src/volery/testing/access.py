@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from itertools import count
+from random import Random
 from typing import Protocol
 
-from volery.base.errors import CapabilityError
-from volery.graph import Graph
+from volery.base.seeds import stream
 from volery.graph.node import NodeId
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
-from volery.run.airfield import LINK_DELAY, Airfield
-from volery.run.graph_wire import FREE
-from volery.run.serving import SIMULATED, serve, serving
+from volery.links.wire import Wire, WireFaults
+from volery.run.airfield import Airfield
+from volery.run.graph_wire import GIVEN_UP, GraphWire, private_graph
+from volery.run.serving import SIMULATED, on_links, serve, serving
 from volery.run.simulated import Simulated, link_to
+from volery.testing.checks import ImpossibleError
 from volery.testing.tap import Tap
 from volery.vehicles.driver import Driver, drivers
 
@@ -43,6 +45,10 @@ class Access(ABC):
     @abstractmethod
     def first(self) -> Driver:
         """That of the program under test."""
+
+    @abstractmethod
+    def suffer(self, faults: WireFaults) -> None:
+        """From now on this happens to what passes. Raises ``ImpossibleError`` where nothing can."""
 
     @abstractmethod
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
@@ -73,19 +79,25 @@ class ByLink(Access):
         link = self._airfield.link(vehicle)
         return self._open(link, vehicle, options), link
 
+    def suffer(self, faults: WireFaults) -> None:
+        """On a link through bytes."""
+        if not isinstance(self.link, Wire):
+            raise ImpossibleError("nothing can happen to values; add wire=bytes to the address")
+        self.link.suffer(faults)
+
     def _open(self, link: Link, vehicle: str, options: dict[str, str]) -> Driver:
         open_driver = self._factory.on_link
         assert open_driver is not None, "seen by access_to"
         return open_driver(self._kernel, link, vehicle, {**SIMULATED, **options})
 
 
-class _Carrier:
-    """Carries the messages of a graph, unless the hand has cut off the node that it is laid on."""
+class _HandOnNode(GraphWire):
+    """The wire of a graph, with a hand on the part of it that leads to the node called ``held``."""
 
-    def __init__(self, kernel: Kernel) -> None:
+    def __init__(self, kernel: Kernel, random: Random, faults: WireFaults | None) -> None:
+        super().__init__(kernel, random, faults)
         self.hears = self.speaks = True
         self.held = ""
-        self._kernel = kernel
 
     def cut(self) -> None:
         """What is sent from now on is lost."""
@@ -95,11 +107,15 @@ class _Carrier:
         """All passes again."""
         self.hears = self.speaks = True
 
-    def carry(self, one: NodeId, other: NodeId, size: int, sure: bool, deliver: Action, lost: Action) -> None:
-        """As long as over a serial line."""
-        del size, sure
-        silenced = (one.name == self.held and not self.speaks) or (other.name == self.held and not self.hears)
-        self._kernel.call_at(self._kernel.now() + LINK_DELAY, lost if silenced else deliver)
+    def carry(
+        self, sender: NodeId, receiver: NodeId, size: int, sure: bool, deliver: Action, lost: Action
+    ) -> None:
+        """See ``GraphWire``; what the hand does not let pass is lost."""
+        unheard = receiver.name == self.held and not self.hears
+        if unheard or (sender.name == self.held and not self.speaks):
+            self._kernel.call_at(self._kernel.now() + GIVEN_UP, lost)
+        else:
+            super().carry(sender, receiver, size, sure, deliver, lost)
 
 
 class ByGraph(Access):
@@ -107,21 +123,26 @@ class ByGraph(Access):
 
     protocol = "a graph"
 
-    def __init__(self, kernel: Kernel, airfield: Airfield, wanted: Simulated, sharing: str = "") -> None:
+    def __init__(
+        self, kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int, sharing: str = ""
+    ) -> None:
         self._kernel = kernel
         self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-        self._carrier = self.hand = _Carrier(kernel)
-        self._graph = Graph(
-            kernel, lambda node, call, x: FREE, self._carrier.carry, records=lambda topic: False
-        )
+        random = stream(seed, f"wire/{self._vehicle}")
+        self._wire = self.hand = _HandOnNode(kernel, random, wanted.faults)
+        self._graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
         self._numbers = count(1)
         for vehicle in filter(None, (self._vehicle, sharing)):
             serve(self._graph, airfield, vehicle, serving(self._autopilot, vehicle), Place(vehicle))
 
+    def suffer(self, faults: WireFaults) -> None:
+        """From now on this happens to what passes, in both directions."""
+        self._wire.suffer(faults)
+
     def first(self) -> Driver:
         """With the hand on its node."""
         driver, name = self._commander(self._vehicle, {})
-        self._carrier.held = name
+        self._wire.held = name
         return driver
 
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
@@ -137,13 +158,7 @@ class ByGraph(Access):
 
 
 def access_to(kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int, sharing: str = "") -> Access:
-    """The way to a vehicle that its autopilot and driver have in common: links first.
-
-    Raises ``CapabilityError`` for faults of a wire where there is none.
-    """
-    name, autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
-    if airfield.family(name).codec is not None and drivers.load(autopilot).on_link is not None:
+    """The way to a vehicle that its autopilot and driver have in common: links first."""
+    if on_links(airfield, wanted):
         return ByLink(kernel, airfield, wanted, seed, sharing)
-    if wanted.faults is not None:
-        raise CapabilityError(f"{name}: {autopilot} is reached over a graph: there is no wire to it")
-    return ByGraph(kernel, airfield, wanted, sharing)
+    return ByGraph(kernel, airfield, wanted, seed, sharing)

@@ -14,15 +14,13 @@ from itertools import pairwise
 from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.task import Cancelled, Place
-from volery.links.wire import Wire
-from volery.testing.checks import BrokenError, ImpossibleError, demand
+from volery.testing.checks import BrokenError, demand
 from volery.testing.faults import FAULTS, WHOLE, Fault
 from volery.testing.phases import PHASES
 from volery.testing.stage_simulated import SimulatedStage
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
-from volery.vehicles.driver import drivers
 
 LONGEST: Ns = 15 * MINUTE
 """A call that is not over by then hangs: no time-out of these short flights is longer."""
@@ -60,7 +58,6 @@ class Trial:
     """One fault in one phase. ``caller``: ``done``, or the error's name, and ``said`` its words.
 
     ``aircraft``: its modes from the fault on. ``broken`` says which demand was not met; empty if all were.
-    ``possible`` is False where there is nothing that this fault could happen to.
     """
 
     autopilot: str
@@ -71,7 +68,6 @@ class Trial:
     aircraft: tuple[str, ...]
     ended: str
     broken: str = ""
-    possible: bool = True
 
 
 def try_fault(autopilot: str, fault: str, phase: str, seed: int = 1) -> Trial:
@@ -86,14 +82,11 @@ class _Trying:
         self._names = autopilot, fault, phase
         self._fault: Fault = FAULTS[fault]
         self._program = PHASES[phase]
-        wired = drivers.load(autopilot).on_link is not None
-        address = parse(f"sim:{autopilot}{'?wire=bytes' if wired else ''}")
-        self._stage = SimulatedStage(address, Drone, seed)
+        self._stage = SimulatedStage(parse(f"sim:{autopilot}?wire=bytes"), Drone, seed)
         self._name = self._stage.name_of_vehicle
         self._seen = Seen()
         self._after = Seen()  # from the fault on
         self._struck = False
-        self._possible = True
         self._caller, self._said = "", ""
         self._ended = ""
         self._scope = self._stage.kernel.root.child("program")
@@ -115,15 +108,7 @@ class _Trying:
             broken = str(error)
         finally:
             stage.close()
-        return Trial(
-            *self._names,
-            self._caller,
-            self._said,
-            tuple(self._after.modes),
-            self._ended,
-            broken,
-            self._possible,
-        )
+        return Trial(*self._names, self._caller, self._said, tuple(self._after.modes), self._ended, broken)
 
     def _look(self) -> None:
         state = self._stage.airfield.autopilots[self._name].state()
@@ -166,8 +151,6 @@ class _Trying:
     def _begin(self) -> None:
         try:
             self._fault.begins(self._stage)
-        except ImpossibleError:
-            self._possible = False
         except VoleryError:
             return  # the other station's refusals are its own concern
 
@@ -183,8 +166,7 @@ class _Trying:
         stage = self._stage
         if self._caller == "done":
             self._demand_done()
-        if isinstance(stage.link, Wire):
-            stage.link.suffer(WHOLE)
+        stage.suffer(WHOLE)
         program = stage.drone
         if self._fault.deadly:
             stage.sleep(LOST_S)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from volery.links.wire import Wire, WireFaults
-from volery.testing.checks import ImpossibleError
+from volery.links.wire import WireFaults
 from volery.testing.stage_simulated import SimulatedStage
 from volery.world.wind import Wind
 
@@ -18,13 +17,12 @@ GALE = Wind(east=12.0, gust=1.5)
 
 @dataclass(frozen=True)
 class Fault:
-    """``begins`` makes it happen. ``of_bytes``: it happens to bytes on a wire. ``deadly``: it ends the
-    program. ``brings_down``: somebody else commands the vehicle from then on; our program must not.
+    """``begins`` makes it happen. ``deadly``: it ends the program. ``brings_down``: somebody else commands
+    the vehicle from then on; our program must not.
     """
 
     words: str
     begins: Callable[[SimulatedStage], None]
-    of_bytes: bool = False
     deadly: bool = False
     brings_down: bool = False
 
@@ -38,12 +36,7 @@ def _cut(seconds: float) -> Callable[[SimulatedStage], None]:
 
 
 def _suffers(faults: WireFaults) -> Callable[[SimulatedStage], None]:
-    def begins(stage: SimulatedStage) -> None:
-        if not isinstance(stage.link, Wire):
-            raise ImpossibleError("its topics are no wire: nothing is lost, doubled or garbled there")
-        stage.link.suffer(faults)
-
-    return begins
+    return lambda stage: stage.suffer(faults)
 
 
 def _another_station(stage: SimulatedStage) -> None:
@@ -64,20 +57,14 @@ FAULTS: Mapping[str, Fault] = {
     "cut-0.5": Fault("the link is cut for 0.5 s", _cut(0.5)),
     "cut-2": Fault("the link is cut for 2 s", _cut(2.0)),
     "cut-10": Fault("the link is cut for 10 s", _cut(10.0)),
-    "duplicated": Fault(
-        "from then on each frame arrives twice", _suffers(WireFaults(duplicate=1.0)), of_bytes=True
-    ),
-    "reordered": Fault(
-        "from then on 30 % of the frames are overtaken", _suffers(WireFaults(reorder=0.3)), of_bytes=True
-    ),
-    "corrupted": Fault(
-        "from then on 1 % of the bytes have a bit turned", _suffers(WireFaults(flip=0.01)), of_bytes=True
-    ),
-    "truncated": Fault(
-        "from then on 20 % of the frames end too early", _suffers(WireFaults(truncate=0.2)), of_bytes=True
-    ),
+    "duplicated": Fault("from then on each frame arrives twice", _suffers(WireFaults(duplicate=1.0))),
+    "reordered": Fault("from then on 30 % of the frames are overtaken", _suffers(WireFaults(reorder=0.3))),
+    "corrupted": Fault("from then on 1 % of the bytes have a bit turned", _suffers(WireFaults(flip=0.01))),
+    "truncated": Fault("from then on 20 % of the frames end too early", _suffers(WireFaults(truncate=0.2))),
     "other-station": Fault(
-        "a second ground station has it land (on the ground: disarms it)", _another_station, brings_down=True
+        "another station lands it (on the ground: disarms it); where programs share a node, the pilot does",
+        _another_station,
+        brings_down=True,
     ),
     "killed": Fault("the program is killed", _dies, deadly=True),
     "battery-low": Fault("8 % are left in the battery", lambda stage: stage.flight.drain_battery(0.08)),

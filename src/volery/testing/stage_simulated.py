@@ -12,6 +12,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.links.wire import WireFaults
 from volery.run.opening import KINDS
 from volery.run.simulated import airfield_of, simulated
 from volery.testing.access import Hand, access_to
@@ -104,6 +105,10 @@ class SimulatedStage(Stage):
     def tap(self) -> Hand:
         """The hand on the wire."""
         return self._access.hand
+
+    def suffer(self, faults: WireFaults) -> None:
+        """From now on this happens to what passes on the wire of the program under test."""
+        self._access.suffer(faults)
 
     def _commander(self) -> Commander:
         if self.link is None:
