@@ -98,8 +98,8 @@ class _Trying:
         broken = ""
         try:
             self._fly()
-            demand(self._struck, "the fault never came: the call was over before")
             self._judge_caller()
+            demand(self._struck, "the fault never came: the call was over before")
             stage.perform(self._bring_down)
             self._judge_aircraft()
         except BrokenError as error:
