@@ -36,9 +36,7 @@ def streamed(station: Any, seconds: float, north: float, down: float) -> None:
 
 
 def shown(station: Any, number: int) -> Any:
-    return station.wait(
-        "HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and beat.custom_mode == number
-    )
+    return station.wait("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and beat.custom_mode == number)
 
 
 def test_from_boot_to_the_ground_again(reached: Any) -> None:
