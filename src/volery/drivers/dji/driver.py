@@ -184,7 +184,8 @@ class Dji:
             answer=key.MOTORS,
             again=ASK_AGAIN,
         )
-        return (*(self._authority() if self.telemetry.armed else ()), step)
+        alone = force and self._carrier.names.kills_without_authority
+        return (*(self._authority() if self.telemetry.armed and not alone else ()), step)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Task 4, which starts the motors and goes to its own height; then to *height* by set-points."""

@@ -41,6 +41,7 @@ class Names(Protocol):
 
     namespace: str
     package: str
+    kills_without_authority: bool
 
     def version(self) -> Ask | None:
         """Which aircraft it is: the response has ``hardware``."""
@@ -106,6 +107,7 @@ class OldNames(_Shared):
     """``dji_sdk`` 3.8."""
 
     package = OLD_NAMES
+    kills_without_authority = False
 
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)
@@ -165,6 +167,7 @@ class NewNames(_Shared):
     """The vehicle node of ``dji_osdk_ros`` 4.1: most services lie beside its prefix."""
 
     package = NEW_NAMES
+    kills_without_authority = True
 
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)

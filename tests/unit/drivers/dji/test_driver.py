@@ -1,0 +1,484 @@
+"""The DJI driver against a scripted node: what it asks, in which order, what it streams, what it notices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import pytest
+
+from volery.base.errors import (
+    CapabilityError,
+    Failsafe,
+    LinkLost,
+    LinkSilent,
+    NotArrived,
+    OutOfBounds,
+    Overridden,
+    Refused,
+    UsageError,
+)
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.time import MS, S
+from volery.drivers.dji import DRIVER, open_driver
+from volery.kernel.task import Place
+from volery.vehicles import Drone
+from volery.vehicles.driver import Capability
+from volery.vehicles.telemetry import Said
+
+HOME = (46.0, -103.0, 900.0)
+METRES = 111_195.0
+Make = Callable[..., Any]
+
+
+def at(north: float, east: float, up: float) -> Position:
+    return Position(HOME[0] + north / METRES, HOME[1] + east / METRES, AboveHome(up))
+
+
+def follows(bench: Any) -> None:
+    """The aircraft is at once where set-points of position send it."""
+
+    def tick() -> None:
+        node = bench.node
+        if node.setpoints:
+            _, flag, (x, y, z, _) = node.setpoints[-1]
+            if flag == 0x91:
+                node.be_at(node.north + y, node.east + x / 1.0, z)
+                node.setpoints.append((bench.kernel.now(), -2, (0.0, 0.0, 0.0, 0.0)))
+
+    bench.kernel.every(100 * MS, tick)
+
+
+# -- being heard
+
+
+def test_it_is_heard_once_it_has_said_which_aircraft_it_is(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_heard()
+        seen = made.drone.telemetry
+        assert (seen.kind, seen.autopilot, seen.mode) == ("drone", "DJI A3", "P_GPS")
+        assert made.node.names() == ["query_drone_version"]
+        assert seen.battery == (0.8, 22.8, 5.0)
+        assert seen.attitude.heading == pytest.approx(90.0)  # a yaw of 0 looks east
+        assert Capability.STABILIZE in made.drone.capabilities
+        assert Capability.TERRAIN not in made.drone.capabilities
+
+    made.run(body)
+
+
+def test_nobody_there_is_told_with_the_topic_that_is_missing(bench: Make) -> None:
+    made = bench()
+    lonely = made.graph.node("lonely", place=Place("lonely"))
+    driver = open_driver(made.kernel, lonely, "d", {"namespace": "/elsewhere/dji_sdk"})
+
+    def body() -> None:
+        with pytest.raises(LinkSilent, match="no DJI node publishes /elsewhere/dji_sdk/flight_status"):
+            Drone(made.kernel, "d", driver).wait_heard(within=2.0)
+        driver.close()
+
+    made.run(body)
+
+
+@pytest.mark.parametrize(
+    ("options", "wrong"),
+    [({"names": "dji"}, "dji_osdk_ros or dji_sdk"), ({"rate": "10"}, "no option 'rate'")],
+)
+def test_options_that_make_no_sense(bench: Make, options: dict[str, str], wrong: str) -> None:
+    made = bench()
+    node = made.graph.node("other", place=Place("other"))
+    with pytest.raises(UsageError, match=wrong):
+        open_driver(made.kernel, node, "d", options)
+    assert DRIVER.on_link is None
+    assert DRIVER.namespace.format(name="x") == "/x/dji_sdk"
+
+
+# -- the sequence
+
+
+def test_a_takeoff_asks_in_order_and_then_climbs_by_setpoints(bench: Make) -> None:
+    made = bench()
+    follows(made)
+
+    def body() -> None:
+        made.drone.takeoff(8.0)
+        assert made.node.names() == [
+            "query_drone_version",
+            "activation",
+            "set_local_pos_ref",
+            "sdk_control_authority",
+            "drone_task_control",
+        ]
+        assert made.node.asked[-1][1].task == 4
+        assert {flag for _, flag, _ in made.node.setpoints if flag > 0} == {0x91}
+        assert made.drone.altitude.metres == pytest.approx(8.0)
+        assert made.drone.home.altitude.metres == pytest.approx(900.0, abs=0.01)
+
+    made.run(body)
+
+
+def test_a_bad_gps_is_waited_for_and_named(bench: Make) -> None:
+    made = bench()
+    made.node.health = 3
+
+    def body() -> None:
+        with pytest.raises(NotArrived, match=r"gps health 3 must be above 3"):
+            made.drone.wait_ready(within=5.0)
+        made.later(2.0, lambda: setattr(made.node, "health", 4))
+        made.drone.wait_ready(within=5.0)
+
+    made.run(body)
+
+
+@pytest.mark.parametrize(
+    ("service", "words"),
+    [
+        ("activation", "refused to activate .*app_id"),
+        ("sdk_control_authority", "give the program the authority .*mode switch must be at F"),
+        ("drone_task_control", "refused to take off"),
+    ],
+)
+def test_a_refusal_says_what_was_refused_and_what_to_do(bench: Make, service: str, words: str) -> None:
+    made = bench()
+    made.node.refuse.add(service)
+
+    def body() -> None:
+        with pytest.raises(Refused, match=words):
+            made.drone.takeoff(5.0)
+
+    made.run(body)
+
+
+def test_setpoints_are_remaining_offsets_fifty_times_a_second(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(2.0, lambda: made.node.be_at(20.0, 0.0, 9.0))
+        start = made.kernel.now()
+        made.drone.goto(at(20.0, 0.0, 9.0))
+        sent = [one for one in made.node.setpoints if one[0] < start + 2 * S]
+        assert 95 <= len(sent) <= 105
+        assert all(flag == 0x91 for _, flag, _ in sent)
+        x, y, z, yaw = sent[50][2]
+        assert (x, y, z) == (pytest.approx(0.0, abs=0.05), pytest.approx(20.0, abs=0.1), 9.0)
+        assert yaw == pytest.approx(0.0, abs=1e-6)  # as it looked before: east
+        assert made.drone.mode == "NAVI_SDK_CTRL"
+
+    made.run(body)
+
+
+def test_an_altitude_above_the_sea_is_flown_above_the_point_of_takeoff(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.arm()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(1.0, lambda: made.node.be_at(5.0, 0.0, 12.0))
+        made.drone.goto(Position(HOME[0] + 5.0 / METRES, HOME[1], AMSL(912.0)))
+        assert made.node.setpoints[10][2][2] == pytest.approx(12.0, abs=0.05)
+        with pytest.raises(OutOfBounds, match="0 to 120 m"):
+            made.drone.goto(at(5.0, 0.0, -1.0))
+
+    made.run(body)
+
+
+def test_a_stated_speed_is_a_velocity_until_near_the_goal(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(1.0, lambda: made.node.be_at(37.0, 0.0, 5.0))
+        made.later(2.0, lambda: made.node.be_at(40.0, 0.0, 5.0))
+        made.drone.goto(at(40.0, 0.0, 5.0), speed=3.0)
+        flags = [flag for _, flag, _ in made.node.setpoints]
+        first = made.node.setpoints[5][2]
+        assert flags[5] == 0x49
+        assert (first[0], first[1]) == (pytest.approx(0.0, abs=0.05), pytest.approx(3.0, abs=0.05))
+        assert 0x91 in flags
+
+    made.run(body)
+
+
+def test_no_offset_is_sent_from_a_place_that_is_old(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(1.0, lambda: setattr(made.node, "lost", True))
+        made.later(2.0, made.node.setpoints.clear)
+        made.later(3.0, lambda: setattr(made.node, "health", 0))
+        made.later(3.0, lambda: setattr(made.node, "mode", 1))
+        with pytest.raises(Failsafe, match="ATTITUDE"):
+            made.drone.goto(at(20.0, 0.0, 5.0))
+        assert made.node.setpoints == []
+
+    made.run(body)
+
+
+def test_a_velocity_is_streamed_for_as_long_as_it_lasts(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.drone.set_velocity(2.0, 1.0, 0.5, 90.0, lasting=1.0)
+        made.wait(5.0)
+        moving = [axes for _, flag, axes in made.node.setpoints if flag == 0x49 and axes[1]]
+        assert 45 <= len(moving) <= 55
+        assert moving[0] == (1.0, 2.0, 0.5, pytest.approx(-pi / 2.0))
+        assert made.node.setpoints[-1][2] == (0.0, 0.0, 0.0, 0.0)
+        count = len(made.node.setpoints)
+        made.wait(1.0)
+        assert len(made.node.setpoints) == count  # it hovers by itself
+
+    made.run(body)
+
+
+def test_sticks_are_angles_turn_and_climb_or_thrust(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.drone.manual_control(1.0, -1.0, 1.0, 0.5)
+        made.drone.altitude_hold()
+        made.wait(0.2)
+        _, flag, axes = made.node.setpoints[-1]
+        assert flag == 0x0B
+        assert axes == (
+            pytest.approx(-0.436, abs=1e-3),
+            pytest.approx(0.436, abs=1e-3),
+            2.0,
+            pytest.approx(-pi / 4),
+        )
+        made.drone.manual_control(0.0, 0.0, 0.5, 0.0)
+        made.wait(0.1)
+        assert made.node.setpoints[-1][2] == (0.0, 0.0, 0.0, pytest.approx(0.0))
+        made.drone.stabilize()
+        made.wait(0.1)
+        assert made.node.setpoints[-1][1:] == (0x2B, (0.0, 0.0, 50.0, pytest.approx(0.0)))
+
+    made.run(body)
+
+
+# -- tasks
+
+
+def test_landing_and_going_home_stop_the_stream_and_wait_until_the_motors_stand(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.arm()
+        for operation, task in ((made.drone.land, 6), (made.drone.return_home, 1)):
+            made.node.obey(4)
+            made.wait(0.1)
+            made.drone.set_velocity(1.0)
+            made.later(0.5, made.node.setpoints.clear)
+            operation()
+            assert made.node.asked[-1][1].task == task
+            assert not made.drone.armed
+            assert made.node.setpoints == []
+
+    made.run(body)
+
+
+def test_in_the_air_the_motors_are_stopped_by_force_only(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        with pytest.raises(Refused, match="would fall"):
+            made.drone.disarm()
+        made.drone.kill(sure=True)
+        assert made.node.asked[-1][1].arm == 0
+        assert not made.drone.armed
+
+    made.run(body)
+
+
+# -- somebody else
+
+
+def test_the_pilot_who_moves_the_mode_switch_has_it_until_he_moves_it_back(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(1.0, lambda: setattr(made.node, "switch", -8000.0))
+        made.later(1.0, lambda: setattr(made.node, "mode", 6))
+        with pytest.raises(Overridden, match="P_GPS by RC"):
+            made.drone.goto(at(20.0, 0.0, 5.0))
+        made.node.setpoints.clear()
+        with pytest.raises(Overridden, match="did not command"):
+            made.drone.hold()
+        assert made.node.setpoints == []
+        assert "the authority is lost" in made.drone.texts[-1].text
+        made.node.switch = 8000.0
+        made.wait(0.1)
+        asked = made.node.names().count("sdk_control_authority")
+        made.drone.hold()
+        assert made.node.names().count("sdk_control_authority") == asked + 1  # it must be asked for anew
+
+    made.run(body)
+
+
+def test_setpoints_that_are_not_obeyed_mean_that_another_has_the_authority(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.kernel.every(10 * MS, lambda: setattr(made.node, "mode", 6))
+        with pytest.raises(Overridden, match="by another program"):
+            made.drone.goto(at(20.0, 0.0, 5.0))
+
+    made.run(body)
+
+
+def test_going_home_by_itself_is_a_failsafe(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+
+        def insist() -> None:
+            made.node.mode = 15
+
+        made.later(1.0, lambda: made.kernel.every(10 * MS, insist) and None)
+        with pytest.raises(Failsafe, match="NAVI_GO_HOME"):
+            made.drone.goto(at(20.0, 0.0, 5.0))
+
+    made.run(body)
+
+
+def test_a_silent_link_is_lost_and_comes_back(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(1.0, lambda: setattr(made.node, "mute", True))
+        with pytest.raises(LinkLost, match="nothing was heard"):
+            made.drone.goto(at(20.0, 0.0, 5.0))
+        made.node.mute = False
+        made.wait(0.5)
+        made.drone.hold()
+
+    made.run(body)
+    details = [event.state for event in made.events if type(event).__name__ == "LinkState"]
+    assert details == ["silent", "back"]
+
+
+def test_anomalies_are_texts(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_heard()
+        made.node.say("flight_anomaly", data=128 | 2048)
+        made.wait(0.1)
+        made.node.say("flight_anomaly", data=128)
+        made.wait(0.1)
+        said: list[Said] = made.drone.texts
+        assert [one.text for one in said] == ["esc disconnected", "strong wind level2"]
+
+    made.run(body)
+
+
+# -- the M100
+
+
+def test_an_m100_is_read_by_its_own_numbers(bench: Make) -> None:
+    made = bench("M100")
+
+    def take_off(_task: int) -> None:
+        made.node.status = 2
+        made.later(4.0, lambda: setattr(made.node, "status", 3))
+        made.later(6.0, lambda: made.node.be_at(0.0, 0.0, 1.2))
+
+    made.node.on_task = take_off
+
+    def body() -> None:
+        made.drone.wait_heard()
+        assert (made.drone.armed, made.drone.flying) == (False, False)  # 1 is ON_GROUND, motors off
+        follows(made)
+        made.drone.takeoff(5.0)
+        assert made.kernel.now() > 6 * S  # it is off the ground when it has gained a metre
+        assert made.drone.telemetry.autopilot == "DJI M100"
+        made.node.on_task = lambda _task: setattr(made.node, "status", 4)
+        made.later(1.0, lambda: setattr(made.node, "status", 5))
+        made.later(3.0, lambda: setattr(made.node, "status", 1))
+        made.drone.land()
+        assert not made.drone.armed
+
+    made.run(body)
+
+
+# -- hostile
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        {"latitude": float("nan"), "longitude": 0.0, "altitude": 0.0},
+        {"latitude": 91.0, "longitude": 0.0, "altitude": 0.0},
+        {"latitude": 46.0, "longitude": -103.0, "altitude": float("inf")},
+        {"latitude": 0.0, "longitude": 0.0, "altitude": 0.0},
+        {"latitude": 46.5, "longitude": -103.0, "altitude": 0.0, "status": {"status": -1}},
+    ],
+)
+def test_a_place_off_the_globe_is_not_believed(bench: Make, spoiled: dict[str, Any]) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.lost = True
+        made.wait(0.1)
+        before = made.drone.position
+        made.node.say("gps_position", **spoiled)
+        made.wait(0.1)
+        assert made.drone.position == before
+
+    made.run(body)
+
+
+def test_numbers_beyond_any_meaning_upset_nothing(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.say("rc", axes=[])
+        made.node.say("battery_state", voltage=float("nan"), current=float("nan"))
+        made.node.say("attitude", quaternion={"w": 0.0, "x": 0.0, "y": 0.0, "z": 0.0})
+        made.node.say("height_above_takeoff", data=float("nan"))
+        made.node.status, made.node.mode = 200, 255
+        made.wait(0.2)
+        assert made.drone.mode == "MODE_255"
+        assert made.drone.flying
+
+    made.run(body)
+
+
+def test_what_a_drone_is_not(bench: Make) -> None:
+    made = bench()
+    with pytest.raises(CapabilityError, match="rovers"):
+        made.driver.manual()
