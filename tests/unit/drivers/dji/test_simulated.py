@@ -1,0 +1,234 @@
+"""Whole flights of the DJI driver with the simulated aircraft, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import hypot
+from typing import Any
+
+import pytest
+
+from volery.base.errors import Failsafe, NotArrived, Overridden
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.time import MS, S
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.run.opening import Stated, open_vehicles
+from volery.trace.events import Operation
+from volery.vehicles import Drone, Land, TakeOff, Vehicle, Waypoint
+
+HOME = Position(46.0825, -103.8995, AMSL(900.0))
+FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
+NEAR_M, NEAR_UP_M = 0.6, 0.3
+
+
+class Flown:
+    """One vehicle at an address, and all that was recorded of it."""
+
+    def __init__(self, options: str = "", seed: int = 1) -> None:
+        opened = open_vehicles({"d": f"sim:dji?start=warm{options}"}, {"d": Drone}, Stated(seed=seed))
+        assert isinstance(opened.kernel, VirtualKernel)
+        assert opened.airfield is not None
+        self.kernel, self.airfield = opened.kernel, opened.airfield
+        (vehicle,) = opened.vehicles
+        assert isinstance(vehicle, Drone)
+        self.drone: Drone = vehicle
+        self.events: list[Any] = []
+        self.kernel.record = self.events.append
+
+    def fly(self, mission: Callable[[Drone], None]) -> list[Operation]:
+        """Carry it out; what it raises comes out here."""
+        problems: list[BaseException] = []
+        ended: list[bool] = []
+
+        def flow() -> None:
+            try:
+                self.drone.wait_heard()
+                mission(self.drone)
+            except Exception as problem:
+                problems.append(problem)
+            finally:
+                ended.append(True)
+
+        self.kernel.spawn(flow, "mission", Place("mission"))
+        while not ended:
+            self.kernel.run(self.kernel.now() + 500 * MS)
+        self.drone.close()
+        self.kernel.close()
+        if problems:
+            raise problems[0]
+        return [event for event in self.events if isinstance(event, Operation)]
+
+    def wait(self, seconds: float) -> None:
+        self.kernel.sleep_until(self.kernel.now() + round(seconds * S))
+
+    def later(self, seconds: float, action: Callable[[], None]) -> None:
+        self.kernel.call_at(self.kernel.now() + round(seconds * S), action)
+
+    def switch(self, pulse: int) -> None:
+        """The pilot's mode switch."""
+        self.airfield.autopilots["d"].vehicle.sticks.transmitter[4] = pulse
+
+    @property
+    def height(self) -> float:
+        """True metres above where it stood."""
+        return float(self.airfield.flights["d"].truth().position[2])
+
+
+def at(east: float, north: float, height: float) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
+    return Position(latitude, longitude, AboveHome(height))
+
+
+def tour(drone: Drone) -> None:
+    drone.takeoff(10.0)
+    drone.goto(at(15.0, 20.0, 12.0))
+    drone.goto(at(-10.0, 5.0, 8.0), speed=3.0)
+    drone.set_heading(120.0)
+    drone.return_home()
+
+
+@pytest.mark.parametrize(
+    "options",
+    ["", "&names=dji_osdk_ros", "&parameters=AIRCRAFT:2", "&wire=bytes&drop=0.02&flip=1e-4&jitter=0.01"],
+    ids=["3.8", "4.1", "M100", "a bad wire"],
+)
+def test_a_tour_arrives_by_the_aircrafts_own_estimate(options: str) -> None:
+    flown = Flown(options)
+    done = flown.fly(tour)
+    assert [one.outcome for one in done] == ["ok"] * 5
+    for one in done[:3]:
+        assert one.estimate_horizontal <= NEAR_M
+        assert one.estimate_vertical <= NEAR_UP_M
+    assert done[-1].estimate_horizontal < 1.0
+    assert not flown.drone.armed
+
+
+def test_the_same_seed_is_the_same_flight() -> None:
+    bad = "&wire=bytes&drop=0.05&jitter=0.02"
+    first, again, other = (Flown(bad, seed) for seed in (3, 3, 4))
+    for one in (first, again, other):
+        one.fly(tour)
+    assert repr(first.events) == repr(again.events)
+    assert repr(first.events) != repr(other.events)
+
+
+def test_sticks_fly_it_without_satellites_from_the_ground_and_back() -> None:
+    flown = Flown()
+
+    def mission(drone: Drone) -> None:
+        flown.wait(1.0)
+        flown.airfield.flights["d"].block_gps()
+        flown.wait(12.0)
+        assert not drone.ready
+        drone.manual_control(0.0, 0.0, 0.0, 0.0)
+        drone.altitude_hold()
+        assert drone.armed
+        drone.manual_control(0.0, 0.0, 0.8, 0.0)
+        flown.wait(8.0)
+        assert flown.height > 4.0
+        drone.manual_control(0.0, 0.0, 0.5, 0.0)
+        flown.wait(1.0)
+        drone.stabilize()
+        flown.wait(1.0)
+        flown.airfield.flights["d"].block_gps(False)
+        flown.wait(5.0)
+        drone.goto(at(5.0, 5.0, 6.0))  # by position again, in flight
+        flown.airfield.flights["d"].block_gps()
+        flown.wait(12.0)
+        drone.land()
+
+    flown.fly(mission)
+    assert flown.height == pytest.approx(0.0, abs=0.2)
+
+
+def test_the_pilot_takes_it_and_gives_it_back() -> None:
+    flown = Flown()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(6.0)
+        flown.later(2.0, lambda: flown.switch(1000))
+        with pytest.raises(Overridden, match="by RC"):
+            drone.goto(at(40.0, 0.0, 6.0))
+        flown.wait(4.0)
+        speed = drone.velocity
+        assert hypot(speed.north, speed.east) < 0.5  # it hovers; nobody fights
+        with pytest.raises(Overridden):
+            drone.land()
+        flown.switch(2000)
+        flown.wait(0.5)
+        drone.land()
+
+    flown.fly(mission)
+
+
+def test_a_low_battery_is_its_own_business() -> None:
+    flown = Flown()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(6.0)
+        flown.later(3.0, lambda: flown.airfield.flights["d"].drain_battery(0.2))
+        with pytest.raises(Failsafe, match="NAVI_GO_HOME"):
+            drone.goto(at(60.0, 0.0, 6.0))
+        assert "NAVI_GO_HOME" in drone.come_to_rest()
+
+    flown.fly(mission)
+    assert flown.height == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_mission_on_board() -> None:
+    flown = Flown()
+
+    def mission(drone: Drone) -> None:
+        drone.wait_ready()
+        route = [TakeOff(6.0), Waypoint(at(0.0, 15.0, 8.0), stay_s=1.0), Land(at(12.0, 15.0, 0.0))]
+        drone.upload_mission(route)
+        drone.start_mission()
+        assert not drone.armed
+
+    flown.fly(mission)
+    east, north, _ = flown.airfield.flights["d"].truth().position
+    assert (east, north) == pytest.approx((12.0, 15.0), abs=1.5)
+
+
+def test_a_cut_link_ends_in_a_hover_and_then_the_way_goes_on() -> None:
+    """The cut is shorter than the patience of the caller: nothing is raised."""
+    flown = Flown("&wire=bytes&cut=14-16")
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(6.0)
+        drone.goto(at(0.0, 60.0, 6.0))
+
+    assert [one.outcome for one in flown.fly(mission)] == ["ok", "ok"]
+
+
+def test_two_in_one_world_do_not_hear_each_other() -> None:
+    urls = {"one": "sim:dji?start=warm", "two": "sim:dji?start=warm"}
+    opened = open_vehicles(urls, dict.fromkeys(urls, Drone), Stated(seed=1))
+    ended: list[str] = []
+
+    def flow(vehicle: Vehicle, height: float) -> None:
+        assert isinstance(vehicle, Drone)
+        vehicle.wait_heard()
+        vehicle.takeoff(height)
+        ended.append(vehicle.name)
+
+    for vehicle, height in zip(opened.vehicles, (4.0, 8.0), strict=True):
+        opened.kernel.spawn(lambda v=vehicle, h=height: flow(v, h), vehicle.name, Place(vehicle.name))
+    opened.kernel.run(30 * S)
+    assert sorted(ended) == ["one", "two"]
+    heights = [vehicle.altitude.metres for vehicle in opened.vehicles]
+    assert heights == [pytest.approx(4.0, abs=0.6), pytest.approx(8.0, abs=0.6)]
+    opened.kernel.close()
+
+
+def test_what_never_arrives_is_said_so() -> None:
+    flown = Flown("&parameters=MAX_SPEED:0.1")
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(3.0)
+        with pytest.raises(NotArrived):
+            drone.goto(at(0.0, 80.0, 3.0))
+
+    flown.fly(mission)
