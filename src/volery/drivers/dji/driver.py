@@ -290,14 +290,16 @@ class Dji:
         return self._to_point(f"reach {goal}", there, at(goal, False), within)
 
     def hold(self) -> Sequence[Step]:
-        """Zero velocity until it stands; then it hovers by itself."""
+        """Zero velocity until it stands; then it hovers by itself. Without a position it cannot."""
+        if self.telemetry.flying and not self.telemetry.ready:
+            raise Refused(self.name, "hold", f"it has no position ({self.telemetry.fix}) and drifts; land()")
         brake = Step(
             ask="stop",
             send=lambda: self._follow(STILL, 0.0, STOPPED_WITHIN),
             done=lambda seen: standing(seen) and not self._stream.fresh,
             within=STOPPED_WITHIN,
             enters=SDK,
-            leads_to=(WAITS, DisplayMode.ATTITUDE.name),
+            leads_to=(WAITS,),
             armed=True,
         )
         return (*self._free(), *self._authority(), brake, self._now("hover", self._stream.stop))

@@ -12,7 +12,7 @@ from typing import Any
 
 from volery.base.frames import attitude_enu_to_ned, enu_to_ned, quaternion_to_euler
 from volery.base.position import AMSL, Position
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.drivers.arrival import DRONE_KIND
 from volery.kernel.api import Kernel
 from volery.messages.dji import HEALTHY_GPS, M100, DisplayMode, FlightStatus, M100Status, display_name
@@ -31,6 +31,11 @@ UNKNOWN = -1
 WARNING = 4
 TAKEN_FOR: Ns = 5 * S
 """So long it shows as taken by another after set-points were not obeyed."""
+
+SETTLED: Ns = 200 * MS
+"""So long a mode after a way down must show before it is believed: on a bad wire the news that the motors
+stand may come later than that of the mode.
+"""
 
 WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
 """Modes in which it hovers and takes commands, if the pilot lets it."""
@@ -58,6 +63,8 @@ class Hearing:
         self._seen = telemetry
         self._records = record
         self._display = UNKNOWN
+        self._shown = UNKNOWN
+        self._shown_since: Ns = 0
         self._status = UNKNOWN
         self._gps_health = 0
         self._height = nan
@@ -92,7 +99,12 @@ class Hearing:
             self._seen.heard = self._kernel.now()
 
     def _display_mode(self, message: Any) -> None:
-        self._display = message.data
+        now, shown = self._kernel.now(), message.data
+        if shown != self._shown:
+            self._shown, self._shown_since = shown, now
+        comes_down = self._display in COMES_DOWN and shown not in COMES_DOWN
+        if not comes_down or not self._seen.armed or now - self._shown_since >= SETTLED:
+            self._display = shown
 
     def _health(self, message: Any) -> None:
         self._gps_health = message.data
