@@ -1,4 +1,4 @@
-"""Stands for a ground station, a recorder or a screen: hears what is said of the drone, does nothing with it."""
+"""Stands for a ground station, a recorder or a screen: hears what is said of the drone and ignores it."""
 
 import rospy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
