@@ -1,0 +1,254 @@
+"""From publish to callback on the embedded graph, and on real ROS 1 and ROS 2, on this machine in one run.
+
+The same functions talk and listen everywhere: on the embedded graph as components that import our ``rospy``
+and ``rclpy``, on real ROS as two processes that import the real ones. Latency is the wall's time from just
+before ``publish`` to the begin of the callback, one message at a time; throughput is how many of a burst are
+heard a second. Medians over rounds that take turns. What is not installed is left out, and said.
+
+    python bench/transports.py [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+from typing import Any, NamedTuple
+
+SPACING_S = 0.005
+TIMEOUT_S = 120
+DISTRIBUTIONS = ("jazzy", "kilted")
+
+
+@dataclass
+class Heard:
+    """What a listener notes: seconds from publish to callback, and a burst's times of arrival."""
+
+    latencies: list[float] = field(default_factory=list)
+    burst: list[float] = field(default_factory=list)
+    begun: float = 0.0
+    ended: bool = False
+
+    def hear(self, message: Any) -> None:
+        now, sent, phase = perf_counter(), message.pose.position.x, message.header.frame_id
+        if phase == "single":
+            self.latencies.append(now - sent)
+        elif phase == "burst":
+            self.begun = self.begun or sent
+            self.burst.append(now)
+        self.ended = phase == "end"
+
+    def result(self) -> tuple[float, float]:
+        """Median latency in us; messages heard per second."""
+        return median(self.latencies) * 1e6, len(self.burst) / (self.burst[-1] - self.begun)
+
+
+def talk(
+    pose: Any,
+    publish: Callable[[Any], None],
+    listeners: Callable[[], int],
+    pause: Callable[[float], None],
+    count: int,
+) -> None:
+    """Singles, a burst, and the end, once somebody listens and until nobody does."""
+    while not listeners():
+        pause(0.05)
+    pause(0.5)
+    for phase, gap in (("single", SPACING_S), ("burst", 0.0), ("end", 0.0)):
+        pose.header.frame_id = phase
+        for _ in range({"single": count // 20, "burst": count, "end": 1}[phase]):
+            pose.pose.position.x = perf_counter()
+            publish(pose)
+            if gap:
+                pause(gap)
+        pause(1.0)
+    while listeners():
+        pause(0.05)
+
+
+def rospy_talker(rospy: Any, kind: Any, count: int) -> None:
+    rospy.init_node("talker", disable_signals=True)
+    publisher = rospy.Publisher("pose", kind, queue_size=count)
+    talk(kind(), publisher.publish, publisher.get_num_connections, rospy.sleep, count)
+
+
+def rospy_listener(rospy: Any, kind: Any, heard: Heard, count: int) -> None:
+    rospy.init_node("listener", disable_signals=True)
+    subscriber = rospy.Subscriber("pose", kind, heard.hear, queue_size=count, tcp_nodelay=True)
+    while not heard.ended:
+        rospy.sleep(0.05)
+    subscriber.unregister()
+
+
+def rclpy_talker(rclpy: Any, kind: Any, count: int) -> None:
+    rclpy.init()
+    node = rclpy.create_node("talker")
+    publisher = node.create_publisher(kind, "pose", count)
+    clock = node.get_clock()
+
+    def pause(seconds: float) -> None:
+        clock.sleep_for(rclpy.duration.Duration(seconds=seconds))
+
+    talk(kind(), publisher.publish, publisher.get_subscription_count, pause, count)
+
+
+def rclpy_listener(rclpy: Any, kind: Any, heard: Heard, count: int) -> None:
+    rclpy.init()
+    node = rclpy.create_node("listener")
+    node.create_subscription(kind, "pose", heard.hear, count)
+    while not heard.ended:
+        rclpy.spin_once(node, timeout_sec=0.5)
+    node.destroy_node()
+
+
+TALKERS: Mapping[str, Any] = {"rospy": rospy_talker, "rclpy": rclpy_talker}
+LISTENERS: Mapping[str, Any] = {"rospy": rospy_listener, "rclpy": rclpy_listener}
+
+
+class Free(NamedTuple):
+    caller: int = 0
+    background: int = 0
+
+
+def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
+    """Both as components of one run in virtual time."""
+    from volery.base.time import S
+    from volery.faces import rclpy, rospy
+    from volery.graph import Graph
+    from volery.kernel.task import Place
+    from volery.kernel.virtual import VirtualKernel
+    from volery.messages import message_class
+
+    kernel = VirtualKernel()
+
+    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+        kernel.call_at(kernel.now(), deliver)
+
+    graph = Graph(kernel, lambda node, call, x: Free(), carry, records=lambda topic: recorded)
+    face = {"rospy": rospy, "rclpy": rclpy}[library].modules(graph)[library]
+    kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
+    kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))
+    kernel.spawn(lambda: TALKERS[library](face, kind, count), "talker", Place("talker"))
+    kernel.call_at(TIMEOUT_S * S + 1, lambda: None)  # the listener's threads wait for ever: no deadlock
+    kernel.run(TIMEOUT_S * S)
+    return heard.result()
+
+
+def peer(library: str, role: str, count: int) -> None:
+    """One of the two processes on real ROS; the listener prints what it has found."""
+    if library == "rospy":
+        import rospy as real
+    else:
+        import rclpy as real
+        import rclpy.duration
+    from geometry_msgs.msg import PoseStamped
+
+    if role == "talker":
+        TALKERS[library](real, PoseStamped, count)
+    else:
+        heard = Heard()
+        LISTENERS[library](real, PoseStamped, heard, count)
+        print(json.dumps(heard.result()), flush=True)
+    os._exit(0)  # the libraries' own ends take seconds and are not measured
+
+
+def real_ros(python: str, library: str, surroundings: Mapping[str, str], count: int) -> tuple[float, float]:
+    """Two processes that import the real library."""
+    asked = [python, __file__, "--count", str(count), "--library", library, "--role"]
+    with ExitStack() as stack:
+        processes = {}
+        for role in ("listener", "talker"):
+            started = subprocess.Popen([*asked, role], env=surroundings, stdout=subprocess.PIPE, text=True)
+            processes[role] = stack.enter_context(started)
+            stack.callback(started.kill)
+        said, _ = processes["listener"].communicate(timeout=TIMEOUT_S)
+    latency, throughput = json.loads(said)
+    return latency, throughput
+
+
+Measure = Callable[[], tuple[float, float]]
+
+
+def ros1(stack: ExitStack, count: int) -> dict[str, Measure]:
+    from volery.base.errors import UsageError
+    from volery.transports.ros1 import Roscore, available
+
+    if not available():
+        print("no rospy here: scripts/debian-packages ros1, scripts/ros1-modules .venv")
+        return {}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        uri = f"http://127.0.0.1:{free.getsockname()[1]}"
+    try:
+        stack.enter_context(Roscore(uri))
+    except UsageError as error:
+        print(error)
+        return {}
+    surroundings = {**os.environ, "ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1"}
+    return {"rospy": lambda: real_ros(sys.executable, "rospy", surroundings, count)}
+
+
+def ros2(count: int) -> dict[str, Measure]:
+    found: dict[str, Measure] = {}
+    surroundings = {
+        **{key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")},
+        "ROS_DOMAIN_ID": str(20 + os.getpid() % 200),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+    for distribution in DISTRIBUTIONS:
+        python = Path(sys.prefix) / f"ros2-{distribution}" / "bin" / "python"
+        if python.exists():
+            found[f"rclpy ({distribution})"] = lambda python=python: real_ros(
+                str(python), "rclpy", surroundings, count
+            )
+        else:
+            print(f"no ROS 2 {distribution} here: scripts/ros2-venv {sys.prefix} {distribution}")
+    return found
+
+
+def show(taken: Mapping[str, list[tuple[float, float]]]) -> None:
+    print(f"{'':<34}{'latency':>12}{'':>9}{'throughput':>14}")
+    for name, values in taken.items():
+        library = name.split()[-1] if name.startswith("embedded") else name.partition(" ")[0]
+        base_us, base_hz = (median(column) for column in zip(*taken[f"embedded, {library}"], strict=True))
+        us, hz = (median(column) for column in zip(*values, strict=True))
+        print(f"{name:<34}{us:>9.1f} us{us / base_us:>7.1f} x{hz:>9.0f} 1/s{base_hz / hz:>7.1f} x")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="fewer messages and rounds")
+    parser.add_argument("--library", help=argparse.SUPPRESS)
+    parser.add_argument("--role", help=argparse.SUPPRESS)
+    parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.role:
+        peer(given.library, given.role, given.count)
+    count, rounds = (2_000, 1) if given.quick else (10_000, 5)
+    with ExitStack() as stack:
+        what: dict[str, Measure] = {
+            "embedded, rospy": lambda: embedded("rospy", False, count),
+            "embedded, recorded, rospy": lambda: embedded("rospy", True, count),
+            "embedded, rclpy": lambda: embedded("rclpy", False, count),
+            "embedded, recorded, rclpy": lambda: embedded("rclpy", True, count),
+            **ros1(stack, count),
+            **ros2(count),
+        }
+        taken: dict[str, list[tuple[float, float]]] = {name: [] for name in what}
+        for _ in range(rounds):
+            for name, measure in what.items():
+                taken[name].append(measure())
+    show(taken)
+
+
+if __name__ == "__main__":
+    main()
