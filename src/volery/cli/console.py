@@ -33,7 +33,7 @@ class Output:
     def note(self, text: str) -> None:
         """A remark beside the result."""
         if not self.quiet:
-            self.notes.print(text, markup=False, highlight=False)
+            self.notes.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def complain(self, text: str) -> None:
         """What is wrong; said in any case."""

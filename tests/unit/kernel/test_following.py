@@ -11,7 +11,7 @@ from volery.kernel.waiting import Rate, sleep
 def test_time_stands_still_until_it_is_told() -> None:
     kernel = FollowingKernel()
     happened: list[str] = []
-    asleep, over = threading.Event(), threading.Event()
+    asleep, house, over = threading.Event(), threading.Event(), threading.Event()
 
     def body() -> None:
         asleep.set()
@@ -19,9 +19,13 @@ def test_time_stands_still_until_it_is_told() -> None:
         happened.append(f"woke at {kernel.now() // S}")
         over.set()
 
+    def act() -> None:
+        happened.append("house")
+        house.set()
+
     with kernel.adopt("test"):
         kernel.spawn(body, "sleeper", Place("sleeper"))
-        kernel.call_at(3 * S, lambda: happened.append("house"))
+        kernel.call_at(3 * S, act)
         asleep.wait()
         assert kernel.now() == 0
         kernel.advance(2 * S)
@@ -30,6 +34,7 @@ def test_time_stands_still_until_it_is_told() -> None:
         kernel.sleep_until(4 * S)
         kernel.advance(-S)  # never goes back
         assert kernel.now() == 4 * S
+        house.wait()
         kernel.advance(S)
         over.wait()
     assert happened == ["house", "woke at 5"]
