@@ -16,7 +16,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.bridge.commands import WARNING
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Node, RosGraph
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Frame, Link
 from volery.links.pprz_message import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
@@ -34,7 +34,7 @@ class PprzrosNode:
     ``start`` it, then its task does the rest.
     """
 
-    def __init__(self, graph: Graph, link: Link, namespace: str) -> None:
+    def __init__(self, graph: RosGraph, link: Link, namespace: str) -> None:
         self._graph, self._kernel = graph, graph.kernel
         self._link = link
         self.namespace = namespace
@@ -64,7 +64,7 @@ class PprzrosNode:
                 publisher.publish(to_message(frame, self._graph.epoch + at))
             rate.sleep()
 
-    def _listen(self, node: EmbeddedNode, aside: Place, scope: Scope) -> None:
+    def _listen(self, node: Node, aside: Place, scope: Scope) -> None:
         group = node.group()
         node.subscribe(FROM_ROS, TYPE, self._send, group=group)
         self._kernel.spawn(group.spin, f"{aside.component} (datalink)", aside, scope)
@@ -80,7 +80,7 @@ class PprzrosNode:
                 kernel.record(Text(kernel.now(), self._component, WARNING, what))
 
 
-def serve_pprzros(graph: Graph, link: Link, name: str, place: Place) -> PprzrosNode:
+def serve_pprzros(graph: RosGraph, link: Link, name: str, place: Place) -> PprzrosNode:
     """Serve the aircraft behind *link* under ``/name`` until the run ends, computing at *place*."""
     served = PprzrosNode(graph, link, f"/{name}")
     served.start(place, graph.kernel.root)

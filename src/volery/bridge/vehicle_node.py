@@ -28,7 +28,7 @@ from volery.bridge.parameters import Parameters
 from volery.bridge.setpoints import Subscription, subscriptions
 from volery.bridge.telemetry import LATCHED_STATE, TOPICS, Telemetry
 from volery.bridge.wire import Wire
-from volery.graph import EmbeddedNode, Graph, Publisher
+from volery.graph import Node, Publisher, RosGraph
 from volery.graph.group import Work
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Link
@@ -64,7 +64,7 @@ class VehicleNode:
     """
 
     def __init__(
-        self, graph: Graph, link: Link, namespace: str, options: VehicleNodeOptions = VehicleNodeOptions()
+        self, graph: RosGraph, link: Link, namespace: str, options: VehicleNodeOptions = VehicleNodeOptions()
     ) -> None:
         self._graph, self._kernel = graph, graph.kernel
         self.namespace, self.options = namespace, options
@@ -94,7 +94,7 @@ class VehicleNode:
 
     # -- what it sets up
 
-    def _advertise(self, node: EmbeddedNode) -> None:
+    def _advertise(self, node: Node) -> None:
         for topic in TOPICS:
             self._publishers[topic.name] = node.advertise(topic.name, topic.type, topic.qos)
         waypoints = "mission/waypoints"
@@ -103,13 +103,13 @@ class VehicleNode:
     def _publish(self, topic: str, message: Any) -> None:
         self._publishers[topic].publish(message)
 
-    def _subscribe(self, node: EmbeddedNode, aside: Place, scope: Scope) -> None:
+    def _subscribe(self, node: Node, aside: Place, scope: Scope) -> None:
         group = node.group()
         for one in subscriptions(self.options.geoid):
             node.subscribe(one.name, one.type, partial(self._command, node, one), group=group)
         self._kernel.spawn(group.spin, f"{aside.component} (set-points)", aside, scope)
 
-    def _command(self, node: EmbeddedNode, subscription: Subscription, message: Any) -> None:
+    def _command(self, node: Node, subscription: Subscription, message: Any) -> None:
         """Send a set-point on; one that makes no sense is dropped, with a warning."""
         try:
             name, fields = subscription.translate(message, self._kernel.now())
@@ -122,7 +122,7 @@ class VehicleNode:
         with self._kernel as kernel:
             kernel.record(Text(kernel.now(), self._component, WARNING, text))
 
-    def _serve(self, node: EmbeddedNode, aside: Place, scope: Scope) -> None:
+    def _serve(self, node: Node, aside: Place, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
                 work.run()
@@ -201,7 +201,7 @@ class VehicleNode:
 
 
 def serve_vehicle(
-    graph: Graph, link: Link, name: str, place: Place, options: VehicleNodeOptions = VehicleNodeOptions()
+    graph: RosGraph, link: Link, name: str, place: Place, options: VehicleNodeOptions = VehicleNodeOptions()
 ) -> VehicleNode:
     """Serve the autopilot behind *link* under ``/name`` until the run ends, computing at *place*."""
     served = VehicleNode(graph, link, f"/{name}", options)

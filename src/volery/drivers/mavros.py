@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.drivers import ardupilot, px4
-from volery.graph import EmbeddedNode
+from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Driver, DriverFactory, Opener
 
 AUTOPILOTS: Mapping[str, Opener] = {"ardupilot": ardupilot.open_mavros, "px4": px4.open_mavros}
 
 
-def open_driver(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[str, str]) -> Driver:
+def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Driver:
     """A vehicle behind a vehicle node, commanded by *node*.
 
     Options: ``autopilot`` (``ardupilot`` or ``px4``), ``namespace`` of the vehicle node (else ``/`` and

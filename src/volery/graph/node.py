@@ -160,6 +160,9 @@ class Rate(Protocol):
         A late loop goes on at once and does not catch up.
         """
 
+    def remaining(self) -> Ns:
+        """How long until the next release; 0 for a late loop."""
+
 
 class Work(NamedTuple):
     """A callback that is ready: since when, and what runs it (as user code)."""
@@ -179,6 +182,20 @@ class Group(Protocol):
 
     def spin(self) -> None:
         """Run callbacks as they come until the node is closed."""
+
+    on_ready: Callable[[], None] | None
+    """Called (as house code) whenever a callback has become ready: for who waits for several groups at once
+    and ``take``s what is there."""
+
+    @property
+    def oldest(self) -> Ns | None:
+        """Since when the next callback has been ready; ``None`` if none is."""
+
+    def take(self) -> Work:
+        """The next one: who takes it runs it. ``IndexError`` if none waits."""
+
+    def add(self, work: Work) -> None:
+        """A callback of somebody else's has become ready. House code."""
 
 
 class Node(Protocol):

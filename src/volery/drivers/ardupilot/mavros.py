@@ -10,7 +10,7 @@ from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.items import INT_FRAMES, frame_of
 from volery.drivers.mavlink.mavros import Behind, MavrosCarrier, clockwise
 from volery.drivers.mavlink.vocabulary import LEFT_ALONE, POSITION_ONLY, SHORTEST_WAY, VELOCITY_AND_YAW_RATE
-from volery.graph import EmbeddedNode
+from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.messages import new
 from volery.vehicles.telemetry import Velocity
@@ -24,7 +24,7 @@ class MavrosCommands(MavrosCarrier):
     behind = Behind("ArduPilot", "HOLD")
 
     def __init__(
-        self, kernel: Kernel, node: EmbeddedNode, name: str, namespace: str, geoid: Geoid | None = None
+        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
     ) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         target = "mavros_msgs/msg/GlobalPositionTarget"

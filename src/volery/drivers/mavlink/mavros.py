@@ -24,7 +24,7 @@ from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.mavros_hearing import MavrosHearing
 from volery.drivers.mavlink.options import check_options
 from volery.drivers.mavlink.vocabulary import FORCE, GROUND_SPEED, UNCHANGED
-from volery.graph import EmbeddedNode, ServiceError
+from volery.graph import Node, ServiceError
 from volery.graph.group import Work
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink import constant, entry_name
@@ -54,7 +54,7 @@ class MavrosCarrier:
     behind: Behind
 
     def __init__(
-        self, kernel: Kernel, node: EmbeddedNode, name: str, namespace: str, geoid: Geoid | None = None
+        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
     ) -> None:
         self.telemetry = Telemetry(kernel, name)
         self._kernel = kernel
@@ -166,6 +166,9 @@ class MavrosCarrier:
     def check(self) -> None:
         """``cmd/command`` with RUN_PREARM_CHECKS."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
+
+    def watch_target(self) -> None:
+        """It would be a topic more, and one more subscription to pay for."""
 
     def watch_mission(self) -> None:
         """``mission/reached`` comes anyhow."""

@@ -9,7 +9,7 @@ from volery.drivers.mavlink.options import OPTIONS, check_options
 from volery.drivers.px4.driver import PX4
 from volery.drivers.px4.mavlink import MavlinkCommands
 from volery.drivers.px4.mavros import MavrosCommands
-from volery.graph import EmbeddedNode
+from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.vehicles.driver import DriverFactory
@@ -27,7 +27,7 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
     return PX4(kernel, name, MavlinkCommands(kernel, link, name, options))
 
 
-def open_mavros(kernel: Kernel, node: EmbeddedNode, name: str, options: Mapping[str, str]) -> PX4:
+def open_mavros(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> PX4:
     """A PX4 behind a vehicle node with MAVROS's names, commanded by *node*.
 
     Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.

@@ -17,7 +17,7 @@ from volery.drivers.mavlink.mavros import Behind, MavrosCarrier, clockwise
 from volery.drivers.mavlink.vocabulary import VELOCITY_AND_YAW, VELOCITY_AND_YAW_RATE
 from volery.drivers.px4.commands import Setpoint, reposition_fields, stick_axes
 from volery.drivers.px4.modes import HOLD
-from volery.graph import EmbeddedNode
+from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.messages import new, request
 from volery.vehicles.driver import Sticks
@@ -29,7 +29,7 @@ class MavrosCommands(MavrosCarrier):
     behind = Behind("PX4", HOLD)
 
     def __init__(
-        self, kernel: Kernel, node: EmbeddedNode, name: str, namespace: str, geoid: Geoid | None = None
+        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
     ) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         self._whole = node.client(self._name("cmd/command_int"), "mavros_msgs/srv/CommandInt")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.graph.group import CallbackGroup as GraphGroup
+from volery.graph import Group
 from volery.graph.group import Work
 
 
@@ -40,7 +40,7 @@ class ReentrantCallbackGroup(CallbackGroup):
 class Queue:
     """What is ready of one group of one node."""
 
-    def __init__(self, group: CallbackGroup, ready: GraphGroup) -> None:
+    def __init__(self, group: CallbackGroup, ready: Group) -> None:
         self.group, self.ready = group, ready
 
     def take(self) -> Work:

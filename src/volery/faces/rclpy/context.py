@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.faces.launch import Launch
 from volery.faces.rclpy.errors import NameValidationException, NotInitializedException
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Node, RosGraph
 from volery.kernel.waiting import Signal, current_task
 from volery.trace.events import Text
 
@@ -26,14 +26,12 @@ class Context:
     it; further ones keep their own names.
     """
 
-    def __init__(
-        self, graph: Graph, component: str, launch: Launch | None, node: EmbeddedNode | None
-    ) -> None:
+    def __init__(self, graph: RosGraph, component: str, launch: Launch | None, node: Node | None) -> None:
         self._graph = graph
         self._component = component
         self._launch = launch
         self._given = node
-        self._nodes: list[EmbeddedNode] = []
+        self._nodes: list[Node] = []
         self._started = False
         self._hooks: list[Callable[[], Any]] = []
         self.kernel = graph.kernel
@@ -80,7 +78,7 @@ class Context:
 
     # -- nodes
 
-    def join(self, name: str, namespace: str | None) -> EmbeddedNode:
+    def join(self, name: str, namespace: str | None) -> Node:
         """A new node of the graph."""
         if not self._started:
             raise NotInitializedException("cannot create node: rclpy.init() has not been called")
@@ -100,13 +98,13 @@ class Context:
         self._nodes.append(made)
         return made
 
-    def node(self) -> EmbeddedNode:
+    def node(self) -> Node:
         """Its first node: who pays for what no node is named for."""
         if not self._nodes:
             raise UsageError(f"{self._component}: create a node first")
         return self._nodes[0]
 
-    def leave(self, node: EmbeddedNode) -> None:
+    def leave(self, node: Node) -> None:
         """A node was destroyed."""
         node.close()
         self.changed.notify()
@@ -130,7 +128,7 @@ class Contexts:
     """All components of one run that import rclpy."""
 
     def __init__(
-        self, graph: Graph, launched: Mapping[str, Launch], nodes: Mapping[str, EmbeddedNode] | None = None
+        self, graph: RosGraph, launched: Mapping[str, Launch], nodes: Mapping[str, Node] | None = None
     ) -> None:
         self.graph = graph
         self.kernel = graph.kernel

@@ -17,13 +17,14 @@ from volery.faces.rclpy.context import Context, Contexts
 from volery.faces.rclpy.executors import Executor
 from volery.faces.rclpy.node import Node
 from volery.faces.rclpy.task import Future
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Node as GraphNode
+from volery.graph import RosGraph
 
 
 def modules(
-    graph: Graph,
+    graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
-    nodes: Mapping[str, EmbeddedNode] | None = None,
+    nodes: Mapping[str, GraphNode] | None = None,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rclpy``, ``rclpy.node``, ``std_msgs.msg`` and so on, by name.
 

@@ -18,7 +18,7 @@ from volery.faces.rclpy.errors import (
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
-from volery.graph import EmbeddedNode
+from volery.graph import Node
 from volery.messages import new
 
 _RESULT = "rcl_interfaces/msg/SetParametersResult"
@@ -93,7 +93,7 @@ Watcher = Callable[[list[Parameter]], Any]
 class Declared:
     """The parameters of one node. What a launch file says overrides what is declared."""
 
-    def __init__(self, node: EmbeddedNode, overrides: Iterable[Parameter], undeclared_allowed: bool) -> None:
+    def __init__(self, node: Node, overrides: Iterable[Parameter], undeclared_allowed: bool) -> None:
         self._node = node
         self._undeclared_allowed = undeclared_allowed
         self._overrides = {one.name: one.value for one in overrides}

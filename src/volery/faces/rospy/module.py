@@ -16,7 +16,7 @@ from volery.faces.rospy import services, time, topics
 from volery.faces.rospy.errors import EXCEPTIONS
 from volery.faces.rospy.logging import LEVELS, loggers
 from volery.faces.rospy.session import Sessions
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Graph, Node, RosGraph
 
 _BOUND = (
     topics.Publisher,
@@ -30,9 +30,9 @@ _BOUND = (
 
 
 def modules(
-    graph: Graph,
+    graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
-    nodes: Mapping[str, EmbeddedNode] | None = None,
+    nodes: Mapping[str, Node] | None = None,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
 
@@ -145,9 +145,12 @@ def delete_param(sessions: Sessions, param_name: str) -> None:
 
 
 def get_param_names(sessions: Sessions) -> list[str]:
-    """All parameters."""
+    """All parameters, where the graph is embedded: what others keep is not listed."""
+    graph = sessions.graph
+    if not isinstance(graph, Graph):
+        raise UsageError("rospy.get_param_names() works on the embedded graph only")
     with sessions.kernel:
-        return sessions.graph.parameters.names()
+        return graph.parameters.names()
 
 
 def get_name(sessions: Sessions) -> str:

@@ -11,8 +11,7 @@ from volery.base.errors import VoleryError
 from volery.base.time import Ns
 from volery.faces.launch import Launch
 from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
-from volery.graph import EmbeddedNode, Graph
-from volery.graph.group import CallbackGroup, Work
+from volery.graph import Group, Node, RosGraph, Work
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task
@@ -26,7 +25,7 @@ ERROR = 3
 class Session:
     """One component's node."""
 
-    node: EmbeddedNode
+    node: Node
     scope: Scope
     kernel: Kernel
     ended: Signal
@@ -53,7 +52,7 @@ class Session:
             self.node.close()
             self.ended.notify()
 
-    def spin_beside(self, label: str, what: str) -> CallbackGroup:
+    def spin_beside(self, label: str, what: str) -> Group:
         """A new group that a task of its own spins, as a thread of rospy would."""
         group = self.node.group()
 
@@ -64,7 +63,7 @@ class Session:
         self._start(body, label)
         return group
 
-    def spawn_each(self, label: str, what: str) -> CallbackGroup:
+    def spawn_each(self, label: str, what: str) -> Group:
         """A new group of which each piece of work gets a task of its own."""
 
         def start(work: Work) -> None:
@@ -107,7 +106,7 @@ class Sessions:
     """All components of one run that are nodes."""
 
     def __init__(
-        self, graph: Graph, launched: Mapping[str, Launch], nodes: Mapping[str, EmbeddedNode] | None = None
+        self, graph: RosGraph, launched: Mapping[str, Launch], nodes: Mapping[str, Node] | None = None
     ) -> None:
         self.graph = graph
         self.kernel = graph.kernel
