@@ -11,6 +11,7 @@ heard a second. Medians over rounds that take turns. What is not installed is le
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import socket
@@ -23,6 +24,15 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
+
+from volery.base.errors import UsageError
+from volery.base.time import S
+from volery.faces import rclpy, rospy
+from volery.graph import Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.messages import message_class
+from volery.transports.ros1 import Roscore, available
 
 SPACING_S = 0.005
 TIMEOUT_S = 120
@@ -121,13 +131,6 @@ class Free(NamedTuple):
 
 def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
     """Both as components of one run in virtual time."""
-    from volery.base.time import S
-    from volery.faces import rclpy, rospy
-    from volery.graph import Graph
-    from volery.kernel.task import Place
-    from volery.kernel.virtual import VirtualKernel
-    from volery.messages import message_class
-
     kernel = VirtualKernel()
 
     def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
@@ -145,18 +148,13 @@ def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
 
 def peer(library: str, role: str, count: int) -> None:
     """One of the two processes on real ROS; the listener prints what it has found."""
-    if library == "rospy":
-        import rospy as real
-    else:
-        import rclpy as real
-        import rclpy.duration
-    from geometry_msgs.msg import PoseStamped
-
+    real = importlib.import_module(library)
+    kind = importlib.import_module("geometry_msgs.msg").PoseStamped
     if role == "talker":
-        TALKERS[library](real, PoseStamped, count)
+        TALKERS[library](real, kind, count)
     else:
         heard = Heard()
-        LISTENERS[library](real, PoseStamped, heard, count)
+        LISTENERS[library](real, kind, heard, count)
         print(json.dumps(heard.result()), flush=True)
     os._exit(0)  # the libraries' own ends take seconds and are not measured
 
@@ -179,9 +177,6 @@ Measure = Callable[[], tuple[float, float]]
 
 
 def ros1(stack: ExitStack, count: int) -> dict[str, Measure]:
-    from volery.base.errors import UsageError
-    from volery.transports.ros1 import Roscore, available
-
     if not available():
         print("no rospy here: scripts/debian-packages ros1, scripts/ros1-modules .venv")
         return {}
