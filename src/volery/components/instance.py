@@ -190,8 +190,14 @@ class Instance:
         return self.object
 
 
+class ForeignError(Exception):
+    """An error of code that is not Python: it says itself what it is."""
+
+
 def describe(error: BaseException) -> str:
     """``ValueError: no such parcel (delivery_central.py:41)``: what was raised, and where in their code."""
+    if isinstance(error, ForeignError):
+        return str(error)
     said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     frames = [
         (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
