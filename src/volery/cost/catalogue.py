@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
@@ -56,7 +57,7 @@ class ProcessorEntry(BaseModel):
         if law is None:
             raise EstimateError(
                 f"{self.name}: the catalogue has no figures of ROS calls for it; allocate ROS nodes to a "
-                f"processor that has some, or add them (measure each call's process time at two frequencies)"
+                f"processor that has some, or measure them there: volery calibrate ros --client {language}"
             )
         charged_as = "" if law.client == language else language
         return law.model_copy(update={"processor": self.name, "charged_as": charged_as})
@@ -114,8 +115,38 @@ def read(text: str, name: str = "catalogue") -> Catalogue:
         raise ModelError(said, name) from error
 
 
+def catalogue(*more: Path) -> Catalogue:
+    """The catalogue that comes with volery, and the entries of the files *more*.
+
+    An entry of a name that is there already adds its laws to it, in place of those of the same library or
+    language. ``ModelError`` names a file that cannot be read, and the place in it of what is wrong.
+    """
+    found = dict(_own().processors)
+    for file in more:
+        for name, entry in read_file(file).processors.items():
+            found[name] = _joined(found[name], entry) if name in found else entry
+    return Catalogue(processors=found)
+
+
 @cache
-def catalogue() -> Catalogue:
-    """The catalogue that comes with volery."""
+def _own() -> Catalogue:
     text = files("volery.cost").joinpath("catalogue.yaml").read_text(encoding="utf-8")
     return read(text, "catalogue.yaml")
+
+
+def _joined(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
+    laws = {"ros": {**known.ros, **new.ros}, "code": {**known.code, **new.code}}
+    reach = {
+        "least_mhz": min(known.least_mhz, new.least_mhz),
+        "greatest_mhz": max(known.greatest_mhz, new.greatest_mhz),
+    }
+    return known.model_copy(update={**laws, **reach, "power": new.power or known.power})
+
+
+def read_file(file: Path) -> Catalogue:
+    """A user's catalogue. ``ModelError`` if there is no such file, or for what is wrong in it."""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{file}: this catalogue cannot be read: {error}") from error
+    return read(text, str(file))

@@ -19,6 +19,11 @@ part per subscriber is spent by the library's threads, and that a sleep's cost f
 * ``publish``: the constant part is the caller's, the part per subscriber is background;
 * ``sleep``: all of it is background;
 * every other call: all of it is the caller's.
+
+Figures that were measured apart (``caller``, ``caller_per_x``) go before this rule.
+
+Some things happen to a node beside its calls (``BESIDE``): a message arrives, somebody connects, time passes
+in ``spin``. The paper does not price them; a law that has figures for them does, all in the background.
 """
 
 from __future__ import annotations
@@ -38,7 +43,12 @@ NOT_COUNTED = (
 )
 """What the law leaves out, in words for a report."""
 
-_DEPENDENT = ("publish", "sleep")
+BESIDE = ("receive", "connect", "accept", "wait")
+"""A message is received; a subscription connects to a publisher; a publisher accepts a subscription's
+connection; x microseconds pass in ``spin``. Without a figure they cost nothing, and a report says so.
+"""
+
+_DEPENDENT = ("publish", "sleep", "wait")
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
 
 
@@ -56,11 +66,16 @@ class Price(NamedTuple):
 class CallFigures(Stated):
     """What is known of one call.
 
-    Coefficients (``constant`` and, if it has an x, ``per_x``), or two points.
+    Coefficients (``constant`` and, if it has an x, ``per_x``), or two points. ``caller`` and
+    ``caller_per_x`` are the parts of them that the calling thread spends, where that was measured. ``error``
+    is the relative band of a typical call.
     """
 
     constant: Line | None = None
     per_x: Line | None = None
+    caller: Line | None = None
+    caller_per_x: Line | None = None
+    error: float | None = None
     points: dict[float, float] | None = None
     doubtful_mhz: tuple[float, ...] = ()
 
@@ -123,10 +138,12 @@ class Tariff:
         self.frequency_mhz = frequency_mhz
         self.warnings = law.warnings(frequency_mhz)
         self._parts: dict[str, tuple[float, float]] = {}
+        self._callers: dict[str, tuple[float, float]] = {}
         self._known: dict[tuple[str, float], Price] = {}
         for call, figures in law.calls.items():
-            constant, per_x = figures.lines()
-            self._parts[call] = (constant.at(frequency_mhz), per_x.at(frequency_mhz) if per_x else 0.0)
+            self._parts[call] = _at(frequency_mhz, *figures.lines())
+            if figures.caller is not None:
+                self._callers[call] = _at(frequency_mhz, figures.caller, figures.caller_per_x)
 
     def __call__(self, call: str, x: float = 0.0) -> Price:
         """What one call takes; see ``RosLaw.price``."""
@@ -135,6 +152,8 @@ class Tariff:
 
     def _work_out(self, call: str, x: float) -> Price:
         name = _SPIN.get(x, call) if call == "spin_once" else call
+        if name in BESIDE and name not in self._parts:
+            return NOTHING
         if name not in self._parts:
             raise EstimateError(
                 f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "
@@ -148,15 +167,20 @@ class Tariff:
                 f"{self.frequency_mhz:g} MHz; they hold from {self.law.least_mhz:g} to "
                 f"{self.law.greatest_mhz:g} MHz"
             )
-        price = self._split(name, constant, variable)
+        price = self._split(name, constant, variable, x)
         if len(self._known) < _REMEMBERED:
             self._known[call, x] = price
         return price
 
-    def _split(self, name: str, constant: float, variable: float) -> Price:
+    def _split(self, name: str, constant: float, variable: float, x: float) -> Price:
         flags = self._flags(name)
-        if name == "sleep":
-            return Price(0, round(constant + variable), flags)
+        whole = round(constant + variable)
+        if name == "sleep" or name in BESIDE:  # a sleep's cost falls while it sleeps, whoever spends it
+            return Price(0, whole, flags)
+        if name in self._callers:
+            fixed, per_x = self._callers[name]
+            caller = min(whole, max(0, round(fixed + (per_x * x if name in _DEPENDENT else 0.0))))
+            return Price(caller, whole - caller, flags)
         return Price(round(constant), round(variable), flags)
 
     def _flags(self, name: str) -> tuple[str, ...]:
@@ -165,6 +189,12 @@ class Tariff:
             return (*self.warnings, f"{name}: {figures.note}")
         return self.warnings
 
+
+def _at(frequency_mhz: float, constant: Line, per_x: Line | None) -> tuple[float, float]:
+    return constant.at(frequency_mhz), per_x.at(frequency_mhz) if per_x else 0.0
+
+
+NOTHING = Price(0, 0)
 
 _REMEMBERED = 4096
 """How many prices a tariff keeps; sleeps of many different lengths must not fill the memory."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns
+from volery.base.time import US, Ns, S
 from volery.graph.node import Carry, NodeId, Price
 from volery.graph.parameters import Parameters
 from volery.kernel.api import Kernel
@@ -63,6 +63,9 @@ class Context:
         return self.epoch + self.kernel.now()
 
 
+KEEP_UP: Ns = S
+"""How often a node pays for the time that it neither sleeps nor calls."""
+
 _CALLS = ("publish", "sleep", "spin_once")
 _KINDS = {call: f"ros:{call}" for call in _CALLS}
 """What is charged often, so that its text is made once."""
@@ -71,7 +74,7 @@ _KINDS = {call: f"ros:{call}" for call in _CALLS}
 class Member:
     """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
 
-    __slots__ = ("closed", "context", "id", "place")
+    __slots__ = ("_since", "_slept", "_waited", "closed", "context", "id", "place")
 
     def __init__(self, context: Context, name: str, place: Place) -> None:
         processor = place.processor.name if place.processor else ""
@@ -79,6 +82,8 @@ class Member:
         self.id = NodeId(name, place.component, processor)
         self.place = place
         self.closed = False
+        self._since = context.kernel.now()
+        self._slept = self._waited = 0.0
 
     @property
     def name(self) -> str:
@@ -95,6 +100,8 @@ class Member:
         who = self.id
         cost = context.price(who, call, x)
         caller, background = cost.caller, cost.background
+        if call == "sleep":
+            self._slept += x
         kind = _KINDS.get(call) or f"ros:{call}"
         if not context.unrecorded:
             kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
@@ -104,6 +111,39 @@ class Member:
             kernel.pay(caller)
         if background and self.place.processor is not None:
             self.place.processor.load(self.place, background)
+
+    def bear(self, what: str, x: float = 0.0) -> None:
+        """Have executed what happens to the node beside its calls; nothing where that has no price."""
+        context, who = self.context, self.id
+        if self.place.processor is None:
+            return
+        cost = context.price(who, what, x)
+        background = cost.caller + cost.background
+        if not background:
+            return
+        if not context.unrecorded:
+            now = context.kernel.now()
+            context.kernel.record(
+                Charge(now, who.component, who.processor, f"ros:{what}", 0, background, 0.0)
+            )
+        self.place.processor.load(self.place, background)
+
+    def keep_up(self) -> None:
+        """Keep the client library's threads going where the node does not sleep: what a sleep costs
+        contains that.
+        """
+        placed = self.place.processor is not None
+        if placed and self.context.price(self.id, "wait", KEEP_UP / US).background:
+            self.context.kernel.every(KEEP_UP, self._wait)
+
+    def _wait(self) -> None:
+        if self.closed:
+            return
+        lived = (self.context.kernel.now() - self._since) / US
+        waited = lived - self._slept - self._waited
+        if waited > 0.0:
+            self._waited += waited
+            self.bear("wait", waited)
 
     def check_open(self) -> None:
         """``UsageError`` if the node has left the graph."""

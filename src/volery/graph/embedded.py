@@ -35,6 +35,7 @@ class EmbeddedNode(LocalNode):
         """Pay for it."""
         self._member.pay("init")
         self._member.pay("node_handle")
+        self._member.keep_up()
         self._context.changed.notify()
 
     def advertise(self, topic_name: str, message_type: str, qos: QoS = DEFAULT) -> EmbeddedPublisher:

@@ -81,6 +81,9 @@ class EmbeddedPublisher:
             self._context.record(Text(self._context.kernel.now(), self.member.name, WARNING, text))
             return
         self._targets.append(subscription)
+        if subscription.member is not self.member:
+            self.member.bear("accept")
+            subscription.member.bear("connect")
         if self._keeps and subscription.qos.durability in (TRANSIENT_LOCAL, BEST_AVAILABLE):
             for content, sent, size in self._kept:
                 self._send(subscription, content.copy(), sent, size)
@@ -177,6 +180,7 @@ class EmbeddedSubscription:
         now = self._context.kernel.now()
         if not self._context.unrecorded:
             self._context.record(Message(sent, now, self.topic, publisher, self.member.name, size))
+        self.member.bear("receive")
         queue = self._queue
         if len(queue) == self.qos.depth:
             queue.popleft()  # its place in the group goes to the next oldest

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from volery.model.fields import Bandwidth, Form, Frequency, Loss, Name, OrNothing, Period, Time
+from volery.model.fields import Bandwidth, Form, Frequency, Listed, Loss, Name, OrNothing, Period, Time
 from volery.model.form_component import ComponentForm, InstanceForm, SignatureForm
 from volery.model.form_environment import EnvironmentForm
 
@@ -36,8 +36,13 @@ class NetworkForm(Form):
 
 
 class PlatformForm(Form):
-    """The computers and what joins them."""
+    """The computers and what joins them.
 
+    `catalogues` are files with kinds of processors beside those that volery knows, such as `volery calibrate`
+    writes, relative to the model.
+    """
+
+    catalogues: Annotated[list[str], Listed()] = []
     processors: dict[Name, ProcessorForm] = {}
     networks: dict[Name, NetworkForm] = {}
 

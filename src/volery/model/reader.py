@@ -18,12 +18,14 @@ from volery.model.resolve_application import Surroundings, instances
 from volery.model.resolve_environment import environment
 from volery.model.resolve_library import components, interfaces
 from volery.model.resolve_platform import (
+    catalogues,
     check_all_variants,
     check_names,
     check_reach,
     networks,
     places,
     processors,
+    with_catalogues,
 )
 from volery.model.resolve_requirements import limits, requirements
 from volery.model.system import System, Vocabulary
@@ -54,7 +56,8 @@ def load(
     form = validate(ModelForm, made.root, problems)
     problems.raise_if_any()
     assert form is not None, "a form that does not validate is a problem"
-    return _resolve(Context(form, vocabulary, problems, file.parent), made, options)
+    context = Context(form, vocabulary, problems, file.parent)
+    return _resolve(with_catalogues(context), made, options)
 
 
 def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
@@ -109,6 +112,7 @@ def _resolve(context: Context, made: Assembly, options: tuple[str, ...]) -> Syst
         overrides=options,
         sources=made.sources,
         folder=context.folder,
+        catalogues=catalogues(context),
     )
     check_reach(context, system.instances, system.networks)
     problems.raise_if_any()

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+from volery.base.errors import ModelError
 from volery.model.context import RESERVED, Context
 from volery.model.form import NetworkForm, ProcessorForm
 from volery.model.problems import Path
 from volery.model.resolve_library import check_processor
 from volery.model.system import Instance, Network, Processor, TargetKind
 from volery.model.text import Node
+
+
+def catalogues(context: Context) -> tuple[FilePath, ...]:
+    """The files of processors that the model brings along."""
+    return tuple(context.folder / name for name in context.form.platform.catalogues)
+
+
+def with_catalogues(context: Context) -> Context:
+    """The same with the processors of those files among the names that are known."""
+    known = dict(context.vocabulary.processors)
+    for position, file in enumerate(catalogues(context)):
+        try:
+            known.update(context.vocabulary.read_catalogue(file))
+        except ModelError as error:
+            context.problems.add(("platform", "catalogues", position), str(error))
+    return replace(context, vocabulary=replace(context.vocabulary, processors=known))
 
 
 def processors(context: Context) -> tuple[Processor, ...]:

@@ -10,7 +10,7 @@ A model may be made without a file: build these by hand, they are plain data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -292,12 +292,20 @@ class ProcessorKind:
     greatest_hz: float
 
 
+Kinds = Mapping[str, ProcessorKind]
+
+
+def _no_catalogue(file: Path) -> Kinds:
+    return {}
+
+
 @dataclass(frozen=True)
 class Vocabulary:
     """Names that point out of the model, given from above: the model checks against them and knows no more.
 
     ``languages`` are those that run today; others of ``LANGUAGES`` are valid in a model. ``faults`` are the
-    kinds that a scenario may inject.
+    kinds that a scenario may inject. ``read_catalogue`` gives the processors of a catalogue that the model
+    brings along, or raises ``ModelError``.
     """
 
     processors: Mapping[str, ProcessorKind]
@@ -305,6 +313,7 @@ class Vocabulary:
     autopilots: frozenset[str]
     observables: tuple[Observable, ...] = ()
     faults: frozenset[str] = frozenset()
+    read_catalogue: Callable[[Path], Kinds] = _no_catalogue
 
 
 @dataclass(frozen=True)
@@ -314,7 +323,7 @@ class System:
     ``instances`` holds the application's components, then the environment's. ``allocation`` and ``scenario``
     name what was chosen (``scenario`` empty: none), ``allocations`` and ``scenarios`` what there is to choose
     from. ``overrides`` are the ``path=value`` texts that were applied. ``folder`` is where relative paths
-    start.
+    start. ``catalogues`` are the files of processors that the model brings along.
     """
 
     name: str
@@ -334,6 +343,7 @@ class System:
     overrides: tuple[str, ...] = ()
     sources: tuple[Source, ...] = ()
     folder: Path = field(default=Path(), compare=False)
+    catalogues: tuple[Path, ...] = ()
 
     @property
     def vehicles(self) -> tuple[Vehicle, ...]:

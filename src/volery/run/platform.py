@@ -59,7 +59,8 @@ class Platform:
         self._kernel = kernel
         self._fidelity = fidelity
         self._models = {model.name: model for model in system.processors}
-        self._entries = {model.name: catalogue().processor(model.kind) for model in system.processors}
+        known = catalogue(*system.catalogues)
+        self._entries = {model.name: known.processor(model.kind) for model in system.processors}
         self.processors = {model.name: self._processor(model) for model in system.processors}
         self._networks = {model.name: self._network(model, seed) for model in system.networks}
         self._languages = {instance.name: instance.component.language for instance in system.instances}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from volery.autopilots.simulated.dialect import dialects
 from volery.cost import catalogue
 from volery.model.system import ProcessorKind, Vocabulary
@@ -14,8 +16,12 @@ LANGUAGES = frozenset({"python", "rclpy", "rospy"})
 
 def vocabulary() -> Vocabulary:
     """What a model is checked against."""
-    kinds = {
+    autopilots = frozenset(dialects.names())
+    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, frozenset(KINDS), _kinds)
+
+
+def _kinds(*more: Path) -> dict[str, ProcessorKind]:
+    return {
         name: ProcessorKind(entry.cores, entry.least_mhz * 1e6, entry.greatest_mhz * 1e6)
-        for name, entry in catalogue().processors.items()
+        for name, entry in catalogue(*more).processors.items()
     }
-    return Vocabulary(kinds, LANGUAGES, frozenset(dialects.names()), OBSERVABLES, frozenset(KINDS))

@@ -1,4 +1,5 @@
 import math
+from pathlib import Path
 
 import pytest
 
@@ -110,3 +111,39 @@ def test_counted_code_is_flagged_as_uncalibrated() -> None:
 def test_a_broken_catalogue_is_a_model_error(text: str, words: str) -> None:
     with pytest.raises(ModelError, match=rf"(?i){words}"):
         read(text)
+
+
+MORE = f"""
+processors:
+  my-computer:
+    description: measured
+    source: a campaign
+    cores: 2
+    least_mhz: 2600
+    greatest_mhz: 2600
+  {ARM}:
+    description: measured
+    source: a campaign
+    cores: 4
+    least_mhz: 1800
+    greatest_mhz: 1800
+    ros:
+      rospy: {{client: rospy, provenance: measured, source: a campaign, error: 0.1,
+              least_mhz: 1800, greatest_mhz: 1800, calls: {{}}}}
+"""
+
+
+def test_a_catalogue_of_ones_own_adds_processors_and_laws(tmp_path: Path) -> None:
+    file = tmp_path / "more.yaml"
+    file.write_text(MORE, encoding="utf-8")
+    more = catalogue(file)
+    assert more.processor("my-computer").greatest_mhz == 2600
+    arm = more.processor(ARM)
+    assert (arm.least_mhz, arm.greatest_mhz, sorted(arm.ros)) == (600, 1800, ["roscpp", "rospy"])
+    assert arm.power == catalogue().processor(ARM).power
+    assert "my-computer" not in catalogue().processors
+
+
+def test_a_catalogue_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"nowhere\.yaml: this catalogue cannot be read"):
+        catalogue(tmp_path / "nowhere.yaml")

@@ -4,6 +4,7 @@ import pytest
 
 from volery.base.errors import EstimateError
 from volery.cost import Price, RosLaw, catalogue
+from volery.cost.catalogue import read
 
 INTEL, ARM = "intel-i5-3470", "rpi4-cortex-a72"
 PLATFORMS = ((INTEL, 1600), (INTEL, 3000), (ARM, 600), (ARM, 1500))
@@ -116,3 +117,61 @@ def test_prices_are_plain_integers() -> None:
     price = law(ARM).price("publish", 2, 1234.5)
     assert isinstance(price, Price)
     assert all(type(part) is int for part in price[:2])
+
+
+MEASURED = """
+processors:
+  here:
+    description: a computer that was measured
+    source: a campaign
+    cores: 2
+    least_mhz: 2600
+    greatest_mhz: 2600
+    ros:
+      rospy:
+        client: rospy
+        provenance: measured
+        source: a campaign
+        error: 0.1
+        least_mhz: 2600
+        greatest_mhz: 2600
+        calls:
+          publish:
+            provenance: measured
+            source: a campaign
+            constant: {offset: 90000}
+            per_x: {offset: 60000}
+            caller: {offset: 50000}
+            caller_per_x: {offset: 20000}
+          receive: {provenance: measured, source: a campaign, constant: {offset: 150000}}
+          wait: {provenance: measured, source: a campaign, constant: {offset: 0}, per_x: {offset: 0.6}}
+"""
+
+
+def measured_law(client: str) -> RosLaw:
+    return read(MEASURED).processor("here").ros_law(client)
+
+
+def test_a_part_that_the_caller_was_measured_to_spend_is_the_callers() -> None:
+    price = measured_law("rospy").price("publish", 3, 2600)
+    assert (price.caller, price.background) == (50000 + 3 * 20000, 40000 + 3 * 40000)
+
+
+def test_what_happens_beside_the_calls_is_background_where_there_are_figures() -> None:
+    law = measured_law("rospy")
+    assert law.price("receive", 0, 2600) == Price(0, 150000)
+    assert law.price("wait", 1e6, 2600) == Price(0, 600000)
+    assert law.price("accept", 0, 2600) == Price(0, 0)
+    assert catalogue().processor(INTEL).ros_law("roscpp").price("receive", 0, 3000) == Price(0, 0)
+
+
+def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
+    assert measured_law("rospy").warnings(2600) == ()
+    [warning] = measured_law("rospy").warnings(1300)
+    assert "1300" in warning
+    assert "extrapolated" in warning
+
+
+def test_a_client_without_a_law_of_its_own_is_told_how_to_get_one() -> None:
+    with pytest.raises(EstimateError, match="volery calibrate ros --client rclpy"):
+        measured_law("rclpy")

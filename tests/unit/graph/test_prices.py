@@ -3,11 +3,13 @@ from typing import Any
 import pytest
 
 from volery import messages
-from volery.base.time import MS, US
+from volery.base.time import MS, US, S
 from volery.graph import NodeId
 from volery.kernel.task import Place
 from volery.kernel.waiting import at
 from volery.trace.events import Charge, Message, Published, Slice
+
+from .conftest import Price
 
 STRING = "std_msgs/msg/String"
 SET_BOOL = "std_srvs/srv/SetBool"
@@ -115,3 +117,45 @@ def test_nobody_listening_costs_no_carrying(rig: Any, recorded: bool) -> None:
     rig.run(talker)
     assert rig.carried == []
     assert len(rig.of(Published)) == recorded
+
+
+def test_what_happens_beside_the_calls_is_borne_in_the_background(rig: Any) -> None:
+    prices = {"receive": 30 * US, "connect": 400 * US, "accept": 300 * US}
+    rig.prices.update({what: Price(0, price) for what, price in prices.items()})
+
+    def hearer() -> None:
+        rig.graph.node("hearer").subscribe("chat", STRING, lambda message: None)
+
+    def talker() -> None:
+        publisher = rig.graph.node("talker").advertise("chat", STRING)
+        publisher.publish(messages.new(STRING))
+
+    rig.task(hearer, "hearer", on_processor=True)
+    rig.task(talker, "talker", on_processor=True)
+    rig.kernel.run(MS)
+    borne = [
+        (one.component, one.kind, one.caller, one.background) for one in rig.of(Charge) if one.background
+    ]
+    assert borne == [
+        ("talker", "ros:accept", 0, 300 * US),
+        ("hearer", "ros:connect", 0, 400 * US),
+        ("hearer", "ros:receive", 0, 30 * US),
+    ]
+
+
+def test_a_node_pays_for_the_time_in_which_it_does_not_sleep(rig: Any) -> None:
+    def price(node: NodeId, call: str, x: float) -> Price:
+        return Price(0, round(2 * x)) if call in ("wait", "sleep") else Price(0, 0)
+
+    rig.price = price
+    rig.graph = rig.new_graph()
+
+    def half() -> None:
+        node = rig.graph.node("half")
+        node.sleep(2500 * MS)
+        node.spin()
+
+    rig.task(half, "half", on_processor=True)
+    rig.kernel.run(4 * S)
+    paid = [(one.at, one.kind, one.background) for one in rig.of(Charge) if one.background]
+    assert paid == [(0, "ros:sleep", 5 * MS), (3 * S, "ros:wait", 1 * MS), (4 * S, "ros:wait", 2 * MS)]

@@ -1,13 +1,15 @@
 """A right model arrives as frozen data in SI units, with everything inherited and overridden settled."""
 
+from dataclasses import replace
 from math import hypot, isclose
+from pathlib import Path
 
 import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import MS, S
 from volery.model.reader import check, load
-from volery.model.system import Activity, Connection, Figure, Target, TargetKind
+from volery.model.system import Activity, Connection, Figure, ProcessorKind, Target, TargetKind
 
 
 def test_units_are_si_and_times_nanoseconds(workshop):
@@ -218,3 +220,20 @@ def test_unknown_scenario_and_allocation_are_the_callers_fault(workshop):
         workshop.load("poket")
     with pytest.raises(UsageError, match="no allocation named 'x'; there is fast or slow"):
         workshop.load(None, "x")
+
+
+def test_a_catalogue_that_the_model_brings_along(workshop):
+    def read_catalogue(file: Path):
+        if file.name != "mine.yaml":
+            raise ModelError(f"{file}: this catalogue cannot be read")
+        return {"mine": ProcessorKind(2, 2.6e9, 2.6e9)}
+
+    workshop.vocabulary = replace(workshop.vocabulary, read_catalogue=read_catalogue)
+    board = "platform.processors.ground={is: mine, frequency: 2600 MHz}"
+    system = workshop.load(None, None, board, "platform.catalogues=mine.yaml")
+    assert system.processor("ground").kind == "mine"
+    assert system.catalogues == (workshop.folder / "mine.yaml",)
+    with pytest.raises(ModelError, match=r"no processor in the catalogue.*'mine'"):
+        workshop.load(None, None, board)
+    with pytest.raises(ModelError, match=r"platform\.catalogues.*cannot be read"):
+        workshop.load(None, None, "platform.catalogues=[gone.yaml]")
