@@ -52,6 +52,10 @@ class Commander:
         """Have it land."""
         self._performer.perform("land", lambda: self._driver.land(300 * S))
 
+    def sender_to(self, place: Position) -> Callable[[], None]:
+        """What has it go to *place*. ``ImpossibleError`` where nobody else can."""
+        return lambda: self._performer.perform("go", lambda: self._driver.goto(place, None, 300 * S))
+
     def disarms_it(self) -> None:
         """Stop its motors, wherever it is."""
         self._performer.perform("disarm", lambda: self._driver.disarm(True))

@@ -9,6 +9,7 @@ from typing import Any
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import UsageError
+from volery.base.position import Position
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -48,6 +49,10 @@ class Pilot(Commander):
         """By hand."""
         self._channels[MODE_SWITCH] = SWITCH_AWAY
         self._channels[THROTTLE] = THROTTLE_DOWN
+
+    def sender_to(self, place: Position) -> Callable[[], None]:
+        """Raises ``ImpossibleError``: set-points of all nodes are one stream to the vehicle's."""
+        raise ImpossibleError(f"programs share one node, which cannot tell who sent it to {place}")
 
 
 class SimulatedStage(Stage):

@@ -47,6 +47,10 @@ class Repeat(NamedTuple):
     action: Action
 
 
+def _never() -> str:
+    return ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Step:
     """One thing asked of an autopilot, and how one sees that it is done.
@@ -59,6 +63,9 @@ class Step:
     ``enters`` is the mode that this step commands. ``mode`` is the mode in which it must stay while it goes
     on, ``leads_to`` modes which the autopilot may choose by itself in the course of it, ``armed`` whether
     it must stay armed.
+
+    ``lost`` says how somebody else has changed what was asked, where the mode does not tell; empty if nobody
+    has.
 
     ``keep`` is sent all the while. ``advice`` says what the user can do if it is refused or late.
     """
@@ -74,6 +81,7 @@ class Step:
     mode: str = ""
     leads_to: tuple[str, ...] = ()
     armed: bool = False
+    lost: Callable[[], str] = _never
     keep: Repeat | None = None
     advice: str = ""
 

@@ -279,6 +279,7 @@ class _Attempt:
             self._mode_before = seen.mode
         elif ours and seen.mode != self._mode_before and not self._changed:
             self._changed = f"changed from {self._mode_before} to {seen.mode}"
+        self._changed = self._changed or step.lost()
         self._was_armed = self._was_armed or seen.armed
         if step.armed and self._was_armed and not seen.armed and not self._changed:
             self._changed = f"was disarmed in {seen.mode}"

@@ -59,9 +59,10 @@ class Telemetry:
     """Facts about one vehicle, in this project's units, each as it was last heard.
 
     ``changed`` is notified after each message. ``heard`` is when the autopilot itself last spoke, -1 for
-    never. ``position`` has an AMSL altitude. ``failsafe`` says that the autopilot itself is in one.
-    ``flying`` is off the ground by the autopilot's own judgement. ``ready`` means that it could arm now and
-    fly by position, ``armable`` that it could arm in the mode it is in.
+    never. ``position`` has an AMSL altitude, as has ``target``: where it said last that it goes. ``failsafe``
+    says that the autopilot itself is in one. ``flying`` is off the ground by the autopilot's own judgement.
+    ``ready`` means that it could arm now and fly by position, ``armable`` that it could arm in the mode it is
+    in.
     """
 
     def __init__(self, kernel: Kernel, name: str) -> None:
@@ -78,6 +79,7 @@ class Telemetry:
         self.armable = False
         self.ready = False
         self.position: Position | None = None
+        self.target: Position | None = None
         self.above_home = nan
         self.home: Position | None = None
         self.velocity = Velocity(nan, nan, nan)

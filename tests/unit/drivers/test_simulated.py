@@ -120,8 +120,10 @@ class Field:
         return found
 
     def pilot_chooses(self, number: int, after_s: float) -> None:
-        fields = {"target_system": 1, "target_component": 1, "command": 176, "param1": 1.0, "param2": number}
-        frame = Frame("COMMAND_LONG", fields, 254, 190)
+        self.station_sends("COMMAND_LONG", after_s, command=176, param1=1.0, param2=number)
+
+    def station_sends(self, name: str, after_s: float, **stated: float) -> None:
+        frame = Frame(name, {"target_system": 1, "target_component": 1, **stated}, 254, 190)
         self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
 
     def operations(self) -> list[Operation]:
@@ -348,3 +350,25 @@ def test_the_same_flight_twice() -> None:
         return field.events
 
     assert repr(events()) == repr(events())
+
+
+def test_one_that_another_station_sends_elsewhere_is_not_sent_back() -> None:
+    field = Field()
+    latitude, longitude, _ = FRAME.from_enu((40.0, 0.0, 0.0))
+    there = {"lat_int": round(latitude * 1e7), "lon_int": round(longitude * 1e7), "alt": 12.0}
+    order = {"coordinate_frame": 6, "type_mask": 3576, **there}
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        field.station_sends("SET_POSITION_TARGET_GLOBAL_INT", 3.0, **order)
+        began = field.kernel.now()
+        with pytest.raises(Overridden, match="was sent elsewhere by another"):
+            drone.goto(at(0, 90), speed=3.0)
+        assert field.kernel.now() - began < 7 * S
+        with pytest.raises(Overridden, match="another mode and then to GUIDED"):
+            drone.land()
+        sleep(field.kernel, 20 * S)
+        east, north, _ = FRAME.to_enu(drone.position.latitude, drone.position.longitude, 900.0)
+        assert (east, north) == (pytest.approx(40.0, abs=1.0), pytest.approx(0.0, abs=1.0))
+
+    field.fly(mission)

@@ -8,7 +8,7 @@ from volery.drivers.ardupilot.driver import ArduPilot
 from volery.drivers.ardupilot.mavlink import MavlinkCommands
 from volery.drivers.ardupilot.mavros import MavrosCommands
 from volery.drivers.mavlink.mavros import namespace_and_geoid
-from volery.drivers.mavlink.options import OPTIONS, check_options
+from volery.drivers.options import OPTIONS, check_options
 from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.links.link import Link

@@ -14,6 +14,7 @@ from math import isfinite
 
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
+from volery.drivers.aim import Aim
 from volery.drivers.ardupilot.commands import Commands
 from volery.drivers.ardupilot.items import items_of
 from volery.drivers.ardupilot.modes import GUIDED
@@ -22,13 +23,14 @@ from volery.drivers.ardupilot.silence import if_silent
 from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, STANDING_M_S, at, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
-from volery.drivers.mavlink.sequences import (
+from volery.drivers.mavlink.sequences import Sequences
+from volery.drivers.steps import (
     ANSWERED_WITHIN,
     READY_WITHIN,
     STOPPED_WITHIN,
     TURNED_WITHIN,
-    Sequences,
     at_once,
+    check_not_idle,
     heads,
     nothing,
 )
@@ -41,11 +43,11 @@ from volery.vehicles.telemetry import Telemetry, Velocity
 class ArduPilot(Sequences):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
-    handover = GUIDED
+    obeys = GUIDED
     comes_down = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
 
     def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
-        super().__init__(name, commands)
+        super().__init__(kernel, name, commands)
         self._commands = commands
         self._setpoints = Setpoints(kernel, commands)
 
@@ -83,17 +85,26 @@ class ArduPilot(Sequences):
     # -- by position
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """GUIDED, then a target; a rover is armed on the way."""
+        """GUIDED, then a target, until it shows that it goes there; a rover is armed on the way."""
         rover = self.telemetry.kind != DRONE_KIND
         start = self._armed_in_guided() if rover else self._guided()
+        aim = Aim(self.telemetry, self._eviction)
+
+        def send() -> None:
+            if not aim.confirmed:
+                aim.set(goal)
+                self._commands.target(goal)
+                self._commands.watch_target()
+
         target = Step(
             ask=f"reach {goal}",
-            send=lambda: self._commands.target(goal),
+            send=send,
             done=at(goal, rover),
             within=within,
             again=S,
             mode=GUIDED,
             armed=True,
+            lost=aim.lost,
         )
         return (*start, *(self._at_speed(speed, GUIDED) if speed is not None else ()), target)
 
@@ -152,7 +163,7 @@ class ArduPilot(Sequences):
     def stabilize(self) -> Sequence[Step]:
         """STABILIZE, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._setpoints.hold_any()
-        self._not_idle(self._setpoints.held)
+        check_not_idle(self.telemetry, self._setpoints.held)
         return self._change("STABILIZE")
 
     def altitude_hold(self) -> Sequence[Step]:

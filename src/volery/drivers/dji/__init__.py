@@ -12,7 +12,7 @@ from volery.base.errors import UsageError, choices
 from volery.drivers.dji.carrier import Carrier
 from volery.drivers.dji.driver import Dji
 from volery.drivers.dji.names import Names, NewNames, OldNames
-from volery.drivers.mavlink.options import check_options, recorded
+from volery.drivers.options import check_options, recorded
 from volery.graph import Node
 from volery.kernel.api import Kernel
 from volery.messages.dji import NEW_NAMES, OLD_NAMES

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import radians
 
-from volery.base.errors import CapabilityError, LinkError, OutOfBounds, Refused, UsageError
+from volery.base.errors import CapabilityError, LinkError, OutOfBounds, Refused
 from volery.base.frames import heading_to_yaw
 from volery.base.position import Position
-from volery.base.time import MINUTE, Ns, S
+from volery.base.time import Ns, S
 from volery.drivers.arrival import NEAR_UP_M, STANDING_M_S, at, standing
 from volery.drivers.dji import carrier as key
 from volery.drivers.dji.carrier import Carrier
@@ -21,20 +21,25 @@ from volery.drivers.dji.hearing import COMES_DOWN, TAKES_OFF
 from volery.drivers.dji.missions import Plan, above_home, plan_of
 from volery.drivers.dji.names import GO_HOME, LAND, START_MISSION, TAKE_OFF
 from volery.drivers.dji.stream import STILL, ByHand, Moving, Point, yaw_of
+from volery.drivers.steps import (
+    ANSWERED_WITHIN,
+    ARMED_WITHIN,
+    READY_WITHIN,
+    STOPPED_WITHIN,
+    TURNED_WITHIN,
+    at_once,
+    check_not_idle,
+    heads,
+    nothing,
+)
 from volery.kernel.api import Action, Kernel
 from volery.messages.dji import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Capability, Step, Sticks
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
-ANSWERED_WITHIN: Ns = 5 * S
-ARMED_WITHIN: Ns = 10 * S
-READY_WITHIN: Ns = 2 * MINUTE
 UP_WITHIN: Ns = 35 * S
 """Of the take-off itself: motors within 5 s, off the ground within 20 s, then to the fixed height."""
-STOPPED_WITHIN: Ns = 30 * S
-TURNED_WITHIN: Ns = 30 * S
-TURNED_DEG = 3.0
 ASK_AGAIN: Ns = 2 * S
 M100_GAINS_M = 0.8
 """An M100 counts as off the ground once it is so much above home. The SDK's demo asks for 1 m; of a take-off
@@ -119,7 +124,7 @@ class Dji:
         )
         wait = Step(
             ask="be ready to go by position",
-            send=_nothing,
+            send=nothing,
             done=lambda seen: seen.ready or seen.armed,
             within=within,
             skippable=True,
@@ -249,7 +254,7 @@ class Dji:
             leads_to=(WAITS,),
             armed=True,
         )
-        return (*self._free(), *self._authority(), step, self._now("hover", self._stream.stop))
+        return (*self._free(), *self._authority(), step, at_once("hover", self._stream.stop))
 
     def _aim(self, aim: Point | Moving | ByHand) -> None:
         self._hearing.asked = SDK
@@ -302,11 +307,11 @@ class Dji:
             leads_to=(WAITS,),
             armed=True,
         )
-        return (*self._free(), *self._authority(), brake, self._now("hover", self._stream.stop))
+        return (*self._free(), *self._authority(), brake, at_once("hover", self._stream.stop))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Streamed for as long as it lasts; then it stops."""
-        follow = self._now("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
+        follow = at_once("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
         return (*self._free(), *self._authority(), follow)
 
     def _follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
@@ -315,15 +320,11 @@ class Dji:
     def heading(self, degrees: float) -> Sequence[Step]:
         """In place."""
 
-        def turned(seen: Telemetry) -> bool:
-            off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
-            return abs(off) <= TURNED_DEG
-
         def turn() -> Point | None:
             here = self._over_here(self.telemetry.above_home)
             return here._replace(yaw=heading_to_yaw(radians(degrees))) if here is not None else None
 
-        return self._to_point(f"turn to {degrees:g} degrees", turn, turned, TURNED_WITHIN)
+        return self._to_point(f"turn to {degrees:g} degrees", turn, heads(degrees), TURNED_WITHIN)
 
     # -- tasks
 
@@ -350,20 +351,14 @@ class Dji:
             enters=mode.name,
             leads_to=(WAITS, SDK),
         )
-        down = Step(ask=ask, send=_nothing, done=lambda seen: not seen.armed, within=within, mode=mode.name)
+        down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode.name)
         return (begin, down)
 
     # -- by sticks
 
     def stabilize(self) -> Sequence[Step]:
         """Lean angles, turn rate and thrust."""
-        held = self._stream.held
-        throttle = held.throttle if held is not None else 0.5
-        if self.telemetry.flying and throttle < LOW_THROTTLE:
-            raise UsageError(
-                f"{self.name}: the throttle is at {throttle:g}: with so little thrust it would fall; "
-                f"manual_control() with a throttle about 0.5 first"
-            )
+        check_not_idle(self.telemetry, self._stream.held or Sticks(), LOW_THROTTLE)
         return self._by_hand("fly stabilized", ByHand(keeps_height=False))
 
     def altitude_hold(self) -> Sequence[Step]:
@@ -473,19 +468,9 @@ class Dji:
 
         return Step(
             ask="finish the mission",
-            send=_nothing,
+            send=nothing,
             done=over,
             within=within,
             mode=flying,
             leads_to=(WAITS, *sorted(self.comes_down)),
         )
-
-    # -- pieces
-
-    def _now(self, ask: str, action: Callable[[], None], enters: str = "") -> Step:
-        """Something that is done as soon as it is sent."""
-        return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN, enters=enters)
-
-
-def _nothing() -> None:
-    """Some steps only wait."""

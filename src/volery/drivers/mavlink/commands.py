@@ -69,6 +69,9 @@ class Carrier(Protocol):
     def watch_mission(self) -> None:
         """Ask for progress of the mission from now on."""
 
+    def watch_target(self) -> None:
+        """Ask from now on where it goes."""
+
     def problem(self) -> LinkError | CapabilityError | None:
         """What is wrong with the way there, or with what is there."""
 

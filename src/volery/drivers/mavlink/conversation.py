@@ -16,10 +16,10 @@ from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.hearing import Hearing
 from volery.drivers.mavlink.inquiries import Inquiries, value_of
-from volery.drivers.mavlink.options import rate, recorded, system
 from volery.drivers.mavlink.streams import Streams
 from volery.drivers.mavlink.upload import Upload
 from volery.drivers.mavlink.vocabulary import FORCE, GROUND_SPEED, UNCHANGED
+from volery.drivers.options import rate, recorded, system
 from volery.kernel.api import Action, Kernel
 from volery.links.codec import Heard
 from volery.links.link import Frame, Link
@@ -299,6 +299,10 @@ class Conversation:
         if self._upload is None or not self._upload.alive(self._kernel.now()):
             self._upload = Upload(items, self._send_to)
             self._upload.begin()
+
+    def watch_target(self) -> None:
+        """POSITION_TARGET_GLOBAL_INT tells where it goes."""
+        self._streams.want("POSITION_TARGET_GLOBAL_INT", 500 * MS)
 
     def watch_mission(self) -> None:
         """MISSION_CURRENT tells the end of missions that do not land."""

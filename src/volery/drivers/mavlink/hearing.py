@@ -55,6 +55,7 @@ class Hearing(ABC):
             "SYS_STATUS": self._sys_status,
             "EXTENDED_SYS_STATE": self._extended_state,
             "HOME_POSITION": self._home_position,
+            "POSITION_TARGET_GLOBAL_INT": self._target,
             "GPS_RAW_INT": self._gps,
             "ATTITUDE": self._attitude,
             "STATUSTEXT": self._texts.hear,
@@ -141,6 +142,10 @@ class Hearing(ABC):
     def _home_position(self, fields: Fields) -> None:
         altitude = AMSL(fields["altitude"] / 1000.0)
         self._seen.home = Position(fields["latitude"] / 1e7, fields["longitude"] / 1e7, altitude)
+
+    def _target(self, fields: Fields) -> None:
+        altitude = AMSL(fields["alt"])
+        self._seen.target = Position(fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, altitude)
 
     def _gps(self, fields: Fields) -> None:
         self._seen.fix = entry_name("GPS_FIX_TYPE", fields["fix_type"]).lower()

@@ -22,7 +22,7 @@ from volery.base.time import MS, Ns, S
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.mavros_hearing import MavrosHearing
-from volery.drivers.mavlink.options import check_options
+from volery.drivers.options import check_options
 from volery.drivers.mavlink.vocabulary import FORCE, GROUND_SPEED, UNCHANGED
 from volery.graph import Node, ServiceError
 from volery.graph.group import Work

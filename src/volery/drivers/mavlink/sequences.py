@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from volery.base.errors import CapabilityError, LinkError, UsageError
-from volery.base.time import MINUTE, Ns, S
+from volery.base.errors import CapabilityError, LinkError
+from volery.base.time import Ns, S
 from volery.drivers.arrival import ROVER_NEAR_M, distance, standing
+from volery.drivers.eviction import Eviction
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Carrier, Item
-from volery.kernel.api import Action
-from volery.vehicles.driver import Capability, Repeat, Step, Sticks
+from volery.drivers.steps import ANSWERED_WITHIN, ARMED_WITHIN, nothing
+from volery.kernel.api import Action, Kernel
+from volery.vehicles.driver import Capability, Repeat, Step
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 
 CHECKS_PERIOD: Ns = 10 * S
-ANSWERED_WITHIN: Ns = 5 * S
-ARMED_WITHIN: Ns = 10 * S
-READY_WITHIN: Ns = 2 * MINUTE
-STOPPED_WITHIN: Ns = 30 * S
-TURNED_WITHIN: Ns = 30 * S
-TURNED_DEG = 3.0
-IDLE_THROTTLE = 0.1
 
 ROVER_CAN = frozenset(
     {
@@ -49,16 +44,25 @@ _NOTHING: frozenset[Capability] = frozenset()
 class Sequences:
     """What drivers over a ``Carrier`` share. See ``vehicles.driver.Driver`` for what the methods mean."""
 
-    def __init__(self, name: str, carrier: Carrier) -> None:
+    obeys = ""
+    """The mode in which the firmware obeys a computer."""
+
+    def __init__(self, kernel: Kernel, name: str, carrier: Carrier) -> None:
         self.name = name
         self.telemetry = carrier.telemetry
         self._carrier = carrier
+        self._eviction = Eviction(kernel, carrier.telemetry, self.obeys)
         self._last_item: int | None = None  # where the mission on board ends in the air
 
     @property
     def capabilities(self) -> frozenset[Capability]:
         """By the kind of vehicle; none until it has been heard."""
         return _CAN.get(self.telemetry.kind, _NOTHING)
+
+    @property
+    def handover(self) -> str:
+        """The mode in which it obeys; words that are no mode while somebody else has it there."""
+        return self._eviction.handover
 
     @property
     def cycle(self) -> Action | None:
@@ -80,6 +84,7 @@ class Sequences:
     def close(self) -> None:
         """Stop talking and let go of the link."""
         self.stop()
+        self._eviction.end()
         self._carrier.close()
 
     # -- on the ground
@@ -175,15 +180,6 @@ class Sequences:
 
     # -- pieces of sequences
 
-    def _not_idle(self, held: Sticks | None) -> None:
-        """In the air the motors must not idle when the throttle becomes the sticks'."""
-        throttle = held.throttle if held is not None else 0.0
-        if self.telemetry.flying and throttle < IDLE_THROTTLE:
-            raise UsageError(
-                f"{self.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle "
-                f"and it would fall; manual_control() with a throttle about 0.5 first"
-            )
-
     @abstractmethod
     def _asks_for(self, mode: str) -> None:
         """This mode is about to be commanded."""
@@ -234,22 +230,3 @@ class Sequences:
             mode=mode,
         )
         return (step,)
-
-
-def at_once(ask: str, action: Callable[[], None]) -> Step:
-    """Something that is done as soon as it is sent."""
-    return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN)
-
-
-def heads(degrees: float) -> Callable[[Telemetry], bool]:
-    """It looks *degrees* clockwise from north."""
-
-    def turned(seen: Telemetry) -> bool:
-        off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
-        return abs(off) <= TURNED_DEG
-
-    return turned
-
-
-def nothing() -> None:
-    """Some steps only wait."""

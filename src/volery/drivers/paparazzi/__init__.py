@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from volery.drivers.mavlink.options import check_options
+from volery.drivers.options import check_options
 from volery.drivers.paparazzi.driver import Paparazzi
 from volery.drivers.paparazzi.ground import Blocks
 from volery.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK

@@ -11,27 +11,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import radians
 
-from volery.base.errors import CapabilityError, LinkError, Refused, UsageError
+from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.position import AboveHome, Position
-from volery.base.time import MINUTE, Ns, S
+from volery.base.time import Ns, S
+from volery.drivers.aim import Aim
 from volery.drivers.arrival import DRONE_KIND, at, standing
-from volery.drivers.mavlink.sequences import at_once, heads, nothing
+from volery.drivers.eviction import Eviction
 from volery.drivers.paparazzi.ground import LIFTED_M, Blocks, Ground
 from volery.drivers.paparazzi.if_silent import if_silent
 from volery.drivers.paparazzi.modes import BY_ATTITUDE, BY_HEIGHT, FAILSAFE, GUIDED
 from volery.drivers.paparazzi.pieces import Pieces
 from volery.drivers.paparazzi.setpoints import VELOCITY_PERIOD
 from volery.drivers.paparazzi.uplink import Uplink
+from volery.drivers.steps import (
+    READY_WITHIN,
+    STOPPED_WITHIN,
+    TURNED_WITHIN,
+    at_once,
+    check_not_idle,
+    heads,
+    nothing,
+)
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Capability, Repeat, Step, Sticks
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
-
-STOPPED_WITHIN: Ns = 30 * S
-TURNED_WITHIN: Ns = 30 * S
-READY_WITHIN: Ns = 2 * MINUTE
-
-IDLE_THROTTLE = 0.1
 
 CAN = frozenset(
     {
@@ -57,7 +61,6 @@ class Paparazzi:
     Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*.
     """
 
-    handover = GUIDED
     comes_down = frozenset({FAILSAFE})
     cycle: Action | None = None
 
@@ -68,6 +71,12 @@ class Paparazzi:
         self._pieces = Pieces(kernel, uplink)
         self._setpoints = self._pieces.setpoints
         self._ground = Ground(self._pieces, blocks)
+        self._eviction = Eviction(kernel, uplink.telemetry, GUIDED)
+
+    @property
+    def handover(self) -> str:
+        """GUIDED; words that are no mode while somebody else has it there."""
+        return self._eviction.handover
 
     @property
     def capabilities(self) -> frozenset[Capability]:
@@ -88,6 +97,7 @@ class Paparazzi:
     def close(self) -> None:
         """Stop talking and let go of the link."""
         self.stop()
+        self._eviction.end()
         self._uplink.close()
 
     # -- on the ground
@@ -128,14 +138,23 @@ class Paparazzi:
         return (*self._pieces.guided(), self._reach(goal, f"reach {goal}", within))
 
     def _reach(self, goal: Position, ask: str, within: Ns) -> Step:
+        """Said until it shows that it goes there."""
+        aim = Aim(self.telemetry, self._eviction)
+
+        def send() -> None:
+            if not aim.confirmed:
+                aim.set(goal)
+                self._uplink.setpoint(self._pieces.at(goal))
+
         return Step(
             ask=ask,
-            send=lambda: self._uplink.setpoint(self._pieces.at(goal)),
+            send=send,
             done=at(goal, False),
             within=within,
             again=S,
             mode=GUIDED,
             armed=True,
+            lost=aim.lost,
         )
 
     def hold(self) -> Sequence[Step]:
@@ -198,13 +217,7 @@ class Paparazzi:
     def stabilize(self) -> Sequence[Step]:
         """ATTITUDE_DIRECT, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._setpoints.hold_any()
-        held = self._setpoints.held
-        throttle = held.throttle if held is not None else 0.0
-        if self.telemetry.flying and throttle < IDLE_THROTTLE:
-            raise UsageError(
-                f"{self.name}: the throttle is at {throttle:g}: in {BY_ATTITUDE} the motors would idle and "
-                f"it would fall; manual_control() with a throttle about 0.5 first"
-            )
+        check_not_idle(self.telemetry, self._setpoints.held)
         return (self._pieces.change(BY_ATTITUDE),)
 
     def altitude_hold(self) -> Sequence[Step]:

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 from volery.base.time import Ns, S
 from volery.drivers.arrival import NEAR_UP_M, STANDING_M_S, distance
-from volery.drivers.mavlink.sequences import nothing
 from volery.drivers.paparazzi.modes import FAILSAFE, GUIDED, KILL, LAND_BLOCK, NAV, START_BLOCK, TAKEOFF_BLOCK
 from volery.drivers.paparazzi.pieces import ARMING, Pieces
 from volery.drivers.paparazzi.uplink import COME_DOWN, VELOCITY_Z, Setpoint
+from volery.drivers.steps import nothing
 from volery.vehicles.driver import Step
 from volery.vehicles.telemetry import Telemetry
 

@@ -14,6 +14,7 @@ from volery.drivers.paparazzi.modes import (
     CANNOT_ARM,
     FAILSAFE,
     GOOD_FIX,
+    GUIDED,
     HOME,
     HOME_WAYPOINT,
     NEEDS_CARE,
@@ -184,9 +185,10 @@ class Hearing:
         seen.attitude = Attitude(degrees(fields["phi"] * ANGLE), degrees(fields["theta"] * ANGLE), heading)
         if self.origin is None:
             return
-        enu = fields["east"] * POSITION, fields["north"] * POSITION, fields["up"] * POSITION
-        seen.position = self.origin.position(enu)
+        seen.position = self.origin.position(_enu(fields, ""))
         seen.above_home = seen.position.altitude.metres - self.origin.amsl
+        if seen.mode == GUIDED:
+            seen.target = self.origin.position(_enu(fields, "carrot_"))
         seen.velocity = Velocity(fields["vnorth"] * SPEED, fields["veast"] * SPEED, fields["vup"] * SPEED)
         self.judge_readiness()
 
@@ -209,6 +211,12 @@ class Hearing:
 
     def _value(self, fields: Fields) -> None:
         self.values[fields["index"]] = self._kernel.now(), fields["value"]
+
+
+def _enu(fields: Fields, prefix: str) -> Vector:
+    """Metres in the local frame."""
+    east, north, up = (fields[f"{prefix}{axis}"] * POSITION for axis in ("east", "north", "up"))
+    return east, north, up
 
 
 def _home_of(aircraft: Aircraft) -> tuple[int, tuple[float, float]]:

@@ -7,10 +7,10 @@ from math import radians
 from volery.base.errors import CapabilityError, Refused
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, S
-from volery.drivers.mavlink.sequences import at_once, nothing
 from volery.drivers.paparazzi.modes import GUIDED, KILL, START
 from volery.drivers.paparazzi.setpoints import Setpoints
 from volery.drivers.paparazzi.uplink import STOP, Setpoint, Uplink
+from volery.drivers.steps import at_once, nothing
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Step
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import Ns, S
-from volery.drivers.mavlink.options import recorded, system
+from volery.drivers.options import recorded, system
 from volery.drivers.paparazzi.hearing import Hearing
 from volery.drivers.paparazzi.modes import AUTO2, KILL_THROTTLE, MODE, NUMBERS, STATUS
 from volery.kernel.api import Kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.drivers.mavlink.mavros import namespace_and_geoid
-from volery.drivers.mavlink.options import OPTIONS, check_options
+from volery.drivers.options import OPTIONS, check_options
 from volery.drivers.px4.driver import PX4
 from volery.drivers.px4.mavlink import MavlinkCommands
 from volery.drivers.px4.mavros import MavrosCommands

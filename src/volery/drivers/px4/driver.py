@@ -13,7 +13,9 @@ ended, the drone is sent to the stated height above the place where it took off,
 meets as well as any other goal; only then has it taken off.
 
 A pilot hands over by AUTO.LOITER, PX4's Hold. One who takes an OFFBOARD flight into Hold has it, too: until
-he has chosen another mode in between, Hold then means his.
+he has chosen another mode in between, Hold then means his. So has one who sends it elsewhere by
+DO_REPOSITION, which is also how a ground station has it pause. To ask for AUTO.LOITER while it flies there
+changes nothing: it goes on to its target.
 """
 
 from __future__ import annotations
@@ -25,18 +27,11 @@ from math import isfinite
 from volery.base.errors import UsageError, VehicleError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import MINUTE, MS, Ns, S
+from volery.drivers.aim import Aim
 from volery.drivers.arrival import DRONE_KIND, ROVER_KIND, at, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
-from volery.drivers.mavlink.sequences import (
-    READY_WITHIN,
-    STOPPED_WITHIN,
-    TURNED_WITHIN,
-    Sequences,
-    at_once,
-    heads,
-    nothing,
-)
+from volery.drivers.mavlink.sequences import Sequences
 from volery.drivers.mavlink.vocabulary import OWN_SPEED
 from volery.drivers.px4 import modes
 from volery.drivers.px4.commands import Commands, Setpoint
@@ -45,6 +40,15 @@ from volery.drivers.px4.modes import HOLD, OFFBOARD
 from volery.drivers.px4.offboard import PERIOD, STILL, Offboard
 from volery.drivers.px4.silence import if_silent
 from volery.drivers.px4.stick_stream import StickStream
+from volery.drivers.steps import (
+    READY_WITHIN,
+    STOPPED_WITHIN,
+    TURNED_WITHIN,
+    at_once,
+    check_not_idle,
+    heads,
+    nothing,
+)
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Repeat, Step, Sticks
 from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint
@@ -60,13 +64,14 @@ REPEATED_FOR: Ns = 1500 * MS
 class PX4(Sequences):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
+    obeys = HOLD
     comes_down = frozenset({modes.LAND, modes.RTL, "AUTO.PRECLAND"})
 
     def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
-        super().__init__(name, commands)
+        super().__init__(kernel, name, commands)
         self._kernel = kernel
         self._commands = commands
-        self._offboard = Offboard(kernel, commands)
+        self._offboard = Offboard(kernel, commands, self._eviction)
         self._sticks = StickStream(kernel, commands)
         self._at_own_speed = True
         self._lifted_at: Position | None = None
@@ -75,7 +80,8 @@ class PX4(Sequences):
     @property
     def handover(self) -> str:
         """AUTO.LOITER; words that are no mode while AUTO.LOITER is a pilot's."""
-        return f"another mode and then to {HOLD}" if self._offboard.evicted else HOLD
+        self._offboard.look()
+        return self._eviction.handover
 
     def if_silent(self) -> str:
         """From its failsafes for the ground station, for OFFBOARD and for sticks."""
@@ -152,20 +158,30 @@ class PX4(Sequences):
     def _target(self, goal: Callable[[], Position], within: Ns) -> Step:
         """DO_REPOSITION to *goal*, until it is there."""
         rover = self.telemetry.kind == ROVER_KIND
+        aim = Aim(self.telemetry, self._eviction)
+
+        def send() -> None:
+            aim.set(self._reposition(goal()))
+            self._commands.watch_target()
+
         return Step(
             ask="reach it",
-            send=lambda: self._reposition(goal()),
+            send=send,
             done=lambda seen: seen.mode == HOLD and at(goal(), rover)(seen),
             within=within,
             answer=key.TARGET,
             again=2 * S,
             enters=HOLD,
             armed=True,
+            lost=aim.lost,
         )
 
-    def _reposition(self, goal: Position) -> None:
+    def _reposition(self, goal: Position) -> Position:
+        """The place as it was sent."""
         self._asks_for(HOLD)
-        self._commands.reposition(Position(goal.latitude, goal.longitude, AMSL(self._amsl(goal.altitude))))
+        target = Position(goal.latitude, goal.longitude, AMSL(self._amsl(goal.altitude)))
+        self._commands.reposition(target)
+        return target
 
     def _here(self, asked: str) -> Position:
         here = self.telemetry.position
@@ -258,7 +274,7 @@ class PX4(Sequences):
     def stabilize(self) -> Sequence[Step]:
         """STABILIZED, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._sticks.hold_any()
-        self._not_idle(self._sticks.held)
+        check_not_idle(self.telemetry, self._sticks.held)
         return self._change(modes.STABILIZED)
 
     def altitude_hold(self) -> Sequence[Step]:
@@ -302,7 +318,6 @@ class PX4(Sequences):
 
     def close(self) -> None:
         """Stop talking and let go of the link."""
-        self._offboard.close()
         super().close()
 
     # -- missions

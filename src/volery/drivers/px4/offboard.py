@@ -9,6 +9,7 @@ it pauses while the autopilot is not heard, until a heartbeat says that the mode
 from __future__ import annotations
 
 from volery.base.time import MS, Ns, S
+from volery.drivers.eviction import Eviction
 from volery.drivers.mavlink import commands as key
 from volery.drivers.px4.commands import Commands, Setpoint
 from volery.drivers.px4.modes import HOLD, OFFBOARD
@@ -29,8 +30,8 @@ STILL = Setpoint(Velocity(0.0, 0.0, 0.0))
 class Offboard:
     """One stream. Where the carrier has a cycle, ``repeat`` is the loop's and the caller's business."""
 
-    def __init__(self, kernel: Kernel, commands: Commands) -> None:
-        self._evicted = False
+    def __init__(self, kernel: Kernel, commands: Commands, eviction: Eviction) -> None:
+        self._eviction = eviction
         self._streaming = False
         self._kernel = kernel
         self._commands = commands
@@ -44,14 +45,11 @@ class Offboard:
         self._asked_to_hold: Ns = 0
         self._in_doubt: Ns = -1  # when it was last silent
         self._timer: Handle | None = None
-        self._watch: Handle | None = None
 
-    @property
-    def evicted(self) -> bool:
-        """Somebody took the mode, into the one in which it would obey us."""
+    def look(self) -> None:
+        """Notice at once that the mode was taken, not with the next set-point only."""
         if self._streaming and self._entered and self._seen.mode != OFFBOARD:
             self._end()
-        return self._evicted
 
     @property
     def holds(self) -> bool:
@@ -103,15 +101,10 @@ class Offboard:
 
     def stop(self) -> None:
         """No set-point any more."""
-        _cancel(self._timer)
-        self._timer = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
         self._streaming = self._entered = self._leaving = False
-
-    def close(self) -> None:
-        """Nothing any more."""
-        self.stop()
-        _cancel(self._watch)
-        self._watch = None
 
     def _tick(self) -> None:
         now = self._kernel.now()
@@ -138,20 +131,10 @@ class Offboard:
             self._commands.set_mode(HOLD)
 
     def _end(self) -> None:
-        """The mode is another one: ours, or somebody's. A failsafe's is told by its status."""
+        """The mode is another one: ours, or somebody's. A failsafe's is told by its status. Somebody who took
+        it into the one in which it would obey us has it.
+        """
         taken = not self._leaving and not self._seen.failsafe and self._seen.mode == HOLD
         self.stop()
         if taken:
-            self._evicted = True
-            self._watch = self._watch or self._kernel.every(PERIOD, self._wait_until_handed_back)
-
-    def _wait_until_handed_back(self) -> None:
-        if self._seen.mode != HOLD or not self._seen.armed:
-            self._evicted = False
-            _cancel(self._watch)
-        self._watch = None
-
-
-def _cancel(handle: Handle | None) -> None:
-    if handle is not None:
-        handle.cancel()
+            self._eviction.begin()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from volery.base.errors import Failsafe, LinkGarbled, LinkSilent, Overridden, VehicleError
+from math import hypot
+
+from volery.base.errors import Failsafe, LinkGarbled, LinkSilent, NotArrived, Overridden, VehicleError
 from volery.base.time import S
 from volery.testing.checks import ImpossibleError, check, demand, raising
 from volery.testing.stage import Stage
@@ -30,6 +32,26 @@ def mode_change_by_another(stage: Stage) -> str:
 
 def _slow(stage: Stage) -> float | None:
     return 2.0 if Capability.SPEED in stage.drone.capabilities else None
+
+
+@check(needs=GO, flies=True)
+def sent_elsewhere_by_another(stage: Stage) -> str:
+    """Another station sends it elsewhere, in the same mode: goto() ends with Overridden where the autopilot
+    tells its target, else in time with NotArrived; it is not sent back.
+    """
+    other = stage.other()
+    stage.drone.takeoff(10)
+    there = stage.at(0, 40)
+    stage.later(3.0, other.sender_to(there))
+    with raising(Overridden, NotArrived, naming=stage.name) as caught:
+        stage.drone.goto(stage.at(60, 0), speed=_slow(stage))
+
+    def is_there() -> bool:
+        north, east, _ = stage.offset(there, stage.drone.position)
+        return hypot(north, east) < 3.0
+
+    stage.until(is_there, 60.0, "it did not go where the other station sent it")
+    return caught.text.removeprefix(f"{stage.name}: ")
 
 
 @check(needs=(*GO, Capability.LAND), flies=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from math import hypot, nan
 from typing import Any
 
 import pytest
@@ -91,8 +91,14 @@ class Field:
     def pilot_chooses(self, mode: str, after_s: float = 0.0) -> None:
         number = MODES[mode]
         stated = {"param1": 1.0, "param2": float(number.main), "param3": float(number.sub)}
-        fields = {"target_system": 1, "target_component": 1, "command": 176, **stated}
-        frame = Frame("COMMAND_LONG", fields, 254, 190)
+        self._pilot_says(after_s, command=176, **stated)
+
+    def station_pauses(self, after_s: float) -> None:
+        here = {"param5": nan, "param6": nan, "param7": nan}
+        self._pilot_says(after_s, command=192, param1=-1.0, param2=1.0, param4=nan, **here)
+
+    def _pilot_says(self, after_s: float, **stated: float) -> None:
+        frame = Frame("COMMAND_LONG", {"target_system": 1, "target_component": 1, **stated}, 254, 190)
         self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
 
     def operations(self) -> list[Operation]:
@@ -264,6 +270,29 @@ def test_a_pilot_takes_over(mode: str) -> None:
         field.fly(mission)
     field.kernel.run(field.kernel.now() + 3 * S)
     assert field.vehicle.telemetry.mode == mode
+
+
+def test_a_station_that_has_it_pause_on_its_way_has_it() -> None:
+    """Hold itself changes nothing while it is sent somewhere; a pause is a DO_REPOSITION to where it is."""
+    field = Field()
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        field.pilot_chooses(HOLD, 3.0)
+        drone.goto(at(0, 30))
+        field.station_pauses(4.0)
+        began = field.kernel.now()
+        with pytest.raises(Overridden, match=r"was sent elsewhere by another.*another mode and then to"):
+            drone.goto(at(0, 90), speed=3.0)
+        assert field.kernel.now() - began < 8 * S
+        with pytest.raises(Overridden, match="did not command"):
+            drone.goto(at(0, 90))
+        field.pilot_chooses("AUTO.RTL", 1.0)
+        field.pilot_chooses(HOLD, 3.0)
+        sleep(field.kernel, 5 * S)
+        drone.goto(at(0, 60))
+
+    field.fly(mission)
 
 
 def test_a_failsafe_for_a_missed_stream_is_not_fought() -> None:

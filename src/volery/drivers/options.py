@@ -1,4 +1,4 @@
-"""Options of an address that are the MAVLink drivers' own."""
+"""Options of an address that are the drivers' own."""
 
 from __future__ import annotations
 
