@@ -98,12 +98,22 @@ class Toolchain:
 
     def library(self, objects: Sequence[Path], options: Sequence[str] = ()) -> Path:
         """*objects* linked into a shared library that lacks nothing."""
-        command = [compiler().program, "-shared", "-Wl,-Bsymbolic", "-Wl,-z,defs"]
+        how = ("-shared", "-Wl,-Bsymbolic", "-Wl,-z,defs")
+        return self._linked(how, objects, options, ".so")
+
+    def executable(self, objects: Sequence[Path], options: Sequence[str] = ()) -> Path:
+        """*objects* linked into a program."""
+        return self._linked((), objects, options, ".out")
+
+    def _linked(
+        self, how: Sequence[str], objects: Sequence[Path], options: Sequence[str], suffix: str
+    ) -> Path:
+        command = [compiler().program, *how]
         place = cache_folder() / _digest(compiler().version, *command, *options, *map(_content, objects))
-        made = place.with_suffix(".so")
+        made = place.with_suffix(suffix)
         if not made.exists():
             with tempfile.TemporaryDirectory(dir=cache_folder()) as scratch:
-                new = Path(scratch, "new.so")
+                new = Path(scratch, f"new{suffix}")
                 self._run([*command, *map(str, objects), *options, "-o", str(new)])
                 new.replace(made)
         return made
