@@ -68,6 +68,13 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
     )
 
 
+def world_to_body(attitude: Quaternion, v: Vector) -> Vector:
+    """A vector of the world in the axes of a body that lies so in that world."""
+    w, x, y, z = attitude
+    _, bx, by, bz = multiply(multiply((w, -x, -y, -z), (0.0, *v)), attitude)
+    return bx, by, bz
+
+
 def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
     """A FRD-in-NED attitude as the FLU-in-ENU attitude of the same body. Its own inverse."""
     world: Quaternion = (0.0, _HALF, _HALF, 0.0)

@@ -6,32 +6,31 @@ five seconds without one. As in MAVROS, ``set_mode`` and ``cmd/command_int`` do 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from volery.base.errors import choices, did_you_mean
 from volery.base.time import Ns, S
 from volery.bridge.modes import mode_names, mode_number
-from volery.bridge.wire import Wire
-from volery.graph import Handler
+from volery.bridge.offering import Service, Surroundings
+from volery.bridge.streams import request_stream
 from volery.kernel.waiting import Lock
 from volery.messages import service
-from volery.trace.events import Text
 
 ACK_WITHIN: Ns = 5 * S
 ACCEPTED, FAILED, IN_PROGRESS = 0, 4, 5
 CUSTOM_MODE_ENABLED = 1
 LAND, TAKEOFF, SET_HOME, ARM_DISARM, SET_MESSAGE_INTERVAL = 21, 22, 179, 400, 511
-WARNING = 4
 
 
 class Commands:
     """The handlers. One command at a time is under way, others wait their turn."""
 
-    def __init__(self, wire: Wire, component: str) -> None:
-        self._wire, self._component = wire, component
-        self._one_at_a_time = Lock(wire.kernel, f"{component} (command)")
+    def __init__(self, around: Surroundings) -> None:
+        self._wire, self._warn = around.wire, around.warn
+        self._one_at_a_time = Lock(around.wire.kernel, f"{around.node.name} (command)")
 
-    def services(self) -> dict[str, tuple[str, Handler]]:
+    def services(self) -> Mapping[str, Service]:
         """Handlers by the service's name, with its type."""
         return {
             "set_mode": ("mavros_msgs/srv/SetMode", self.set_mode),
@@ -44,10 +43,6 @@ class Commands:
             "set_stream_rate": ("mavros_msgs/srv/StreamRate", self.set_stream_rate),
             "set_message_interval": ("mavros_msgs/srv/MessageInterval", self.set_message_interval),
         }
-
-    def _warn(self, text: str) -> None:
-        with self._wire.kernel as kernel:
-            kernel.record(Text(kernel.now(), self._component, WARNING, text))
 
     def ask(self, command: int, *parameters: float, confirmation: int = 0) -> tuple[bool, int]:
         """Send a COMMAND_LONG; whether it was accepted, and the result (FAILED without an answer)."""
@@ -140,7 +135,8 @@ class Commands:
 
     def set_stream_rate(self, request: Any) -> Any:
         """``set_stream_rate``: not acknowledged by MAVLink either."""
-        request_streams(self._wire, request.stream_id, request.message_rate if request.on_off else 0)
+        rate = request.message_rate if request.on_off else 0
+        request_stream(self._wire, request.stream_id, rate)
         return service("mavros_msgs/srv/StreamRate").response()
 
     def set_message_interval(self, request: Any) -> Any:
@@ -149,9 +145,3 @@ class Commands:
         interval = -1.0 if rate < 0 else (0.0 if rate == 0 else 1e6 / rate)
         accepted, _ = self.ask(SET_MESSAGE_INTERVAL, float(request.message_id), interval)
         return service("mavros_msgs/srv/MessageInterval").response(accepted)
-
-
-def request_streams(wire: Wire, stream: int, rate: int) -> None:
-    """Ask for a MAV_DATA_STREAM at *rate* hertz; 0 stops it."""
-    fields = {"req_stream_id": stream, "req_message_rate": rate, "start_stop": 1 if rate else 0}
-    wire.send_to("REQUEST_DATA_STREAM", fields)

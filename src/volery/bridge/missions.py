@@ -6,12 +6,12 @@ whole mission.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 from volery.base.time import MS, Ns
-from volery.bridge.wire import Ear, Wire
-from volery.graph import Handler
+from volery.bridge.offering import LATCHED_STATE, Fields, Service, Surroundings, Topic, Translate, stamped
+from volery.bridge.wire import Ear
 from volery.links.link import Frame
 from volery.messages import new, service
 
@@ -59,13 +59,23 @@ def to_waypoint(item: dict[str, Any]) -> Any:
     )
 
 
+TOPICS = (
+    Topic("mission/waypoints", "mavros_msgs/msg/WaypointList", LATCHED_STATE),
+    Topic("mission/reached", "mavros_msgs/msg/WaypointReached", LATCHED_STATE),
+)
+
+
 class Missions:
-    """The handlers. *publish* is told the mission after each ``mission/pull`` and ``mission/push``."""
+    """Handlers and translators. ``mission/waypoints`` is published after each ``mission/pull`` and
+    ``mission/push``, and when another of its items has become the current one.
+    """
 
-    def __init__(self, wire: Wire, publish: Callable[[Any], None]) -> None:
-        self._wire, self._publish = wire, publish
+    def __init__(self, around: Surroundings) -> None:
+        self._wire, self._publish = around.wire, around.publish
+        self._known: list[Any] = []
+        self._current = 0
 
-    def services(self) -> dict[str, tuple[str, Handler]]:
+    def services(self) -> Mapping[str, Service]:
         """Handlers by the service's name, with its type."""
         return {
             "mission/push": ("mavros_msgs/srv/WaypointPush", self.push),
@@ -73,6 +83,24 @@ class Missions:
             "mission/clear": ("mavros_msgs/srv/WaypointClear", self.clear),
             "mission/set_current": ("mavros_msgs/srv/WaypointSetCurrent", self.set_current),
         }
+
+    def translators(self) -> Mapping[str, Translate]:
+        """By the name of the frame."""
+        return {"MISSION_ITEM_REACHED": self._reached, "MISSION_CURRENT": self._is_current}
+
+    def _reached(self, said: Fields, at: Ns) -> None:
+        message = new("mavros_msgs/msg/WaypointReached", header=stamped(at), wp_seq=said["seq"])
+        self._publish("mission/reached", message)
+
+    def _is_current(self, said: Fields, at: Ns) -> None:
+        changed, self._current = said["seq"] != self._current, said["seq"]
+        if changed and self._known:
+            self._show(self._known)
+
+    def _show(self, waypoints: list[Any]) -> None:
+        self._known = waypoints
+        message = new("mavros_msgs/msg/WaypointList", current_seq=self._current, waypoints=waypoints)
+        self._publish("mission/waypoints", message)
 
     def _ask(self, ear: Ear, message: str, fields: dict[str, Any]) -> Frame | None:
         for _ in range(TRIES):
@@ -85,7 +113,7 @@ class Missions:
     def push(self, request: Any) -> Any:
         """``mission/push``."""
         response = service("mavros_msgs/srv/WaypointPush").response
-        waypoints = request.waypoints
+        waypoints = list(request.waypoints)
         if request.start_index != 0 or not waypoints:
             return response(False, 0)
         sent = 0
@@ -100,7 +128,7 @@ class Missions:
                 said = ear.next(TRIES * ANSWER_WITHIN)
         accepted = said is not None and said.fields["type"] == ACCEPTED
         if accepted:
-            self._publish(new("mavros_msgs/msg/WaypointList", waypoints=waypoints))
+            self._show(waypoints)
         return response(accepted, sent if accepted else 0)
 
     def pull(self, request: Any) -> Any:
@@ -117,7 +145,7 @@ class Missions:
                     return response(False, len(waypoints))
                 waypoints.append(to_waypoint(item.fields))
         self._wire.send_to("MISSION_ACK", {"type": ACCEPTED})
-        self._publish(new("mavros_msgs/msg/WaypointList", waypoints=waypoints))
+        self._show(waypoints)
         return response(True, len(waypoints))
 
     def clear(self, request: Any) -> Any:

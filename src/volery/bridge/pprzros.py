@@ -15,7 +15,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
-from volery.bridge.commands import WARNING
+from volery.bridge.vehicle_node import WARNING
 from volery.graph import Node, RosGraph
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Frame, Link

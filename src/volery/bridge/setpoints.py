@@ -8,29 +8,17 @@ as they are, in the frame that the message names (AMSL, above home or above terr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from volery.base import frames
 from volery.base.geoid import Geoid
 from volery.base.time import MS, Ns
-
-Asked = tuple[str, dict[str, Any]]
-"""A frame's name and fields, without addresses."""
+from volery.bridge.offering import Asked, Subscription
 
 BODY_FRAMES = frozenset({8, 9})
 LOCAL_NED, GLOBAL_INT = 1, 5
 POSITION_AND_YAW = 8 | 16 | 32 | 64 | 128 | 256 | 2048
 VELOCITY_AND_YAW_RATE = 1 | 2 | 4 | 64 | 128 | 256 | 1024
-RC_CHANNELS = 18
-
-
-class Subscription(NamedTuple):
-    """A topic that the vehicle node subscribes to, and what its messages become."""
-
-    name: str
-    type: str
-    translate: Callable[[Any, Ns], Asked]
 
 
 def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
@@ -44,9 +32,12 @@ def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
         Subscription("setpoint_raw/global", "mavros_msgs/msg/GlobalPositionTarget", raw_global),
         Subscription("setpoint_position/local", "geometry_msgs/msg/PoseStamped", position_local),
         Subscription("setpoint_position/global", "geographic_msgs/msg/GeoPoseStamped", position_global),
+        Subscription("setpoint_raw/attitude", "mavros_msgs/msg/AttitudeTarget", raw_attitude),
         Subscription("setpoint_velocity/cmd_vel", "geometry_msgs/msg/TwistStamped", velocity),
+        Subscription("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/msg/Twist", velocity_unstamped),
         Subscription("rc/override", "mavros_msgs/msg/OverrideRCIn", rc_override),
         Subscription("manual_control/send", "mavros_msgs/msg/ManualControl", manual_control),
+        Subscription("statustext/send", "mavros_msgs/msg/StatusText", status_text),
     )
 
 
@@ -96,6 +87,22 @@ def raw_global(message: Any, now: Ns) -> Asked:
     }
 
 
+def raw_attitude(message: Any, now: Ns) -> Asked:
+    """``setpoint_raw/attitude``: how a FLU body lies in ENU, its rates in FLU; thrust 0..1."""
+    orientation = message.orientation
+    enu = (orientation.w, orientation.x, orientation.y, orientation.z)
+    roll_rate, pitch_rate, yaw_rate = frames.flu_to_frd(_vector(message.body_rate))
+    return "SET_ATTITUDE_TARGET", {
+        "time_boot_ms": now // MS,
+        "type_mask": message.type_mask,
+        "q": list(frames.attitude_enu_to_ned(enu)),
+        "body_roll_rate": roll_rate,
+        "body_pitch_rate": pitch_rate,
+        "body_yaw_rate": yaw_rate,
+        "thrust": message.thrust,
+    }
+
+
 def _heading(orientation: Any) -> float:
     enu = (orientation.w, orientation.x, orientation.y, orientation.z)
     return frames.yaw_to_heading(frames.quaternion_to_euler(enu)[2])
@@ -123,14 +130,19 @@ def _position_global(message: Any, now: Ns, geoid: Geoid) -> Asked:
         "type_mask": POSITION_AND_YAW,
         "lat_int": round(position.latitude * 1e7),
         "lon_int": round(position.longitude * 1e7),
-        "alt": geoid.to_amsl(position.altitude),
+        "alt": geoid.to_amsl(position.latitude, position.longitude, position.altitude),
         "yaw": _heading(message.pose.orientation),
     }
 
 
 def velocity(message: Any, now: Ns) -> Asked:
     """``setpoint_velocity/cmd_vel``: ENU metres per second, yaw rate anticlockwise."""
-    vx, vy, vz = frames.enu_to_ned(_vector(message.twist.linear))
+    return velocity_unstamped(message.twist, now)
+
+
+def velocity_unstamped(message: Any, now: Ns) -> Asked:
+    """``setpoint_velocity/cmd_vel_unstamped``: the same without a header."""
+    vx, vy, vz = frames.enu_to_ned(_vector(message.linear))
     return "SET_POSITION_TARGET_LOCAL_NED", {
         "time_boot_ms": now // MS,
         "coordinate_frame": LOCAL_NED,
@@ -138,7 +150,7 @@ def velocity(message: Any, now: Ns) -> Asked:
         "vx": vx,
         "vy": vy,
         "vz": vz,
-        "yaw_rate": -message.twist.angular.z,
+        "yaw_rate": -message.angular.z,
     }
 
 
@@ -157,3 +169,8 @@ def manual_control(message: Any, now: Ns) -> Asked:
         "r": round(message.r),
         "buttons": message.buttons,
     }
+
+
+def status_text(message: Any, now: Ns) -> Asked:
+    """``statustext/send``: for ground stations behind the autopilot."""
+    return "STATUSTEXT", {"severity": message.severity, "text": message.text}

@@ -1,33 +1,29 @@
-"""The vehicle node: one vehicle on the graph, as MAVROS serves it.
+"""The vehicle node: one vehicle on the graph, under MAVROS's names or roscopter's.
 
-Telemetry is published by a loop (10 Hz unless told otherwise): what is repeated all the time in its latest
-form, each HEARTBEAT, text and reached waypoint as it came. Set-points go on as they arrive, in a task of
-their own; each service request has a task of its own, so a command that waits for its acknowledgement holds
-up nobody. Everything is charged to the node's place as calls into ROS; the decoding of MAVLink itself is not
-counted.
+Telemetry is published by a loop. With a period (10 Hz unless told otherwise) it says what is repeated all
+the time in its latest form, each HEARTBEAT, text, parameter and reached waypoint as it came; without one
+it publishes what arrives as it arrives, and sleeps in between. Set-points go on as they arrive, in a task
+of their own; each service request has a task of its own, so a command that waits for its acknowledgement
+holds up nobody. Everything is charged to the node's place as calls into ROS; the decoding of MAVLink
+itself is not counted.
 
-Differences from MAVROS: publishers are reliable, as in ROS 1; it speaks as a ground station's system id,
-which is the only one from which ArduPilot takes sticks; it asks for the streams it publishes, as roscopter
-does.
+What the graph has no types for is left out, with a warning.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from volery.base.errors import UsageError
-from volery.base.geoid import SEA_LEVEL, Geoid
+from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
-from volery.bridge.commands import WARNING, Commands, request_streams
-from volery.bridge.missions import Missions
-from volery.bridge.modes import PX4_ID
-from volery.bridge.parameters import Parameters
-from volery.bridge.setpoints import Subscription, subscriptions
-from volery.bridge.telemetry import LATCHED_STATE, TOPICS, Telemetry
-from volery.bridge.wire import Wire
+from volery.bridge.mavros import MAVROS
+from volery.bridge.offering import Names, Offering, Service, Subscription, Surroundings
+from volery.bridge.streams import Streams
+from volery.bridge.wire import Heard, Wire
 from volery.graph import Node, Publisher, RosGraph
 from volery.graph.group import Work
 from volery.kernel.task import Place, Scope, Task
@@ -35,26 +31,28 @@ from volery.links.link import Link
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
-EXTENDED_SYS_STATE, GET_HOME_POSITION, SET_MESSAGE_INTERVAL = 245, 410, 511
-
-STREAMS: Mapping[int, int] = {1: 1, 2: 2, 3: 1, 6: 10, 10: 4, 11: 1}
-"""Hertz by MAV_DATA_STREAM: raw sensors, extended status, RC channels, position, attitude, VFR_HUD."""
+WARNING = 4
+NONSENSE = (ValueError, OverflowError, UsageError)
+"""What comes of numbers that make no sense, in a message or in a frame."""
 
 
 @dataclass(frozen=True)
 class VehicleNodeOptions:
     """How a vehicle node works.
 
-    ``period`` of its loop; ``streams`` it asks the autopilot for (hertz by MAV_DATA_STREAM); ``silent``
-    until the autopilot counts as disconnected; ``system`` and ``component`` are its MAVLink ids.
+    ``period`` of its loop, ``None``: as frames arrive; ``streams`` it asks the autopilot for (hertz by
+    MAV_DATA_STREAM), those of the names unless given; ``silent`` until the autopilot counts as disconnected;
+    ``system`` and ``component`` are its MAVLink ids; *control*: roscopter's ``send_rc`` is taken.
     """
 
-    period: Ns = 100 * MS
-    streams: Mapping[int, int] = field(default_factory=lambda: dict(STREAMS))
+    names: Names = MAVROS
+    period: Ns | None = 100 * MS
+    streams: Mapping[int, int] | None = None
     silent: Ns = 10 * S
     system: int = 255
     component: int = 191
-    geoid: Geoid = SEA_LEVEL
+    geoid: Geoid = EGM96
+    control: bool = False
 
 
 class VehicleNode:
@@ -69,11 +67,13 @@ class VehicleNode:
         self._graph, self._kernel = graph, graph.kernel
         self.namespace, self.options = namespace, options
         self.wire = Wire(graph.kernel, link, options.system, options.component)
-        self._telemetry = Telemetry(self.wire, options.geoid, self._publish)
+        rates = options.names.streams if options.streams is None else options.streams
+        self._streams = Streams(self.wire, rates, home=options.names.home)
         self._publishers: dict[str, Publisher] = {}
+        self._on_demand: set[str] = set()
+        self._warned: set[str] = set()
         self._next_heartbeat: Ns = 0
-        self._next_request: Ns = 0
-        self._connected = False
+        self.connected = False
         self._component = ""
 
     def start(self, place: Place, scope: Scope) -> Task:
@@ -82,31 +82,73 @@ class VehicleNode:
         return self._kernel.spawn(lambda: self._run(place, scope), place.component, place, scope)
 
     def _run(self, place: Place, scope: Scope) -> None:
-        node = self._graph.node("mavros", self.namespace, place=place)
+        options = self.options
+        node = self._graph.node(options.names.node, self.namespace, place=place)
         aside = replace(place, deadline=None, on_release=None)
-        self._advertise(node)
-        self._subscribe(node, aside, scope)
-        self._serve(node, aside, scope)
-        rate = node.rate(self.options.period)
+        offering = options.names.offer(
+            Surroundings(
+                node, self.wire, self._publish, self._wanted, self._warn, options.geoid, options.control
+            )
+        )
+        self._advertise(node, offering)
+        self._subscribe(node, offering, aside, scope)
+        self._serve(node, offering, aside, scope)
+        self._go_round(node, offering)
+
+    def _go_round(self, node: Node, offering: Offering) -> None:
+        period = self.options.period
+        rate = None if period is None else node.rate(period)
         while not node.closed:
-            self._cycle()
-            rate.sleep()
+            self._cycle(offering)
+            if rate is not None:
+                rate.sleep()
+            else:
+                self.wire.wait(self._next_heartbeat)
+
+    def _warn(self, text: str) -> None:
+        with self._kernel as kernel:
+            kernel.record(Text(kernel.now(), self._component, WARNING, text))
 
     # -- what it sets up
 
-    def _advertise(self, node: Node) -> None:
-        for topic in TOPICS:
-            self._publishers[topic.name] = node.advertise(topic.name, topic.type, topic.qos)
-        waypoints = "mission/waypoints"
-        self._publishers[waypoints] = node.advertise(waypoints, "mavros_msgs/msg/WaypointList", LATCHED_STATE)
+    def _tried(self, make: Callable[[], object], missing: list[str]) -> None:
+        """A real ROS 2 may lack a type."""
+        try:
+            make()
+        except UsageError as error:
+            missing.append(str(error))
+
+    def _advertise(self, node: Node, offering: Offering) -> None:
+        def advertise(name: str, kind: str, qos: Any) -> None:
+            self._publishers[name] = node.advertise(name, kind, qos)
+
+        missing: list[str] = []
+        for topic in offering.topics:
+            self._tried(partial(advertise, *topic[:3]), missing)
+            if topic.on_demand:
+                self._on_demand.add(topic.name)
+        self._say_missing("topics", missing)
+
+    def _say_missing(self, what: str, missing: list[str]) -> None:
+        if missing:
+            self._warn(f"{len(missing)} {what} are left out; the first: {missing[0]}")
 
     def _publish(self, topic: str, message: Any) -> None:
-        self._publishers[topic].publish(message)
+        publisher = self._publishers.get(topic)
+        if publisher is not None:
+            publisher.publish(message)
 
-    def _subscribe(self, node: Node, aside: Place, scope: Scope) -> None:
+    def _wanted(self, topic: str) -> bool:
+        publisher = self._publishers.get(topic)
+        return publisher is not None and (topic not in self._on_demand or publisher.subscribers() > 0)
+
+    def _subscribe(self, node: Node, offering: Offering, aside: Place, scope: Scope) -> None:
         group = node.group()
-        for one in subscriptions(self.options.geoid):
-            node.subscribe(one.name, one.type, partial(self._command, node, one), group=group)
+        missing: list[str] = []
+        for one in offering.subscriptions:
+            command = partial(self._command, node, one)
+            self._tried(partial(node.subscribe, one.name, one.type, command, group=group), missing)
+        self._say_missing("subscriptions", missing)
         self._kernel.spawn(group.spin, f"{aside.component} (set-points)", aside, scope)
 
     def _command(self, node: Node, subscription: Subscription, message: Any) -> None:
@@ -115,56 +157,59 @@ class VehicleNode:
             name, fields = subscription.translate(message, self._kernel.now())
             with self._kernel:
                 self.wire.send_to(name, fields)
-        except (ValueError, OverflowError, UsageError) as error:
+        except NONSENSE as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
 
-    def _warn(self, text: str) -> None:
-        with self._kernel as kernel:
-            kernel.record(Text(kernel.now(), self._component, WARNING, text))
-
-    def _serve(self, node: Node, aside: Place, scope: Scope) -> None:
+    def _serve(self, node: Node, offering: Offering, aside: Place, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
                 work.run()
-            except (ValueError, OverflowError, UsageError) as error:
+            except NONSENSE as error:
                 self._warn(f"service request refused: {error}")
 
         def start(work: Work) -> None:
             self._kernel.spawn(lambda: run(work), f"{aside.component} (service)", aside, scope)
 
+        def serve(name: str, service: Service) -> None:
+            node.serve(name, *service, group)
+
         group = node.group(start)
-        parts = (
-            Commands(self.wire, aside.component),
-            Parameters(self.wire),
-            Missions(self.wire, partial(self._publish, "mission/waypoints")),
-        )
-        for part in parts:
-            for name, (service_type, handler) in part.services().items():
-                node.serve(name, service_type, handler, group)
+        missing: list[str] = []
+        for name, service in offering.services.items():
+            self._tried(partial(serve, name, service), missing)
+        self._say_missing("services", missing)
 
     # -- its loop
 
-    def _cycle(self) -> None:
+    def _cycle(self, offering: Offering) -> None:
         with self._kernel as kernel:
             now = kernel.now()
             heard = self.wire.take()
-        epoch = self._graph.epoch
-        for frame, at in heard:
-            self._telemetry.publish(frame, epoch + at)
-        self._watch_connection(now)
+        for one in heard:
+            self._translate(offering, one)
+        self._watch_connection(offering, now)
         if now >= self._next_heartbeat:
             self._next_heartbeat = now + S
             self._send_heartbeat()
-        if self.wire.known and now >= self._next_request:
-            self._next_request = now + S
-            self._request_what_is_missing(now)
+        self._streams.look(now)
 
-    def _watch_connection(self, now: Ns) -> None:
+    def _translate(self, offering: Offering, heard: Heard) -> None:
+        """Publish what a frame says; of what makes no sense one is warned once for each kind of frame."""
+        frame, at = heard
+        for translate in offering.translators.get(frame.name, ()):
+            try:
+                translate(frame.fields, self._graph.epoch + at)
+            except NONSENSE as error:
+                if frame.name not in self._warned:
+                    self._warned.add(frame.name)
+                    self._warn(f"{frame.name}: not published: {error}")
+
+    def _watch_connection(self, offering: Offering, now: Ns) -> None:
         last = self.wire.last_heartbeat
         connected = last is not None and now - last < self.options.silent
-        if self._connected and not connected:
-            self._telemetry.disconnected(self._graph.epoch + now)
-        self._connected = connected
+        if self.connected and not connected:
+            offering.disconnected(self._graph.epoch + now)
+        self.connected = connected
 
     def _send_heartbeat(self) -> None:
         fields = {
@@ -177,28 +222,6 @@ class VehicleNode:
         }
         self.wire.send("HEARTBEAT", fields)
 
-    def _request_what_is_missing(self, now: Ns) -> None:
-        """Ask for streams that do not come: a request right after boot may be lost, though acknowledged."""
-        latest = self.wire.latest
-        by_message = self.wire.firmware.autopilot == PX4_ID
-        for stream, rate in self.options.streams.items():
-            heard = latest.get(_SHOWN_BY.get(stream, ""))
-            if heard is not None and now - heard.at <= 3 * S:
-                continue
-            if not by_message:
-                request_streams(self.wire, stream, rate)
-                continue
-            for number in _MESSAGES_OF.get(stream, ()):
-                self._send_command(SET_MESSAGE_INTERVAL, number, 1e6 / max(rate, 1))
-        if "EXTENDED_SYS_STATE" not in latest:
-            self._send_command(SET_MESSAGE_INTERVAL, EXTENDED_SYS_STATE, 1e6)
-        if "HOME_POSITION" not in latest:
-            self._send_command(GET_HOME_POSITION)
-
-    def _send_command(self, command: int, *parameters: float) -> None:
-        fields = {f"param{number}": value for number, value in enumerate(parameters, start=1)}
-        self.wire.send_to("COMMAND_LONG", {"command": command, **fields})
-
 
 def serve_vehicle(
     graph: RosGraph, link: Link, name: str, place: Place, options: VehicleNodeOptions = VehicleNodeOptions()
@@ -207,19 +230,3 @@ def serve_vehicle(
     served = VehicleNode(graph, link, f"/{name}", options)
     served.start(place, graph.kernel.root)
     return served
-
-
-_SHOWN_BY = {
-    1: "RAW_IMU",
-    2: "SYS_STATUS",
-    3: "RC_CHANNELS",
-    6: "GLOBAL_POSITION_INT",
-    10: "ATTITUDE",
-    11: "VFR_HUD",
-}
-"""The message by which one sees that a MAV_DATA_STREAM comes."""
-
-_MESSAGES_OF: Mapping[int, tuple[int, ...]] = {2: (1, 24), 3: (65,), 6: (33, 32), 10: (30,), 11: (74,)}
-"""The messages of a MAV_DATA_STREAM that are published: PX4 knows no streams and is asked for each. There is
-no RAW_IMU.
-"""

@@ -14,7 +14,7 @@ from volery.links.link import Frame, Link
 
 INVALID_AUTOPILOT = 8
 """MAV_AUTOPILOT of ground stations and companions."""
-_KEPT_ALL = frozenset({"STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT"})
+_KEPT_ALL = frozenset({"STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT", "PARAM_VALUE"})
 
 
 class Heard(NamedTuple):
@@ -72,6 +72,7 @@ class Wire:
         self.latest: dict[str, Heard] = {}
         self.fresh: list[Heard] = []
         self.ears: list[Ear] = []
+        self._came = Signal(kernel, f"{link.name} (frames)")
         link.receive(self._receive)
 
     @property
@@ -93,6 +94,7 @@ class Wire:
             self._forget(frame.name)
         self.latest[frame.name] = heard
         self.fresh.append(heard)
+        self._came.notify()
         for ear in tuple(self.ears):
             if frame.name in ear.names:
                 ear.hear(frame)
@@ -108,6 +110,16 @@ class Wire:
         taken, self.fresh = self.fresh, []
         return taken
 
+    def wait(self, until: Ns) -> None:
+        """Block the current task until something has come, or that time."""
+        within = max(0, until - self.kernel.now())
+        self._came.wait_for(lambda: self.fresh, within, ends_activation=True)
+
+    def last(self, name: str) -> dict[str, Any] | None:
+        """The fields of the latest frame of that name."""
+        heard = self.latest.get(name)
+        return heard.frame.fields if heard else None
+
     def listen(self, *names: str) -> Ear:
         """An ear for frames of these names; a context manager."""
         return Ear(self, names)
@@ -122,5 +134,7 @@ class Wire:
         system, component = self.target
         if name == "MANUAL_CONTROL":  # the one message that addresses a system only
             self.send(name, {"target": system, **fields})
-            return
-        self.send(name, {"target_system": system, "target_component": component, **fields})
+        elif name == "STATUSTEXT":  # to whom it may concern
+            self.send(name, fields)
+        else:
+            self.send(name, {"target_system": system, "target_component": component, **fields})

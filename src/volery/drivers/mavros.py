@@ -17,7 +17,7 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
     """A vehicle behind a vehicle node, commanded by *node*.
 
     Options: ``autopilot`` (``ardupilot`` or ``px4``), ``namespace`` of the vehicle node (else ``/`` and
-    *name*), ``geoid``: metres above the ellipsoid.
+    *name*), ``geoid``: ``egm96``, which is also what holds without it, or metres above the ellipsoid.
     """
     rest = dict(options)
     autopilot = rest.pop("autopilot", "ardupilot")

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery import messages
-from volery.base.geoid import Geoid
+from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
 from volery.bridge import VehicleNode, VehicleNodeOptions
 from volery.graph import Graph
@@ -34,7 +34,7 @@ class Aviary:
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
         self.answers: dict[str, Callable[[dict[str, Any]], None]] = {}
-        self.node = VehicleNode(self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=Geoid(geoid)))
+        self.node = VehicleNode(self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=LevelGeoid(geoid)))
         self.node.start(Place("mavros"), self.kernel.root)
         self.user = self.graph.node("user", place=Place("user"))
         self.got: dict[str, list[Any]] = {}

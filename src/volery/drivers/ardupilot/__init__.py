@@ -30,7 +30,7 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
 def open_mavros(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> ArduPilot:
     """An ArduPilot behind a vehicle node with MAVROS's names, commanded by *node*.
 
-    Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.
+    Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: ``egm96`` or metres.
     """
     where = namespace_and_geoid("ardupilot", name, options)
     return ArduPilot(kernel, name, MavrosCommands(kernel, node, name, *where))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from volery.base.geoid import Geoid
+from volery.base.geoid import EGM96, Geoid
 from volery.base.position import Position
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.items import INT_FRAMES, frame_of
@@ -24,7 +24,7 @@ class MavrosCommands(MavrosCarrier):
     behind = Behind("ArduPilot", "HOLD")
 
     def __init__(
-        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
+        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96
     ) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         target = "mavros_msgs/msg/GlobalPositionTarget"

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from volery.base.time import Ns, S
-from volery.links.mavlink import constant
+from volery.links.parameter_values import from_bytes
 
 ASK_AGAIN: Ns = 2 * S
 TRIES = 5
 """What was not answered so often does not exist there: firmware does not answer for a parameter it lacks."""
-
-_WHOLE = struct.Struct("<i")
-_FLOAT = struct.Struct("<f")
-_WHOLE_TYPES = frozenset(
-    constant(f"MAV_PARAM_TYPE_{name}") for name in ("UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32")
-)
 
 
 class Inquiries:
@@ -60,6 +53,4 @@ class Inquiries:
 def value_of(fields: Mapping[str, Any], bytewise: bool) -> float:
     """The value in a PARAM_VALUE. *bytewise*: whole numbers lie in the four bytes of the float, as in PX4."""
     value: float = fields["param_value"]
-    if bytewise and fields["param_type"] in _WHOLE_TYPES:
-        return float(_WHOLE.unpack(_FLOAT.pack(value))[0])
-    return value
+    return from_bytes(fields["param_type"], value) if bytewise else value

@@ -15,15 +15,15 @@ from collections.abc import Mapping, Sequence
 from math import radians
 from typing import Any, NamedTuple
 
-from volery.base.errors import LinkError, LinkSilent, UsageError
+from volery.base.errors import LinkError, LinkSilent
 from volery.base.frames import ned_to_enu
-from volery.base.geoid import Geoid
+from volery.base.geoid import BY_NAME, EGM96, Geoid, geoid_of
 from volery.base.time import MS, Ns, S
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.mavros_hearing import MavrosHearing
-from volery.drivers.options import check_options
 from volery.drivers.mavlink.vocabulary import FORCE, GROUND_SPEED, UNCHANGED
+from volery.drivers.options import check_options
 from volery.graph import Node, ServiceError
 from volery.graph.group import Work
 from volery.kernel.api import Action, Kernel
@@ -53,14 +53,12 @@ class MavrosCarrier:
 
     behind: Behind
 
-    def __init__(
-        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
-    ) -> None:
+    def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         self.telemetry = Telemetry(kernel, name)
         self._kernel = kernel
         self._node = node
         self._namespace = namespace.rstrip("/")
-        self._hearing = MavrosHearing(kernel, self.telemetry, geoid or Geoid(), *self.behind)
+        self._hearing = MavrosHearing(kernel, self.telemetry, geoid, *self.behind)
         self._wrong = ""
         self._arrived: deque[Work] = deque()
         self._spinner = node.group()
@@ -221,15 +219,9 @@ def _waypoint(item: Item, current: bool) -> Any:
 
 
 def namespace_and_geoid(driver: str, name: str, options: Mapping[str, str]) -> tuple[str, Geoid]:
-    """What the options of an address say of the vehicle node called *name*."""
+    """What the options of an address say of the vehicle node called *name*.
+
+    ``geoid``: MAVROS counts altitudes from the ellipsoid, by EGM96; else metres.
+    """
     check_options(driver, options, *OPTIONS)
-    return options.get("namespace", f"/{name}"), _geoid_of(options)
-
-
-def _geoid_of(options: Mapping[str, str]) -> Geoid:
-    """``geoid``: metres of the geoid above the ellipsoid; MAVROS counts altitudes from the latter."""
-    given = options.get("geoid", "0")
-    try:
-        return Geoid(float(given))
-    except ValueError:
-        raise UsageError(f"geoid={given!r} is not a number of metres") from None
+    return options.get("namespace", f"/{name}"), geoid_of(options.get("geoid", BY_NAME))

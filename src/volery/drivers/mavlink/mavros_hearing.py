@@ -86,10 +86,13 @@ class MavrosHearing:
     def _global(self, message: Any) -> None:
         self._has_fix = message.status.status > NO_FIX
         if message.latitude != 0.0 or message.longitude != 0.0:
-            altitude = AMSL(self._geoid.to_amsl(message.altitude))
-            self._seen.position = Position(message.latitude, message.longitude, altitude)
+            self._seen.position = self._position(message)
         self._judge_ready()
         self._heard()
+
+    def _position(self, place: Any) -> Position:
+        latitude, longitude = place.latitude, place.longitude
+        return Position(latitude, longitude, AMSL(self._geoid.to_amsl(latitude, longitude, place.altitude)))
 
     def _relative_altitude(self, message: Any) -> None:
         self._seen.above_home = message.data
@@ -105,8 +108,7 @@ class MavrosHearing:
         self._judge_ready()
 
     def _home(self, message: Any) -> None:
-        altitude = AMSL(self._geoid.to_amsl(message.geo.altitude))
-        self._seen.home = Position(message.geo.latitude, message.geo.longitude, altitude)
+        self._seen.home = self._position(message.geo)
         self._judge_ready()
 
     def _judge_ready(self) -> None:

@@ -30,7 +30,7 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
 def open_mavros(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> PX4:
     """A PX4 behind a vehicle node with MAVROS's names, commanded by *node*.
 
-    Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: metres above the ellipsoid.
+    Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: ``egm96`` or metres.
     """
     where = namespace_and_geoid("px4", name, options)
     return PX4(kernel, name, MavrosCommands(kernel, node, name, *where))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from math import isnan, nan, radians
 
 from volery.base.frames import heading_to_yaw
-from volery.base.geoid import Geoid
+from volery.base.geoid import EGM96, Geoid
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.drivers.mavlink.mavros import Behind, MavrosCarrier, clockwise
@@ -29,7 +29,7 @@ class MavrosCommands(MavrosCarrier):
     behind = Behind("PX4", HOLD)
 
     def __init__(
-        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid | None = None
+        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96
     ) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         self._whole = node.client(self._name("cmd/command_int"), "mavros_msgs/srv/CommandInt")

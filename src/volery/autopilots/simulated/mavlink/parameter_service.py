@@ -8,8 +8,9 @@ from zlib import crc32
 
 from volery.autopilots.simulated.mavlink.channel import Channel, Peer
 from volery.autopilots.simulated.mavlink.habits import ParameterHabits
-from volery.autopilots.simulated.parameters import REAL32, Parameter
+from volery.autopilots.simulated.parameters import Parameter
 from volery.autopilots.simulated.vehicle import Vehicle
+from volery.links.parameter_values import as_bytes, from_bytes
 
 UNSOLICITED = 65535
 """The index of a value that nobody listed."""
@@ -18,21 +19,6 @@ UINT32 = 5
 """MAV_PARAM_TYPE of a checksum."""
 
 _REAL = struct.Struct("<f")
-
-
-def as_bytes(kind: int, value: float) -> float:
-    """The real number whose bytes are those of an integer; a real number is itself."""
-    if kind == REAL32:
-        return value
-    number: float = _REAL.unpack(struct.pack("<I", int(value) & 0xFFFF_FFFF))[0]
-    return number
-
-
-def from_bytes(kind: int, value: float) -> float:
-    """What ``as_bytes`` was given."""
-    if kind == REAL32:
-        return value
-    return float(struct.unpack("<i", _REAL.pack(value))[0])
 
 
 class ParameterService:
