@@ -77,6 +77,15 @@ class CallbackGroup:
         work.run()
         return True
 
+    def spin_available(self) -> None:
+        """Run what is ready now, as one poll; what becomes ready meanwhile waits for the next."""
+        with self._member.context.kernel:
+            self._pay()
+            count = len(self._ready)
+        for _ in range(count):
+            if self._ready:
+                self._ready.popleft().run()
+
     def spin(self) -> None:
         """Run callbacks as they come until the node is closed."""
         while not self._member.closed:

@@ -100,6 +100,10 @@ class LocalNode:
         """``spin_once`` of the node's own group."""
         return self._own.spin_once(within)
 
+    def spin_available(self) -> None:
+        """``spin_available`` of the node's own group."""
+        self._own.spin_available()
+
     def spin(self) -> None:
         """``spin`` of the node's own group."""
         self._own.spin()

@@ -182,6 +182,9 @@ class Group(Protocol):
         False if there was none. What the callback raises comes out here.
         """
 
+    def spin_available(self) -> None:
+        """Run all callbacks that are ready now, as one poll: roscpp's ``spinOnce``."""
+
     def spin(self) -> None:
         """Run callbacks as they come until the node is closed."""
 
@@ -259,6 +262,9 @@ class Node(Protocol):
 
     def spin_once(self, within: Ns | None = None) -> bool:
         """``spin_once`` of the node's own group."""
+
+    def spin_available(self) -> None:
+        """``spin_available`` of the node's own group."""
 
     def spin(self) -> None:
         """``spin`` of the node's own group."""

@@ -7,7 +7,7 @@ ROS 2 Humble; the few packages that the stores lack are written out in ``definit
 
 from volery.messages.cdr import cdr_size, from_cdr, to_cdr
 from volery.messages.message import Message
-from volery.messages.nearby import define_imported
+from volery.messages.nearby import define_imported, define_packages
 from volery.messages.packages import modules
 from volery.messages.ros1 import Ros1Service, Ros1Type, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.messages.store import (
@@ -32,6 +32,7 @@ __all__ = [
     "cdr_size",
     "define",
     "define_imported",
+    "define_packages",
     "definition",
     "from_cdr",
     "from_ros1",

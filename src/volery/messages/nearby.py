@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from volery.base.errors import Location, ModelError, UsageError
@@ -24,16 +24,21 @@ _NAME = re.compile(r"<name>\s*([\w-]+)\s*</name>")
 
 
 def define_imported(file: Path) -> list[str]:
-    """Define the interfaces that *file* imports and that nobody has defined; returns the packages' names.
+    """``define_packages`` for what a Python file imports."""
+    return define_packages(file, _imported(file))
+
+
+def define_packages(file: Path, packages: Iterable[str]) -> list[str]:
+    """Define the interfaces of *packages*, which *file* speaks of, if nobody has; returns those it found.
 
     ``ModelError`` at the interface's file where one is no definition. Packages that are nowhere are left to
-    the import itself, which names them.
+    whoever then misses them.
     """
     known = {name.partition("/")[0] for name in (*types(), *service_types(), *action_types())}
     known -= _from_files.keys()  # another file may mean another package by the same name
     texts: dict[str, str] = {}
     found: list[str] = []
-    wanted = [name for name in _imported(file) if name not in known]
+    wanted = [name for name in packages if name not in known]
     while wanted:
         package = wanted.pop(0)
         folder = _folder_of(package, file)

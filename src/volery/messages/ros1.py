@@ -50,13 +50,13 @@ def _noetic() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)
 
 
-def _known(full: str) -> Typestore:
+def definition_store(full: str) -> Typestore:
     """Noetic's store with type *full* in it. ``UsageError`` if Noetic's differs from ours in its layout."""
     ours, noetic = store(), _noetic()
     for _, what in ours.fielddefs[full][1]:
         inner = _nested(what)
         if inner and inner not in _TIMES:
-            _known(inner)
+            definition_store(inner)
     if full not in noetic.fielddefs:
         noetic.register({full: ours.fielddefs[full]})
     elif _layout(ours, full) != _layout(noetic, full):
@@ -102,7 +102,7 @@ def our_name(name: str) -> str:
 def ros1_type(name: str) -> Ros1Type:
     """What ROS 1 knows of a message type. ``UsageError`` if unknown, or if ROS 1's has other fields."""
     full = message_name(name)
-    text, checksum = _known(full).generate_msgdef(full, ros_version=1)
+    text, checksum = definition_store(full).generate_msgdef(full, ros_version=1)
     fields = store().fielddefs[full][1]
     return Ros1Type(ros1_name(full), checksum, text, bool(fields) and fields[0][1][1] == _HEADER)
 
@@ -121,7 +121,7 @@ def ros1_service(name: str) -> Ros1Service:
 
 def _hashed(full: str) -> str:
     """The text whose MD5 sum is that of the type: constants, then fields, nested types by their sums."""
-    noetic = _known(full)
+    noetic = definition_store(full)
     constants, fields = noetic.fielddefs[full]
     lines = [f"{kind} {name}={value}" for name, kind, value in constants]
     for name, what in fields:

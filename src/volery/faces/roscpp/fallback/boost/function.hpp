@@ -1,0 +1,9 @@
+// In place of Boost's header where Boost is not installed.
+#pragma once
+#include <functional>
+
+namespace boost {
+
+using std::function;
+
+}  // namespace boost

@@ -1,0 +1,10 @@
+// In place of Boost's header where Boost is not installed.
+#pragma once
+#include <functional>
+
+namespace boost {
+
+using std::cref;
+using std::ref;
+
+}  // namespace boost

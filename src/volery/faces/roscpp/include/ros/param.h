@@ -1,0 +1,134 @@
+// Parameters, converted as roscpp does: whole numbers where floating ones are asked for, not the other way round.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ros/names.h"
+
+namespace ros {
+namespace detail {
+
+// A value of the tree of parameters, on its way over the border: a letter for its kind, then itself.
+inline void put_value(volery::Writer& out, bool value) { out.put("b").put(value); }
+inline void put_value(volery::Writer& out, int value) { out.put("i").put(value); }
+inline void put_value(volery::Writer& out, double value) { out.put("d").put(value); }
+inline void put_value(volery::Writer& out, float value) { put_value(out, static_cast<double>(value)); }
+inline void put_value(volery::Writer& out, const std::string& value) { out.put("s").put(value); }
+inline void put_value(volery::Writer& out, const char* value) { out.put("s").put(value); }
+template <class Value>
+void put_value(volery::Writer& out, const std::vector<Value>& values) {
+    out.put("l").put(values.size());
+    for (const auto& value : values) put_value(out, static_cast<const Value&>(value));
+}
+template <class Value>
+void put_value(volery::Writer& out, const std::map<std::string, Value>& values) {
+    out.put("m").put(values.size());
+    for (const auto& [name, value] : values) {
+        out.put(name);
+        put_value(out, value);
+    }
+}
+
+// False where what is there is of another kind.
+inline bool get_value(volery::Reader& in, bool& value) {
+    auto const kind = in.text();
+    if (kind == "b" || kind == "i") return value = in.flag(), true;
+    return false;
+}
+inline bool get_value(volery::Reader& in, int& value) {
+    auto const kind = in.text();
+    if (kind == "b" || kind == "i") return value = static_cast<int>(in.integer()), true;
+    return false;
+}
+inline bool get_value(volery::Reader& in, double& value) {
+    auto const kind = in.text();
+    if (kind == "d") return value = in.real(), true;
+    if (kind == "b" || kind == "i") return value = static_cast<double>(in.integer()), true;
+    return false;
+}
+inline bool get_value(volery::Reader& in, float& value) {
+    double wide = value;
+    bool const found = get_value(in, wide);
+    value = static_cast<float>(wide);
+    return found;
+}
+inline bool get_value(volery::Reader& in, std::string& value) {
+    if (in.text() != "s") return false;
+    value = in.text();
+    return true;
+}
+template <class Value>
+bool get_value(volery::Reader& in, std::vector<Value>& values) {
+    if (in.text() != "l") return false;
+    std::vector<Value> found;
+    for (auto left = in.integer(); left > 0; --left) {
+        Value value{};
+        if (!get_value(in, value)) return false;
+        found.push_back(value);
+    }
+    values = std::move(found);
+    return true;
+}
+template <class Value>
+bool get_value(volery::Reader& in, std::map<std::string, Value>& values) {
+    if (in.text() != "m") return false;
+    std::map<std::string, Value> found;
+    for (auto left = in.integer(); left > 0; --left) {
+        auto const name = in.text();
+        Value value{};
+        if (!get_value(in, value)) return false;
+        found[name] = value;
+    }
+    values = std::move(found);
+    return true;
+}
+
+}  // namespace detail
+
+namespace param {
+
+// Whether there is such a parameter of such a kind; *value* is left alone otherwise.
+template <class Value>
+bool get(const std::string& name, Value& value) {
+    auto answer = volery::ask("ros.param_get", volery::Writer().put(name));
+    return answer.flag() && detail::get_value(answer, value);
+}
+template <class Value>
+bool getCached(const std::string& name, Value& value) {
+    return get(name, value);
+}
+template <class Value>
+void set(const std::string& name, const Value& value) {
+    volery::Writer with;
+    with.put(name);
+    detail::put_value(with, value);
+    volery::ask("ros.param_set", with);
+}
+inline void set(const std::string& name, const char* value) { set(name, std::string(value)); }
+inline bool has(const std::string& name) { return volery::ask("ros.param_has", volery::Writer().put(name)).flag(); }
+inline bool del(const std::string& name) { return volery::ask("ros.param_delete", volery::Writer().put(name)).flag(); }
+template <class Value>
+bool param(const std::string& name, Value& value, const Value& otherwise) {
+    if (get(name, value)) return true;
+    value = otherwise;
+    return false;
+}
+template <class Value>
+Value param(const std::string& name, const Value& otherwise) {
+    Value value{};
+    param(name, value, otherwise);
+    return value;
+}
+inline bool getParamNames(std::vector<std::string>& names) {
+    auto answer = volery::ask("ros.param_names");
+    names.resize(static_cast<std::size_t>(answer.integer()));
+    for (auto& name : names) name = answer.text();
+    return true;
+}
+
+}  // namespace param
+}  // namespace ros

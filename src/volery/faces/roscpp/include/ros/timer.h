@@ -1,0 +1,63 @@
+// ros::Timer.
+#pragma once
+#include <boost/function.hpp>
+
+#include "ros/held.h"
+#include "ros/time.h"
+
+namespace ros {
+
+struct TimerEvent {
+    Time last_expected, last_real, current_expected, current_real;
+    struct {
+        WallDuration last_duration;
+    } profile;
+};
+struct WallTimerEvent {
+    WallTime last_expected, last_real, current_expected, current_real;
+    struct {
+        WallDuration last_duration;
+    } profile;
+};
+using SteadyTimerEvent = WallTimerEvent;
+using TimerCallback = boost::function<void(const TimerEvent&)>;
+using WallTimerCallback = boost::function<void(const WallTimerEvent&)>;
+
+namespace detail {
+
+// Calls back each period while the node spins. Copies share it; it ends with the last of them.
+template <class Event, class Time, class Span>
+class TimerOf : public Handle {
+public:
+    using Handle::Handle;
+    void start() { order("ros.timer_start"); }
+    void stop() { order("ros.timer_stop"); }
+    void setPeriod(const Span& period, bool = true) {
+        if (held_) volery::ask("ros.timer_period", volery::Writer().put(held_->handle()).put(period.toNSec()));
+    }
+    bool hasStarted() const { return count("ros.timer_started") != 0; }
+    bool hasPending() const { return hasStarted(); }
+    bool isValid() const { return held_ != nullptr; }
+
+    static TimerOf make(Span period, boost::function<void(const Event&)> callback, bool oneshot, bool autostart) {
+        auto const callable = volery::enlist([callback](volery::Reader in, volery::Writer&) {
+            Event event;
+            event.last_expected = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
+            event.last_real = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
+            event.current_expected = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
+            event.current_real = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
+            event.profile.last_duration.fromNSec(in.integer());
+            callback(event);
+        });
+        auto const with = volery::Writer().put(period.toNSec()).put(oneshot).put(autostart).put(callable);
+        return TimerOf(std::make_shared<Held>(volery::ask("ros.timer", with).integer(), "", callable));
+    }
+};
+
+}  // namespace detail
+
+using Timer = detail::TimerOf<TimerEvent, Time, Duration>;
+using WallTimer = detail::TimerOf<WallTimerEvent, WallTime, WallDuration>;
+using SteadyTimer = WallTimer;
+
+}  // namespace ros
