@@ -45,8 +45,10 @@ class Stamp(Message):
         return int(self.sec * _SECOND + self.nanosec)
 
     def to_sec(self) -> float:
-        """Seconds."""
-        return self.to_nsec() / _SECOND
+        """Seconds, with the last digit that ROS 1's own has."""
+        return float(self.sec + self.nanosec / _SECOND)
+
+    to_time = to_sec
 
     def is_zero(self) -> bool:
         """Whether nothing was ever set."""

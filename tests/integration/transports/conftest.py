@@ -7,6 +7,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -31,6 +32,20 @@ def lacking(what: str) -> None:
     if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
         pytest.fail(f"{what}, and VOLERY_REQUIRE_ALL=1 asks for it")
     pytest.skip(what)
+
+
+def python_of(distribution: str) -> str:
+    found = Path(sys.prefix) / f"ros2-{distribution}" / "bin" / "python"
+    if not found.exists():
+        lacking(f"no environment with ROS 2 {distribution} (scripts/ros2-venv {sys.prefix} {distribution})")
+    return str(found)
+
+
+def surroundings(domain: int) -> dict[str, str]:
+    """Loopback, a domain of one's own, and nothing of what another rclpy has left behind."""
+    leaked = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+    kept = {key: value for key, value in os.environ.items() if key not in leaked}
+    return {**kept, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 @pytest.fixture(scope="session")

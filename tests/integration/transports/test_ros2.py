@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from volery.testing.transports import CHECKS
 
-from .conftest import HERE, lacking
+from .conftest import HERE, python_of, surroundings
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
 
@@ -30,20 +28,6 @@ FAULTS = (
     "the-end",
 )
 _DOMAINS = iter(range(20 + os.getpid() % 180, 230))
-
-
-def python_of(distribution: str) -> str:
-    found = Path(sys.prefix) / f"ros2-{distribution}" / "bin" / "python"
-    if not found.exists():
-        lacking(f"no environment with ROS 2 {distribution} (scripts/ros2-venv {sys.prefix} {distribution})")
-    return str(found)
-
-
-def surroundings(domain: int) -> dict[str, str]:
-    """Loopback, a domain of one's own, and nothing of what another rclpy has left behind."""
-    leaked = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
-    kept = {key: value for key, value in os.environ.items() if key not in leaked}
-    return {**kept, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 @cache

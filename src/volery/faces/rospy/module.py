@@ -8,15 +8,13 @@ from types import ModuleType
 from typing import Any
 
 from volery import messages
-from volery.base.errors import UsageError
-from volery.base.time import S
 from volery.faces.launch import Launch
 from volery.faces.module import face_module
-from volery.faces.rospy import services, time, topics
+from volery.faces.rospy import parameters, services, time, topics
 from volery.faces.rospy.errors import EXCEPTIONS
 from volery.faces.rospy.logging import LEVELS, loggers
 from volery.faces.rospy.session import Sessions
-from volery.graph import Graph, Node, RosGraph
+from volery.graph import Node, RosGraph
 
 _BOUND = (
     topics.Publisher,
@@ -57,11 +55,16 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
     """The functions of rospy, bound to the sessions of one run."""
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
-        get_param, set_param, has_param, delete_param, get_param_names, get_name, get_namespace,
-        get_time, get_rostime, resolve_name, get_published_topics,
+        get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics,
+        *parameters.FUNCTIONS,
     )  # fmt: skip
     bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
-    return {**bound, "get_caller_id": bound["get_name"], "myargv": myargv}
+    return {
+        **bound,
+        "get_caller_id": bound["get_name"],
+        "remap_name": bound["resolve_name"],
+        "myargv": myargv,
+    }
 
 
 def init_node(
@@ -85,7 +88,7 @@ def signal_shutdown(sessions: Sessions, reason: str = "") -> None:
 
 def on_shutdown(sessions: Sessions, h: Callable[[], Any]) -> None:
     """Call *h* when this node shuts down."""
-    sessions.here().hooks.append(h)
+    sessions.early().hooks.append(h)
 
 
 def spin(sessions: Sessions) -> None:
@@ -104,68 +107,27 @@ def _within(timeout: Any) -> int | None:
 
 def wait_for_message(sessions: Sessions, topic: str, topic_type: Any, timeout: Any = None) -> Any:
     """The next message of a topic."""
-    return topics.wait_for_message(sessions.here(), topic, topic_type, _within(timeout))
+    return topics.wait_for_message(sessions.early(), topic, topic_type, _within(timeout))
 
 
 def wait_for_service(sessions: Sessions, service: str, timeout: Any = None) -> None:
     """Block until somebody serves it."""
-    services.wait_for_service(sessions.here(), service, _within(timeout))
-
-
-_NO_DEFAULT = object()
-
-
-def get_param(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
-    """A parameter; ``KeyError`` if there is none and no default."""
-    node = sessions.here().node
-    if default is not _NO_DEFAULT:
-        return node.get_parameter(param_name, default)
-    try:
-        return node.get_parameter(param_name)
-    except UsageError as error:
-        raise KeyError(str(error)) from error
-
-
-def set_param(sessions: Sessions, param_name: str, param_value: Any) -> None:
-    """Set a parameter."""
-    sessions.here().node.set_parameter(param_name, param_value)
-
-
-def has_param(sessions: Sessions, param_name: str) -> bool:
-    """Whether there is such a parameter."""
-    return sessions.here().node.has_parameter(param_name)
-
-
-def delete_param(sessions: Sessions, param_name: str) -> None:
-    """Remove a parameter; ``KeyError`` if there is none."""
-    try:
-        sessions.here().node.delete_parameter(param_name)
-    except UsageError as error:
-        raise KeyError(str(error)) from error
-
-
-def get_param_names(sessions: Sessions) -> list[str]:
-    """All parameters, where the graph is embedded: what others keep is not listed."""
-    graph = sessions.graph
-    if not isinstance(graph, Graph):
-        raise UsageError("rospy.get_param_names() works on the embedded graph only")
-    with sessions.kernel:
-        return graph.parameters.names()
+    services.wait_for_service(sessions.early(), service, _within(timeout))
 
 
 def get_name(sessions: Sessions) -> str:
     """The full name of this node."""
-    return sessions.here().node.name
+    return sessions.early().node.name
 
 
 def get_namespace(sessions: Sessions) -> str:
     """This node's namespace, with a slash at its end."""
-    return f"{sessions.here().node.namespace.rstrip('/')}/"
+    return f"{sessions.early().node.namespace.rstrip('/')}/"
 
 
 def get_time(sessions: Sessions) -> float:
     """ROS time in seconds."""
-    return sessions.now() / S
+    return float(get_rostime(sessions).to_sec())
 
 
 def get_rostime(sessions: Sessions) -> time.Time:
@@ -175,7 +137,7 @@ def get_rostime(sessions: Sessions) -> time.Time:
 
 def resolve_name(sessions: Sessions, name: str) -> str:
     """The absolute name, remappings applied."""
-    return sessions.here().node.resolve(name)
+    return sessions.early().node.resolve(name)
 
 
 def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:

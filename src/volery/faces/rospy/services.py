@@ -35,7 +35,7 @@ class Service:
         buff_size: int = 65536,
         error_handler: Any = None,
     ) -> None:
-        self._session = self.sessions.here()
+        self._session = self.sessions.early()
         self.service_class = service_class
         self.type = _service_type("Service", service_class)
         self._handler = handler
@@ -80,7 +80,7 @@ class ServiceProxy:
     sessions: ClassVar[Sessions]
 
     def __init__(self, name: str, service_class: Any, persistent: bool = False, headers: Any = None) -> None:
-        self._session = self.sessions.here()
+        self._session = self.sessions.early()
         self.service_class = service_class
         self.request_class = getattr(service_class, "_request_class", None)
         self.response_class = getattr(service_class, "_response_class", None)

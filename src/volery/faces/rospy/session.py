@@ -32,6 +32,7 @@ class Session:
     shutdown: str = ""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
     failures: set[str] = field(default_factory=set)
+    initialised: bool = False
 
     def say(self, severity: int, text: str) -> None:
         """Record a log line of this node. An interaction point."""
@@ -119,9 +120,11 @@ class Sessions:
 
     def join(self, name: str, anonymous: bool) -> None:
         """``init_node``: a second call of the same component changes nothing."""
+        session = self._open.get(self._component()) or self._joined(name, anonymous)
+        session.initialised = True
+
+    def _joined(self, name: str, anonymous: bool) -> Session:
         component = self._component()
-        if component in self._open:
-            return
         task = current_task(self.kernel)
         launch = self._launched.get(component, Launch())
         label = re.sub(r"\W", "_", component if component in self._launched else name)
@@ -134,17 +137,22 @@ class Sessions:
         for key, value in launch.parameters.items():
             node.set_parameter(f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
-        self._open[component] = Session(node, task.scope, self.kernel, ended)
+        made = self._open[component] = Session(node, task.scope, self.kernel, ended)
+        return made
 
     def here(self) -> Session:
         """The session of the component that the current task computes for."""
-        session = self._open.get(self._component())
-        if session is None:
+        session = self.find()
+        if session is None or not session.initialised:
             raise ROSInitException(f"{self._component()}: call rospy.init_node() first")
         return session
 
+    def early(self) -> Session:
+        """``here``, for what rospy does before ``init_node`` as well: the component joins the graph now."""
+        return self.find() or self._joined(self._component(), anonymous=False)
+
     def find(self) -> Session | None:
-        """``here``, or ``None`` before ``init_node``."""
+        """``here``, or ``None`` before the component has joined the graph."""
         return self._open.get(self._component())
 
     def now(self) -> Ns:

@@ -23,8 +23,14 @@ def as_ns(value: Any) -> Ns:
 
 
 def _parts(secs: float, nsecs: int) -> tuple[int, int]:
-    whole = from_seconds(secs) if isinstance(secs, float) else secs * S
+    whole = _cut(secs) if isinstance(secs, float) else secs * S
     return divmod(whole + nsecs, S)
+
+
+def _cut(seconds: float) -> Ns:
+    """Seconds as genpy takes them: what is behind the nanosecond is cut off, seconds and the rest apart."""
+    whole = int(seconds)
+    return whole * S + int((seconds - whole) * S)
 
 
 class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this module is loaded
@@ -43,8 +49,8 @@ class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this m
 
     @classmethod
     def from_sec(cls, seconds: float) -> Self:
-        """From seconds."""
-        return cls(0, from_seconds(seconds))
+        """From seconds, as genpy cuts them."""
+        return cls(0, _cut(seconds))
 
     from_seconds = from_sec
 
@@ -59,8 +65,8 @@ class Duration(_DurationMessage):  # type: ignore[misc]  # the class is made whe
 
     @classmethod
     def from_sec(cls, seconds: float) -> Self:
-        """From seconds."""
-        return cls(0, from_seconds(seconds))
+        """From seconds, as genpy cuts them."""
+        return cls(0, _cut(seconds))
 
     from_seconds = from_sec
 
@@ -74,8 +80,9 @@ class Rate:
         if hz <= 0:
             raise UsageError(f"rospy.Rate({hz}): give a frequency above 0 Hz")
         self._session = self.sessions.here()
-        self.sleep_dur = Duration(0, round(S / hz))
-        self._rate = self._session.node.rate(round(S / hz))
+        period = int(S / hz)  # cut off, as rospy does
+        self.sleep_dur = Duration(0, period)
+        self._rate = self._session.node.rate(period)
 
     def remaining(self) -> Duration:
         """Until the next release."""

@@ -46,7 +46,7 @@ class Publisher:
         *,
         queue_size: int | None = None,
     ) -> None:
-        session = self.sessions.here()
+        session = self._session = self.sessions.early()
         qos = LATCHED if latch else QoS(queue_size or None)
         self.data_class = data_class
         self.type = type_name("Publisher", data_class)
@@ -54,7 +54,9 @@ class Publisher:
         self.name = self.resolved_name = self._publisher.topic
 
     def publish(self, *args: Any, **fields: Any) -> None:
-        """Publish a message, or one made of these fields."""
+        """Publish a message, or one made of these fields; ``ROSException`` before ``init_node``."""
+        if not self._session.initialised:
+            raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
         if len(args) == 1 and not fields and isinstance(args[0], Message):
             message = args[0]
         else:
@@ -96,7 +98,7 @@ class Subscriber:
         *,
         tcp_nodelay: bool = False,
     ) -> None:
-        session = self.sessions.here()
+        session = self.sessions.early()
         self.data_class = data_class
         self.type = type_name("Subscriber", data_class)
         self.callback = callback

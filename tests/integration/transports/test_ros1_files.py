@@ -1,0 +1,75 @@
+"""Files written for rospy say the same on the embedded graph, in virtual time, and on a real roscore."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from volery.transports.ros1 import Roscore
+from volery.transports.ros1.roscore import environment
+
+from .conftest import HERE
+from .files_on_ros import Case, compare, embedded, observed, running
+
+pytestmark = pytest.mark.integration
+
+FILES = HERE / "ros_files" / "ros1"
+STRING = "std_msgs/msg/String"
+GAINS = {"p": 2.0, "i": 0.1, "d": 0.07}  # those that the thesis flew with
+CASES = {
+    "topics": Case(
+        {"listener": {}, "talker": {"listeners": 1}}, {"/chatter": (STRING, 20), "/heard": (STRING, 20)}
+    ),
+    "services": Case(
+        {"adder": {}, "asker": {"listeners": 0}},
+        {"/sums": ("std_msgs/msg/Int64", 4), "/people": ("tutorial_msgs/msg/Person", 1)},
+    ),
+    "parameters": Case({"parameters": {"rate": 10, "listeners": 0}}, {"/told": (STRING, 15)}),
+    "controller": Case(
+        {"controller": {"gains": GAINS}, "plant": {"steps": 250, "listeners": 1}},
+        {
+            "/pose": ("geometry_msgs/msg/PoseStamped", 250),
+            "/cmd_vel": ("geometry_msgs/msg/Twist", 250),
+            "/reached": ("std_msgs/msg/Int32", 4),
+        },
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def tutorial_msgs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The classes of the package beside the files, made by genpy as a catkin workspace would."""
+    made = tmp_path_factory.mktemp("generated")
+    for kind in ("msg", "srv"):
+        output = made / "tutorial_msgs" / kind
+        sources = [str(one) for one in sorted((FILES / "tutorial_msgs" / kind).glob(f"*.{kind}"))]
+        generator = f"/usr/lib/genpy/gen{kind}_py.py"
+        include = ["-I", "std_msgs:/usr/share/std_msgs/msg", "-p", "tutorial_msgs", "-o", str(output)]
+        for command in (sources, ["--initpy"]):
+            subprocess.run(["/usr/bin/python3", generator, *command, *include], check=True, timeout=30)
+    (made / "tutorial_msgs" / "__init__.py").touch()
+    return made
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_same_messages(name: str, roscore: Roscore, tutorial_msgs: Path, tmp_path: Path) -> None:
+    case = CASES[name]
+    programs = [
+        ["/usr/bin/python3", str(FILES / f"{one}.py"), *(f"_{key}:={value}" for key, value in given.items())]
+        for one, given in case.observed_files()
+    ]
+    surroundings = {
+        **environment(roscore.uri),
+        "PYTHONPATH": str(tutorial_msgs),
+        "ROS_PACKAGE_PATH": str(FILES),
+    }
+    with (
+        observed(sys.executable, "ros1", case, FILES, {**os.environ, **surroundings}) as said,
+        running(programs, surroundings),
+    ):
+        real = said()
+    compare(case, embedded(case, "rospy", FILES, tmp_path / "embedded"), real)
