@@ -54,12 +54,20 @@ class ActivityForm(Form):
     start: Time = 0
 
 
+class BuildForm(Form):
+    """How C++ is compiled: options for the compiler, and libraries by the names that follow `-l`."""
+
+    flags: Annotated[list[str], Listed()] = []
+    libraries: Annotated[list[str], Listed()] = []
+
+
 class ComponentForm(Form):
     """A kind of component: its language and file, its ports, and what it takes in fidelity `times`."""
 
     language: Language
     path: str = ""
     class_name: str = Field(default="", alias="class")
+    build: BuildForm = BuildForm()
     provides: dict[Name, str] = {}
     requires: dict[Name, str] = {}
     parameters: Parameters = {}

@@ -8,10 +8,12 @@ from volery.model.context import Context
 from volery.model.form_component import ActivityForm, ComponentForm, FigureForm, ReferenceForm, SignatureForm
 from volery.model.problems import Path
 from volery.model.system import (
+    CPP_LANGUAGES,
     ENVIRONMENT_INTERFACE,
     VEHICLE_INTERFACES,
     Activity,
     Argument,
+    Build,
     Component,
     Figure,
     Interface,
@@ -72,6 +74,7 @@ def _component(context: Context, name: str, form: ComponentForm, known: dict[str
         activity=activity(form.active),
         operations=operations,
         activation=_figures(context, (*path, "activation"), form.activation, form.at),
+        build=Build(tuple(form.build.flags), tuple(form.build.libraries)),
         where=context.where(path),
     )
 
@@ -95,10 +98,9 @@ def activity(form: ActivityForm | None) -> Activity | None:
 
 
 def _check_file(context: Context, path: Path, form: ComponentForm) -> None:
-    if form.path and not (context.folder / form.path).is_file():
-        there = sorted(
-            found.name for found in (context.folder / form.path).parent.glob("*") if found.is_file()
-        )
+    file = context.folder / form.path
+    if form.path and not (file.is_file() or (form.language in CPP_LANGUAGES and file.is_dir())):
+        there = sorted(found.name for found in file.parent.glob("*") if found.is_file())
         beside = f"; in that folder there is {', '.join(there[:8])}" if there else ""
         context.problems.add((*path, "path"), f"there is no file {form.path!r} beside the model{beside}")
 

@@ -36,6 +36,9 @@ ENVIRONMENT_INTERFACE = "Environment"
 LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp", "rclcpp")
 """Languages that a model may name. Which of them run is for the ``Vocabulary`` to say."""
 
+CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
+"""Languages that are compiled."""
+
 ROS_LANGUAGES = ("rospy", "rclpy", "roscpp", "rclcpp")
 """Languages that bring ROS into the system by themselves."""
 
@@ -117,12 +120,20 @@ class RequiredPort:
 
 
 @dataclass(frozen=True, slots=True)
+class Build:
+    """How C++ is compiled: options for the compiler, and libraries by the names that follow ``-l``."""
+
+    flags: tuple[str, ...] = ()
+    libraries: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Component:
     """A kind of component in the library.
 
     ``path`` is as written, relative to the model's folder (``System.file_of`` resolves it), and empty where
-    there is no code yet. ``class_name`` is the usual one where the model states none (``class_stated``).
-    ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive component.
+    there is no code yet; of C++ it may be a folder. ``class_name`` is the usual one where
+    the model states none (``class_stated``). ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive component.
     ``operations`` and ``activation`` hold the figures of fidelity ``times``, one per processor kind.
     """
 
@@ -137,6 +148,7 @@ class Component:
     activity: Activity | None = None
     operations: Mapping[str, tuple[Figure, ...]] = field(default_factory=dict)
     activation: tuple[Figure, ...] = ()
+    build: Build = Build()
     where: Location | None = field(default=None, compare=False)
 
 
