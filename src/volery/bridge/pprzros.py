@@ -40,6 +40,7 @@ class PprzrosNode:
         self.namespace = namespace
         self._fresh: list[tuple[Frame, Ns]] = []
         self._component = ""
+        self._heard_of: set[int] = set()
         link.receive(self._heard)
 
     def start(self, place: Place, scope: Scope) -> Task:
@@ -47,8 +48,14 @@ class PprzrosNode:
         self._component = place.component
         return self._kernel.spawn(lambda: self._run(place, scope), place.component, place, scope)
 
+    @property
+    def summary(self) -> str:
+        """Whom it hears; empty while it hears nobody."""
+        return f"aircraft {', '.join(map(str, sorted(self._heard_of)))}" if self._heard_of else ""
+
     def _heard(self, frame: Frame) -> None:
         """House code."""
+        self._heard_of.add(frame.system)
         if len(self._fresh) < MOST_WAITING:
             self._fresh.append((frame, self._kernel.now()))
 

@@ -21,6 +21,7 @@ from volery.base.errors import UsageError
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
 from volery.bridge.mavros import MAVROS
+from volery.bridge.modes import mode_name
 from volery.bridge.offering import Names, Offering, Service, Subscription, Surroundings
 from volery.bridge.streams import Streams
 from volery.bridge.wire import Heard, Wire
@@ -28,9 +29,12 @@ from volery.graph import Node, Publisher, RosGraph
 from volery.graph.group import Work
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Link
+from volery.links.mavlink import entry_name
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
+SAFETY_ARMED = 128
+"""MAV_MODE_FLAG."""
 WARNING = 4
 NONSENSE = (ValueError, OverflowError, UsageError)
 """What comes of numbers that make no sense, in a message or in a frame."""
@@ -42,7 +46,8 @@ class VehicleNodeOptions:
 
     ``period`` of its loop, ``None``: as frames arrive; ``streams`` it asks the autopilot for (hertz by
     MAV_DATA_STREAM), those of the names unless given; ``silent`` until the autopilot counts as disconnected;
-    ``system`` and ``component`` are its MAVLink ids; *control*: roscopter's ``send_rc`` is taken.
+    ``system`` and ``component`` are its MAVLink ids, ``vehicle`` the autopilot's, 0: whichever is heard
+    first; ``control``: roscopter's ``send_rc`` is taken.
     """
 
     names: Names = MAVROS
@@ -51,6 +56,7 @@ class VehicleNodeOptions:
     silent: Ns = 10 * S
     system: int = 255
     component: int = 191
+    vehicle: int = 0
     geoid: Geoid = EGM96
     control: bool = False
 
@@ -66,7 +72,7 @@ class VehicleNode:
     ) -> None:
         self._graph, self._kernel = graph, graph.kernel
         self.namespace, self.options = namespace, options
-        self.wire = Wire(graph.kernel, link, options.system, options.component)
+        self.wire = Wire(graph.kernel, link, options.system, options.component, options.vehicle)
         rates = options.names.streams if options.streams is None else options.streams
         self._streams = Streams(self.wire, rates, home=options.names.home)
         self._publishers: dict[str, Publisher] = {}
@@ -80,6 +86,17 @@ class VehicleNode:
         """Spawn the node's task: its computing is spent at *place*, it ends with *scope*."""
         self._component = place.component
         return self._kernel.spawn(lambda: self._run(place, scope), place.component, place, scope)
+
+    @property
+    def summary(self) -> str:
+        """Whom it hears, in which mode; empty while it hears nobody."""
+        beat = self.wire.last("HEARTBEAT")
+        if beat is None or not self.connected:
+            return ""
+        who = entry_name("MAV_AUTOPILOT", beat["autopilot"]).lower()
+        mode = mode_name(self.wire.firmware, beat["custom_mode"])
+        armed = "armed" if beat["base_mode"] & SAFETY_ARMED else "disarmed"
+        return f"{who} (system {self.wire.target[0]}): {mode}, {armed}"
 
     def _run(self, place: Place, scope: Scope) -> None:
         options = self.options

@@ -60,12 +60,17 @@ class Ear:
 
 
 class Wire:
-    """Sends as (*system*, *component*) to the autopilot that is heard first, and keeps what it says."""
+    """Sends as (*system*, *component*) to the autopilot that is heard first, and keeps what it says.
 
-    def __init__(self, kernel: Kernel, link: Link, system: int, component: int) -> None:
+    *vehicle* is the system id to listen for where several share a link; 0: whichever speaks.
+    """
+
+    def __init__(self, kernel: Kernel, link: Link, system: int, component: int, vehicle: int = 0) -> None:
         self.kernel, self.name = kernel, link.name
         self._link = link
         self._system, self._component = system, component
+        self._vehicle = vehicle
+        self.frames = 0
         self.target: tuple[int, int] = (0, 0)
         self.firmware = Firmware()
         self.last_heartbeat: Ns | None = None
@@ -81,11 +86,14 @@ class Wire:
         return self.target != (0, 0)
 
     def _receive(self, frame: Frame) -> None:
+        if self._vehicle not in (0, frame.system):
+            return
         if frame.name == "HEARTBEAT" and not self.known and frame.fields["autopilot"] != INVALID_AUTOPILOT:
             self.target = (frame.system, frame.component)
         if (frame.system, frame.component) != self.target:
             return
         now = self.kernel.now()
+        self.frames += 1
         if frame.name == "HEARTBEAT":
             self.last_heartbeat = now
             self.firmware = Firmware(frame.fields["autopilot"], frame.fields["type"])
