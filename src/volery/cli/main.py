@@ -21,6 +21,8 @@ model_app = typer.Typer(help="Look at a model without running it.", no_args_is_h
 app.add_typer(model_app, name="model")
 bag_app = typer.Typer(help="Recordings of ROS topics: rosbag 1, rosbag 2 and MCAP.", no_args_is_help=True)
 app.add_typer(bag_app, name="bag")
+calibrate_app = typer.Typer(help="Measure what computing takes on this machine.", no_args_is_help=True)
+app.add_typer(calibrate_app, name="calibrate")
 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but what is wrong.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
@@ -188,53 +190,6 @@ def vehicle(
 
 
 @app.command()
-def bridge(
-    url: Annotated[str, typer.Argument(metavar="URL", help="ardupilot+serial:///dev/ttyUSB0, sim:px4 ...")],
-    graph: Annotated[
-        str, typer.Option(metavar="ros1|ros2", help="The graph to put the vehicle on.")
-    ] = "ros1",
-    names: Annotated[
-        str, typer.Option(metavar="mavros|roscopter|pprzros", help="Whose names; else the usual ones.")
-    ] = "",
-    namespace: Annotated[str, typer.Option(metavar="/NAME", help="Where they begin, such as /mavros.")] = "",
-    rate: Annotated[int, typer.Option(help="What the autopilot is asked for, Hz; 0: nothing.")] = 10,
-    enable_control: Annotated[
-        bool, typer.Option("--enable-control", help="Take roscopter's send_rc; MAVROS's names need no leave.")
-    ] = False,
-    source_system: Annotated[int, typer.Option(help="The MAVLink system id that it speaks as.")] = 255,
-    geoid: Annotated[
-        str, typer.Option(metavar="egm96|METRES", help="Mean sea level above the ellipsoid.")
-    ] = "egm96",
-    speed: Annotated[float, typer.Option(help="Of a simulated vehicle: seconds per second.")] = 1.0,
-    seed: Seed = 1,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Put a vehicle on a real ROS graph under the names of MAVROS, roscopter or pprzros, until Ctrl-C.
-
-    In real time, over serial lines (57600 baud unless the address says ?baud=...), UDP and TCP; a link that
-    breaks is opened again.
-    """
-    from volery.cli import bridge as command
-    from volery.run.bridging import Bridging
-
-    output = Output(quiet, False, debug)
-    wanted = Bridging(
-        url=url,
-        graph=graph,
-        names=names,
-        namespace=namespace,
-        rate=rate,
-        control=enable_control,
-        system=source_system,
-        geoid=geoid,
-        speed=speed,
-        seed=seed,
-    )
-    run_command(output, lambda: command.bridge(output, wanted))
-
-
-@app.command()
 def conformance(
     url: Annotated[
         str, typer.Argument(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...")
@@ -353,6 +308,44 @@ def bag_convert(
 
     output = Output(quiet, as_json, debug)
     run_command(output, lambda: command.convert(output, recording, out, tuple(topics or ())))
+
+
+@calibrate_app.command("ros")
+def calibrate_ros(
+    client: Annotated[str, typer.Option(metavar="roscpp|rospy|rclpy", help="The client library.")],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
+    ] = Path("catalogue.yaml"),
+    frequency: Annotated[
+        float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
+    ] = None,
+    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    python: Annotated[
+        str, typer.Option(metavar="PATH", help="The Python that has rospy or rclpy; by default this one.")
+    ] = "",
+    rounds: Annotated[
+        tuple[int, int], typer.Option(metavar="LEAST MOST", help="How many fresh processes are measured.")
+    ] = (10, 30),
+    within: Annotated[
+        float, typer.Option(metavar="PERCENT", help="How well each figure is to be known: 95 % intervals.")
+    ] = 10.0,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what ROS calls cost here, and write it as an entry of a catalogue.
+
+    CPU time of whole cycles minus idle cycles: publish to 1 to 8 subscribers, sleeps of several lengths,
+    spinOnce, messages received, registrations by fresh processes. Ctrl-C keeps what was measured; the same
+    command goes on from there. Exit status: 0 if every figure is known as well as asked for, 2 for bad
+    input, 1 otherwise.
+    """
+    from volery.cli import calibrate as command
+
+    output = Output(quiet, as_json, debug)
+    plan = command.Plan(*rounds, within / 100.0)
+    wanted = command.Wanted(client, out, frequency, name, python, plan)
+    run_command(output, lambda: command.ros(output, wanted))
 
 
 @model_app.command("check")

@@ -1,0 +1,170 @@
+// What calls of roscpp cost this process. Prints one JSON object a line:
+//   {"what": .., "x": .., "cycles": .., "waited_ns": .., "process_ns": .., "caller_ns": ..}
+// process_ns: CPU time of the whole process; caller_ns: of the calling thread; waited_ns: time on the wall.
+// Usage: roscpp BLOCK_MS PERIOD_MS SLEEP_MS,SLEEP_MS,.. SUBSCRIBERS,SUBSCRIBERS,..
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <std_msgs/Float64MultiArray.h>
+#include <std_srvs/Trigger.h>
+
+namespace {
+using Message = std_msgs::Float64MultiArray;
+using Action = std::function<void()>;
+
+const int kConnectMs = 10000;
+const int kGlanceMs = 50;  // each look costs the probe a little, so there are few
+const int kSettleMs = 100;
+const double kFeedMs = 50.0;
+
+long heard = 0;
+
+long ns(clockid_t clock) {
+  timespec now;
+  clock_gettime(clock, &now);
+  return now.tv_sec * 1000000000L + now.tv_nsec;
+}
+
+// Waits without ROS.
+void pause(int ms) {
+  timespec wanted = {ms / 1000, (ms % 1000) * 1000000L};
+  nanosleep(&wanted, nullptr);
+}
+
+// What passes between its making and tell().
+class Measured {
+ public:
+  Measured()
+      : wall_(ns(CLOCK_MONOTONIC)), process_(ns(CLOCK_PROCESS_CPUTIME_ID)), caller_(ns(CLOCK_THREAD_CPUTIME_ID)) {}
+
+  void tell(const char* what, double x, long cycles) const {
+    const long caller = ns(CLOCK_THREAD_CPUTIME_ID) - caller_;
+    const long process = ns(CLOCK_PROCESS_CPUTIME_ID) - process_;
+    const long wall = ns(CLOCK_MONOTONIC) - wall_;
+    std::printf(
+        "{\"what\": \"%s\", \"x\": %g, \"cycles\": %ld, \"waited_ns\": %ld, \"process_ns\": %ld, \"caller_ns\": %ld}\n",
+        what, x, cycles, wall, process, caller);
+    std::fflush(stdout);
+  }
+
+ private:
+  long wall_, process_, caller_;
+};
+
+// One call, and what it makes the library do shortly after.
+void once(const char* what, const Action& call, const std::function<bool()>& done = [] { return true; }, double x = 0) {
+  Measured measured;
+  call();
+  for (int waited = 0; !done() && waited < kConnectMs; waited += kGlanceMs) pause(kGlanceMs);
+  pause(kSettleMs);
+  measured.tell(what, x, 1);
+}
+
+// As many cycles of a call and a sleep as fit into a block.
+void block(const char* what, double x, double period_ms, double block_ms, const Action& call) {
+  const long cycles = std::max(3L, static_cast<long>(block_ms / period_ms));
+  const ros::Duration period(period_ms / 1000.0);
+  for (int warm = 0; warm < 2; ++warm) {
+    call();
+    period.sleep();
+  }
+  Measured measured;
+  for (long cycle = 0; cycle < cycles; ++cycle) {
+    call();
+    period.sleep();
+  }
+  measured.tell(what, x, cycles);
+}
+
+std::vector<double> numbers(const char* text) {
+  std::vector<double> found;
+  std::stringstream stream(text);
+  for (std::string one; std::getline(stream, one, ',');) found.push_back(std::atof(one.c_str()));
+  return found;
+}
+
+void onMessage(const Message::ConstPtr&) { ++heard; }
+
+bool onRequest(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&) { return true; }
+
+void registrations(ros::NodeHandle& node) {
+  ros::Publisher publisher;
+  ros::Subscriber subscriber, hearing;
+  ros::ServiceClient client;
+  ros::ServiceServer server;
+  once("advertise", [&] { publisher = node.advertise<Message>("calibration/unheard", 10); });
+  once("subscribe", [&] { subscriber = node.subscribe("calibration/unsaid", 10, onMessage); });
+  once("connect", [&] { hearing = node.subscribe("calibration/quiet", 10, onMessage); },
+       [&] { return hearing.getNumPublishers() > 0; });
+  once("service_client", [&] { client = node.serviceClient<std_srvs::Trigger>("calibration/nobody"); });
+  once("advertise_service", [&] { server = node.advertiseService("calibration/service", onRequest); });
+  once("settle", [] {});
+  Measured measured;
+  ros::spinOnce();
+  measured.tell("spin_once_first", 0, 1);
+}
+
+void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const std::vector<double>& counts) {
+  Message message;
+  message.data.resize(4);
+  for (double count : counts) {
+    ros::Publisher publisher;
+    once("accept", [&] { publisher = node.advertise<Message>("calibration/to_" + std::to_string(int(count)), 10); },
+         [&] { return publisher.getNumSubscribers() >= count; }, count);
+    block("idle", 0, period_ms, block_ms, [] {});
+    block("publish", count, period_ms, block_ms, [&] { publisher.publish(message); });
+    publisher.shutdown();
+    pause(kSettleMs);
+  }
+}
+
+void receiving(ros::NodeHandle& node, double period_ms, double block_ms) {
+  block("spin_once", 0, period_ms, block_ms, [] { ros::spinOnce(); });
+  ros::Subscriber feed = node.subscribe("calibration/feed", 10, onMessage);
+  for (int waited = 0; heard == 0 && waited < kConnectMs; waited += kGlanceMs) {
+    pause(kGlanceMs);
+    ros::spinOnce();
+  }
+  pause(kSettleMs);
+  const long before = heard;
+  Measured measured;
+  while (heard < before + block_ms / kFeedMs) {
+    ros::spinOnce();
+    ros::Duration(period_ms / 1000.0).sleep();
+  }
+  measured.tell("receive", 0, heard - before);
+  feed.shutdown();
+  pause(kSettleMs);
+  Measured waiting;
+  for (int times = 0; times < block_ms / 100; ++times)
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));  // as ros::spin() does
+  waiting.tell("wait", 0, 1);
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 5) return 2;
+  const double block_ms = std::atof(argv[1]), period_ms = std::atof(argv[2]);
+  once("nothing", [] {});
+  once("init", [&] { ros::init(argc, argv, "calibration_probe"); });
+  std::unique_ptr<ros::NodeHandle> node;
+  once("node_handle", [&] {
+    node.reset(new ros::NodeHandle);
+    pause(3 * kSettleMs);
+  });
+  once("settle", [] { pause(5 * kSettleMs); });
+  registrations(*node);
+  for (double ms : numbers(argv[3])) block("sleep", ms * 1000.0, ms, block_ms, [] {});
+  publishing(*node, period_ms, block_ms, numbers(argv[4]));
+  receiving(*node, period_ms, block_ms);
+  return 0;
+}
