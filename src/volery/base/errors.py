@@ -25,6 +25,16 @@ from typing import NamedTuple, Self
 class VoleryError(Exception):
     """Anything this project raises on purpose."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """How it gets to another process: as it is, whatever its constructor takes."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[VoleryError], args: tuple[object, ...], state: Mapping[str, object]) -> VoleryError:
+    made = kind.__new__(kind, *args)
+    made.__dict__.update(state)
+    return made
+
 
 class Location(NamedTuple):
     """Where in a file something stands. Lines count from 1; 0 is no line (an option, a missing file)."""
@@ -126,6 +136,9 @@ class FleetError(ExceptionGroup[Exception], VoleryError):
 
     def __init__(self, asked: str, failed: Mapping[str, Exception]) -> None:
         super().__init__(asked, list(failed.values()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.message, self.failed)
 
     def derive(self, errors: Sequence[Exception]) -> ExceptionGroup[Exception]:  # type: ignore[override]  # typeshed states a group of any exceptions
         """The part of it that ``except*`` did not take."""

@@ -132,8 +132,9 @@ class Component:
     """A kind of component in the library.
 
     ``path`` is as written, relative to the model's folder (``System.file_of`` resolves it), and empty where
-    there is no code yet; of C++ it may be a folder. ``class_name`` is the usual one where
-    the model states none (``class_stated``). ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive component.
+    there is no code yet; of C++ it may be a folder. ``class_name`` is the usual one where the model states
+    none (``class_stated``). ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive
+    component.
     ``operations`` and ``activation`` hold the figures of fidelity ``times``, one per processor kind.
     """
 
