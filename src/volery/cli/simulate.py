@@ -34,6 +34,7 @@ class Wanted:
     overrides: tuple[str, ...]
     speed: str
     out: Path | None
+    graph: str = ""
 
 
 def simulate(output: Output, wanted: Wanted) -> int:
@@ -42,7 +43,9 @@ def simulate(output: Output, wanted: Wanted) -> int:
     system = load(wanted.model, vocabulary(), wanted.scenario, wanted.allocation, wanted.overrides)
     folder = make_folder(wanted.out or next_folder(system.name))  # before anything that takes time
     with shown(output, " · ".join(filter(None, (system.name, system.allocation, system.scenario)))) as show:
-        run = run_simulation(system, Options(wanted.fidelity, wanted.seed, pace, folder, show))
+        run = run_simulation(
+            system, Options(wanted.fidelity, wanted.seed, pace, folder, show, graph=wanted.graph)
+        )
     return tell(output, run)
 
 

@@ -26,6 +26,10 @@ from volery.components.counting import Steps
 from volery.components.instance import MARK
 
 _PREFIX = "volery.user"
+USER = f"{_PREFIX}."
+"""What the names of all modules of users begin with."""
+SHARED = f"{_PREFIX}.shared."
+"""And of those that components share: what is beside their files."""
 OURS = "volery"
 
 
@@ -157,7 +161,7 @@ class Loader:
         if known is not None:
             return known
         code = self._compile(parse(path))
-        module = self._module(f"{_PREFIX}.shared.{name}", path)
+        module = self._module(f"{SHARED}{name}", path)
         if path.name == "__init__.py":
             module.__path__ = [str(path.parent)]
         self._shared[path] = module  # before it runs, as Python does: modules may import each other

@@ -92,7 +92,7 @@ class Port:
             args, kwargs = self._copied((args, kwargs), f"the arguments of {callee.name}.{operation}")
         self._move(self._there, (args, kwargs))
         with callee.visited(task, operation) as thing:
-            result = _serve(callee, thing, operation, args, kwargs)
+            result = execute(callee, thing, operation, args, kwargs)
             if far:
                 result = self._copied(result, f"the result of {callee.name}.{operation}")
         self._move(self._back, result)
@@ -113,9 +113,10 @@ class Port:
                 travel(HEADER_BYTES + size_of(content))
 
 
-def _serve(
+def execute(
     callee: Instance, thing: object, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
+    """The result of an operation of *callee*, whose object is *thing*. Errors as ``Port`` says."""
     try:
         return getattr(thing, operation)(*args, **kwargs)
     except VoleryError:

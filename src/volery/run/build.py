@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from volery.base.position import Position
 from volery.components.body import Body
 from volery.components.counting import Steps
 from volery.components.instance import Instance
@@ -17,9 +18,9 @@ from volery.components.stand_ins import stand_ins
 from volery.components.stub import StubProgram
 from volery.faces import rclpy, rospy
 from volery.faces.launch import Launch
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Graph, Node, RosGraph
+from volery.kernel.api import Kernel
 from volery.kernel.task import Place
-from volery.kernel.virtual import VirtualKernel
 from volery.messages import define_imported
 from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
@@ -67,6 +68,7 @@ class Built:
 
     starters: tuple[Callable[[], object], ...]
     loader: Loader
+    instances: Mapping[str, Instance]
 
     def start(self) -> None:
         """Every check comes first: nothing has started when something is missing."""
@@ -82,11 +84,40 @@ class Built:
         return [f"{what}; state it with volery.add_time()"]
 
 
+Truth = Callable[[], Position]
+"""Where a vehicle really is."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """The part of a model that one process runs: its instances, its graph, and its way to the others.
+
+    ``reach(caller, callee)`` gives the port of an instance here to one that is elsewhere. ``nodes`` are those
+    that instances have already, by the instances' names; ``truth`` says where a vehicle really is.
+    """
+
+    graph: RosGraph
+    instances: tuple[InstanceModel, ...]
+    reach: Callable[[InstanceModel, InstanceModel], Port]
+    nodes: Mapping[str, Node] = field(default_factory=dict)
+    truth: Callable[[str], Truth] | None = None
+
+
 class Builder:
-    """Makes the components of one run."""
+    """Makes the components of one run, or of the *part* of it that is this process's.
+
+    Without an *airfield* the vehicles are elsewhere.
+    """
 
     def __init__(
-        self, system: System, kernel: VirtualKernel, platform: Platform, airfield: Airfield, ending: Ending
+        self,
+        system: System,
+        kernel: Kernel,
+        platform: Platform,
+        airfield: Airfield | None,
+        ending: Ending,
+        *,
+        part: Part | None = None,
     ) -> None:
         self._system = system
         self._kernel = kernel
@@ -94,30 +125,32 @@ class Builder:
         self._airfield = airfield
         self._ending = ending
         self._fence = fence_of(system.environment)
-        self._graph = Graph(kernel, platform.price, platform.carry)
-        self._nodes: dict[str, EmbeddedNode] = {}
+        self._part = part
+        self._truth = airfield.truth if airfield else part.truth if part else None
+        self._models = part.instances if part else system.instances
+        self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.carry)
+        self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._vehicles: dict[str, Vehicle] = {}
         self._instances: dict[str, Instance] = {}
 
     def build(self, fidelity: str, seed: int) -> Built:
         """Load every file, make every instance, connect every port."""
         steps = Steps() if fidelity == "code" else None
-        for model in self._system.instances:
+        for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component))
         launches = self._launches()
         faces = (face.modules(self._graph, launches, self._nodes) for face in (rospy, rclpy))
         modules = {name: module for face in faces for name, module in face.items()}
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
-        models = self._system.instances
-        self._instances = {model.name: self._instance(model, steps) for model in models}
-        starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in models))
-        return Built(starters, loader)
+        self._instances = {model.name: self._instance(model, steps) for model in self._models}
+        starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
+        return Built(starters, loader, self._instances)
 
     def _launches(self) -> dict[str, Launch]:
         return {
             model.name: Launch(model.namespace, model.remap, dict(model.parameters))
-            for model in self._system.instances
+            for model in self._models
             if is_node(model)
         }
 
@@ -181,10 +214,14 @@ class Builder:
         return found
 
     def _body(self, vehicle: str) -> Body:
+        assert self._airfield is not None, "components of the environment live where the vehicles are"
         return Body(self._kernel, vehicle, self._airfield.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
-        here, there = model.processor, self._system.instance(callee).processor
+        other = self._system.instance(callee)
+        if self._part is not None and callee not in self._instances:
+            return self._part.reach(model, other)
+        here, there = model.processor, other.processor
         return Port(
             self._kernel,
             model.name,
@@ -195,8 +232,10 @@ class Builder:
 
     def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
         """Join the graph and command vehicles over it."""
-        node = self._graph.node(model.name, model.namespace, remaps=model.remap)
-        self._nodes[model.name] = node
+        node = self._nodes.get(model.name)
+        if node is None:
+            node = self._graph.node(model.name, model.namespace, remaps=model.remap)
+            self._nodes[model.name] = node
         found: dict[str, Any] = {}
         for connection in commands:
             vehicles = [
@@ -205,10 +244,10 @@ class Builder:
             found[connection.port] = vehicles if connection.many else vehicles[0]
         return found
 
-    def _vehicle(self, node: EmbeddedNode, name: str, interface: str) -> Drone | Rover:
+    def _vehicle(self, node: Node, name: str, interface: str) -> Drone | Rover:
         served = serving(self._autopilot(name), name)
         driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace})
-        truth = self._airfield.truth(name)
+        truth = self._truth(name) if self._truth else None
         vehicle = (
             Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
             if interface == "Drone"
@@ -221,19 +260,21 @@ class Builder:
     # -- nodes that serve vehicles
 
     def _vehicle_nodes(self) -> Iterable[Callable[[], object]]:
+        if self._airfield is None:
+            return
         commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
             if vehicle.name in commanded:
                 serving(vehicle.autopilot, vehicle.name)  # one that cannot be served is told before the start
-                yield partial(self._serve, vehicle.name, vehicle.processor)
+                yield partial(self._serve, self._airfield, vehicle.name, vehicle.processor)
 
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
 
-    def _serve(self, name: str, processor: str | None) -> None:
+    def _serve(self, airfield: Airfield, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""
         place = Place(node_name(name), self._platform.processors[processor] if processor else None)
-        serve(self._graph, self._airfield, name, serving(self._autopilot(name), name), place)
+        serve(self._graph, airfield, name, serving(self._autopilot(name), name), place)
 
 
 def _kind(connection: Connection) -> TargetKind | None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
+from typing import Protocol
 
 from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, Ns
@@ -20,12 +21,22 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Place, Scope
 from volery.requirements.record import Status
 from volery.trace.events import Failure
-from volery.vehicles import Vehicle
 
 FOREVER: Ns = 2**63 - 1
 
 SAFETY_WITHIN: Ns = 10 * MINUTE
 """Of run time: a vehicle that is not down by then is left to its autopilot, and named."""
+
+
+class Lands(Protocol):
+    """A vehicle, or whoever answers for some."""
+
+    @property
+    def name(self) -> str:
+        """Who."""
+
+    def come_to_rest(self) -> object:
+        """Bring down what is armed and nobody else's; blocks until that is done."""
 
 
 class Ending:
@@ -35,7 +46,7 @@ class Ending:
         self._kernel = kernel
         self.users: Scope = kernel.root.child("components")
         self._safety: Scope = kernel.root.child("safety")
-        self.vehicles: Sequence[Vehicle] = ()
+        self.vehicles: Sequence[Lands] = ()
         self.status: Status = "completed"
         self.reason = ""
         self.error: VoleryError | None = None
@@ -63,7 +74,7 @@ class Ending:
             self._kernel.cancel(self._kernel.root, reason)
         self._kernel.call_at(self._kernel.now() + SAFETY_WITHIN, self._give_up)
 
-    def _bring_down(self, vehicle: Vehicle) -> None:
+    def _bring_down(self, vehicle: Lands) -> None:
         try:
             vehicle.come_to_rest()
         except VoleryError as error:

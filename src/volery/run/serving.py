@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from volery.base.errors import CapabilityError
 from volery.base.seeds import stream
 from volery.bridge import serve_pprzros, serve_vehicle
-from volery.graph import Graph
+from volery.graph import RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
@@ -25,7 +25,7 @@ from volery.run.graph_wire import GraphWire, private_graph
 from volery.run.simulated import Simulated, link_to
 from volery.vehicles.driver import Driver, Opener, drivers
 
-Serve = Callable[[Graph, Link, str, Place], object]
+Serve = Callable[[RosGraph, Link, str, Place], object]
 """``serve(graph, link, vehicle, place)``."""
 
 NODES: Mapping[str, Serve] = {"MAVLink": serve_vehicle, "pprzlink": serve_pprzros}
@@ -54,7 +54,7 @@ def serving(autopilot: str, vehicle: str) -> Serving:
     return Serving(factory.on_graph, factory.namespace.format(name=vehicle))
 
 
-def serve(graph: Graph, airfield: Airfield, vehicle: str, how: Serving, place: Place) -> None:
+def serve(graph: RosGraph, airfield: Airfield, vehicle: str, how: Serving, place: Place) -> None:
     """Start the node that serves a simulated *vehicle*, computing at *place*."""
     codec = airfield.family(vehicle).codec
     if codec is None:

@@ -13,7 +13,8 @@ from volery.model.reader import load
 from volery.model.system import System
 from volery.requirements.observables import Observers
 from volery.run.airfield import Airfield
-from volery.run.build import Builder
+from volery.run.apart import Apart, Host, Order, unallocated, without_computers
+from volery.run.build import Builder, Built
 from volery.run.ending import Ending
 from volery.run.faults import inject
 from volery.run.platform import Platform
@@ -24,11 +25,14 @@ from volery.run.result import Run
 from volery.run.setup import attachments_of, setup_of
 from volery.run.vocabulary import vocabulary
 from volery.trace.events import Text
+from volery.trace.setup import RunSetup
 
 FIDELITIES = ("times", "code")
 LATER = ("firmware", "hardware")
 WHO, WARNING = "volery", 4
 """Under this name and severity a run says what is doubtful about it."""
+
+NOT_MODELLED = "its components compute on this machine and not on the model's processors"
 
 PATIENCE_S = 30.0
 """Seconds on the wall that a component may compute without letting virtual time go on."""
@@ -41,7 +45,8 @@ GOAL_PERIOD: Ns = 100 * MS
 class Options:
     """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes.
 
-    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once.
+    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once. ``graph``
+    (``ros1``, ``ros2``): with the components as processes on that graph, at a pace of 1 unless one is given.
     """
 
     fidelity: str = "times"
@@ -50,6 +55,7 @@ class Options:
     out: Path | None = None
     show: Show | None = None
     tell: Tell | None = None
+    graph: str = ""
 
 
 AS_USUAL = Options()
@@ -76,7 +82,12 @@ def simulate(
         system = model
     else:
         system = load(model, vocabulary(), scenario, allocation, overrides)
-    return _Simulation(system, options).run()
+    simulation = _OnGraph(system, options) if options.graph else _Simulation(system, options, options.pace)
+    try:
+        simulation.prepare()
+        return simulation.run()
+    finally:
+        simulation.leave()
 
 
 def _check_fidelity(fidelity: str) -> None:
@@ -87,21 +98,37 @@ def _check_fidelity(fidelity: str) -> None:
 
 
 class _Simulation:
-    """One execution of ``simulate``."""
+    """One execution of ``simulate``, with everything in this process."""
 
-    def __init__(self, system: System, options: Options) -> None:
+    def __init__(self, system: System, options: Options, pace: float | None = None) -> None:
         self._system = system
-        self._kernel = kernel = VirtualKernel(pace=options.pace, watchdog_s=PATIENCE_S)
-        platform = Platform(system, kernel, options.seed, options.fidelity)
+        self._options = options
+        self._kernel = VirtualKernel(pace=pace, watchdog_s=PATIENCE_S)
+        self._ending = Ending(self._kernel)
+
+    def _platform(self) -> Platform:
+        options = self._options
+        platform = Platform(self._system, self._kernel, options.seed, options.fidelity)
         platform.foresee()
-        setup = setup_of(system, platform, options.seed, options.fidelity)
-        self._ending = Ending(kernel)
+        return platform
+
+    def _setup(self, platform: Platform) -> RunSetup:
+        return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
+
+    def _build(self, platform: Platform) -> Built:
+        builder = Builder(self._system, self._kernel, platform, self._airfield, self._ending)
+        return builder.build(self._options.fidelity, self._options.seed)
+
+    def prepare(self) -> None:
+        """Make what the run is made of. Raises what is wrong with the model."""
+        system, kernel, options = self._system, self._kernel, self._options
+        platform = self._platform()
+        setup = self._setup(platform)
         surroundings = system.environment
         self._airfield = Airfield(
             kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed
         )
-        builder = Builder(system, kernel, platform, self._airfield, self._ending)
-        self._built = builder.build(options.fidelity, options.seed)
+        self._built = self._build(platform)
         self._recording = Recording(setup, options.out, attachments_of(system))
         kernel.record = self._recording.stream
         self._observers = Observers(system.requirements, setup)
@@ -127,13 +154,20 @@ class _Simulation:
         kernel.call_at(self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up"))
         try:
             with ending.signals():
-                self._built.start()
+                self._start()
                 left = ending.pass_time()
         except BaseException as fault:
             ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
             self._close(())
             raise
-        return self._close(left)
+        return self._close([*left, *self.leave()])
+
+    def _start(self) -> None:
+        self._built.start()
+
+    def leave(self) -> list[str]:
+        """Leave nothing behind; returns the names of those that would not go."""
+        return []
 
     def _close(self, left: Sequence[str]) -> Run:
         now, ending = self._kernel.now(), self._ending
@@ -143,3 +177,33 @@ class _Simulation:
         verdicts = self._observers.verdicts(now)
         record = self._recording.finish(ending.status, ending.reason, now, verdicts)
         return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
+
+
+class _OnGraph(_Simulation):
+    """One execution of ``simulate`` on a real graph: components are processes, see ``volery.run.apart``."""
+
+    def __init__(self, system: System, options: Options) -> None:
+        pace = options.pace or 1.0
+        system, self._unjudged = without_computers(system)
+        super().__init__(system, options, pace)
+        self._apart = Apart(system, self._kernel, self._ending, Order(options.graph, pace, options.seed))
+
+    def _platform(self) -> Platform:
+        host = Host(self._system, self._kernel, self._options.seed, self._options.fidelity)
+        for name in self._unjudged:
+            host.warnings[f"the requirement {name!r} is not judged: {NOT_MODELLED}"] = None
+        return host
+
+    def _setup(self, platform: Platform) -> RunSetup:
+        return setup_of(unallocated(self._system), platform, self._options.seed, self._options.fidelity)
+
+    def _build(self, platform: Platform) -> Built:
+        return self._apart.build(platform, self._airfield)
+
+    def _start(self) -> None:
+        self._apart.start()
+        super()._start()
+
+    def leave(self) -> list[str]:
+        """See ``_Simulation.leave``."""
+        return self._apart.close()

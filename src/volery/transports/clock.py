@@ -25,15 +25,15 @@ class Followable(Protocol):
         """Let time pass."""
 
 
-def tell(context: Context, wire: Wire) -> Callable[[], None]:
-    """Publish the kernel's time as ``/clock`` each 10 ms of it, whoever listens. Returns what ends it."""
+def tell(context: Context, wire: Wire, period: Ns = CLOCK_PERIOD) -> Callable[[], None]:
+    """Publish the kernel's time as ``/clock`` each *period* of it, whoever listens. Returns what ends it."""
     outlet = wire.advertise(CLOCK, CLOCK_TYPE, QoS(depth=1))
 
     def tick() -> None:
         sec, nanosec = divmod(context.stamp(), S)
         outlet.send(to_cdr(new(CLOCK_TYPE, clock={"sec": sec, "nanosec": nanosec})))
 
-    ticking = context.kernel.every(CLOCK_PERIOD, tick)
+    ticking = context.kernel.every(period, tick)
 
     def end() -> None:
         ticking.cancel()
@@ -42,8 +42,10 @@ def tell(context: Context, wire: Wire) -> Callable[[], None]:
     return end
 
 
-def follow(context: Context, wire: Wire) -> Callable[[], None]:
+def follow(context: Context, wire: Wire, since: Ns | None = None) -> Callable[[], None]:
     """Let the kernel's time be what ``/clock`` says. Returns what ends it.
+
+    *since* is ROS time at the kernel's zero, where that is agreed; else it is what is heard first.
 
     The kernel's time never goes back: where ``/clock`` does (a simulation or a recording begins anew), ROS
     time does, and what waits goes on waiting for the time that is left. ``UsageError`` for a kernel whose
@@ -55,7 +57,7 @@ def follow(context: Context, wire: Wire) -> Callable[[], None]:
             f"a {type(kernel).__name__} keeps its own time; to follow {CLOCK} take a FollowingKernel"
         )
     guard = threading.Lock()
-    last: list[Ns] = []
+    last = [] if since is None else [since]
 
     def arrived(parcel: Parcel) -> None:
         stamp = parcel.read(parcel.data).clock.to_nsec()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
+from volery.graph.clock import CLOCK_PERIOD
 from volery.graph.context import Context, Records
 from volery.graph.graph import everything
 from volery.graph.node import Cost, NodeId, RosGraph, ServiceState, TopicState
@@ -54,6 +55,7 @@ class TransportGraph:
         self, kernel: Kernel, library: Library, *, records: Records = everything, epoch: Ns | None = None
     ) -> None:
         self.kernel = kernel
+        self._since = epoch
         if epoch is None:
             epoch = time_ns() - kernel.now()
         self._context = Context(kernel, _price, _carry, records, epoch, Signal(kernel, "the ROS graph"))
@@ -118,28 +120,31 @@ class TransportGraph:
         del self._nodes[node.name]
         node.part()
 
-    def tell_clock(self, name: str = "clock") -> None:
-        """Publish ``/clock`` from a node *name*, for others to use as their time.
+    def tell_clock(self, node: TransportNode | str = "clock", period: Ns = CLOCK_PERIOD) -> None:
+        """Publish ``/clock`` from *node* (or a new one of that name), for others to use as their time.
 
         On ROS 1 ``/use_sim_time`` is set, which nodes read when they start; on ROS 2 each node is told by
         its own parameter ``use_sim_time``.
         """
-        self._keep_time(name, clock.tell)
+        self._keep_time(node, partial(clock.tell, period=period), self._library.announce_clock)
 
-    def follow_clock(self, name: str = "clock_listener") -> None:
-        """Let the kernel's time be what ``/clock`` says, heard by a node *name*.
+    def follow_clock(self, node: TransportNode | str = "clock_listener") -> None:
+        """Let the kernel's time be what ``/clock`` says, heard by *node* (or a new one of that name).
 
         Until it says something, time stands still. ``UsageError`` for a kernel that keeps its own time.
         """
-        self._keep_time(name, clock.follow)
+        self._keep_time(node, partial(clock.follow, since=self._since))
 
-    def _keep_time(self, name: str, way: Callable[[Context, Wire], Callable[[], None]]) -> None:
-        node = self.node(name)
-        telling = way is clock.tell
+    def _keep_time(
+        self,
+        where: TransportNode | str,
+        way: Callable[[Context, Wire], Callable[[], None]],
+        before: Callable[[], None] = lambda: None,
+    ) -> None:
+        node = self.node(where) if isinstance(where, str) else where
 
         def begin() -> Callable[[], None]:
-            if telling:
-                self._library.announce_clock()
+            before()
             return way(self._context, node.wire)
 
         node.keep(abroad(self.kernel, "/clock", begin))
