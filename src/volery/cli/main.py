@@ -119,6 +119,10 @@ def simulate(
     seed: Seed = 1,
     overrides: Overrides = None,
     speed: Annotated[str, typer.Option(help="Simulated seconds per second: max, 1, 10 ...")] = "max",
+    graph: Annotated[
+        str,
+        typer.Option(metavar="ros1|ros2", help="With each component as a process on that graph; --speed 1."),
+    ] = "",
     out: Out = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -131,7 +135,8 @@ def simulate(
     from volery.cli import simulate as command
 
     output = Output(quiet, as_json, debug)
-    wanted = command.Wanted(model, fidelity, allocation, scenario, seed, tuple(overrides or ()), speed, out)
+    changes = tuple(overrides or ())
+    wanted = command.Wanted(model, fidelity, allocation, scenario, seed, changes, speed, out, graph)
     run_command(output, lambda: command.simulate(output, wanted))
 
 
@@ -187,6 +192,53 @@ def vehicle(
     output = Output(quiet, False, debug)
     wanted = command.Wanted(autopilot, listen, speed, home, kind, sensors, seed, system, graph)
     run_command(output, lambda: command.vehicle(output, wanted))
+
+
+@app.command()
+def bridge(
+    url: Annotated[str, typer.Argument(metavar="URL", help="ardupilot+serial:///dev/ttyUSB0, sim:px4 ...")],
+    graph: Annotated[
+        str, typer.Option(metavar="ros1|ros2", help="The graph to put the vehicle on.")
+    ] = "ros1",
+    names: Annotated[
+        str, typer.Option(metavar="mavros|roscopter|pprzros", help="Whose names; else the usual ones.")
+    ] = "",
+    namespace: Annotated[str, typer.Option(metavar="/NAME", help="Where they begin, such as /mavros.")] = "",
+    rate: Annotated[int, typer.Option(help="What the autopilot is asked for, Hz; 0: nothing.")] = 10,
+    enable_control: Annotated[
+        bool, typer.Option("--enable-control", help="Take roscopter's send_rc; MAVROS's names need no leave.")
+    ] = False,
+    source_system: Annotated[int, typer.Option(help="The MAVLink system id that it speaks as.")] = 255,
+    geoid: Annotated[
+        str, typer.Option(metavar="egm96|METRES", help="Mean sea level above the ellipsoid.")
+    ] = "egm96",
+    speed: Annotated[float, typer.Option(help="Of a simulated vehicle: seconds per second.")] = 1.0,
+    seed: Seed = 1,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Put a vehicle on a real ROS graph under the names of MAVROS, roscopter or pprzros, until Ctrl-C.
+
+    In real time, over serial lines (57600 baud unless the address says ?baud=...), UDP and TCP; a link that
+    breaks is opened again.
+    """
+    from volery.cli import bridge as command
+    from volery.run.bridging import Bridging
+
+    output = Output(quiet, False, debug)
+    wanted = Bridging(
+        url=url,
+        graph=graph,
+        names=names,
+        namespace=namespace,
+        rate=rate,
+        control=enable_control,
+        system=source_system,
+        geoid=geoid,
+        speed=speed,
+        seed=seed,
+    )
+    run_command(output, lambda: command.bridge(output, wanted))
 
 
 @app.command()

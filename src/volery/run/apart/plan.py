@@ -78,9 +78,7 @@ class Host(Platform):
     """This machine: computing takes the time that it takes, and costs nothing beside."""
 
     def __init__(self, system: System, kernel: Kernel, seed: int, fidelity: str) -> None:
-        virtual = cast(
-            "VirtualKernel", kernel
-        )  # there is no processor that it would serve
+        virtual = cast("VirtualKernel", kernel)  # there is no processor that it would serve
         super().__init__(system, virtual, seed, fidelity)
 
     def foresee(self) -> None:
