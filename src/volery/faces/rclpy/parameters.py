@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.faces.rclpy.constraints import unfit
 from volery.faces.rclpy.errors import (
     InvalidParameterException,
     InvalidParameterTypeException,
@@ -99,7 +100,6 @@ class Declared:
         self._overrides = {one.name: one.value for one in overrides}
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Any] = {}
-        self._expected: dict[str, Parameter.Type | None] = {}
         self._watchers: list[Watcher] = []
 
     def watch(self, callback: Watcher) -> None:
@@ -127,12 +127,14 @@ class Declared:
             kind = Parameter.Type.from_parameter_value(value())
         default = None if kind is not None else value
         given = default if ignore else self._given(name, private, default)
-        self._descriptors[name] = descriptor or new(_DESCRIPTOR, name=name)
-        if kind is None and given is not None:
+        described = self._descriptors[name] = descriptor or new(_DESCRIPTOR)
+        if kind is None and given is not None and not described.dynamic_typing:
             kind = Parameter(name, value=default if default is not None else given).type_
+        described.name, described.type = name, int(kind or 0)
         parameter = Parameter(name, kind if given is not None else None, self._fitting(kind, given))
-        self._expected[name] = kind
         refused = self._refused([parameter])
+        if refused.startswith("Wrong parameter type"):
+            raise InvalidParameterTypeException(parameter, Parameter.Type(described.type).name)
         if refused:
             raise InvalidParameterValueException(name, given, refused)
         self._keep(parameter)
@@ -168,7 +170,7 @@ class Declared:
             if self._undeclared_allowed:
                 return Parameter(name)
             raise ParameterNotDeclaredException(name)
-        if found.value is None and self._expected.get(name) is not None:
+        if found.value is None and self._descriptors[name].type:
             raise ParameterUninitializedException(name)
         return found
 
@@ -197,31 +199,19 @@ class Declared:
         if why:
             return new(_RESULT, successful=False, reason=why)
         for parameter in parameters:
-            self._descriptors.setdefault(parameter.name, new(_DESCRIPTOR, name=parameter.name))
+            kind = int(parameter.type_)
+            self._descriptors.setdefault(parameter.name, new(_DESCRIPTOR, name=parameter.name, type=kind))
             self._keep(parameter)
         return new(_RESULT, successful=True)
 
     def _refused(self, parameters: list[Parameter]) -> str:
         for one in parameters:
-            why = self._unfit(one)
+            descriptor = self._descriptors.get(one.name)
+            why = "" if descriptor is None else unfit(one, descriptor, declared=one.name in self._parameters)
             if why:
                 return why
         for watcher in self._watchers:
             result = watcher(parameters)
             if not result.successful:
                 return result.reason or "a callback refused it"
-        return ""
-
-    def _unfit(self, one: Parameter) -> str:
-        descriptor, expected = self._descriptors.get(one.name), self._expected.get(one.name)
-        if descriptor is None:
-            return ""
-        if descriptor.read_only and one.name in self._parameters:
-            return f"Trying to set a read-only parameter: {one.name}."
-        if expected and one.type_ and one.type_ is not expected and not descriptor.dynamic_typing:
-            return str(InvalidParameterTypeException(one, expected.name).args[0])
-        ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
-        for bound in ranges if isinstance(one.value, (int, float)) else ():
-            if not bound.from_value <= one.value <= bound.to_value:
-                return f"Parameter {one.name} out of range. Min: {bound.from_value}, Max: {bound.to_value}"
         return ""
