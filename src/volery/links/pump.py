@@ -11,19 +11,25 @@ _JOIN_S = 5.0
 
 
 class Pump:
-    """Runs *body* in a thread of its own until ``stop``. *body* waits only in ``readable``."""
+    """Runs *body* in a thread of its own from ``start`` to ``stop``. *body* waits only in ``readable``.
+
+    What *body* hands to the house may be looked at before ``start`` returns: let go of it when all is in place.
+    """
 
     def __init__(self, name: str, body: Callable[[Pump], None]) -> None:
         self._wake_read, self._wake_write = os.pipe()
         self._stopped = threading.Event()
         self._body = body
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
 
     @property
     def stopped(self) -> bool:
         """It was told to stop."""
         return self._stopped.is_set()
+
+    def start(self) -> None:
+        """Let it go, once."""
+        self._thread.start()
 
     def readable(self, file: int) -> bool:
         """Wait until *file* (a descriptor) can be read, or has ended; False: stop."""

@@ -50,6 +50,7 @@ class StreamLink(CodedLink):
         self._retry = FIRST_RETRY
         self._was_up = False
         self._pump = Pump(name, self._live)
+        self._pump.start()
 
     @abstractmethod
     def _open(self) -> Pipe:
@@ -115,6 +116,7 @@ class StreamLink(CodedLink):
     def _again(self) -> None:
         if not self._closed:
             self._pump = Pump(self.name, self._live)
+            self._pump.start()
 
     def _transmit(self, data: bytes) -> None:
         if self._pipe is None or len(self._unsent) + len(data) > MOST_UNSENT:

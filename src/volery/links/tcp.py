@@ -74,6 +74,7 @@ class _Client:
         self._parser = parser
         self._unsent = bytearray()
         self._pump = Pump(f"tcp {who}", self._read)
+        self._pump.start()
 
     def _read(self, pump: Pump) -> None:
         with suppress(OSError):
@@ -124,6 +125,7 @@ class TcpServer(CodedLink):
         self._joined = joined
         self._clients: list[_Client] = []
         self._pump = Pump(self.name, self._accept)
+        self._pump.start()
 
     @property
     def clients(self) -> int:

@@ -57,6 +57,7 @@ class UdpLink(CodedLink):
         self._peer = self._fixed
         self._heard_at: Ns = -1
         self._pump = Pump(self.name, self._read)
+        self._pump.start()
 
     def _read(self, pump: Pump) -> None:
         while pump.readable(self._socket.fileno()):
