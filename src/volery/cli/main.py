@@ -242,6 +242,20 @@ def bridge(
 
 
 @app.command()
+def interfaces(
+    packages: Annotated[list[str], typer.Argument(help="Such as roscopter, mavros_msgs, pprzros_msgs.")],
+    out: Annotated[Path, typer.Option(help="Where they go, a folder each.")] = Path(),
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write packages of messages and services, so that rostopic and rosservice know their types."""
+    from volery.cli import interfaces as command
+
+    output = Output(quiet, False, debug)
+    run_command(output, lambda: command.interfaces(output, packages, out))
+
+
+@app.command()
 def conformance(
     url: Annotated[
         str, typer.Argument(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...")
