@@ -27,6 +27,8 @@ from volery.vehicles.telemetry import Answer, Telemetry
 SETPOINT_PERIOD: Ns = 20 * MS
 ANSWERED_WITHIN: Ns = 60 * S
 """The vehicle node of 4.1 may answer a task only when it is done."""
+QUIET: Ns = 200 * MS
+"""So long after the last set-point none is on its way any more: one that came later would end a task."""
 LOOK_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
 KEPT = 1000
@@ -58,6 +60,7 @@ class Carrier:
         self._arrived: deque[Work] = deque(maxlen=KEPT)
         self._due = Signal(kernel, f"messages of {names.namespace}")
         self._next: Ns = 0
+        self._sent_at: Ns = -QUIET
         self._silent = False
         self._closed = False
         self._place: Place = replace(node.place, deadline=None, on_release=None, meter=None)
@@ -125,6 +128,12 @@ class Carrier:
             self.names.setpoint(*setpoint)
         except ServiceError as error:
             self._wrong = str(error)
+        self._sent_at = self._kernel.now()
+
+    @property
+    def quiet(self) -> bool:
+        """No set-point is sent or on its way."""
+        return not self.stream.wanted and self._kernel.now() - self._sent_at >= QUIET
 
     def stir(self) -> None:
         """There is something else to send. House code."""

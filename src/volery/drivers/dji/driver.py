@@ -352,7 +352,17 @@ class Dji:
             leads_to=(WAITS, SDK),
         )
         down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode.name)
-        return (begin, down)
+        return (self._quiet(), begin, down)
+
+    def _quiet(self) -> Step:
+        """A set-point that is still on its way would end what is asked for next."""
+        return Step(
+            ask="send no more set-points",
+            send=self._stream.stop,
+            done=lambda seen: self._carrier.quiet,
+            within=ANSWERED_WITHIN,
+            skippable=True,
+        )
 
     # -- by sticks
 
@@ -449,7 +459,7 @@ class Dji:
             leads_to=(WAITS, SDK),
             armed=True,
         )
-        return (*lift, *self._authority(), begin, self._mission_over(plan, within))
+        return (*lift, *self._authority(), self._quiet(), begin, self._mission_over(plan, within))
 
     def _begin_mission(self) -> None:
         self._stream.stop()
