@@ -414,6 +414,35 @@ def calibrate_ros(
     run_command(output, lambda: command.ros(output, wanted))
 
 
+@app.command()
+def measure(
+    model: Model,
+    runs: Annotated[int, typer.Option(help="How often; medians and quartiles are shown.")] = 10,
+    seconds: Annotated[
+        float | None, typer.Option(help="How long each run is; by default as the model's.")
+    ] = None,
+    fidelity: Fidelity = "code",
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run a model's nodes on real ROS here, measure what each takes, and compare with the estimate.
+
+    For models whose components are nodes of rospy or roscpp, on a processor that `volery calibrate` has
+    measured. Exit status: 0 if every estimate is near enough (15 %, or half the quartiles of the runs), 2 for
+    bad input, 1 otherwise.
+    """
+    from volery.cli import measure as command
+
+    output = Output(quiet, as_json, debug)
+    changes = tuple(overrides or ())
+    wanted = command.Wanted(model, runs, seconds, fidelity, allocation, scenario, changes)
+    run_command(output, lambda: command.measure(output, wanted))
+
+
 @model_app.command("check")
 def model_check(
     model: Model,

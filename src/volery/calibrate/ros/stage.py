@@ -133,6 +133,16 @@ def roscpp_program(name: str, sources: Sequence[Path]) -> Path:
 
 
 @contextmanager
+def own_master() -> Iterator[str]:
+    """The address of a ROS master that nobody else is on."""
+    with socket() as asked:
+        asked.bind(("127.0.0.1", 0))
+        port = asked.getsockname()[1]
+    with Roscore(f"http://127.0.0.1:{port}") as core:
+        yield core.uri
+
+
+@contextmanager
 def stage(client: str, python: str = "") -> Iterator[Stage]:
     """A graph of one's own on loopback, with sinks on it, for probes of *client*.
 
@@ -146,8 +156,8 @@ def stage(client: str, python: str = "") -> Iterator[Stage]:
             yield Stage(client, probe, _for_ros2())
         return
     command = (str(_roscpp_probe()),) if client == "roscpp" else probe
-    with Roscore(f"http://127.0.0.1:{_free_port()}") as core:
-        surroundings = environment(core.uri)
+    with own_master() as master:
+        surroundings = environment(master)
         with _sinks((sys.executable, "-m", "volery.calibrate.ros.sinks"), surroundings):
             yield Stage(client, command, surroundings)
 
@@ -191,10 +201,3 @@ def _sinks(command: Sequence[str], surroundings: Mapping[str, str]) -> Iterator[
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-
-
-def _free_port() -> int:
-    with socket() as asked:
-        asked.bind(("127.0.0.1", 0))
-        port: int = asked.getsockname()[1]
-        return port
