@@ -25,6 +25,7 @@ from volery.messages import define_imported
 from volery.model.system import Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.run.airfield import Airfield
+from volery.run.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.ending import Ending
 from volery.run.fences import fence_of
 from volery.run.platform import Platform, commanded_by, is_node
@@ -140,6 +141,8 @@ class Builder:
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component))
         launches = self._launches()
+        compiled = compile_all(self._models, self._system)
+        self._cpp = CppPrograms(self._kernel, self._graph, compiled, launches, self._nodes)
         faces = (face.modules(self._graph, launches, self._nodes) for face in (rospy, rclpy))
         modules = {name: module for face in faces for name, module in face.items()}
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
@@ -190,6 +193,8 @@ class Builder:
         if not component.path:
             period = model.activity.period_ns if model.activity else None
             return StubProgram(self._kernel, self._operations(model), period)
+        if is_cpp(component):
+            return self._cpp.program(model)
         path = self._system.file_of(component)
         chosen = component.class_name
         if component.language in PYTHON_ROS and not component.class_stated:
@@ -264,7 +269,7 @@ class Builder:
             return
         commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
-            if vehicle.name in commanded:
+            if vehicle.name in commanded or vehicle.processor is not None:
                 serving(vehicle.autopilot, vehicle.name)  # one that cannot be served is told before the start
                 yield partial(self._serve, self._airfield, vehicle.name, vehicle.processor)
 

@@ -20,7 +20,7 @@ from volery.graph.node import NodeId
 from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.virtual import VirtualKernel
-from volery.model.system import ROS_LANGUAGES, Figure, Instance, System, TargetKind
+from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
 
@@ -105,8 +105,14 @@ class Platform:
         """What the own computing of *instance* costs, at this run's fidelity."""
         if instance.processor is None:
             return FREE
-        if self._fidelity == "code" and instance.component.path:
-            return self._counted(instance, instance.processor)
+        component = instance.component
+        if self._fidelity == "code" and component.path:
+            if component.language not in CPP_LANGUAGES:
+                return self._counted(instance, instance.processor)
+            if not (component.activation or component.operations):
+                what = f"what {instance.name} computes is not counted: it is C++"
+                self.warnings[f"{what}; state times in the model, or call uc_add_times()"] = None
+                return FREE
         return self._stated(instance, instance.processor)
 
     def _counted(self, instance: Instance, processor: str) -> Pricing:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from volery.base.errors import CapabilityError, UsageError, choices
 from volery.base.time import MS, Ns
+from volery.components.cpp.build import build_house
 from volery.kernel.virtual import VirtualKernel
 from volery.model.reader import load
 from volery.model.system import System
@@ -15,6 +17,7 @@ from volery.requirements.observables import Observers
 from volery.run.airfield import Airfield
 from volery.run.apart import Apart, Host, Order, unallocated, without_computers
 from volery.run.build import Builder, Built
+from volery.run.cpp import compile_all, has_cpp
 from volery.run.ending import Ending
 from volery.run.faults import inject
 from volery.run.platform import Platform
@@ -22,7 +25,9 @@ from volery.run.power import PowerFeed
 from volery.run.progress import Reporter, Show, Tell
 from volery.run.recording import Recording
 from volery.run.result import Run
+from volery.run.salvage import salvage
 from volery.run.setup import attachments_of, setup_of
+from volery.run.supervised import Supervision, supervised
 from volery.run.vocabulary import vocabulary
 from volery.trace.events import Text
 from volery.trace.setup import RunSetup
@@ -82,12 +87,36 @@ def simulate(
         system = model
     else:
         system = load(model, vocabulary(), scenario, allocation, overrides)
+    if has_cpp(system) and not options.graph:
+        return _supervised(system, options)
+    return _simulated(system, options)
+
+
+def _simulated(system: System, options: Options) -> Run:
+    """In this process."""
     simulation = _OnGraph(system, options) if options.graph else _Simulation(system, options, options.pace)
     try:
         simulation.prepare()
         return simulation.run()
     finally:
         simulation.leave()
+
+
+def _supervised(system: System, options: Options) -> Run:
+    """In a process of its own: C++ components may end it."""
+    compiled = compile_all(system.instances, system, options.tell)
+    libraries = {
+        instance.name: compiled[instance.component.name].library
+        for instance in system.instances
+        if instance.component.name in compiled
+    }
+    supervision = Supervision(build_house(), libraries, PATIENCE_S)
+    return supervised(
+        lambda show: _simulated(system, replace(options, show=show, tell=None)),
+        options.show,
+        supervision,
+        partial(salvage, system, options.out, options.seed, options.fidelity),
+    )
 
 
 def _check_fidelity(fidelity: str) -> None:

@@ -10,7 +10,7 @@ from volery.model.system import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
 from volery.run.faults import KINDS
 
-LANGUAGES = frozenset({"python", "rclpy", "rospy"})
+LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
 """Languages of components that run today."""
 
 

@@ -6,6 +6,7 @@
 
 #include <cxxabi.h>
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <pthread.h>
 #include <sys/mman.h>
 #include <ucontext.h>
@@ -127,16 +128,29 @@ void volery_return(volery_flow* which, const char* how, const char* data, std::u
 namespace {
 
 constexpr unsigned int TICKS = 4;  // looks within the patience
+constexpr int FRAMES = 64;
 int report_to = -1;
 
-// One line: whose doing, what, at which address, and where in its library the code stood.
-void report(const char* what, const void* address, const void* at) {
+// Where in the component's library the code stood: the innermost of its frames, 0 if there is none.
+unsigned long place_in_library(const void* counter) {
+    Dl_info library{};
+    dladdr(reinterpret_cast<void*>(last->dispatch), &library);
+    void* frames[FRAMES];
+    int const count = backtrace(frames, FRAMES);
+    for (int index = 0; index < count; ++index) {
+        Dl_info place{};
+        if (dladdr(frames[index], &place) == 0 || place.dli_fbase != library.dli_fbase) continue;
+        auto const offset = static_cast<char*>(frames[index]) - static_cast<char*>(place.dli_fbase);
+        return static_cast<unsigned long>(offset) - (frames[index] == counter ? 0 : 1);  // of the call itself
+    }
+    return 0;
+}
+
+// One line: whose doing, what, at which address, and where in its library. Nothing of this process goes on.
+void report(const char* what, const void* address, const void* counter) {
     char line[512];
-    Dl_info place{};
-    dladdr(at, &place);
-    auto const offset = reinterpret_cast<std::uintptr_t>(at) - reinterpret_cast<std::uintptr_t>(place.dli_fbase);
     int const size = std::snprintf(line, sizeof line, "%s\t%s\t%p\t%lx\n", last->component, what, address,
-                                   static_cast<unsigned long>(offset));
+                                   place_in_library(counter));
     if (size > 0 && write(report_to, line, static_cast<std::size_t>(size)) < 0) _exit(3);
     _exit(2);
 }
@@ -194,6 +208,8 @@ void handle(int signal, void (*handler)(int, siginfo_t*, void*), int flags) {
 
 void volery_guard(std::int32_t to, double patience_s) {
     report_to = to;
+    void* frame = nullptr;
+    backtrace(&frame, 1);  // loads what it needs, which must not happen in a handler
     static char emergency[65536];  // a handler's own stack: the component's may be full
     stack_t stack{};
     stack.ss_sp = emergency;

@@ -1,0 +1,66 @@
+"""What a crash in a component was, from the one line that its dying process wrote."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.base.errors import ComponentError
+
+_LINE = 4096
+_WORDS = {
+    "stack": "its stack is full: it recurses without end, or keeps too much in local variables",
+    "frozen": "virtual time is frozen: it computes and asks nothing any more",
+    str(int(signal.SIGSEGV)): "segmentation fault",
+    str(int(signal.SIGBUS)): "bus error",
+    str(int(signal.SIGFPE)): "arithmetic fault, such as a division of whole numbers by zero",
+    str(int(signal.SIGILL)): "illegal instruction",
+    str(int(signal.SIGABRT)): "aborted: abort(), a failed assertion or an exception that nothing catches",
+}
+
+
+@dataclass(frozen=True)
+class Crash:
+    """Whose doing it was, what happened, and where in the source (empty if that is not known)."""
+
+    component: str
+    what: str
+    where: str = ""
+
+    def error(self) -> ComponentError:
+        """It in words."""
+        return ComponentError(self.component, f"{self.what}{f', in {self.where}' if self.where else ''}")
+
+
+def read_crash(report: int, libraries: Mapping[str, Path]) -> Crash | None:
+    """The crash that was reported to the file descriptor *report*, ``None`` if none was.
+
+    *libraries* are the components' by the instances' names, to find source lines in. The other end must be
+    closed.
+    """
+    line = os.read(report, _LINE).decode(errors="replace").strip("\n")
+    if not line:
+        return None
+    component, what, address, offset = line.split("\t")
+    words = _WORDS.get(what, f"signal {what}")
+    if what == str(int(signal.SIGSEGV)):
+        words = f"{words} at address {'0' if address == '(nil)' else address}"
+    library = libraries.get(component)
+    return Crash(component, words, _source_line(library, offset) if library else "")
+
+
+def _source_line(library: Path, offset: str) -> str:
+    """``Pilot::run() (pilot.cpp:12)``; empty without ``addr2line`` or where it knows nothing."""
+    program = shutil.which("addr2line")
+    if program is None or int(offset, 16) == 0:
+        return ""
+    command = [program, "-C", "-f", "-s", "-e", str(library), f"0x{offset}"]
+    said = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
+    if len(said) < 2 or said[1].startswith("?"):
+        return ""
+    return f"{said[0]} ({said[1].partition(' ')[0]})"
