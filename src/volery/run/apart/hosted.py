@@ -103,12 +103,18 @@ class Hosted:
 
     def _listen(self) -> None:
         try:
-            while isinstance(end := self._run.hear(), pipe.There):
-                self._answers.put(end.position)
+            while True:
+                said = self._run.hear()
+                if isinstance(said, pipe.There):
+                    self._answers.put(said.position)
+                else:
+                    self._end(said.why)
         except EOFError:
-            end = pipe.End("its run is gone")
             threading.Timer(ORPHAN_S, partial(os._exit, 1)).start()
-        self._kernel.post(partial(self._ending.begin, "interrupted", end.why))
+            self._end("its run is gone")
+
+    def _end(self, why: str) -> None:
+        self._kernel.post(partial(self._ending.begin, "interrupted", why))
 
 
 def main() -> None:
