@@ -47,6 +47,12 @@ def is_node(instance: Instance) -> bool:
     return bool(commanded_by(instance)) or instance.component.language in ROS_LANGUAGES
 
 
+def ros_language(instance: Instance) -> str:
+    """The language whose client library its calls into ROS are charged as."""
+    language = instance.component.language
+    return "roscpp" if language == "c++" else language
+
+
 VEHICLE_NODE_LANGUAGE = "roscpp"
 """The node that serves a vehicle stands for MAVROS, which is written with roscpp."""
 
@@ -63,7 +69,7 @@ class Platform:
         self._entries = {model.name: known.processor(model.kind) for model in system.processors}
         self.processors = {model.name: self._processor(model) for model in system.processors}
         self._networks = {model.name: self._network(model, seed) for model in system.networks}
-        self._languages = {instance.name: instance.component.language for instance in system.instances}
+        self._languages = {instance.name: ros_language(instance) for instance in system.instances}
         self._tariffs: dict[tuple[str, str], Tariff] = {}
         self.warnings: dict[str, None] = {}  # an ordered set
 
@@ -96,10 +102,11 @@ class Platform:
         activity = instance.activity
         priority = activity.priority if activity else None
         deadline = activity.deadline_ns if activity else None
+        start = activity.start_ns if activity else 0
         if instance.processor is None:
-            return Seat(priority=priority, deadline=deadline)
+            return Seat(priority=priority, deadline=deadline, starts_at=start)
         frequency = self._models[instance.processor].frequency_mhz
-        return Seat(self.processors[instance.processor], frequency, priority, deadline)
+        return Seat(self.processors[instance.processor], frequency, priority, deadline, start)
 
     def pricing(self, instance: Instance) -> Pricing:
         """What the own computing of *instance* costs, at this run's fidelity."""
@@ -170,7 +177,7 @@ class Platform:
         for instance in self._system.instances:
             self.pricing(instance)
             if instance.processor is not None and is_node(instance):
-                self._tariff(instance.processor, instance.component.language)
+                self._tariff(instance.processor, ros_language(instance))
         for vehicle in self._system.vehicles:
             if vehicle.processor is not None:
                 self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
