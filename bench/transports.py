@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.faces import rclpy, rospy
+from volery.faces.importable import importable
 from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -137,7 +137,7 @@ def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
         kernel.call_at(kernel.now(), deliver)
 
     graph = Graph(kernel, lambda node, call, x: Free(), carry, records=lambda topic: recorded)
-    face = {"rospy": rospy, "rclpy": rclpy}[library].modules(graph)[library]
+    face = importable(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
     kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))
     kernel.spawn(lambda: TALKERS[library](face, kind, count), "talker", Place("talker"))

@@ -16,7 +16,7 @@ from volery.components.ports import Port, PortList
 from volery.components.python import Program, ScriptProgram, load_program, script_or_class, start
 from volery.components.stand_ins import stand_ins
 from volery.components.stub import StubProgram
-from volery.faces import rclpy, rospy
+from volery.faces.importable import importable
 from volery.faces.launch import Launch
 from volery.graph import Graph, Node, RosGraph
 from volery.kernel.api import Kernel
@@ -143,8 +143,7 @@ class Builder:
         launches = self._launches()
         compiled = compile_all(self._models, self._system)
         self._cpp = CppPrograms(self._kernel, self._graph, compiled, launches, self._nodes)
-        faces = (face.modules(self._graph, launches, self._nodes) for face in (rospy, rclpy))
-        modules = {name: module for face in faces for name, module in face.items()}
+        modules = importable(self._graph, launches, self._nodes)
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))

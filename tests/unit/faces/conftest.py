@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery.base.time import S
-from volery.faces import rclpy, rospy
+from volery.faces.importable import importable
 from volery.faces.launch import Launch
 from volery.graph import EmbeddedNode, Graph
 from volery.kernel.task import Place
@@ -31,10 +31,7 @@ class Stage:
         self.graph = Graph(self.kernel, self._price, self._carry)
         self.launched: dict[str, Launch] = {}
         self.nodes: dict[str, EmbeddedNode] = {}
-        self.modules = {
-            **rospy.modules(self.graph, self.launched, self.nodes),
-            **rclpy.modules(self.graph, self.launched, self.nodes),
-        }
+        self.modules = importable(self.graph, self.launched, self.nodes)
         self.out: list[Any] = []
 
     def _price(self, node: Any, call: str, x: float) -> Free:

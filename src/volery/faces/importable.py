@@ -1,0 +1,45 @@
+"""All that a file written for ROS may import in a run: the faces of rospy and rclpy, tf2, and interfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import NoReturn
+
+from volery.faces import rclpy, rospy, tf2
+from volery.faces.launch import Launch
+from volery.graph import Node, RosGraph
+
+_ABSENT = {
+    "actionlib": "make topics and services of it, or use rclpy.action",
+    "dynamic_reconfigure": "ask rospy.get_param each time, as a parameter may be set while it runs",
+    "dynamic_reconfigure.client": "use rospy.set_param",
+    "dynamic_reconfigure.server": "ask rospy.get_param each time, as a parameter may be set while it runs",
+    "message_filters": "subscribe to each topic and compare the stamps",
+}
+"""Libraries beside the client libraries that are not there, and what to do instead."""
+
+
+def importable(
+    graph: RosGraph,
+    launched: Mapping[str, Launch] | None = None,
+    nodes: Mapping[str, Node] | None = None,
+) -> dict[str, ModuleType]:
+    """The modules by name; *launched* and *nodes* as in ``faces.rospy.modules``."""
+    found = {**rospy.modules(graph, launched, nodes), **rclpy.modules(graph, launched, nodes)}
+    transforms = tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"])
+    return {**found, **transforms, **{name: _absent(name, instead) for name, instead in _ABSENT.items()}}
+
+
+def _absent(name: str, instead: str) -> ModuleType:
+    """A module that says, as soon as something of it is asked for, that it is not there."""
+    module = ModuleType(name)
+    module.__path__ = []
+
+    def missing(attribute: str) -> NoReturn:
+        if attribute.startswith("__"):
+            raise AttributeError(attribute)
+        raise ImportError(f"{name}.{attribute}: {name} is not there on the embedded graph; {instead}")
+
+    vars(module)["__getattr__"] = missing
+    return module
