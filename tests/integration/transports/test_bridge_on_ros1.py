@@ -1,0 +1,142 @@
+"""``volery bridge`` on a real roscore: the session of a thesis with Debian's tools, and flights behind
+MAVROS's names.
+
+The simulated vehicles live four times as fast as real time.
+"""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import volery
+from volery import AboveHome, Position
+from volery.transports.ros1 import Roscore
+from volery.transports.ros1.packages import write_package
+
+from .conftest import LIMIT_S, Run
+from .test_dji_on_ros1 import COMMAND
+
+pytestmark = pytest.mark.integration
+
+Start = Callable[..., Any]
+
+
+def bridged(start: Start, *options: str) -> Any:
+    """A bridge that hears its vehicle."""
+    bridge = start(*COMMAND, "bridge", *options, "--speed", "4")
+    said = ""
+    while "disarmed" not in said:
+        line = bridge.stdout.readline()
+        assert line, said
+        said += line
+    return bridge
+
+
+@pytest.fixture
+def types(tmp_path: Path) -> str:
+    """Lets Debian's tools know roscopter's types: stands before their names."""
+    write_package("roscopter", tmp_path)
+    return f"PYTHONPATH={tmp_path}"
+
+
+@pytest.fixture
+def debian(ros: Run, types: str) -> Run:
+    """Debian's tools."""
+
+    def run(*command: str) -> str:
+        return ros("env", types, *command)
+
+    return run
+
+
+def until(look: Callable[[], Any], what: str) -> Any:
+    """What *look* finds; it takes its time, as it starts a program."""
+    end = time.monotonic() + LIMIT_S
+    while time.monotonic() < end:
+        found = look()
+        if found:
+            return found
+    raise AssertionError(f"not in time: {what}")
+
+
+def heading(debian: Run) -> int:
+    found = re.search(r"heading: (\d+)", debian("rostopic", "echo", "-n1", "/vfr_hud"))
+    assert found
+    return int(found[1])
+
+
+def test_the_session_of_a_thesis(debian: Run, start: Start, types: str) -> None:
+    """gps is looked at, the quadrotor armed, sticks sent that turn it."""
+    patient = "sim:ardupilot?start=warm&parameters=DISARM_DELAY:0"  # starting the tools takes its time
+    bridge = bridged(start, patient, "--names", "roscopter", "--enable-control")
+    gps = until(lambda: re.search(r"status: 0", debian("rostopic", "echo", "-n1", "/gps")), "a fix")
+    assert gps
+    place = debian("rostopic", "echo", "-n1", "/gps")
+    assert re.search(r"latitude: 46\.082", place)
+    assert re.search(r"altitude: (89[5-9]|90[0-5])\.", place)  # above mean sea level
+    assert debian("rosservice", "type", "/arm").strip() == "std_srvs/Empty"
+
+    def armed() -> bool:
+        debian("rosservice", "call", "/arm")
+        return "armed: True" in debian("rostopic", "echo", "-n1", "/state")
+
+    until(armed, "to be armed")
+    sticks = "[1500, 1500, 1620, 1700, 0, 0, 0, 0]"
+    start("env", types, "rostopic", "pub", "-r", "5", "/send_rc", "roscopter/RC", sticks)
+    channels = until(
+        lambda: re.search(r"1620, 1700.*", debian("rostopic", "echo", "-n1", "/rc")), "the sticks"
+    )
+    assert channels[0].endswith("1800, 1000, 1000, 1800]")  # 0 leaves a channel to the remote control
+    before = heading(debian)
+    until(lambda: abs((heading(debian) - before + 180) % 360 - 180) > 20, "it to turn")
+    bridge.send_signal(signal.SIGINT)
+    assert bridge.wait(10) == 0
+    assert "/gps" not in debian("rostopic", "list")
+
+
+def test_without_leave_it_takes_no_sticks(debian: Run, start: Start) -> None:
+    bridged(start, "sim:ardupilot?start=warm", "--names", "roscopter", "--namespace", "/left_alone")
+    listed = debian("rostopic", "list").split()
+    assert "/left_alone/vfr_hud" in listed
+    assert "/left_alone/send_rc" not in listed
+    kind = debian("rostopic", "type", "/left_alone/raw_imu").strip()
+    assert kind == "roscopter/Mavlink_RAW_IMU"
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_a_vehicle_behind_mavros(
+    roscore: Roscore, start: Start, monkeypatch: pytest.MonkeyPatch, autopilot: str
+) -> None:
+    """One process is MAVROS, this one flies."""
+    bridged(start, f"sim:{autopilot}?start=warm", "--names", "mavros", "--namespace", f"/{autopilot}")
+    monkeypatch.setenv("ROS_MASTER_URI", roscore.uri)
+    with volery.connect(f"mavros+ros1:///{autopilot}?autopilot={autopilot}") as drone:
+        drone.wait_ready()
+        home = drone.home
+        assert home.altitude.metres == pytest.approx(900.0, abs=2.0)  # there and back through the geoid
+        drone.takeoff(4.0)
+        goal = Position(home.latitude + 0.00008, home.longitude, AboveHome(5.0))
+        drone.goto(goal)
+        assert drone.position.latitude == pytest.approx(goal.latitude, abs=1e-5)
+        drone.land()
+        assert not drone.armed
+
+
+def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) -> None:
+    ours.graph.node("mavros", "/taken")
+    bridge = start(*COMMAND, "bridge", "sim:ardupilot", "--namespace", "/taken")
+    try:
+        said, _ = bridge.communicate(timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        bridge.kill()
+        raise
+    assert bridge.returncode == 2
+    assert "a node named /taken/mavros is there already" in " ".join(said.split())
