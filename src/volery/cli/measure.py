@@ -14,7 +14,7 @@ from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
-from volery.calibrate.measured.campaign import Show, compare, measured_runs, prepared
+from volery.calibrate.measured.campaign import Show, compare, estimated, measured_runs, prepared
 from volery.calibrate.measured.comparison import Compared
 from volery.cli.console import Output
 from volery.cli.endings import FAILED, OK
@@ -47,9 +47,10 @@ def measure(output: Output, wanted: Wanted) -> int:
     system = _lasting(system, wanted.seconds)
     duration = system.limits.duration_ns
     with _shown(output, wanted.runs, to_seconds(duration)) as show:
+        estimate = estimated(system, wanted.fidelity)
         nodes = prepared(system)
         done, whole = measured_runs(nodes, wanted.runs, duration, show)
-    found = compare(system, done, wanted.fidelity)
+    found = compare(system, estimate, done)
     output.show(*tables(found, system))
     output.give({"system": system.name, "nodes": [one.as_data() for one in found], "complete": whole})
     if not whole:

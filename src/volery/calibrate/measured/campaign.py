@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 
 from volery.base.errors import EstimateError, UsageError
 from volery.base.time import Ns
-from volery.calibrate.measured.comparison import Compared, compared, estimates
+from volery.calibrate.measured.comparison import Compared, Estimate, compared, estimates
 from volery.calibrate.measured.programs import NodeProgram, programs
-from volery.calibrate.measured.runs import measure
+from volery.calibrate.measured.runs import Run, running
 from volery.calibrate.ros.stage import check_client, own_master
 from volery.model.system import System
 from volery.run.simulate import Options, simulate
 
 Show = Callable[[int], None]
 """Told how many runs are done."""
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Estimate and measurement of each node. ``complete`` is false if it was broken off."""
-
-    nodes: tuple[Compared, ...]
-    complete: bool
 
 
 def prepared(system: System) -> tuple[NodeProgram, ...]:
@@ -38,29 +29,31 @@ def prepared(system: System) -> tuple[NodeProgram, ...]:
 
 def measured_runs(
     nodes: Sequence[NodeProgram], count: int, duration: Ns, show: Show = lambda done: None
-) -> tuple[list[dict[str, Ns]], bool]:
+) -> tuple[list[Run], bool]:
     """*count* runs on a master of their own; fewer, and false, if Ctrl-C breaks them off."""
-    done: list[dict[str, Ns]] = []
+    done: list[Run] = []
     try:
-        with own_master() as master:
+        with own_master() as master, running(nodes, master, duration) as run:
             for number in range(count):
                 show(number)
-                done.append(measure(nodes, master, duration))
+                done.append(run())
     except KeyboardInterrupt:
         return done, False
     return done, True
 
 
-def compare(system: System, runs: Sequence[dict[str, Ns]], fidelity: str = "code") -> tuple[Compared, ...]:
-    """Simulate *system* and put what it estimates beside what *runs* measured.
-
-    ``UsageError`` without a run, ``EstimateError`` if the simulation does not come to its end.
-    """
-    if not runs:
-        raise UsageError("no run was measured to its end")
+def estimated(system: System, fidelity: str = "code") -> dict[str, Estimate]:
+    """What a simulation of *system* charges its nodes. ``EstimateError`` if it does not come to its end."""
     run = simulate(system, Options(fidelity=fidelity))
     if not run.completed:
         reason = run.error or run.record.outcome.reason
         raise EstimateError(f"the simulation that estimates {system.name} failed: {reason}")
+    return estimates(run.record, [one.name for one in system.instances if not one.is_environment])
+
+
+def compare(system: System, estimate: Mapping[str, Estimate], runs: Sequence[Run]) -> tuple[Compared, ...]:
+    """Each node's estimate beside what *runs* measured. ``UsageError`` without a run."""
+    if not runs:
+        raise UsageError("no run was measured to its end")
     languages = {one.name: one.component.language for one in system.instances}
-    return tuple(compared(languages, estimates(run.record, list(runs[0])), runs))
+    return tuple(compared(languages, estimate, runs))

@@ -6,17 +6,21 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Self
 
 from volery.base.errors import ComponentError, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.calibrate.measured.programs import NodeProgram
 from volery.transports.ros1.master import Master
 from volery.transports.ros1.roscore import environment
+
+Run = dict[str, Ns]
+"""CPU time of each measured node, by the name of its instance."""
 
 READY: Ns = 30 * S
 SETTLE: Ns = S
@@ -59,24 +63,33 @@ def process_cpu(pid: int) -> Ns:
     return time.clock_gettime_ns((~pid << 3) | 2)
 
 
-def measure(programs: Sequence[NodeProgram], master: str, duration: Ns) -> dict[str, Ns]:
-    """Run all *programs* on the master at that address; what each measured one took in its first *duration*.
+@contextmanager
+def running(programs: Sequence[NodeProgram], master: str, duration: Ns) -> Iterator[Callable[[], Run]]:
+    """The nodes of *programs* that are not measured, for as long as the context lasts, on the master at that
+    address. What it gives runs the others once, and says what each took in its first *duration*.
 
     ``ComponentError`` names a node that ends with an error, ``LinkSilent`` one that does not begin.
     """
-    with TemporaryDirectory(prefix="volery-measure-") as folder, _nodes(Path(folder), master) as start:
-        others = [start(one) for one in programs if not one.measured]
-        _begun(others)
-        _known(Master(master, "/volery"), others)
-        _sleep(SETTLE)
-        measured = [start(one) for one in programs if one.measured]
-        _begun(measured)
-        taken: dict[str, Ns] = {}
-        for node in sorted(measured, key=lambda one: one.began):
+    with TemporaryDirectory(prefix="volery-measure-") as folder:
+        surroundings = {**environment(master), "ROS_LOG_DIR": folder}
+        with _Nodes(Path(folder), surroundings) as others:
+            started = [others.start(one) for one in programs if not one.measured]
+            _begun(started)
+            _known(Master(master, "/volery"), started)
+            _sleep(SETTLE)
+            yield lambda: _run(programs, _Nodes(Path(folder), surroundings), duration)
+
+
+def _run(programs: Sequence[NodeProgram], nodes: _Nodes, duration: Ns) -> Run:
+    with nodes:
+        started = [nodes.start(one) for one in programs if one.measured]
+        _begun(started)
+        taken: Run = {}
+        for node in sorted(started, key=lambda one: one.began):
             _sleep(node.began + duration - time.monotonic_ns())
             taken[node.program.instance] = node.cpu()
             node.look()
-        return {one.instance: taken[one.instance] for one in programs if one.measured}
+    return {one.instance: taken[one.instance] for one in programs if one.measured}
 
 
 def _sleep(duration: Ns) -> None:
@@ -101,25 +114,23 @@ def _known(master: Master, nodes: Sequence[_Running]) -> None:
         _sleep(GLANCE)
 
 
-@contextmanager
-def _nodes(folder: Path, master: str) -> Iterator[_Starter]:
-    starter = _Starter(folder, {**environment(master), "ROS_LOG_DIR": str(folder)})
-    try:
-        yield starter
-    finally:
-        starter.stop()
-
-
-class _Starter:
-    """Starts nodes and stops what it has started."""
+class _Nodes:
+    """Starts nodes, and stops at the end of its context what it has started."""
 
     def __init__(self, folder: Path, surroundings: Mapping[str, str]) -> None:
         self._folder, self._surroundings = folder, surroundings
         self._started: list[_Running] = []
 
-    def __call__(self, program: NodeProgram) -> _Running:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.stop()
+
+    def start(self, program: NodeProgram) -> _Running:
         """Start it."""
         note, said = (self._folder / f"{program.instance}.{ending}" for ending in ("meter", "out"))
+        note.unlink(missing_ok=True)  # of the run before
         with said.open("wb") as output:
             process = subprocess.Popen(
                 program.command,

@@ -125,7 +125,7 @@ class _Round:
         spinning, receiving = self._by_name.get("spin_once", []), self._by_name.get("receive", [])
         idle = [one.each(self._clock) for one in self._by_name.get("idle", [])]
         for one in spinning:
-            if idle:
+            if idle and "spin_once_first" in self._by_name:  # rospy has no such call
                 yield "spin_once_next", 0.0, one.each(self._clock) - median(idle)
         for quiet, one in zip(spinning, receiving, strict=False):
             anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns

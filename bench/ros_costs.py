@@ -1,0 +1,150 @@
+"""ROS calls, estimated and measured on this machine: the paper's Tables III and IV for other nodes.
+
+Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), then five nodes
+of each library run on a real master and are measured from outside. What is estimated is a simulation of the
+same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were committed
+before anything was calibrated; nothing is fitted to them. An estimate holds if it is off by at most 15 % or
+half the inter-quartile range of the measured runs.
+
+    python bench/ros_costs.py [--rounds 10] [--client roscpp --client rospy]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+from rich.console import Console
+from ruamel.yaml import YAML
+
+from volery.calibrate.machine import this_machine
+from volery.calibrate.measured.campaign import compare, estimated, prepared
+from volery.calibrate.measured.comparison import Compared
+from volery.calibrate.measured.runs import Run, running
+from volery.calibrate.ros.campaign import Circumstances, Plan
+from volery.calibrate.ros.entry import described, law_of, write_entry
+from volery.calibrate.ros.fitting import Cost, costs
+from volery.calibrate.ros.samples import Round
+from volery.calibrate.ros.stage import Pace, own_master, stage
+from volery.cli.measure import tables
+from volery.cost import catalogue
+from volery.model.reader import load
+from volery.model.system import System
+from volery.run.vocabulary import vocabulary
+
+NODES = Path(__file__).parent / "ros_nodes"
+PACE = Pace(block_ms=400.0, sleeps_ms=(10.0, 20.0, 50.0, 100.0, 200.0))
+SECONDS = 8
+
+Done = TypeVar("Done")
+
+
+class Campaign:
+    """Calibration and measurement of one client library."""
+
+    def __init__(self, client: str, folder: Path) -> None:
+        self.client = client
+        self.machine = this_machine()
+        self.catalogue = folder / f"{client}.yaml"
+        self.rounds: list[Round] = []
+        self.runs: list[Run] = []
+        self.plan = Plan(pace=PACE)
+        self._stack = ExitStack()
+
+    def open(self) -> None:
+        """Compile, and start all that stays."""
+        system = self.system("platform.processors.host.frequency=3000 MHz")
+        nodes = prepared(system)
+        self.stage = self._stack.enter_context(stage(self.client))
+        master = self._stack.enter_context(own_master())
+        self._run = self._stack.enter_context(running(nodes, master, system.limits.duration_ns))
+
+    def close(self) -> None:
+        self._stack.close()
+
+    def system(self, *changes: str) -> System:
+        return load(
+            NODES / f"{self.client}.yaml", vocabulary(), None, None, [f"run.duration={SECONDS} s", *changes]
+        )
+
+    def calibrate(self) -> None:
+        self.rounds.append(self.stage.probe(self.plan.pace_of(len(self.rounds))))
+
+    def measure(self) -> None:
+        self.runs.append(self._run())
+
+    def costs(self) -> dict[str, Cost]:
+        return costs(self.rounds)
+
+    def result(self) -> tuple[System, tuple[Compared, ...]]:
+        """Estimated with all rounds, beside all runs."""
+        machine = self.machine
+        under = Circumstances(self.client, machine.description, machine.frequency_mhz)
+        write_entry(self.catalogue, machine, law_of(self.costs(), under))
+        _with_code(self.catalogue, machine.name)
+        host = f"{{is: {machine.name}, frequency: {machine.frequency_mhz:g} MHz}}"
+        system = self.system(f"platform.catalogues={self.catalogue}", f"platform.processors.host={host}")
+        return system, compare(system, estimated(system), self.runs)
+
+
+def _with_code(file: Path, name: str) -> None:
+    """The nodes' own code is priced as that of any computer: it is a thousandth of what they take."""
+    yaml = YAML()
+    data: Any = yaml.load(file.read_text(encoding="utf-8"))
+    laws = catalogue().processor("generic-host").code
+    data["processors"][name]["code"] = {
+        key: law.model_dump(exclude_defaults=True) for key, law in laws.items()
+    }
+    with file.open("w", encoding="utf-8") as out:
+        yaml.dump(data, out)
+
+
+def together(campaigns: list[Campaign], what: Callable[[Campaign], Done]) -> list[Done]:
+    with ThreadPoolExecutor(len(campaigns)) as pool:
+        return list(pool.map(what, campaigns))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=10, help="of calibration and measurement each")
+    parser.add_argument("--client", action="append", choices=("roscpp", "rospy"))
+    wanted = parser.parse_args()
+    console = Console(width=120)
+    with TemporaryDirectory() as folder:
+        campaigns = [Campaign(client, Path(folder)) for client in wanted.client or ("roscpp", "rospy")]
+        try:
+            together(campaigns, Campaign.open)
+            for number in range(wanted.rounds):
+                Console(stderr=True).print(f"round {number + 1} of {wanted.rounds}")
+                together(campaigns, Campaign.calibrate)
+                together(campaigns, Campaign.measure)
+        finally:
+            together(campaigns, Campaign.close)
+        machine = campaigns[0].machine
+        console.print(f"{machine.description}, {machine.cores} cores, {machine.frequency_mhz:g} MHz")
+        for one in campaigns:
+            show(console, one)
+
+
+def show(console: Console, one: Campaign) -> None:
+    console.print(f"\n[bold]{one.client}: what calls cost, medians of {len(one.rounds)} rounds")
+    for call, cost in one.costs().items():
+        sure = f"known to {cost.half_width:.0%}, quartiles ±{cost.spread / 2:.0%}"
+        console.print(f"  {call:<18}{described(cost.whole, call):<52}{sure}", highlight=False)
+    system, found = one.result()
+    console.print(*tables(found, system))
+    off = median(abs(node.difference) for node in found)
+    far = [node.node for node in found if not node.holds]
+    console.print(
+        f"{one.client}: median difference {off:.1%}; too far: {', '.join(far) or 'none'}", highlight=False
+    )
+
+
+if __name__ == "__main__":
+    main()
