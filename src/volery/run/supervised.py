@@ -20,7 +20,6 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.components.cpp.crash import Crash, read_crash
@@ -124,8 +123,7 @@ def _live(work: Work, shown: bool, supervision: Supervision, to: Connection, tol
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    os.dup2(sys.stderr.fileno() if _is_file(sys.stderr) else 2, 1)  # stdout is the parent's
-    house(supervision.house).guard(told, supervision.patience_s)
+    house(supervision.house).supervise(told, supervision.patience_s)
 
     def show(progress: Progress) -> None:
         to.send(("show", progress))
@@ -135,13 +133,4 @@ def _live(work: Work, shown: bool, supervision: Supervision, to: Connection, tol
     except BaseException as error:
         to.send(("raised", error))
     finally:
-        ctypes.CDLL(None).fflush(None)
         to.close()
-
-
-def _is_file(stream: Any) -> bool:
-    try:
-        stream.fileno()
-    except (AttributeError, OSError, ValueError):
-        return False
-    return True

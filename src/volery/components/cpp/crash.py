@@ -10,9 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from volery import components, faces
 from volery.base.errors import ComponentError
 
 _LINE = 4096
+_OURS = tuple(f"{Path(package.__file__).parent}/" for package in (components, faces) if package.__file__)
 _WORDS = {
     "stack": "its stack is full: it recurses without end, or keeps too much in local variables",
     "frozen": "virtual time is frozen: it computes and asks nothing any more",
@@ -43,24 +45,31 @@ def read_crash(report: int, libraries: Mapping[str, Path]) -> Crash | None:
     *libraries* are the components' by the instances' names, to find source lines in. The other end must be
     closed.
     """
-    line = os.read(report, _LINE).decode(errors="replace").strip("\n")
+    line = os.read(report, _LINE).decode(errors="replace").removesuffix("\n")
     if not line:
         return None
-    component, what, address, offset = line.split("\t")
+    component, what, address, frames, said = line.split("\t", 4)
     words = _WORDS.get(what, f"signal {what}")
     if what == str(int(signal.SIGSEGV)):
         words = f"{words} at address {'0' if address == '(nil)' else address}"
+    if said:
+        words = f"{words}; it said: {said}"
     library = libraries.get(component)
-    return Crash(component, words, _source_line(library, offset) if library else "")
+    return Crash(component, words, _source_line(library, frames.split()) if library else "")
 
 
-def _source_line(library: Path, offset: str) -> str:
-    """``Pilot::run() (pilot.cpp:12)``; empty without ``addr2line`` or where it knows nothing."""
+def _source_line(library: Path, frames: list[str]) -> str:
+    """``Pilot::run() (pilot.cpp:12)``, of the innermost frame that is the user's.
+
+    Empty without ``addr2line`` or where that knows nothing.
+    """
     program = shutil.which("addr2line")
-    if program is None or int(offset, 16) == 0:
+    if program is None or not frames:
         return ""
-    command = [program, "-C", "-f", "-s", "-e", str(library), f"0x{offset}"]
+    command = [program, "-C", "-f", "-i", "-e", str(library), *(f"0x{frame}" for frame in frames)]
     said = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
-    if len(said) < 2 or said[1].startswith("?"):
-        return ""
-    return f"{said[0]} ({said[1].partition(' ')[0]})"
+    for function, place in zip(said[::2], said[1::2], strict=False):
+        file, _, line = place.partition(" ")[0].rpartition(":")
+        if not file.startswith(("?", "/usr/", *_OURS)):
+            return f"{function} ({Path(file).name}:{line})"
+    return ""

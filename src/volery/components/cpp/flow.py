@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from volery.kernel.task import STUBBORN
 _CALL, _ANSWER, _FAIL, _END = range(4)
 STACK_BYTES = 8 * 1024 * 1024
 """As a process's main thread has. Memory is taken as it is used."""
+
+Hear = Callable[[str], None]
+"""Told what the code has printed."""
 
 _RETURNED, _FAILED, _THREW, _ENDED = b"returned", b"failed", b"threw", b"ended"
 
@@ -30,6 +34,8 @@ class _Shared(ctypes.Structure):
         ("reply", ctypes.c_char_p),
         ("reply_size", ctypes.c_uint64),
         ("callable", ctypes.c_int64),
+        ("said", ctypes.c_void_p),
+        ("said_size", ctypes.c_uint64),
     )
 
 
@@ -47,8 +53,8 @@ class House:
         self.free = library.volery_flow_free
         self.free.argtypes = (ctypes.POINTER(_Shared),)
         self.free.restype = None
-        self._guard = library.volery_guard
-        self._guard.argtypes = (ctypes.c_int32, ctypes.c_double)
+        self._supervise = library.volery_supervise
+        self._supervise.argtypes = (ctypes.c_int32, ctypes.c_double)
 
     def flow(self, component: str, dispatch: int) -> ctypes._Pointer[_Shared]:
         """A new flow of *component*, whose library runs callables with the function at *dispatch*."""
@@ -57,12 +63,12 @@ class House:
             raise MemoryError(f"{component}: no memory for another stack of {STACK_BYTES} bytes")
         return made
 
-    def guard(self, report: int, patience_s: float) -> None:
+    def supervise(self, report: int, patience_s: float) -> None:
         """From now on a crash in a component is told to the file descriptor *report* and ends the process.
 
-        So does code that asks nothing for *patience_s* seconds on the wall.
+        So does code that asks nothing for *patience_s* seconds on the wall. What components print is taken.
         """
-        self._guard(report, patience_s)
+        self._supervise(report, patience_s)
 
 
 @cache
@@ -74,8 +80,8 @@ def house(path: Path) -> House:
 class Flow:
     """One flow of control. See ``volery.faces.wire.CppFlow``."""
 
-    def __init__(self, owner: House, component: str, dispatch: int, answers: Answers) -> None:
-        self.component = component
+    def __init__(self, owner: House, component: str, dispatch: int, answers: Answers, hear: Hear) -> None:
+        self._hear = hear
         self._owner = owner
         self._handle = owner.flow(component, dispatch)
         self._shared = self._handle.contents
@@ -103,6 +109,8 @@ class Flow:
         while True:
             shared.directive, shared.reply, shared.reply_size = directive, reply, len(reply)
             resume(handle)
+            if shared.said_size:
+                self._hear(ctypes.string_at(shared.said, shared.said_size).decode(errors="replace"))
             question = shared.question
             data = ctypes.string_at(shared.data, shared.size) if shared.size else b""
             if question == _RETURNED:
@@ -160,8 +168,8 @@ _WAYS_OUT = (_FAILED, _THREW, _ENDED)
 class Flows:
     """The flows of one component: each of its callers has one to itself for as long as its call lasts."""
 
-    def __init__(self, owner: House, component: str, dispatch: int, answers: Answers) -> None:
-        self._make = partial(Flow, owner, component, dispatch, answers)
+    def __init__(self, owner: House, component: str, dispatch: int, answers: Answers, hear: Hear) -> None:
+        self._make = partial(Flow, owner, component, dispatch, answers, hear)
         self._idle: list[Flow] = []
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:

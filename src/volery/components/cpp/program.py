@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -9,14 +10,16 @@ from typing import Any
 from volery.base.errors import ComponentError, ModelError
 from volery.components.cpp.answers import Connected, answers
 from volery.components.cpp.build import Compiled
-from volery.components.cpp.errors import Exited
+from volery.components.cpp.errors import CppError, Exited
 from volery.components.cpp.flow import Flows, house
 from volery.components.cpp.interfaces import Operation, operations
 from volery.components.cpp.library import Library
 from volery.components.cpp.meter import Meter, Worth
 from volery.components.ports import PortList
+from volery.components.stand_ins.words import INFO
 from volery.faces.wire import Answers, Reader, Writer
 from volery.kernel.api import Kernel
+from volery.trace.events import Text
 
 MAKE, RUN, OPERATIONS = range(3)
 """The first callables of a library, as in ``<volery/border.h>``."""
@@ -92,7 +95,7 @@ class CppProgram:
         if self._meter is not None:
             meter, worth = self._meter
             meter.read_from(library.counters, worth)
-        flows = Flows(runtime, self._name, library.dispatch, {**known, **self._more})
+        flows = Flows(runtime, self._name, library.dispatch, {**known, **self._more}, self._hear)
         flows.call(MAKE)
         return CppObject(flows, component.provided)
 
@@ -107,6 +110,13 @@ class CppProgram:
             found[port.port] = Connected(known, targets)
         return found
 
+    def _hear(self, text: str) -> None:
+        """What it prints becomes lines of the trace, and goes to the standard error stream."""
+        sys.stderr.write(text)
+        now, record = self._kernel.now(), self._kernel.record
+        for line in filter(str.strip, text.splitlines()):
+            record(Text(now, self._name, INFO, line))
+
     def run(self, thing: object) -> None:
         """See ``Program``."""
         assert isinstance(thing, CppObject)
@@ -114,6 +124,10 @@ class CppProgram:
             status = _status(thing.flows.call(RUN, Writer().text(self._name).done()))
         except Exited as left:
             status = left.status
+        except CppError as error:
+            if self._compiled.component.class_name:
+                raise
+            raise ComponentError(self._name, f"main() raised {error}") from error
         if self._on_end is not None:
             self._on_end()
         if status:

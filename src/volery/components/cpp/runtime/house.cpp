@@ -19,6 +19,9 @@
 #include <cstring>
 #include <ctime>
 #include <initializer_list>
+#include <iostream>
+#include <streambuf>
+#include <string>
 
 namespace {
 
@@ -32,16 +35,17 @@ struct Flow : volery_flow {
     ucontext_t inside, outside;
     Exceptions exceptions;
     volery_dispatch dispatch;
-    char* memory;  // the guard page, then the stack
+    char* memory;  // the guard, then the stack
     std::size_t bytes;
     char component[128];
+    std::string printed;
 };
 
 Flow* volatile running = nullptr;
 Flow* last = nullptr;                // the one that ran most recently
 volatile std::uint64_t resumed = 0;  // how often any flow has been let go on
 pthread_t owner;                     // the one thread that flows run on
-std::size_t const page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+constexpr std::size_t GUARD_BYTES = 1 << 20;  // more than a function's local variables should take
 
 void exchange_exceptions(Flow* flow) {
     auto* current = reinterpret_cast<Exceptions*>(abi::__cxa_get_globals());
@@ -50,10 +54,19 @@ void exchange_exceptions(Flow* flow) {
     flow->exceptions = theirs;
 }
 
-void leave(Flow* flow) {
+void leave(Flow* flow, std::size_t told) {
+    flow->said = flow->printed.data();
+    flow->said_size = told;
     exchange_exceptions(flow);
     running = nullptr;
     swapcontext(&flow->inside, &flow->outside);
+    flow->printed.erase(0, told);
+}
+
+// What of its printed text is whole lines.
+std::size_t whole_lines(const Flow* flow) {
+    auto const end = flow->printed.rfind('\n');
+    return end == std::string::npos ? 0 : end + 1;
 }
 
 // What runs at the bottom of each stack: callables, one after the other.
@@ -65,19 +78,19 @@ void body(unsigned int high, unsigned int low) {
 }  // namespace
 
 volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, std::uint64_t stack_bytes) {
-    std::size_t const bytes = page + stack_bytes;
+    std::size_t const bytes = GUARD_BYTES + stack_bytes;
     int const flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK;
     void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, flags, -1, 0);
     if (memory == MAP_FAILED) return nullptr;
-    mprotect(memory, page, PROT_NONE);
+    mprotect(memory, GUARD_BYTES, PROT_NONE);
     auto* flow = new Flow{};
     flow->dispatch = dispatch;
     flow->memory = static_cast<char*>(memory);
     flow->bytes = bytes;
     std::snprintf(flow->component, sizeof flow->component, "%s", component);
     getcontext(&flow->inside);
-    flow->inside.uc_stack.ss_sp = flow->memory + page;
-    flow->inside.uc_stack.ss_size = bytes - page;
+    flow->inside.uc_stack.ss_sp = flow->memory + GUARD_BYTES;
+    flow->inside.uc_stack.ss_size = stack_bytes;
     flow->inside.uc_link = nullptr;
     auto const address = reinterpret_cast<std::uintptr_t>(flow);
     makecontext(&flow->inside, reinterpret_cast<void (*)()>(body), 2, static_cast<unsigned int>(address >> 32),
@@ -110,7 +123,7 @@ std::int32_t volery_ask(const char* question, const char* data, std::uint64_t si
     flow->data = data;
     flow->size = size;
     flow->cannot_throw = cannot_throw;
-    leave(flow);
+    leave(flow, flow->printed.empty() ? 0 : whole_lines(flow));
     while (flow->directive == VOLERY_CALL) flow->dispatch(flow);
     return flow->directive;
 }
@@ -120,7 +133,7 @@ void volery_return(volery_flow* which, const char* how, const char* data, std::u
     flow->question = how;
     flow->data = data;
     flow->size = size;
-    leave(flow);
+    leave(flow, flow->printed.size());
 }
 
 // -- what a component does that no program survives. The report goes to the supervising process.
@@ -131,27 +144,27 @@ constexpr unsigned int TICKS = 4;  // looks within the patience
 constexpr int FRAMES = 64;
 int report_to = -1;
 
-// Where in the component's library the code stood: the innermost of its frames, 0 if there is none.
-unsigned long place_in_library(const void* counter) {
+// One line: whose doing, what, at which address, where in its library the code stood (innermost frame first), and
+// what it printed last. Nothing of this process goes on.
+void report(const char* what, const void* address, const void* counter) {
+    char line[2048];
+    int size = std::snprintf(line, sizeof line, "%s\t%s\t%p\t", last->component, what, address);
     Dl_info library{};
     dladdr(reinterpret_cast<void*>(last->dispatch), &library);
     void* frames[FRAMES];
     int const count = backtrace(frames, FRAMES);
-    for (int index = 0; index < count; ++index) {
+    for (int index = 0; index < count && size < static_cast<int>(sizeof line) - 32; ++index) {
         Dl_info place{};
         if (dladdr(frames[index], &place) == 0 || place.dli_fbase != library.dli_fbase) continue;
         auto const offset = static_cast<char*>(frames[index]) - static_cast<char*>(place.dli_fbase);
-        return static_cast<unsigned long>(offset) - (frames[index] == counter ? 0 : 1);  // of the call itself
+        long const of_call = offset - (frames[index] == counter ? 0 : 1);
+        size += std::snprintf(line + size, sizeof line - static_cast<std::size_t>(size), "%lx ", of_call);
     }
-    return 0;
-}
-
-// One line: whose doing, what, at which address, and where in its library. Nothing of this process goes on.
-void report(const char* what, const void* address, const void* counter) {
-    char line[512];
-    int const size = std::snprintf(line, sizeof line, "%s\t%s\t%p\t%lx\n", last->component, what, address,
-                                   place_in_library(counter));
-    if (size > 0 && write(report_to, line, static_cast<std::size_t>(size)) < 0) _exit(3);
+    line[size++] = '\t';
+    for (char const letter : last->printed)
+        if (size < static_cast<int>(sizeof line) - 1) line[size++] = letter < ' ' ? ' ' : letter;
+    line[size++] = '\n';
+    if (write(report_to, line, static_cast<std::size_t>(size)) < 0) _exit(3);
     _exit(2);
 }
 
@@ -174,7 +187,7 @@ void crashed(int signal, siginfo_t* info, void* context) {
         return;
     }
     auto const* address = static_cast<const char*>(info->si_addr);
-    bool const full = flow != nullptr && signal == SIGSEGV && address >= flow->memory && address < flow->memory + page;
+    bool const full = flow != nullptr && signal == SIGSEGV && address >= flow->memory && address < flow->memory + GUARD_BYTES;
     char name[16];
     std::snprintf(name, sizeof name, "%d", signal);
     report(full ? "stack" : name, address, program_counter(context));
@@ -206,7 +219,45 @@ void handle(int signal, void (*handler)(int, siginfo_t*, void*), int flags) {
 
 }  // namespace
 
-void volery_guard(std::int32_t to, double patience_s) {
+// -- what components print
+
+namespace {
+
+ssize_t print(void*, const char* text, std::size_t size) {
+    if (running == nullptr) return write(STDERR_FILENO, text, size);
+    running->printed.append(text, size);
+    return static_cast<ssize_t>(size);
+}
+
+class Printed : public std::streambuf {
+protected:
+    int overflow(int letter) override {
+        char const one = static_cast<char>(letter);
+        if (letter != traits_type::eof()) print(nullptr, &one, 1);
+        return traits_type::not_eof(letter);
+    }
+    std::streamsize xsputn(const char* text, std::streamsize size) override {
+        return print(nullptr, text, static_cast<std::size_t>(size));
+    }
+};
+
+void take_over_printing() {
+    static Printed printed;
+    for (std::ostream* stream : {&std::cout, &std::cerr, &std::clog}) stream->rdbuf(&printed);
+    for (FILE** stream : {&stdout, &stderr}) {
+        cookie_io_functions_t functions{};
+        functions.write = print;
+        FILE* ours = fopencookie(nullptr, "w", functions);
+        if (ours == nullptr) continue;
+        std::setvbuf(ours, nullptr, _IONBF, 0);
+        *stream = ours;
+    }
+}
+
+}  // namespace
+
+void volery_supervise(std::int32_t to, double patience_s) {
+    take_over_printing();
     report_to = to;
     void* frame = nullptr;
     backtrace(&frame, 1);  // loads what it needs, which must not happen in a handler

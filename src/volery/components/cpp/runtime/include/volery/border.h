@@ -83,7 +83,7 @@ inline Reader ask(const char* question, const Writer& with = {}) {
         case VOLERY_ANSWER: break;
         case VOLERY_END: throw Ended{};
         case VOLERY_FAIL: throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
-        default: throw std::logic_error(std::string(question) + " is asked before main() or beside it");
+        default: throw std::logic_error(std::string(question) + ": a component has one flow of control; not before main(), and not in a thread of its own");
     }
     return Reader(volery_here()->reply, volery_here()->reply_size);
 }

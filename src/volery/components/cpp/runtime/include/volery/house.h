@@ -27,6 +27,8 @@ struct volery_flow {
     const char* reply;
     std::uint64_t reply_size;
     std::int64_t callable;  // which one VOLERY_CALL is to run
+    const char* said;       // whole lines that it has printed since
+    std::uint64_t said_size;
 };
 
 // Runs one callable and ends with `volery_return`. Each component's library has one.
@@ -36,7 +38,7 @@ typedef void (*volery_dispatch)(volery_flow*);
 volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, std::uint64_t stack_bytes);
 void volery_flow_free(volery_flow* flow);
 void volery_resume(volery_flow* flow);  // returns when it asks the next question, or returns from a callable
-void volery_guard(std::int32_t report, double patience_s);
+void volery_supervise(std::int32_t report, double patience_s);
 
 // -- asked by components, through <volery/border.h>
 std::int32_t volery_ask(const char* question, const char* data, std::uint64_t size, std::int32_t cannot_throw);
