@@ -108,5 +108,8 @@ class Range(NamedTuple):
 SETPOINT_HEIGHTS = Range(0.0, 120.0)
 """Metres above the point of take-off that a set-point may ask for."""
 
+GO_HOME_ALTITUDES = Range(20.0, 500.0)
+"""Metres above home that a program may ask for as the height of the way home; assumed."""
+
 MISSION_SPEEDS = Range(2.0, 15.0)
 """Metres per second of a waypoint mission."""

@@ -1,7 +1,7 @@
 """A DJI aircraft behind the topics and services of its onboard SDK: a dialect of the simulated stack.
 
-The protocol is from public definitions; how the aircraft behaves beyond them is assumed, and each assumption
-stands in docs/dji.md and, where it is a figure, in ``parameters``.
+The protocol is from public definitions; how the aircraft behaves beyond them is assumed: see ``assumed`` and,
+for figures, ``parameters``.
 """
 
 from volery.autopilots.dji.copter import COPTER

@@ -13,7 +13,16 @@ from typing import Any, NamedTuple
 from volery.autopilots.dji.controller import Controller
 from volery.base.frames import heading_to_yaw
 from volery.messages import message_class
-from volery.messages.dji import HARDWARE, HORIZONTAL, MISSION_SPEEDS, NEW_NAMES, OLD_NAMES, DisplayMode, Flag
+from volery.messages.dji import (
+    GO_HOME_ALTITUDES,
+    HARDWARE,
+    HORIZONTAL,
+    MISSION_SPEEDS,
+    NEW_NAMES,
+    OLD_NAMES,
+    DisplayMode,
+    Flag,
+)
 
 START, STOP, PAUSE, RESUME = range(4)
 """Actions on a mission."""
@@ -168,8 +177,8 @@ class Services:
         return True
 
     def _go_home_altitude(self, request: Any) -> bool:
-        """20 to 500 m: assumed."""
-        if not 20 <= request.altitude <= 500:
+        low, high = GO_HOME_ALTITUDES
+        if not low <= request.altitude <= high:
             return False
         return self._controller.vehicle.set_parameter("GO_HOME_ALTITUDE", float(request.altitude))
 

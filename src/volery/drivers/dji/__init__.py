@@ -1,7 +1,7 @@
 """DJI aircraft through the ROS node of their onboard SDK: ``dji_sdk`` 3.8, or the vehicle node of
 ``dji_osdk_ros`` 4.1, over any graph.
 
-The protocol is from public definitions and has not been flown; what is assumed stands in docs/dji.md.
+The protocol is from public definitions and has not been flown; what is assumed: ``assumed``.
 """
 
 from __future__ import annotations

@@ -355,13 +355,15 @@ class Dji:
         return (self._quiet(), begin, down)
 
     def _quiet(self) -> Step:
-        """A set-point that is still on its way would end what is asked for next."""
+        """A set-point still on its way would end what is asked for next. Who takes it meanwhile has it."""
         return Step(
             ask="send no more set-points",
             send=self._stream.stop,
             done=lambda seen: self._carrier.quiet,
             within=ANSWERED_WITHIN,
             skippable=True,
+            mode=self.telemetry.mode,
+            leads_to=(WAITS, SDK),
         )
 
     # -- by sticks

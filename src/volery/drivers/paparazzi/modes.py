@@ -49,6 +49,7 @@ ASSUMED: Mapping[str, str] = {
     "SETTING of 'kill_throttle'": "0 starts the motors in every mode but KILL, 1 stops them, in the air, too",
     "RC_4CH": "counts as a transmitter; mode 2 is the third position of its switch; pitch is nose up +",
     "GUIDED_SETPOINT_NED": "about the origin that INS_REF tells; stands until the next one",
+    "ROTORCRAFT_FP": "in GUIDED its carrot is the set-point, of whoever sent it",
     "block 'Start Engine'": "starts the motors, in NAV",
     "block 'Takeoff'": "climbs straight up to some 2 m",
     "block 'land here'": "takes the touch-down point from where it is, descends, and stops the motors",

@@ -294,6 +294,24 @@ def test_landing_and_going_home_stop_the_stream_and_wait_until_the_motors_stand(
     made.run(body)
 
 
+def test_a_task_is_asked_for_once_no_setpoint_is_on_its_way(bench: Make) -> None:
+    """One that arrives after it would end it."""
+    made = bench()
+    at: list[int] = []
+
+    def body() -> None:
+        made.drone.arm()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.drone.set_velocity(1.0)
+        made.wait(0.3)
+        made.node.on_task = lambda task: (at.append(made.kernel.now()), made.node.obey(task))
+        made.drone.land()
+        assert at[0] - made.node.setpoints[-1][0] >= 150 * MS
+
+    made.run(body)
+
+
 def test_in_the_air_the_motors_are_stopped_by_force_only(bench: Make) -> None:
     made = bench()
 

@@ -1,0 +1,38 @@
+"""What is assumed of a DJI aircraft stands in the documentation, word for word."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from volery.autopilots.dji import assumed as simulated
+from volery.autopilots.dji.parameters import HONOURED, parameters
+from volery.drivers.dji import assumed as driver
+
+PAGE = Path(__file__).parents[4] / "docs" / "dji.md"
+
+
+def table(heading: str, head: str) -> list[str]:
+    """The rows of the first table after *heading* that begins with *head*."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    rows = lines[lines.index(head, lines.index(heading)) + 2 :]
+    return rows[: rows.index("")]
+
+
+@pytest.mark.parametrize(
+    ("heading", "assumed"),
+    [
+        ("## What is taken for granted", driver.ASSUMED),
+        ("## The simulated DJI", simulated.ASSUMED),
+    ],
+)
+def test_every_assumption_is_in_a_table(heading: str, assumed: Mapping[str, str]) -> None:
+    expected = [f"| {what} | {text} |" for what, text in assumed.items()]
+    assert table(heading, "| what | assumption |") == expected
+
+
+def test_every_figure_is_in_the_table() -> None:
+    expected = [f"| `{one.name}` | {one.value:g} | {HONOURED[one.name]} |" for one in parameters()]
+    assert table("## The simulated DJI", "| parameter | value | what it is |") == expected
