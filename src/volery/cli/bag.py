@@ -32,6 +32,7 @@ class Wanted:
     rate: float = 1.0
     after: float = 0.0
     clock: bool = False
+    delay: float = 0.0
 
 
 def info(output: Output, path: Path) -> int:
@@ -85,7 +86,7 @@ def play_bag(output: Output, path: Path, wanted: Wanted) -> int:
             show(to_seconds(at - bag.start))
 
         node = graph.node("volery_play", anonymous=True)
-        how = Playing(wanted.rate, wanted.topics or None, wanted.after, wanted.clock, told)
+        how = Playing(wanted.rate, wanted.topics or None, wanted.after, wanted.clock, wanted.delay, told)
         played = play(node, bag, how)
     output.give({"played": played})
     output.show(f"played {played} messages")

@@ -330,6 +330,7 @@ def bag_play(
     topics: Topics = None,
     after: Annotated[float, typer.Option(help="Begin so many recorded seconds from the start.")] = 0.0,
     clock: Annotated[bool, typer.Option("--clock", help="Publish the recorded time on /clock.")] = False,
+    delay: Annotated[float, typer.Option(help="Seconds for others to connect, and to hear the last.")] = 0.5,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -338,7 +339,7 @@ def bag_play(
     from volery.cli import bag as command
 
     output = Output(quiet, as_json, debug)
-    wanted = command.Wanted(on, tuple(topics or ()), rate, after, clock)
+    wanted = command.Wanted(on, tuple(topics or ()), rate, after, clock, delay)
     run_command(output, lambda: command.play_bag(output, recording, wanted))
 
 

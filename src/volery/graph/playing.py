@@ -28,19 +28,23 @@ class Playing:
 
     ``rate``: recorded seconds per second. ``topics``: only these; ``None``: all that can be read, but for
     what a run says of itself (``/volery/...``). ``after``: begin so many recorded seconds from the start.
-    ``clock``: publish the recorded time on ``/clock``. ``told`` is told, for each message, how many have been
-    played and its recorded time.
+    ``clock``: publish the recorded time on ``/clock``. ``delay``: wait so many seconds between advertising
+    and the first message, and after the last one, since connecting takes time on a real graph. ``told`` is
+    told, for each message, how many have been played and its recorded time.
     """
 
     rate: float = 1.0
     topics: Collection[str] | None = None
     after: float = 0.0
     clock: bool = False
+    delay: float = 0.0
     told: Callable[[int, Ns], None] = nothing
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate < float("inf"):
             raise UsageError(f"a rate of {self.rate:g}: give recorded seconds per second, above 0")
+        if not 0.0 <= self.delay < float("inf"):
+            raise UsageError(f"a delay of {self.delay:g}: give seconds, 0 or more")
 
 
 def play(node: Node, bag: Bag, how: Playing = Playing()) -> int:
@@ -51,6 +55,7 @@ def play(node: Node, bag: Bag, how: Playing = Playing()) -> int:
     publishers = _advertise(node, bag, how)
     clock = node.advertise(CLOCK, "rosgraph_msgs/msg/Clock", QoS(1)) if how.clock else None
     begin = bag.start + from_seconds(how.after)
+    node.sleep(from_seconds(how.delay))
     started = node.now()
     ticked: Ns = begin - _CLOCK_PERIOD
     played = 0
@@ -65,6 +70,7 @@ def play(node: Node, bag: Bag, how: Playing = Playing()) -> int:
         publishers[recorded.topic].publish(recorded.message)
         played += 1
         how.told(played, recorded.at)
+    node.sleep(from_seconds(how.delay))
     return played
 
 
