@@ -68,9 +68,8 @@ def processors() -> str:
             words = f"{power.provenance}, within {power.band():.0%}; {power.source}. Valid: {power.validity}"
             lines.append(f"- Power: {words}.")
         for language, code in entry.code.items():
-            lines.append(
-                f"- Counted code ({language}): {code.provenance}; {code.source}. Valid: {code.validity}."
-            )
+            good = code.how_good().capitalize()
+            lines.append(f"- Counted code ({language}): {code.source}. Valid: {code.validity}. {good}.")
     return "\n".join(lines) + "\n"
 
 

@@ -117,7 +117,8 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
         for code in entry.code.values() if fidelity == "code" else ():
             warning = "; ".join(code.model_copy(update={"processor": model.kind}).warnings())
             name = f"counted {code.language} code on {model.kind}"
-            yield LawSetup(name, code.source, code.provenance, code.validity, warning)
+            validity = f"{code.validity}; {code.how_good()}"
+            yield LawSetup(name, code.source, code.provenance, validity, warning)
         if entry.power is not None:
             name = f"power of {model.kind}"
             yield LawSetup(name, entry.power.source, entry.power.provenance, entry.power.validity)

@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import ComponentError, Location, ModelError, UsageError
 from volery.base.time import MS, S
 from volery.components import services
-from volery.components.counting import Steps
+from volery.components.counting import UNIFORM, Steps
 from volery.components.instance import Instance, Seat
 from volery.components.loading import Loader
 from volery.components.pricing import Counted
@@ -279,7 +279,7 @@ def test_services_outside_of_a_run_say_so():
 
 def test_counted_code_is_charged_and_takes_its_time(tmp_path):
     desk = Desk(tmp_path)
-    steps = Steps()
+    steps = Steps(UNIFORM)
     loader = Loader(stand_ins(desk.kernel, 1), steps)
     path = desk.write(
         "loop.py",
@@ -303,7 +303,9 @@ def test_counted_code_is_charged_and_takes_its_time(tmp_path):
     slices = desk.of(Slice)
     assert desk.failures == []
     assert sum(ran.end - ran.start for ran in slices) == sum(charge.caller for charge in desk.of(Charge))
-    assert slices[0].end - slices[0].start == slices[1].end - slices[1].start + 1000 * 3  # the first: range()
+    assert (
+        slices[0].end - slices[0].start == slices[1].end - slices[1].start + 1000 * 5
+    )  # the first: run, for, range(2)
     assert {charge.kind for charge in desk.of(Charge)} == {"code"}
 
 

@@ -7,6 +7,7 @@ from volery.base.errors import EstimateError, ModelError
 from volery.cost import catalogue, scale_energy, scale_time
 from volery.cost.catalogue import read
 from volery.cost.figure import Stated
+from volery.cost.interpreter import STEPS_PER_NS, python_operations
 
 INTEL, ARM, HOST = "intel-i5-3470", "rpi4-cortex-a72", "generic-host"
 
@@ -91,13 +92,24 @@ def test_energies_scale_with_the_voltage_squared() -> None:
     assert math.isclose(scale_energy(3e-3, (ARM, 1500), (ARM, 600), law), 3e-3 * (0.80 / 0.88) ** 2)
 
 
-def test_counted_code_is_flagged_as_uncalibrated() -> None:
+def test_counted_code_says_how_good_it_is() -> None:
     law = catalogue().processor(ARM).code_law()
-    assert math.isclose(law.ns_per_step(1500), 80 / 1.5)
-    assert math.isclose(law.ns_per_step(600), 80 / 0.6)
+    assert math.isclose(law.ns_per_step(1500), 6.1 / STEPS_PER_NS)
+    assert math.isclose(law.ns_per_step(600), 2.5 * law.ns_per_step(1500))
+    table = python_operations()
+    assert law.error == table.mean_error + 0.35
     [warning] = law.warnings()
     assert "rpi4-cortex-a72" in warning
-    assert "uncalibrated" in warning
+    assert f"{table.mean_error:.0%} on average, {table.worst_error:.0%} at worst" in warning
+    assert "estimated within 35%" in warning
+
+
+def test_a_measured_slowdown_is_nothing_to_warn_of() -> None:
+    law = catalogue().processor(ARM).code_law()
+    measured = law.slowdown.model_copy(update={"provenance": "measured", "error": None})
+    law = law.model_copy(update={"slowdown": measured})
+    assert law.warnings() == ()
+    assert "expected error unknown" in law.how_good()
 
 
 @pytest.mark.parametrize(

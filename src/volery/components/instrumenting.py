@@ -1,0 +1,290 @@
+"""Puts counters into a syntax tree: one addition for each straight run of statements.
+
+What is done a number of times that only the run can tell (the items of a comprehension, a lambda, the second
+operand of ``and``) gets a counter of its own inside the expression, if it is worth one: operands that call
+nothing are counted with their statement whether they are taken or not.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeVar
+
+from volery.components import operations
+from volery.components.operations import CAUGHT, ENTER, ITEM, RESUME, ROUND, SIZED, SIZED_METHODS
+
+CELL = "__volery_steps__"
+TICK = "__volery_tick_"
+TAKEN = "__volery_taken_by_"
+
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+_DIVERTS = (ast.Return, ast.Break, ast.Continue, ast.Raise)
+_BODIES = ("body", "orelse", "finalbody", "handlers", "cases")
+_WORTH_A_TICK = (ast.Call, *_COMPREHENSIONS)
+
+_LEADING_BITS = 5
+
+
+class Weights:
+    """What operations and pieces of syntax weigh, in steps. ``weights["load"]`` is that of an operation."""
+
+    def __init__(self, steps: Mapping[str, float]) -> None:
+        self._steps = steps
+        self._made: Mapping[str, list[tuple[str, int]]] = {}
+
+    def look_at(self, tree: ast.Module) -> None:
+        """From now on *tree* is weighed: whose objects does it make?"""
+        self._made = operations.made_by(tree)
+
+    def __getitem__(self, operation: str) -> float:
+        return self._steps[operation]
+
+    def of(self, node: ast.AST) -> float:
+        """Executing *node* once, without what has a counter of its own."""
+        own = sum(self._steps[name] * times for name, times in self._operations(node))
+        return own + sum(self.of(part) for part in _parts(node))
+
+    def _operations(self, node: ast.AST) -> Iterable[tuple[str, int]]:
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self._made:
+            return self._made[node.func.id]
+        return operations.of(node)
+
+
+def _parts(node: ast.AST) -> Iterator[ast.AST]:
+    """What is executed with *node*, once each time that it is."""
+    if isinstance(node, ast.Lambda):
+        return
+    if isinstance(node, _COMPREHENSIONS):
+        yield node.generators[0].iter
+    elif isinstance(node, (*_FUNCTIONS, ast.ClassDef)):
+        yield from node.decorator_list
+    elif isinstance(node, (ast.For, ast.AsyncFor)):
+        yield node.iter
+    elif isinstance(node, ast.AnnAssign):
+        yield from (node.target, node.value) if node.value else ()
+    elif isinstance(node, ast.BoolOp):
+        yield node.values[0]
+        yield from (value for value in node.values[1:] if not _worth_a_tick(value))
+    elif isinstance(node, ast.IfExp):
+        yield node.test
+        yield from (value for value in (node.body, node.orelse) if not _worth_a_tick(value))
+    elif not isinstance(node, ast.While) and not _is_remark(node):
+        yield from _fields(node)
+
+
+def _fields(node: ast.AST) -> Iterator[ast.AST]:
+    for name, value in ast.iter_fields(node):
+        if name in _BODIES and isinstance(value, list):
+            continue
+        yield from (
+            item for item in (value if isinstance(value, list) else [value]) if isinstance(item, ast.AST)
+        )
+
+
+def _is_remark(node: ast.AST) -> bool:
+    """A constant that stands alone, which the compiler drops."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+def _worth_a_tick(operand: ast.expr) -> bool:
+    return any(isinstance(part, _WORTH_A_TICK) for part in ast.walk(operand))
+
+
+def with_counters(tree: ast.Module, weights: Weights) -> tuple[ast.Module, set[int]]:
+    """*tree* with counters, and the weights of those that are inside expressions. Lines stay as they were."""
+    weights.look_at(tree)
+    counters = _Counters(weights)
+    counted: ast.Module = counters.visit(tree)
+    return ast.fix_missing_locations(counted), counters.ticks
+
+
+class _Counters(ast.NodeTransformer):
+    """``ticks`` are the weights of the counters that are inside expressions."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._weights = weights
+        self.ticks: set[int] = set()
+
+    # -- statements
+
+    def _block(self, body: list[ast.stmt], extra: float = 0.0) -> list[ast.stmt]:
+        """*body* cut into straight runs: a new one starts behind each statement that may leave the block."""
+        counted: list[ast.stmt] = []
+        run: list[ast.stmt] = []
+        for statement in body:
+            run.append(statement)
+            if _may_leave(statement):
+                counted += self._run(run, extra)
+                run, extra = [], 0.0
+        return counted + (self._run(run, extra) if run else [])
+
+    def _run(self, statements: list[ast.stmt], extra: float) -> list[ast.stmt]:
+        steps = round(extra + sum(self._weights.of(statement) for statement in statements))
+        visited: list[ast.stmt] = [self.visit(statement) for statement in statements]
+        return [_add(steps, statements[0]), *visited] if steps else visited
+
+    def visit_Module(self, node: ast.Module) -> ast.Module:
+        head = _prologue(node.body)
+        node.body = node.body[:head] + self._block(node.body[head:])
+        return node
+
+    def _visit_function(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> ast.AST:
+        head = 1 if ast.get_docstring(node, clean=False) is not None else 0
+        body = node.body[head:] or [_at(ast.Pass(), node)]  # a docstring may be all there is
+        node.body = node.body[:head] + self._block(body, self._weights[ENTER])
+        return node
+
+    visit_FunctionDef = visit_AsyncFunctionDef = _visit_function  # noqa: N815 (ast's naming)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        node.body = [self.visit(statement) for statement in node.body]
+        return node
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Bodies of compound statements become blocks; the rest is searched for lambdas and the like."""
+        extra = self._each_time(node)
+        for name, value in ast.iter_fields(node):
+            if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
+                setattr(node, name, self._block(value, extra if name == "body" else 0.0))
+            elif isinstance(value, list):
+                setattr(
+                    node, name, [self.visit(item) if isinstance(item, ast.AST) else item for item in value]
+                )
+            elif isinstance(value, ast.AST):
+                setattr(node, name, self.visit(value))
+        return node
+
+    def _each_time(self, node: ast.AST) -> float:
+        """What it takes to come into the body of *node* each time, beside the body."""
+        weights = self._weights
+        if isinstance(node, (ast.For, ast.AsyncFor)):
+            return weights[ROUND] + weights.of(node.target)
+        if isinstance(node, ast.While):
+            return weights[ROUND] + weights["branch"] + weights.of(node.test)
+        return weights[CAUGHT] if isinstance(node, ast.ExceptHandler) else 0.0
+
+    # -- expressions
+
+    def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
+        steps = self._weights[ENTER] + self._weights.of(node.body)
+        node.body = self._ticking(steps, self.visit(node.body))
+        return node
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        node.values = [self.visit(node.values[0]), *(self._operand(value) for value in node.values[1:])]
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        node.test = self.visit(node.test)
+        node.body, node.orelse = self._operand(node.body), self._operand(node.orelse)
+        return node
+
+    def _operand(self, operand: ast.expr) -> ast.expr:
+        """One that may not be evaluated."""
+        if not _worth_a_tick(operand):
+            return operand
+        steps = self._weights.of(operand)
+        return self._ticking(steps, self.visit(operand))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        taker = _taker(node)
+        self.generic_visit(node)
+        if taker:
+            things = node.args[0]
+            node.args = [_at(ast.Call(ast.Name(f"{TAKEN}{taker}__", ast.Load()), [things], []), things)]
+        return node
+
+    def _visit_comprehension(self, node: Any) -> ast.AST:
+        weights = self._weights
+        pending = 0.0  # steps for each item that reached the next part
+        for number, generator in enumerate(node.generators):
+            steps = pending + weights["loop"] + weights.of(generator.iter)
+            generator.iter = self.visit(generator.iter)
+            if number:  # the first one is evaluated with the statement
+                generator.iter = self._ticking(steps, generator.iter)
+            pending = weights[ITEM] + weights.of(generator.target)
+            if generator.ifs:
+                steps = pending + sum(weights["branch"] + weights.of(test) for test in generator.ifs)
+                generator.ifs = [self.visit(test) for test in generator.ifs]
+                generator.ifs[0] = self._ticking(steps, generator.ifs[0])
+                pending = 0.0
+        parts = [name for name in ("key", "value", "elt") if hasattr(node, name)]
+        pending += weights[RESUME] if isinstance(node, ast.GeneratorExp) else 0.0
+        pending += sum(weights.of(getattr(node, name)) for name in parts)
+        for name in parts:
+            setattr(node, name, self.visit(getattr(node, name)))
+        setattr(node, parts[-1], self._ticking(pending, getattr(node, parts[-1])))
+        return node  # type: ignore[no-any-return] # it is one of four kinds of node
+
+    visit_ListComp = visit_SetComp = _visit_comprehension  # noqa: N815 (ast's naming)
+    visit_DictComp = visit_GeneratorExp = _visit_comprehension  # noqa: N815 (ast's naming)
+
+    def _ticking(self, steps: float, expression: ast.expr) -> ast.expr:
+        """``(__volery_tick_7__() or expression)``: the tick gives ``None``."""
+        weight = _few_bits(steps)
+        if not weight:
+            return expression
+        self.ticks.add(weight)
+        tick = ast.Call(ast.Name(f"{TICK}{weight}__", ast.Load()), [], [])
+        return _at(ast.BoolOp(ast.Or(), [tick, expression]), expression)
+
+
+def _taker(node: ast.Call) -> str:
+    """The builtin or method that is about to go through the only argument; a generator counts its items."""
+    if len(node.args) != 1 or isinstance(node.args[0], (ast.Starred, ast.GeneratorExp)):
+        return ""
+    if isinstance(node.func, ast.Name) and node.func.id in SIZED:
+        return node.func.id
+    return node.func.attr if isinstance(node.func, ast.Attribute) and node.func.attr in SIZED_METHODS else ""
+
+
+def _few_bits(steps: float) -> int:
+    """*steps* to five leading bits (3 %), so that not every expression needs an iterator of its own."""
+    whole = round(steps)
+    unit = 1 << max(0, whole.bit_length() - _LEADING_BITS)
+    return round(whole / unit) * unit
+
+
+def _may_leave(statement: ast.stmt) -> bool:
+    """Whether what follows *statement* in its block may be left out."""
+    if isinstance(statement, (*_FUNCTIONS, ast.ClassDef)):
+        return False
+    if isinstance(statement, _DIVERTS):
+        return True
+    return any(_may_leave(child) for child in _statements_in(statement))
+
+
+def _statements_in(statement: ast.stmt) -> Iterator[ast.stmt]:
+    for child in ast.iter_child_nodes(statement):
+        if isinstance(child, ast.stmt):
+            yield child
+        elif isinstance(child, (ast.ExceptHandler, ast.match_case)):
+            yield from child.body
+
+
+def _prologue(body: list[ast.stmt]) -> int:
+    """How many leading statements must stay first: the docstring and ``from __future__`` imports."""
+    count = 0
+    for number, statement in enumerate(body):
+        docstring = (
+            number == 0 and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+        )
+        if not docstring and not (isinstance(statement, ast.ImportFrom) and statement.module == "__future__"):
+            break
+        count += 1
+    return count
+
+
+def _add(steps: int, place: ast.stmt) -> ast.stmt:
+    """``__volery_steps__[0] += steps``."""
+    cell = ast.Subscript(ast.Name(CELL, ast.Load()), ast.Constant(0), ast.Store())
+    return _at(ast.AugAssign(cell, ast.Add(), ast.Constant(steps)), place)
+
+
+Node = TypeVar("Node", ast.stmt, ast.expr)
+
+
+def _at(new: Node, place: ast.AST) -> Node:
+    return ast.copy_location(new, place)
