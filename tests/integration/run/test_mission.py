@@ -34,9 +34,12 @@ def assert_down(vehicle):
     assert vehicle.airborne_s > 0.0
 
 
-@pytest.mark.parametrize("seed", range(1, 9))
-def test_each_point_is_reached_by_the_autopilots_own_estimate(mission_file, seed):
-    (drone,) = flown(mission_file, "sim:ardupilot", seed).record.vehicles.values()
+@pytest.mark.parametrize(
+    ("autopilot", "seed"),
+    [*(("ardupilot", seed) for seed in range(1, 9)), ("px4", 1), ("paparazzi", 1), ("dji", 1)],
+)
+def test_each_point_is_reached_by_the_autopilots_own_estimate(mission_file, autopilot, seed):
+    (drone,) = flown(mission_file, f"sim:{autopilot}", seed).record.vehicles.values()
     sigma = declared_sigma("consumer")
     assert len(legs(drone, "goto")) == 3
     for leg in legs(drone, "goto"):
