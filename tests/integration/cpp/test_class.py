@@ -1,0 +1,96 @@
+"""A component whose class is written in C++: ports both ways, time, costs, errors."""
+
+from __future__ import annotations
+
+import pytest
+
+from volery.trace.events import Charge, Milestone, Text
+
+pytestmark = pytest.mark.integration
+
+MODEL = """
+volery: 1
+name: adders
+interfaces:
+  Adding:
+    add: {args: {a: int, b: int}, returns: int}
+    shifted: {args: {points: "Position[]", north: float}, returns: "Position[]"}
+  Listing:
+    names: {args: {count: int}, returns: "str[]"}
+components:
+  Adder:
+    language: c++
+    path: adder.cpp
+    provides: {sums: Adding}
+    requires: {list: Listing}
+    parameters: {rounds: 3}
+    active: true
+  Lister: {language: python, path: lister.py, provides: {list: Listing}}
+  Caller: {language: python, path: caller.py, requires: {one: Adding, other: Adding}, active: true}
+application:
+  one: {is: Adder, list: lister.list}
+  other: {is: Adder, list: lister.list, parameters: {rounds: 0}}
+  lister: {is: Lister}
+  caller: {is: Caller, one: one.sums, other: other.sums}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {only: {one: pc, other: pc, lister: pc, caller: pc}}
+run: {duration: 10 s}
+"""
+
+LISTER = """
+class Lister:
+    def names(self, count):
+        if count < 0:
+            raise ValueError("less than nothing")
+        return [f"item {i}" for i in range(count)]
+"""
+
+CALLER = """
+import time
+import volery
+from volery import AMSL, AboveHome, Position
+from volery.base.errors import ComponentError
+
+class Caller:
+    def __init__(self, one, other):
+        self.one, self.other = one, other
+
+    def run(self):
+        time.sleep(1.5)
+        began = time.monotonic()
+        volery.log(f"{self.one.add(1, b=2)} {self.other.add(-1, 1)} {time.monotonic() - began:.3f}")
+        there = self.one.shifted([Position(1.0, 2.0, AMSL(3.0)), Position(4.0, 5.0, AboveHome(6.0))], 0.5)
+        volery.log(str(there == [Position(1.5, 2.0, AMSL(3.0)), Position(4.5, 5.0, AboveHome(6.0))]))
+        try:
+            self.one.shifted([], 1.0)
+        except ComponentError as error:
+            volery.log(str(error))
+"""
+
+
+def test_calls_in_and_out_time_costs_and_errors(run_model):
+    outcome = run_model(MODEL, "adder.cpp", lister=LISTER, caller=CALLER)
+    assert outcome.run.completed, outcome.run.record.outcome
+    said = [(one.source, one.text) for one in outcome.of(Text)]
+    assert [text for source, text in said if source == "caller"] == [
+        "203 0 1.000",  # one has begun its second round, the other none; both slept in virtual time
+        "True",
+        "one: shifted raised std::out_of_range: no points",
+    ]
+    assert [text for source, text in said if source == "one"] == [
+        "item 0 of 1",
+        "item 0 of 2",
+        "item 0 of 3",
+        "lister: names raised ValueError: less than nothing (lister.py:5)",
+    ]
+    [done] = [one for one in outcome.of(Milestone) if one.component == "one"]
+    assert float(done.detail) == pytest.approx(3.0, abs=0.1)
+    stated = [one.caller for one in outcome.of(Charge) if one.kind == "stated"]
+    assert stated == [2_000_000] * 3
+
+
+def test_the_same_seed_gives_the_same_trace(run_model, tmp_path):
+    for out in ("first", "second"):
+        run_model(MODEL, "adder.cpp", lister=LISTER, caller=CALLER, out=out)
+    first, second = ((tmp_path / out / "trace.mcap").read_bytes() for out in ("first", "second"))
+    assert first == second

@@ -1,0 +1,91 @@
+"""Components that no program survives: the run does, names the component, and leaves a whole trace."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from volery.base.errors import ComponentError, ModelError, UsageError
+from volery.components.cpp import toolchain
+from volery.run import simulate
+from volery.trace.events import Failure, Text
+
+pytestmark = pytest.mark.integration
+
+MODEL = """
+volery: 1
+name: crash
+components:
+  Crash: {{language: roscpp, path: crash.cpp, active: true}}
+  Other: {{language: python, path: other.py, active: true}}
+application:
+  crash: {{is: Crash, parameters: {{how: {how}}}}}
+  other: {{is: Other}}
+platform: {{processors: {{pc: {{is: intel-i5-3470, frequency: 3000 MHz}}}}}}
+allocations: {{only: {{crash: pc, other: pc}}}}
+requirements:
+  failures: {{observe: crash.failures, max: 0}}
+run: {{duration: 6 s}}
+"""
+OTHER = """
+import volery
+
+class Other:
+    def run(self):
+        for second in range(6):
+            volery.log(f"at {second}")
+            volery.sleep(1.0)
+"""
+WAYS = {
+    "segmentation fault": "segmentation fault at address 0, in main (crash.cpp:24)",
+    "throw": "main() raised std::out_of_range: nothing there",
+    "loop": "virtual time is frozen: it computes and asks nothing any more, in main (crash.cpp:26)",
+    "recursion": "its stack is full: it recurses without end, or keeps too much in local variables",
+    "abort": "aborted: abort(), a failed assertion or an exception that nothing catches",
+    "status": "ended with exit status 3",
+}
+
+
+@pytest.mark.parametrize("how", WAYS)
+def test_the_component_is_named_and_the_trace_is_whole(run_model, monkeypatch, how):
+    monkeypatch.setattr(simulate, "PATIENCE_S", 1.0)
+    outcome = run_model(MODEL.format(how=how), "crash.cpp", other=OTHER)
+    assert isinstance(outcome.run.error, ComponentError)
+    assert outcome.run.error.component == "crash"
+    assert WAYS[how] in str(outcome.run.error)
+    assert outcome.run.record.outcome.status == "failed"
+    assert outcome.run.record.outcome.requirements_met is False
+    assert outcome.trace.complete
+    [failure] = outcome.of(Failure)
+    assert failure.who == "crash"
+    texts = [one.text for one in outcome.of(Text)]
+    assert texts[:3] == ["at 0", "at 1", "at 2"]
+    assert (outcome.run.folder / "report.html").exists()
+
+
+def test_one_that_does_not_crash_prints_into_the_trace(run_model):
+    outcome = run_model(MODEL.format(how="not"), "crash.cpp", other=OTHER)
+    assert outcome.run.ok
+    assert ("crash", "and now: not") in [(one.source, one.text) for one in outcome.of(Text)]
+
+
+def test_a_compilers_error_is_told_with_its_place(run_model, tmp_path):
+    (tmp_path / "crash.cpp").write_text("#include <ros/ros.h>\nint main() {\n    ros::AsyncSpinner(2);\n}\n")
+    with pytest.raises(ModelError) as caught:
+        run_model(MODEL.format(how="not"), other=OTHER)
+    assert caught.value.path == "Crash"
+    assert caught.value.where is not None
+    assert caught.value.where.file.endswith("crash.cpp")
+    assert caught.value.where.line == 3
+    assert "ros::AsyncSpinner is not offered" in str(caught.value)
+
+
+def test_no_compiler(run_model, monkeypatch):
+    toolchain.compiler.cache_clear()
+    monkeypatch.setenv("PATH", os.devnull)
+    try:
+        with pytest.raises(UsageError, match=r"need a compiler.*apt install g\+\+"):
+            run_model(MODEL.format(how="not"), "crash.cpp", other=OTHER)
+    finally:
+        toolchain.compiler.cache_clear()

@@ -1,0 +1,88 @@
+"""Files written for roscpp, unmodified: in virtual time, with Boost and without, and with the real roscpp."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from volery.components.cpp.build import INCLUDE
+from volery.faces import roscpp
+from volery.messages import from_cdr
+from volery.trace.events import Charge, Published, Text
+
+pytestmark = pytest.mark.integration
+
+MODEL = """
+volery: 1
+name: keeping
+components:
+  Keeper: {language: roscpp, path: pose_keeper.cpp, active: true}
+  Plant: {language: roscpp, path: plant.cpp, active: true}
+application:
+  keeper:
+    is: Keeper
+    namespace: /robot
+    parameters: {goal_x: 0.5, goal_y: 1, tolerances: [0.1, 7]}
+    remap: {poseupdate: where}
+  plant: {is: Plant, namespace: /robot, remap: {poseupdate: where}}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {only: {keeper: pc, plant: pc}}
+run: {duration: 60 s}
+"""
+FILES = Path(__file__).parent / "files"
+
+
+def test_two_nodes_talk(run_model):
+    outcome = run_model(MODEL, "pose_keeper.cpp", "plant.cpp", "robot_msgs")
+    assert outcome.run.completed, outcome.run.record.outcome
+    said = [(one.source, one.text) for one in outcome.of(Text)]
+    assert ("plant", "enabled: go on") in said
+    assert ("keeper", "gps at 43.5, status -1") in said
+    assert ("keeper", "/robot/keeper has arrived") in said
+    [stopped] = [text for source, text in said if source == "plant" and text.startswith("stopped after")]
+    assert not [text for _, text in said if "nobody serves" in text]
+
+    marks = [one for one in outcome.of(Published) if one.topic == "/robot/marks"]
+    assert len(marks) == int(stopped.split()[2])
+    last = from_cdr(marks[-1].type, marks[-1].data)
+    assert (last.kind, list(last.numbers), list(last.weights)) == ("round", [len(marks) - 1, -1], [0, 0, 0])
+    assert {one.topic for one in outcome.of(Published)} >= {"/robot/where", "/robot/cmd_vel", "/robot/errors"}
+
+    kinds = {one.kind for one in outcome.of(Charge) if one.component == "keeper"}
+    assert kinds >= {
+        "ros:init",
+        "ros:subscribe",
+        "ros:advertise",
+        "ros:spin_once",
+        "ros:sleep",
+        "ros:publish",
+    }
+
+
+def test_it_compiles_without_boost(tmp_path):
+    headers = roscpp.generate(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
+    for name, text in headers.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    _check("pose_keeper.cpp", *(f"-I{one}" for one in (roscpp.FALLBACK, tmp_path, roscpp.INCLUDE, INCLUDE)))
+
+
+def test_it_compiles_with_the_real_roscpp():
+    if shutil.which("pkg-config") is None or subprocess.run(["pkg-config", "roscpp"], check=False).returncode:
+        pytest.skip("there is no roscpp: scripts/debian-packages roscpp")
+    flags = subprocess.run(["pkg-config", "--cflags", "roscpp"], capture_output=True, text=True, check=True)
+    _check("pose_keeper.cpp", *flags.stdout.split())
+
+
+def _includes(name: str) -> list[str]:
+    lines = (FILES / name).read_text().splitlines()
+    return [line.split("<")[1].rstrip(">") for line in lines if line.startswith("#include")]
+
+
+def _check(name: str, *options: str) -> None:
+    command = ["g++", "-std=c++17", "-fsyntax-only", *options, str(FILES / name)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
