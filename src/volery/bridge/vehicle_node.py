@@ -107,6 +107,7 @@ class VehicleNode:
                 node, self.wire, self._publish, self._wanted, self._warn, options.geoid, options.control
             )
         )
+        self.wire.only(offering.translators)
         self._advertise(node, offering)
         self._subscribe(node, offering, aside, scope)
         self._serve(node, offering, aside, scope)

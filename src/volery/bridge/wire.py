@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
@@ -70,7 +71,7 @@ class Wire:
         self._link = link
         self._system, self._component = system, component
         self._vehicle = vehicle
-        self.frames = 0
+        self._published: frozenset[str] | None = None
         self.target: tuple[int, int] = (0, 0)
         self.firmware = Firmware()
         self.last_heartbeat: Ns | None = None
@@ -93,7 +94,6 @@ class Wire:
         if (frame.system, frame.component) != self.target:
             return
         now = self.kernel.now()
-        self.frames += 1
         if frame.name == "HEARTBEAT":
             self.last_heartbeat = now
             self.firmware = Firmware(frame.fields["autopilot"], frame.fields["type"])
@@ -101,8 +101,9 @@ class Wire:
         if frame.name not in _KEPT_ALL:
             self._forget(frame.name)
         self.latest[frame.name] = heard
-        self.fresh.append(heard)
-        self._came.notify()
+        if self._published is None or frame.name in self._published:
+            self.fresh.append(heard)
+            self._came.notify()
         for ear in tuple(self.ears):
             if frame.name in ear.names:
                 ear.hear(frame)
@@ -112,6 +113,10 @@ class Wire:
         last = self.latest.get(name)
         if last is not None and last in self.fresh:
             self.fresh.remove(last)
+
+    def only(self, published: Iterable[str]) -> None:
+        """From now on these names alone are fresh: nobody is woken for the others."""
+        self._published = frozenset(published)
 
     def take(self) -> list[Heard]:
         """What has come since it was last asked."""
