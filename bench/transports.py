@@ -129,6 +129,9 @@ class Free(NamedTuple):
     background: int = 0
 
 
+FREE = Free()
+
+
 def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
     """Both as components of one run in virtual time."""
     kernel = VirtualKernel()
@@ -136,7 +139,7 @@ def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
     def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
         kernel.call_at(kernel.now(), deliver)
 
-    graph = Graph(kernel, lambda node, call, x: Free(), carry, records=lambda topic: recorded)
+    graph = Graph(kernel, lambda node, call, x: FREE, carry, records=lambda topic: recorded)
     face = importable(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
     kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))

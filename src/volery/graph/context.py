@@ -107,7 +107,7 @@ class Member:
             kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
         if kernel.current() is None:
             background += caller
-        else:
+        elif caller:
             kernel.pay(caller)
         if background and self.place.processor is not None:
             self.place.processor.load(self.place, background)

@@ -98,7 +98,8 @@ class CallbackGroup:
     def _wait(self, within: Ns | None) -> Work | None:
         kernel = self._member.context.kernel
         end_activation(kernel)
-        self._filled.wait_for(lambda: self._ready or self._member.closed, within)
+        if not self._ready:
+            self._filled.wait_for(lambda: self._ready or self._member.closed, within)
         work = self._ready.popleft() if self._ready else None
         current_task(kernel).release(work.arrived if work else kernel.now())
         return work

@@ -21,6 +21,7 @@ from volery.messages.store import (
     service,
     service_name,
     service_types,
+    type_hash,
     types,
 )
 
@@ -48,5 +49,6 @@ __all__ = [
     "service_types",
     "to_cdr",
     "to_ros1",
+    "type_hash",
     "types",
 ]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from volery.base.errors import UsageError
+from volery.messages.copying import plain_copy
 
 Default = Callable[[], Any]
 Copier = Callable[[Any], Any]
@@ -28,6 +29,9 @@ class Message:
     __match_args__: ClassVar[tuple[str, ...]] = ()
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
+    _plain: ClassVar[Callable[[Any], Any] | None] = None
+    fields_of: ClassVar[list[Field]] = []
+    """The fields of the type, for this room."""
     __hash__: ClassVar[Any] = None  # messages are mutable values
 
     if TYPE_CHECKING:  # each class has the fields of its type
@@ -39,10 +43,17 @@ class Message:
 
         ``UsageError`` where a value does not fit its field.
         """
+        plain = type(self)._plain
+        if plain is None:
+            return self._copied_by_fields()
+        try:
+            return plain(self)
+        except AttributeError:
+            return self._copied_by_fields()  # which says what is wrong
+
+    def _copied_by_fields(self) -> Any:
         cls = type(self)
         values = cls._values(self)
-        if not cls._copiers:
-            return cls(*values)
         copied = list(values)
         for index, copier in cls._copiers:
             try:
@@ -123,10 +134,14 @@ def make_class(
         "_type": name,
         "_copiers": tuple(copiers),
         "_values": staticmethod(_values_of(tuple(one.name for one in fields))),
+        "fields_of": fields,
     }
-    return make_dataclass(
+    made = make_dataclass(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
+    copy = plain_copy(made, fields)
+    made._plain = None if copy is None else staticmethod(copy)
+    return made
 
 
 def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:

@@ -94,6 +94,11 @@ def types() -> list[str]:
     return sorted(name for name in store().fielddefs if name.split("/")[1] == "msg")
 
 
+def type_hash(name: str) -> bytes:
+    """The 32 bytes of a message type's RIHS01 hash, by which ROS 2 knows whether two mean the same by it."""
+    return bytes.fromhex(store().hash_rihs01(name).rpartition("_")[2])
+
+
 def service_types() -> list[str]:
     """The names of all service types, sorted; an action's are not among them."""
     ending = "_Request"
