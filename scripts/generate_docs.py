@@ -11,11 +11,13 @@ import ast
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from typer.main import get_command
 
-from volery.autopilots.ardupilot import DIALECT
+from volery.autopilots.ardupilot import DIALECT as ARDUPILOT
+from volery.autopilots.px4 import DIALECT as PX4
+from volery.autopilots.simulated.dialect import Family
 from volery.cli.main import app
 from volery.cost import catalogue
 from volery.model.schema import schema
@@ -27,7 +29,7 @@ from volery.testing.phases import PHASES
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"
-CONFORMANCE = ROOT / "tests" / "conformance" / "ardupilot"
+CONFORMANCE = ROOT / "tests" / "conformance"
 MARKS = {"passed": "✓", "failed": "✗", "declared missing": "–", "not possible here": "·"}
 MADE = "<!-- made by scripts/generate_docs.py; do not edit -->\n\n"
 
@@ -92,16 +94,42 @@ def command_line() -> str:
     return "\n".join(lines) + "\n"
 
 
-def ardupilot_parameters() -> str:
-    """Which parameters of the simulated ArduPilot change what it does."""
+class Firmware(NamedTuple):
+    """A simulated autopilot that is held to recordings. ``parameters`` says which there are."""
+
+    name: str
+    recorded: str
+    family: Family
+    parameters: str
+
+
+FIRMWARES = {
+    "ardupilot": Firmware(
+        "ArduPilot",
+        "ArduCopter and ArduRover 4.5.6",
+        ARDUPILOT,
+        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set, kept. The copter's\n"
+        "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it\n"
+        "shares with the copter have the copter's values, the rest the documented defaults.",
+    ),
+    "px4": Firmware(
+        "PX4",
+        "PX4 1.14.0 with its built-in quadrotor",
+        PX4,
+        "The recorded parameters are there, with their recorded types and values: listed, read, set, kept.\n"
+        "The rover's are the multirotor's and documented defaults of a few of its own.",
+    ),
+}
+
+
+def honoured(firmware: Firmware) -> str:
+    """Which parameters of a simulated autopilot change what it does."""
     lines = [
-        "# Parameters of the simulated ArduPilot\n",
-        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set, kept. The copter's",
-        "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it",
-        "shares with the copter have the copter's values, the rest the documented defaults. Those in the",
-        "tables change what the vehicle does; the others change nothing.",
+        f"# Parameters of the simulated {firmware.name}\n",
+        firmware.parameters,
+        "Those in the tables change what the vehicle does; the others change nothing.",
     ]
-    for kind, dialect in DIALECT.kinds.items():
+    for kind, dialect in firmware.family.kinds.items():
         every = [one.name for one in dialect.parameters()]
         kept = [name for name in every if name not in dialect.honoured]
         lines += [f"\n## {dialect.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
@@ -113,16 +141,19 @@ def ardupilot_parameters() -> str:
     return "\n".join(lines) + "\n"
 
 
-def ardupilot_checks() -> str:
+def checks(firmware: Firmware, folder: str) -> str:
     """What is checked against the recordings: the names of the conformance tests."""
     lines = [
-        "# What is checked of the simulated ArduPilot\n",
-        "Each line is a test against facts that were read off recordings of ArduCopter and ArduRover 4.5.6.",
+        f"# What is checked of the simulated {firmware.name}\n",
+        f"Each line is a test against facts that were read off recordings of {firmware.recorded},",
+        "but where a heading says that there is no recording.",
     ]
-    for file in sorted(CONFORMANCE.glob("test_*.py")):
-        tests = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.FunctionDef)]
+    for file in sorted((CONFORMANCE / folder).glob("test_*.py")):
+        module = ast.parse(file.read_text(encoding="utf-8"))
+        tests = [node for node in module.body if isinstance(node, ast.FunctionDef)]
         names = [node.name.removeprefix("test_") for node in tests if node.name.startswith("test_")]
-        lines += [f"\n## {file.stem.removeprefix('test_').capitalize()}\n"]
+        about = " ".join((ast.get_docstring(module) or "").split())
+        lines += [f"\n## {file.stem.removeprefix('test_').capitalize()}\n", f"{about}\n"]
         lines += [f"- {name.replace('_', ' ')}" for name in names]
     return "\n".join(lines) + "\n"
 
@@ -197,8 +228,8 @@ def pages() -> dict[str, str]:
         "observables.md": MADE + observables(),
         "processors.md": MADE + processors(),
         "command-line.md": MADE + command_line(),
-        "ardupilot-parameters.md": MADE + ardupilot_parameters(),
-        "ardupilot-checks.md": MADE + ardupilot_checks(),
+        **{f"{name}-parameters.md": MADE + honoured(one) for name, one in FIRMWARES.items()},
+        **{f"{name}-checks.md": MADE + checks(one, name) for name, one in FIRMWARES.items()},
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",

@@ -295,3 +295,21 @@ def test_reposition_without_its_flag_is_refused_and_flown(bench: Any) -> None:
     before = rig.ned[0]
     rig.run(5.0)
     assert rig.ned[0] > before + 3.0
+
+
+def test_where_it_was_sent_it_shows_within_a_second(facts: dict[str, Any], bench: Any) -> None:
+    """By that a program knows that nobody else has sent it elsewhere; asking for Hold again does not."""
+    recorded = facts["target"]
+    for asked, shown in zip(recorded["asked"], recorded["shown"], strict=True):
+        assert shown == pytest.approx(asked, abs=1.0)  # 1e-7 degrees, and metres
+    rig = bench()
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    north = round((latitude + 1e-3) * 1e7)
+    place = {"x": north, "y": round(longitude * 1e7), "z": amsl, "param4": nan}
+    assert rig.command_int(192, param1=-1, param2=1, **place) == ACCEPTED
+    rig.run(max(1.1, recorded["after"]))
+    assert rig.latest["POSITION_TARGET_GLOBAL_INT"]["lat_int"] == pytest.approx(north, abs=1)
+    assert rig.mode(4, 3) == ACCEPTED
+    rig.run(2.0)
+    assert rig.latest["POSITION_TARGET_GLOBAL_INT"]["lat_int"] == pytest.approx(north, abs=1)

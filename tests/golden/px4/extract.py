@@ -314,6 +314,17 @@ def sink(rows: list[Row]) -> float:
     return round(sum(falling) / len(falling), 2)
 
 
+def shown_target(rows: list[Row]) -> dict[str, Any]:
+    """Where DO_REPOSITION sent it, where it says next that it goes, and after how many seconds."""
+    asked = next(row for row in sent(rows, "COMMAND_INT") if row.fields["command"] == 192)
+    shown = next(row for row in of(rows, "POSITION_TARGET_GLOBAL_INT") if row.at > asked.at)
+    return {
+        "asked": [asked.fields[name] for name in ("x", "y", "z")],
+        "shown": [shown.fields[name] for name in ("lat_int", "lon_int", "alt")],
+        "after": round(shown.at - asked.at, 2),
+    }
+
+
 def parameters(rows: list[Row]) -> dict[str, Any]:
     values = of(rows, "PARAM_VALUE")
     listed = [row for row in values if row.at < values[0].at + 2.0]
@@ -345,6 +356,7 @@ def main(folder: Path) -> None:
             "station": streams([row for row in gcs if row.at > 20.0]),
         },
         "flight": flight(basic, offboard, gcs),
+        "target": shown_target(gcs),
         "losses": losses(basic) + losses(offboard),
         "parameters": parameters(gcs),
         "version": plain(
