@@ -28,15 +28,18 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Crash:
-    """Whose doing it was, what happened, and where in the source (empty if that is not known)."""
+    """Whose doing it was, what happened, where in the source and with which last words (empty: not known)."""
 
     component: str
     what: str
     where: str = ""
+    said: str = ""
 
     def error(self) -> ComponentError:
         """It in words."""
-        return ComponentError(self.component, f"{self.what}{f', in {self.where}' if self.where else ''}")
+        where = f", in {self.where}" if self.where else ""
+        said = f"; it said: {self.said}" if self.said else ""
+        return ComponentError(self.component, f"{self.what}{where}{said}")
 
 
 def read_crash(report: int, libraries: Mapping[str, Path]) -> Crash | None:
@@ -52,10 +55,9 @@ def read_crash(report: int, libraries: Mapping[str, Path]) -> Crash | None:
     words = _WORDS.get(what, f"signal {what}")
     if what == str(int(signal.SIGSEGV)):
         words = f"{words} at address {'0' if address == '(nil)' else address}"
-    if said:
-        words = f"{words}; it said: {said}"
     library = libraries.get(component)
-    return Crash(component, words, _source_line(library, frames.split()) if library else "")
+    where = _source_line(library, frames.split()) if library else ""
+    return Crash(component, words, where, " ".join(said.split()))
 
 
 def _source_line(library: Path, frames: list[str]) -> str:
