@@ -98,7 +98,13 @@ PARTS: tuple[Part, ...] = (
         "apt install python3-rospy",
     ),
     Part("rclpy", module("rclpy"), "later: a real ROS 2", "source your ROS 2 set-up"),
-    Part("clang", program("clang", "clang-19"), "later: C++ components", "apt install clang-19"),
+    Part(
+        "g++ or clang++",
+        program("g++", "clang++"),
+        "components in C++ (language c++ or roscpp)",
+        "apt install g++",
+    ),
+    Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
     Part(
         "a browser",
         program("chromium", "chromium-browser", "google-chrome", "firefox"),

@@ -44,7 +44,8 @@ def simulate(output: Output, wanted: Wanted) -> int:
     folder = make_folder(wanted.out or next_folder(system.name))  # before anything that takes time
     with shown(output, " · ".join(filter(None, (system.name, system.allocation, system.scenario)))) as show:
         run = run_simulation(
-            system, Options(wanted.fidelity, wanted.seed, pace, folder, show, graph=wanted.graph)
+            system,
+            Options(wanted.fidelity, wanted.seed, pace, folder, show, output.note, wanted.graph),
         )
     return tell(output, run)
 

@@ -17,12 +17,19 @@ from volery.model.system import Interface
 RUNTIME = Path(__file__).parent / "runtime"
 INCLUDE = RUNTIME / "include"
 
-CompileUnit = Callable[[Toolchain, Path, Sequence[Path], Sequence[str]], Path]
-"""Compiles one of the user's sources, given include folders and options; returns the object file. Whoever
-counts what code computes gives another one than the compiler's own."""
+Compile = Callable[[Toolchain, Sequence[Path], Sequence[Path], Sequence[str]], Sequence[Path]]
+"""Compiles the user's sources, given include folders and options; returns object files. Whoever counts what
+code computes gives another one than the compiler's own."""
 
 Generate = Callable[[Sequence[str], Path], Mapping[str, str]]
 """Texts of headers by their names, for what the files in a folder include."""
+
+
+def one_by_one(
+    tools: Toolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
+) -> list[Path]:
+    """The compiler's own way: an object for each source."""
+    return [tools.object_file(source, include, flags) for source in sources]
 
 
 @dataclass(frozen=True)
@@ -68,7 +75,7 @@ def compile_component(
     component: CppComponent,
     face: Face = Face(),
     tell: Tell | None = None,
-    compile_unit: CompileUnit = Toolchain.object_file,
+    compiled_by: Compile = one_by_one,
 ) -> Compiled:
     """Compile and link, as far as that was not done before.
 
@@ -79,7 +86,7 @@ def compile_component(
     house = build_house()
     include = (sources.folder, _headers(component, face, sources), *face.include, INCLUDE)
     flags = (*component.flags, *(option for path in face.fallback for option in ("-idirafter", str(path))))
-    units = [compile_unit(tools, source, include, flags) for source in _units(component, sources, include[1])]
+    units = compiled_by(tools, _units(component, sources), include, flags)
     ours = ["component.cpp", "stand_ins.cpp", *(["main.cpp"] if not component.class_name else [])]
     objects = [*units, *(_own(name) for name in ours)]
     options = [str(house), *(f"-l{library}" for library in component.libraries)]
@@ -110,7 +117,7 @@ def _usable(component: CppComponent, known: Iterable[Interface]) -> list[Interfa
     return [one for one in known if one.name in required or offered & one.operations.keys()]
 
 
-def _units(component: CppComponent, sources: Sources, headers: Path) -> list[Path]:
+def _units(component: CppComponent, sources: Sources) -> list[Path]:
     """What is compiled: for a class, the glue takes the place of the source that defines it."""
     if not component.class_name:
         return list(sources.compiled)
