@@ -15,10 +15,9 @@ connecting takes no time; ``Header.seq`` is not carried; callback queues of one'
 from pathlib import Path
 
 from volery.faces.roscpp.answers import answers
-from volery.faces.roscpp.headers import generate
+from volery.faces.roscpp.headers import INCLUDE, generate
 from volery.faces.roscpp.session import Session
 
-INCLUDE = Path(__file__).parent / "include"
 FALLBACK = Path(__file__).parent / "fallback"
 
 __all__ = ["FALLBACK", "INCLUDE", "Session", "answers", "generate"]

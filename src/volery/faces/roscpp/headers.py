@@ -11,6 +11,7 @@ from volery.base.errors import UsageError
 from volery.messages.layout import Constant, FieldLayout, Layout, ros1_layout
 from volery.messages.packages import ROS1_SPELLING
 
+INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
 _BASES = {
     "bool": "std::uint8_t", "byte": "std::int8_t", "char": "std::uint8_t", "octet": "std::uint8_t",
@@ -24,15 +25,25 @@ _TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Du
 def generate(includes: Sequence[str], path: Path) -> Mapping[str, str]:
     """The headers that *includes* name, and those they include, by name.
 
-    *path* is the component's file or folder: packages of interfaces near it are found. Names that are no
-    interface's are left to the compiler. ``ModelError`` where an interface's file is no definition.
+    *path* is the component's file or folder: packages of interfaces near it are found. What is of ROS and not
+    offered says so, lest the compiler finds a real one; other names are left to it. ``ModelError`` where an
+    interface's file is no definition.
     """
     named = [found for name in includes if (found := _HEADER.match(name))]
     messages.define_packages(path, dict.fromkeys(found[1] for found in named))
+    packages = {name.partition("/")[0] for name in (*messages.types(), *messages.service_types())}
     texts: dict[str, str] = {}
     for found in named:
         _add(texts, found[1], found[2])
+        ours = INCLUDE / found[0]
+        if found[0] not in texts and found[1] in {"ros", *packages} and not ours.exists():
+            texts[found[0]] = _REFUSED.format(name=found[0])
     return texts
+
+
+_REFUSED = """\
+#error "volery: <{name}> is not offered on the embedded graph"
+"""
 
 
 def _add(texts: dict[str, str], package: str, label: str) -> None:
