@@ -1,0 +1,145 @@
+"""C++ components without a compiler: generated text, sources, crashes, counters."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import ModelError
+from volery.base.position import AboveHome, Position
+from volery.components.cpp import build, toolchain
+from volery.components.cpp.crash import Crash, read_crash
+from volery.components.cpp.interfaces import Required, glue, interfaces_header, operation, operations
+from volery.components.cpp.meter import Meter
+from volery.components.cpp.sources import find_sources
+from volery.components.cpp.types import kind_of
+from volery.faces.wire import Reader, Writer
+from volery.model.system import Argument, Interface, Signature
+
+ROUTING = Interface(
+    "Routing",
+    {
+        "route": Signature("route", (Argument("goal", "Position"), Argument("by", "str")), "Position[]"),
+        "forget": Signature("forget"),
+    },
+)
+
+
+def test_an_interface_becomes_an_abstract_class():
+    text = interfaces_header([ROUTING])
+    assert "class Routing {" in text
+    taken = "const volery::Position& goal, const std::string& by"
+    assert f"virtual std::vector<volery::Position> route({taken}) = 0;" in text
+    assert "virtual void forget() = 0;" in text
+
+
+def test_the_glue_constructs_from_ports_and_serves_operations():
+    requires = [Required("routes", "Routing"), Required("drones", "Drone", many=True)]
+    text = glue("Planner", Path("/there/planner.cpp"), requires, operations(ROUTING), {"Routing": ROUTING})
+    assert '#include "/there/planner.cpp"' in text
+    assert "class Routing_port final : public Routing, public volery::Port {" in text
+    assert 'volery::one<Routing, Routing_port>("routes")' in text
+    assert 'volery::many<I_RosDron, I_RosDron>("drones")' in text
+    assert "check_constructor<Planner, Routing&, const std::vector<I_RosDron*>&>" in text
+    assert "volery::OPERATIONS + 1" in text
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("bool", True),
+        ("int", -(2**40)),
+        ("float", 0.1),
+        ("str", "schön"),
+        ("bytes", b"\0\1"),
+        ("Position", Position(1.0, -2.0, AboveHome(3.0))),
+        ("str[]", ["a", "", "bc"]),
+        ("int[][]", [[1], [], [2, 3]]),
+    ],
+)
+def test_values_cross_the_border_unchanged(written, value):
+    kind = kind_of(written, "here")
+    out = Writer()
+    kind.write(out, value)
+    assert kind.read(Reader(out.done())) == value
+
+
+def test_a_type_that_c_plus_plus_has_not_is_named_with_its_place():
+    with pytest.raises(ModelError, match=r"interfaces\.Shop\.order\.returns.*no 'Receipt'.*Position"):
+        operation("Shop", Signature("order", (), "Receipt"))
+
+
+def test_sources_of_a_file_and_of_a_folder(tmp_path):
+    (tmp_path / "node.cpp").write_text('#include <ros/ros.h>\n#include "robot/arm.h"\nint main() {}\n')
+    (tmp_path / "other.cc").write_text("// int main()\nstruct Arm : Base { };\n")
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "arm.h").write_text("class Hand;\nclass Hand final : public Base<int> {\n};\n")
+    one = find_sources(tmp_path / "node.cpp")
+    assert [file.name for file in one.compiled] == ["node.cpp"]
+    assert one.includes() == ["ros/ros.h", "robot/arm.h"]
+    assert one.defines_main()
+    assert not find_sources(tmp_path / "other.cc").defines_main()
+    every = find_sources(tmp_path)
+    assert [file.name for file in every.compiled] == ["node.cpp", "other.cc"]
+    assert every.file_of_class("Hand") == (tmp_path / "robot" / "arm.h").resolve()
+    assert every.file_of_class("Arm") == (tmp_path / "other.cc").resolve()
+    assert every.file_of_class("Foot") is None
+
+
+def test_a_folder_without_sources(tmp_path):
+    with pytest.raises(ModelError, match="no source file"):
+        find_sources(tmp_path)
+
+
+def test_a_class_that_is_nowhere(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "a.cpp").write_text("struct Somebody {};")
+    component = build.CppComponent("Thing", tmp_path / "a.cpp", "Thing")
+    with pytest.raises(ModelError, match=r"Thing: no class 'Thing' in a\.cpp"):
+        build._units(component, find_sources(component.path))
+
+
+def _report(line: str) -> Crash | None:
+    ours, theirs = os.pipe()
+    os.write(theirs, line.encode())
+    os.close(theirs)
+    try:
+        return read_crash(ours, {})
+    finally:
+        os.close(ours)
+
+
+def test_a_crash_in_words():
+    crash = _report("pilot\t11\t(nil)\t12 34 \tterminating \n")
+    assert crash is not None
+    assert str(crash.error()) == "pilot: segmentation fault at address 0; it said: terminating"
+    full = _report("pilot\tstack\t0x7f00\t\t\n")
+    assert full is not None
+    assert "its stack is full" in full.what
+    assert _report("") is None
+
+
+def test_a_meter_gives_what_is_new():
+    counters = (ctypes.c_uint64 * 2)(5, 0)
+    meter = Meter()
+    assert meter() == 0
+    meter.read_from(counters, lambda counts: 3 * counts[0] + counts[1])
+    assert meter() == 0
+    counters[0], counters[1] = 7, 1
+    assert meter() == 7
+    assert meter() == 0
+
+
+def test_a_make_rule_names_its_files():
+    rule = "x.o: /a/b.cpp \\\n /usr/in\\ clude/c.h \\\n d.h\n"
+    assert toolchain._read_dependencies(rule) == ["/a/b.cpp", "/usr/in clude/c.h", "d.h"]
+
+
+def test_a_cache_that_cannot_be_made(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(Exception, match="set XDG_CACHE_HOME to a folder of yours"):
+        toolchain.cache_folder()
