@@ -131,6 +131,7 @@ def _check(wanted: Bridging) -> None:
         raise UsageError(f"{wanted.system} is no system id; 1 to {MOST_IDS} are")
     if not 0.0 < wanted.speed < float("inf"):
         raise UsageError(f"a speed of {wanted.speed:g}: simulated seconds per second, above 0")
+    geoid_of(wanted.geoid)
 
 
 def _names(address: Address, wanted: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from volery import messages
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
-from volery.bridge import VehicleNode, VehicleNodeOptions
+from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
 from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -25,7 +25,7 @@ class Free(NamedTuple):
 class Aviary:
     """A vehicle node with a scripted autopilot behind it and a user's node in front."""
 
-    def __init__(self, geoid: float = 0.0) -> None:
+    def __init__(self, geoid: float = 0.0, **options: Any) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
@@ -34,7 +34,9 @@ class Aviary:
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
         self.answers: dict[str, Callable[[dict[str, Any]], None]] = {}
-        self.node = VehicleNode(self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=LevelGeoid(geoid)))
+        self.node = VehicleNode(
+            self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=LevelGeoid(geoid), **options)
+        )
         self.node.start(Place("mavros"), self.kernel.root)
         self.user = self.graph.node("user", place=Place("user"))
         self.got: dict[str, list[Any]] = {}
@@ -117,3 +119,15 @@ def aviary() -> Aviary:
 def raised_aviary() -> Aviary:
     """Where the geoid is 47 m above the ellipsoid."""
     return Aviary(47.0)
+
+
+@pytest.fixture
+def roscopter() -> Aviary:
+    """Under roscopter's names, frames as they arrive, sticks taken."""
+    return Aviary(names=ROSCOPTER, period=None, control=True)
+
+
+@pytest.fixture
+def aviary_of() -> type[Aviary]:
+    """One with options of its vehicle node."""
+    return Aviary

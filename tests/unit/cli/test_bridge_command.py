@@ -1,0 +1,52 @@
+"""``volery bridge``: what makes no sense is told before anything is opened."""
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.cli.bridge import Told
+from volery.cli.console import Output
+from volery.cli.endings import BAD_INPUT
+from volery.cli.main import app
+from volery.trace.events import LinkState, Text
+
+
+def said_of(*arguments: str) -> str:
+    done = CliRunner().invoke(app, ["bridge", *arguments])
+    assert done.exit_code == BAD_INPUT
+    return " ".join(done.output.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("sim:ardupilot", "--graph", "embedded"), "the embedded graph is inside a run"),
+        (("sim:ardupilot", "--graph", "ros3"), "no graph 'ros3'"),
+        (("sim:ardupilot", "--names", "roscoptr"), "did you mean 'roscopter'?"),
+        (("sim:paparazzi", "--names", "mavros"), "paparazzi speaks pprzlink, which goes by pprzros"),
+        (("ardupilot+tcp://127.0.0.1:5760", "--names", "pprzros"), "ardupilot speaks MAVLink"),
+        (("sim:dji",), "`volery vehicle dji --graph ros1`"),
+        (("mavros+ros1:///mavros",), "reached over a graph already"),
+        (("px4+ros1:///mavros",), "there is nothing to bridge"),
+        (("sim:ardupilot", "--rate", "2000"), "1 to 1000"),
+        (("sim:ardupilot", "--source-system", "0"), "0 is no system id"),
+        (("sim:ardupilot", "--speed", "0"), "a speed of 0"),
+        (("sim:ardupilot", "--geoid", "egm08"), "egm96, or a number of metres"),
+        (("nonsense",), "is not an address"),
+    ],
+)
+def test_what_makes_no_sense(arguments: tuple[str, ...], says: str) -> None:
+    assert says in said_of(*arguments)
+
+
+def test_what_happens_is_told_when_it_changes(capsys: pytest.CaptureFixture[str]) -> None:
+    told = Told(Output())
+    for text in ("nobody", "nobody", "an autopilot"):
+        told.status(1_000_000_000, text)
+    told.record(LinkState(2_000_000_000, "tcp://x", "lost", "the other side closed the connection"))
+    told.record(Text(3_000_000_000, "bridge", 4, "message dropped"))
+    assert [line.split("  ")[1] for line in capsys.readouterr().err.splitlines()] == [
+        "nobody",
+        "an autopilot",
+        "link lost: the other side closed the connection",
+        "message dropped",
+    ]
