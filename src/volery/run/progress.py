@@ -10,7 +10,7 @@ from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.run.airfield import Airfield
 from volery.trace.events import Event, Milestone, Text
-from volery.vehicles.commanded import IF_SILENT
+from volery.vehicles.heard import IF_SILENT
 
 PERIOD: Ns = S
 

@@ -7,7 +7,7 @@ What ends an operation and what is then done with the vehicle:
 |---|---|---|
 | it strays out of limits or fence | ``OutOfBounds`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
-| somebody else changes the mode | ``Overridden``, ``Failsafe`` | is theirs; nothing is sent to it |
+| somebody else changes the mode, or its target | ``Overridden``, ``Failsafe`` | is theirs; nothing is sent to it |
 | another task of this program asks for hold, return home, land or kill | ``Overridden`` | does that |
 | the link falls silent | ``LinkLost`` | does what its parameters say: ``if_silent`` |
 
@@ -18,14 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from math import hypot, isfinite, nan
-from typing import NamedTuple
+from dataclasses import replace
+from math import isfinite
 
 from volery.base.errors import (
     CapabilityError,
-    LinkLost,
-    LinkSilent,
     LowBattery,
     OutOfBounds,
     Refused,
@@ -33,82 +30,31 @@ from volery.base.errors import (
     VehicleError,
     VoleryError,
 )
-from volery.base.frames import LocalFrame
 from volery.base.position import Position
-from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
+from volery.base.time import MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import Place, Task
-from volery.trace.events import Operation, Text
-from volery.vehicles.bounds import FLOOR, Bounds, Watch, low_battery
+from volery.trace.events import Operation
+from volery.vehicles.bounds import Bounds, Watch, low_battery
 from volery.vehicles.driver import Capability, Driver, Step, Sticks
+from volery.vehicles.goals import NOWHERE, Goal, offset
+from volery.vehicles.heard import RETURN_OF_LINK_S, Heard
 from volery.vehicles.limits import Fence, Limits, excludes_home
-from volery.vehicles.perform import SILENCE, Performer
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.manner import BY_HAND, PLAIN, SAFE, Manner
+from volery.vehicles.perform import SILENCE
 
 Truth = Callable[[], Position]
 """Where a simulated vehicle really is (AMSL): for the errors that are recorded, never for the operations."""
 
-HEARD_WITHIN_S = 10.0
-RETURN_OF_LINK_S = 30.0
-TOLD_ANEW_S = 2.0
-"""After a link has returned everything that counts has been said again within this time."""
 MEASURED_WITHIN_S = 10.0
 STICKS_FRESH: Ns = S
 """A stick sample that is older is none to begin flying by hand with."""
 
 STRAY_PERIOD: Ns = 200 * MS
-ASK_PERIOD: Ns = 500 * MS
-ASKED_FOR: Ns = MINUTE
-"""An autopilot that has not told its parameters by then will not."""
 
 
-class Goal(NamedTuple):
-    """What an operation is measured against at its end. NaN: not this coordinate."""
-
-    latitude: float
-    longitude: float
-    amsl: float
-
-
-NOWHERE = Goal(nan, nan, nan)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manner:
-    """What kind of operation it is.
-
-    ``ours``: refused while somebody else has the vehicle. ``noted`` False: recorded only if it fails; a loop
-    of set-points is no list of operations. ``bounded``: watched for bounds; ``goes_on``: still so after it
-    has returned, until the next one. ``travels``: not below the battery's reserve. ``by_hand``: sticks keep
-    what they are. ``safe``: brings it to safety, so it takes the place of what another task has under way.
-    ``excused`` are bounds that do not count.
-    """
-
-    ours: bool = True
-    noted: bool = True
-    bounded: bool = False
-    goes_on: bool = False
-    travels: bool = False
-    by_hand: bool = False
-    safe: bool = False
-    excused: frozenset[str] = frozenset()
-
-
-PLAIN = Manner(by_hand=True)
-ANYHOW = Manner(by_hand=True, ours=False)
-TURN = Manner(bounded=True)
-TRAVEL = Manner(bounded=True, travels=True)
-MISSION = Manner(bounded=True, travels=True, excused=frozenset({FLOOR}))
-STREAM = Manner(bounded=True, travels=True, goes_on=True, noted=False)
-BY_HAND = Manner(bounded=True, goes_on=True, by_hand=True)
-SAFE = Manner(safe=True)
-LAST_RESORT = Manner(safe=True, ours=False)
-
-
-class Commanded:
+class Commanded(Heard):
     """A vehicle as something that is told what to do. ``Vehicle`` adds its state and its operations."""
-
-    kind = ""
 
     def __init__(
         self,
@@ -121,96 +67,15 @@ class Commanded:
         truth: Truth | None = None,
         silence: Ns = SILENCE,
     ) -> None:
-        self.name = name
+        super().__init__(kernel, name, driver, silence)
         self.limits = limits or Limits()
         self.fence = fence
-        self._kernel = kernel
-        self._driver = driver
         self._truth = truth
-        self._performer = Performer(kernel, driver, silence)
         self._busy: tuple[Task | None, str] | None = None
         self._bounds: tuple[Bounds, Limits, Fence | None] | None = None
         self._straying: Handle | None = None  # looks after what goes on when a call has returned
         self._strayed: VehicleError | None = None  # for whoever commands it next
         self._sticks_at: Ns | None = None
-        self._asking: Handle | None = None
-
-    @property
-    def kernel(self) -> Kernel:
-        """The clock that it lives on."""
-        return self._kernel
-
-    # -- what it was heard to be
-
-    def _look(self) -> Telemetry:
-        if self._driver.cycle is not None:
-            self._driver.look()
-        with self._kernel:
-            return self._driver.telemetry
-
-    def _known(self, what: str, value: Position | None) -> Position:
-        if value is None:
-            raise VehicleError(self.name, what, "the autopilot does not know it yet; wait_ready() first")
-        return value
-
-    def wait_heard(self, within: float = HEARD_WITHIN_S) -> None:
-        """Until the autopilot is heard. Raises ``LinkSilent`` or ``LinkGarbled``: what is there instead."""
-        seen = self._driver.telemetry
-
-        def well_heard() -> bool:
-            return seen.heard >= 0 and self._driver.problem() is None
-
-        if not self._performer.wait(well_heard, from_seconds(within)):
-            with self._kernel:
-                problem = self._driver.problem()
-            if problem is not None:
-                raise type(problem)(f"{self.name}: {problem}")
-            raise LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
-        if not seen.kind:
-            seen.kind = self.kind  # MAVROS does not say what it is
-        if seen.kind != self.kind:
-            raise CapabilityError(f"{self.name} is a {seen.kind}, not a {self.kind}")
-        self._tell_if_silent()
-
-    def _tell_if_silent(self) -> None:
-        """Record what it does if its commander falls silent, as soon as that is known. Nobody waits."""
-        if self._asking is not None:
-            return
-
-        until = self._kernel.now() + ASKED_FOR
-
-        def ask() -> None:
-            line = self._driver.if_silent()
-            if line:
-                self._kernel.record(Text(self._kernel.now(), self.name, 6, f"{IF_SILENT}: {line}"))
-            if line or self._kernel.now() >= until:
-                asking.cancel()
-
-        with self._kernel.guard:
-            self._asking = asking = self._kernel.every(ASK_PERIOD, ask)
-
-    def _hear(self) -> None:
-        """What comes before every operation: take in what has arrived, and wait if nothing ever has."""
-        self._look()
-        if self._driver.telemetry.heard < 0 or self._driver.telemetry.kind != self.kind:
-            self.wait_heard()
-
-    def _require(self, capability: Capability) -> None:
-        self._hear()
-        problem = self._driver.problem()
-        if isinstance(problem, CapabilityError):
-            raise CapabilityError(f"{self.name}: {problem}")
-        if capability not in self._driver.capabilities:
-            can = ", ".join(sorted(each.value for each in self._driver.capabilities))
-            raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
-
-    def _wait_for_link(self) -> None:
-        """If it is lost at this moment, give it time to return, and then to say what it does meanwhile."""
-        if not self._performer.silent():
-            return
-        if not self._performer.wait(lambda: not self._performer.silent(), from_seconds(RETURN_OF_LINK_S)):
-            raise LinkLost(f"{self.name}: the link did not return; nobody knows whether it has come to rest")
-        self._performer.wait(lambda: False, from_seconds(TOLD_ANEW_S))
 
     def _in_flight(self, asked: str) -> None:
         """It flies, and if it has strayed since the last call, that is told first."""
@@ -415,21 +280,3 @@ class Commanded:
             return (*steps, *(replace(step, mode=mode, advice=advice) for step in self._driver.arm()))
 
         self._operate(operation, asked, plan, manner=BY_HAND)
-
-
-IF_SILENT = "if this program falls silent"
-"""How the line begins that says what a vehicle then does."""
-
-
-def offset(position: Position | None, goal: Goal) -> tuple[float, float]:
-    """How far *position* (AMSL) is from *goal*: horizontally and vertically, metres; NaN where unknown."""
-    if position is None:
-        return nan, nan
-    vertical = abs(position.altitude.metres - goal.amsl)
-    if goal.latitude != goal.latitude:
-        return nan, vertical
-    height = position.altitude.metres
-    east, north, _ = LocalFrame(goal.latitude, goal.longitude, height).to_enu(
-        position.latitude, position.longitude, height
-    )
-    return hypot(east, north), vertical

@@ -8,9 +8,10 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, from_seconds
-from volery.vehicles.commanded import NOWHERE, SAFE, STREAM, TRAVEL, TURN, Goal
 from volery.vehicles.driver import Capability, Sticks
+from volery.vehicles.goals import NOWHERE, Goal
 from volery.vehicles.limits import too_high
+from volery.vehicles.manner import SAFE, STREAM, TRAVEL, TURN
 from volery.vehicles.perform import RESTARTS
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle, travel_within

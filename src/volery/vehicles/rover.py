@@ -6,8 +6,9 @@ from math import nan
 
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
-from volery.vehicles.commanded import SAFE, TRAVEL, Goal
 from volery.vehicles.driver import Capability, Sticks
+from volery.vehicles.goals import Goal
+from volery.vehicles.manner import SAFE, TRAVEL
 from volery.vehicles.vehicle import Vehicle
 
 

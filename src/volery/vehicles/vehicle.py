@@ -13,9 +13,11 @@ from math import hypot, isfinite
 from volery.base.errors import CapabilityError, OutOfBounds, UsageError
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import Ns, from_seconds
-from volery.vehicles.commanded import ANYHOW, LAST_RESORT, MISSION, SAFE, Commanded, Goal
+from volery.vehicles.commanded import Commanded
 from volery.vehicles.driver import Capability
+from volery.vehicles.goals import Goal
 from volery.vehicles.limits import Home, violation
+from volery.vehicles.manner import ANYHOW, LAST_RESORT, MISSION, SAFE
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
 
