@@ -29,7 +29,7 @@ from volery.transports.ros1.packages import write_package
 from volery.transports.ros1.roscore import environment
 
 RATES_HZ = (10, 50)
-SETTLE_S = 4.0
+SETTLE_S = 2.0
 PEERS = Path(__file__).parent / "bridge_peers"
 FRAMES, MESSAGES = 20, 5
 """Of a period; heartbeats and what becomes of them come on top."""
@@ -77,7 +77,7 @@ def measure(
         running(surroundings, PEERS / "source.py", rate, *ports.values()),
     ):
         processes = dict(zip(WAYS, (ours, blocking, asking), strict=True))
-        time.sleep(SETTLE_S)
+        assert listener.stdout.readline() == "ready\n"
         before = {way: processor_seconds(process) for way, process in processes.items()}
         began = time.monotonic()
         heard = json.loads(listener.stdout.readline())

@@ -1,6 +1,7 @@
-"""Hears roscopter's topics under several namespaces; prints the delays of each, in microseconds, as JSON.
+"""Hears roscopter's topics under several namespaces; prints ``ready`` when all are there, and in the end the
+delays of each, in microseconds, as JSON.
 
-listener.py SETTLE_S SECONDS NAMESPACE...
+    listener.py SETTLE_S SECONDS NAMESPACE...
 """
 
 from __future__ import annotations
@@ -38,7 +39,10 @@ def listen(settle: float, seconds: float, ways: list[str]) -> None:
     for way in ways:
         for topic, kind in TOPICS.items():
             rospy.Subscriber(f"/{way}/{topic}", kind, hear, (way, topic), tcp_nodelay=True)
+    while not all(heard.values()):
+        time.sleep(0.1)
     time.sleep(settle)
+    print("ready", flush=True)
     for way in ways:
         delays[way].clear()
         heard[way] = 0
