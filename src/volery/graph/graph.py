@@ -140,6 +140,11 @@ class Graph:
                 states.append(TopicState(name, at.type, publishers, subscribers))
         return states
 
+    def heard(self, topic_name: str) -> bool:
+        """Whether somebody subscribes to the topic; without being an interaction point."""
+        at = self._context.topics.get(topic_name)
+        return at is not None and bool(at.subscriptions)
+
     def services(self) -> list[ServiceState]:
         """The services that somebody serves, by name."""
         served = sorted(self._context.services.items())

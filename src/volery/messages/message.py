@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import field, make_dataclass
 from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -136,12 +136,12 @@ def make_class(
         "_values": staticmethod(_values_of(tuple(one.name for one in fields))),
         "fields_of": fields,
     }
-    made = make_dataclass(
+    made: Any = make_dataclass(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
     copy = plain_copy(made, fields)
     made._plain = None if copy is None else staticmethod(copy)
-    return made
+    return cast("type[Message]", made)
 
 
 def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:

@@ -22,7 +22,8 @@ STRING = "std_msgs/msg/String"
 GAINS = {"p": 2.0, "i": 0.1, "d": 0.07}  # those that the thesis flew with
 CASES = {
     "topics": Case(
-        {"listener": {}, "talker": {"listeners": 1}}, {"/chatter": (STRING, 20), "/heard": (STRING, 20)}
+        {"listener": {"listeners": 0}, "talker": {"listeners": 1}},
+        {"/chatter": (STRING, 20), "/heard": (STRING, 20)},
     ),
     "services": Case(
         {"adder": {}, "asker": {"listeners": 0}},
@@ -30,7 +31,7 @@ CASES = {
     ),
     "parameters": Case({"parameters": {"rate": 10, "listeners": 0}}, {"/told": (STRING, 15)}),
     "controller": Case(
-        {"controller": {"gains": GAINS}, "plant": {"steps": 250, "listeners": 1}},
+        {"controller": {"gains": GAINS, "listeners": 0}, "plant": {"steps": 250, "listeners": 1}},
         {
             "/pose": ("geometry_msgs/msg/PoseStamped", 250),
             "/cmd_vel": ("geometry_msgs/msg/Twist", 250),

@@ -135,7 +135,7 @@ def test_our_record_of_rospys_talker(
 
 
 def test_the_graph_of_a_roscore(roscore: Any, start: Start, volery: Volery, tmp_path: Path) -> None:
-    start(*LISTENER)
+    start(*LISTENER, "_listeners:=0")
     start(*TALKER, "__name:=talker", "_listeners:=1")
     end = time.monotonic() + 20
     picture: dict[str, Any] = {"topics": []}

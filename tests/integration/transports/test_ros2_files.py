@@ -19,13 +19,13 @@ STRING = "std_msgs/msg/String"
 GAINS = {"gains.p": 2.0, "gains.i": 0.1, "gains.d": 0.07}  # those that the thesis flew with
 CASES = {
     "topics": Case(
-        {"listener": {}, "talker": {"listeners": 1}},
+        {"listener": {"listeners": 0}, "talker": {"listeners": 1}},
         {"/topic": (STRING, 25), "/repeated": (STRING, 25), "/last": (STRING, 1)},
     ),
     "services": Case({"switch": {}, "asker": {"listeners": 0}}, {"/told": (STRING, 11)}),
     "parameters": Case({"parameters": {"my_parameter": "earth", "listeners": 0}}, {"/told": (STRING, 10)}),
     "controller": Case(
-        {"controller": GAINS, "plant": {"steps": 250, "listeners": 1}},
+        {"controller": {**GAINS, "listeners": 0}, "plant": {"steps": 250, "listeners": 1}},
         {
             "/pose": ("geometry_msgs/msg/PoseStamped", 250),
             "/cmd_vel": ("geometry_msgs/msg/Twist", 250),

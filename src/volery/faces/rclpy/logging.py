@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import partial
 from typing import Any, ClassVar
 
-from volery.base.time import Ns, from_seconds
+from volery.base.time import Ns, S, from_seconds
 from volery.faces.rclpy.context import Contexts
+from volery.faces.rosout import Caller, Rosout, caller
 
 
 class LoggingSeverity(IntEnum):
@@ -34,15 +36,16 @@ class Logger:
 
     contexts: ClassVar[Contexts]
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, rosout: Rosout | None = None) -> None:
         self.name = name
+        self._rosout = rosout
         self._level = LoggingSeverity.INFO
         self._last: dict[str, Ns] = {}
         self._seen: set[str] = set()
 
     def get_child(self, name: str) -> Logger:
         """A logger below this one."""
-        return type(self)(f"{self.name}.{name}")
+        return type(self)(f"{self.name}.{name}", self._rosout)
 
     def set_level(self, level: int) -> None:
         """Log nothing that is less severe."""
@@ -58,12 +61,21 @@ class Logger:
 
     def log(self, message: Any, severity: int, **options: Any) -> bool:
         """Log a line; False if it was left out."""
-        level = LoggingSeverity(severity)
+        return self._log(message, LoggingSeverity(severity), caller(1), options)
+
+    def _log(self, message: Any, level: LoggingSeverity, where: Caller, options: dict[str, Any]) -> bool:
         text = str(message)
         if level < self._level or self._left_out(text, options):
             return False
         self.contexts.here().say(_SYSLOG[level], text)
+        if self._rosout is not None:
+            self._rosout.tell(partial(self._fill, level, text, where))
         return True
+
+    def _fill(self, level: int, text: str, where: Caller, message: Any) -> None:
+        message.stamp.sec, message.stamp.nanosec = divmod(self.contexts.now(), S)
+        message.level, message.name, message.msg = int(level), self.name, text
+        message.file, message.function, message.line = where
 
     def _left_out(self, text: str, options: dict[str, Any]) -> bool:
         first = text not in self._seen
@@ -84,22 +96,22 @@ class Logger:
 
     def debug(self, message: Any, **options: Any) -> bool:
         """For developers."""
-        return self.log(message, LoggingSeverity.DEBUG, **options)
+        return self._log(message, LoggingSeverity.DEBUG, caller(1), options)
 
     def info(self, message: Any, **options: Any) -> bool:
         """For everybody."""
-        return self.log(message, LoggingSeverity.INFO, **options)
+        return self._log(message, LoggingSeverity.INFO, caller(1), options)
 
     def warning(self, message: Any, **options: Any) -> bool:
         """Something may be wrong."""
-        return self.log(message, LoggingSeverity.WARN, **options)
+        return self._log(message, LoggingSeverity.WARN, caller(1), options)
 
     warn = warning
 
     def error(self, message: Any, **options: Any) -> bool:
         """Something is wrong."""
-        return self.log(message, LoggingSeverity.ERROR, **options)
+        return self._log(message, LoggingSeverity.ERROR, caller(1), options)
 
     def fatal(self, message: Any, **options: Any) -> bool:
         """It cannot go on."""
-        return self.log(message, LoggingSeverity.FATAL, **options)
+        return self._log(message, LoggingSeverity.FATAL, caller(1), options)

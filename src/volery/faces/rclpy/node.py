@@ -15,8 +15,11 @@ from volery.faces.rclpy.logging import Logger
 from volery.faces.rclpy.parameters import Declared, Parameter, Watcher
 from volery.faces.rclpy.task import Task
 from volery.faces.rclpy.time import Clock, ClockType, Rate
+from volery.faces.rosout import Rosout
+from volery.graph import RELIABLE, TRANSIENT_LOCAL, QoS
 from volery.graph.group import Work
 
+_ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
 _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")
 
 
@@ -48,7 +51,9 @@ class Node:
         self._executor: Executor | None = None
         self._default_group = MutuallyExclusiveCallbackGroup()
         self._made: list[Any] = []
-        self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."))
+        rosout = Rosout(self.contexts.graph, self.graph_node, "rcl_interfaces/msg/Log", _ROSOUT)
+        told = rosout if services.get("enable_rosout", True) else None
+        self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."), told)
         self._clock = self.clocks(clock_type=ClockType.ROS_TIME)
         self._declared = Declared(self.graph_node, parameter_overrides or (), allow_undeclared_parameters)
         if automatically_declare_parameters_from_overrides:

@@ -11,6 +11,7 @@ from volery import messages
 from volery.faces.launch import Launch
 from volery.faces.module import face_module
 from volery.faces.rospy import parameters, services, time, topics
+from volery.faces.rospy.anymsg import AnyMsg
 from volery.faces.rospy.errors import EXCEPTIONS
 from volery.faces.rospy.logging import LEVELS, loggers
 from volery.faces.rospy.session import Sessions
@@ -45,10 +46,21 @@ def modules(
     names["TimerEvent"] = time.TimerEvent
     names["Header"] = messages.message_class("std_msgs/msg/Header")
     names["Message"] = messages.Message
-    rospy = face_module("rospy", names)
-    exceptions = face_module("rospy.exceptions", EXCEPTIONS)
-    vars(rospy)["exceptions"] = exceptions
-    return {**messages.modules(), "rospy": rospy, "rospy.exceptions": exceptions}
+    names["AnyMsg"] = AnyMsg
+    parts: dict[str, Mapping[str, Any]] = {
+        "exceptions": EXCEPTIONS,
+        "msg": {"AnyMsg": AnyMsg},
+        "numpy_msg": {"numpy_msg": numpy_msg},
+        "rostime": {one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
+    }
+    found = {f"rospy.{part}": face_module(f"rospy.{part}", inside) for part, inside in parts.items()}
+    rospy = face_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
+    return {**messages.modules(), "rospy": rospy, **found}
+
+
+def numpy_msg(msg_type: Any) -> Any:
+    """Messages whose arrays are numpy's: as they are here anyway."""
+    return msg_type
 
 
 def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:

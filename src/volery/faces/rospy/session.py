@@ -10,8 +10,9 @@ from typing import Any
 from volery.base.errors import VoleryError
 from volery.base.time import Ns
 from volery.faces.launch import Launch
+from volery.faces.rosout import Rosout
 from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
-from volery.graph import Group, Node, RosGraph, Work
+from volery.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task
@@ -25,10 +26,12 @@ ERROR = 3
 class Session:
     """One component's node."""
 
+    graph: RosGraph
     node: Node
     scope: Scope
     kernel: Kernel
     ended: Signal
+    rosout: Rosout
     shutdown: str = ""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
     failures: set[str] = field(default_factory=set)
@@ -63,6 +66,10 @@ class Session:
 
         self._start(body, label)
         return group
+
+    def beside(self, body: Callable[[], None], label: str) -> None:
+        """Have a task of its own do something, as a thread of rospy would."""
+        self._start(lambda: self._guarded(body, label), label)
 
     def spawn_each(self, label: str, what: str) -> Group:
         """A new group of which each piece of work gets a task of its own."""
@@ -137,7 +144,8 @@ class Sessions:
         for key, value in launch.parameters.items():
             node.set_parameter(f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
-        made = self._open[component] = Session(node, task.scope, self.kernel, ended)
+        rosout = Rosout(self.graph, node, "rosgraph_msgs/msg/Log", LATCHED)
+        made = self._open[component] = Session(self.graph, node, task.scope, self.kernel, ended, rosout)
         return made
 
     def here(self) -> Session:

@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
+from volery.faces.rospy.anymsg import AnyMsg, AnySubscription
 from volery.faces.rospy.errors import ROSException, ROSSerializationException
 from volery.faces.rospy.session import Session, Sessions
-from volery.graph import BEST_AVAILABLE, LATCHED, QoS
+from volery.graph import BEST_AVAILABLE, LATCHED, QoS, Subscription
 from volery.kernel.waiting import Signal
 from volery.messages import Message
 
@@ -46,6 +47,10 @@ class Publisher:
         *,
         queue_size: int | None = None,
     ) -> None:
+        if subscriber_listener is not None:
+            raise NotImplementedError(
+                "rospy.Publisher: subscriber_listener is not there on the embedded graph"
+            )
         session = self._session = self.sessions.early()
         qos = LATCHED if latch else QoS(queue_size or None)
         self.data_class = data_class
@@ -100,15 +105,18 @@ class Subscriber:
     ) -> None:
         session = self.sessions.early()
         self.data_class = data_class
-        self.type = type_name("Subscriber", data_class)
         self.callback = callback
         self._args = callback_args
-        topic = session.node.resolve(name)
+        topic = self.name = self.resolved_name = session.node.resolve(name)
+        qos = _listening(queue_size)
+        self._subscription: AnySubscription | Subscription
+        if data_class is AnyMsg:
+            self.type = AnyMsg._type
+            self._subscription = AnySubscription(session, topic, self._call, qos)
+            return
+        self.type = type_name("Subscriber", data_class)
         group = session.spin_beside(topic, f"callback of {topic}")
-        self._subscription = session.node.subscribe(
-            name, self.type, self._call, _listening(queue_size), group
-        )
-        self.name = self.resolved_name = topic
+        self._subscription = session.node.subscribe(name, self.type, self._call, qos, group)
 
     def _call(self, message: Any) -> None:
         if self.callback is None:

@@ -41,6 +41,10 @@ class Controller:
         self.goal = 0
         self.commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self.reached = rospy.Publisher("reached", Int32, queue_size=10)
+        while self.reached.get_num_connections() < rospy.get_param("~listeners"):
+            rospy.sleep(0.05)
+        while self.commands.get_num_connections() < 1 + rospy.get_param("~listeners"):
+            rospy.sleep(0.05)
         rospy.Subscriber("pose", PoseStamped, self.steer, queue_size=1)
 
     def steer(self, pose):

@@ -8,6 +8,8 @@ from std_msgs.msg import String
 class Listener:
     def __init__(self):
         self.heard = rospy.Publisher("heard", String, queue_size=10)
+        while self.heard.get_num_connections() < rospy.get_param("~listeners"):
+            rospy.sleep(0.05)
         rospy.Subscriber("chatter", String, self.hear, callback_args="I heard: ")
 
     def hear(self, message, before):

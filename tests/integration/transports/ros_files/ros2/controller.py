@@ -42,6 +42,11 @@ class Controller(Node):
         self.goal = 0
         self.commands = self.create_publisher(Twist, "cmd_vel", 1)
         self.reached = self.create_publisher(Int32, "reached", 10)
+        listeners = self.declare_parameter("listeners", 1).value
+        while (
+            min(self.commands.get_subscription_count() - 1, self.reached.get_subscription_count()) < listeners
+        ):
+            rclpy.spin_once(self, timeout_sec=0.05)
         self.create_subscription(PoseStamped, "pose", self.steer, 1)
 
     def steer(self, pose):

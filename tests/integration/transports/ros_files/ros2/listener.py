@@ -17,6 +17,9 @@ class Listener(Node):
             depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
         self.last = self.create_publisher(String, "last", kept)
+        listeners = self.declare_parameter("listeners", 1).value
+        while self.repeated.get_subscription_count() < listeners:
+            rclpy.spin_once(self, timeout_sec=0.05)
         self.create_subscription(String, "topic", self.hear, 10)
 
     def hear(self, message):
