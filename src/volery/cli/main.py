@@ -444,6 +444,43 @@ def measure(
     run_command(output, lambda: command.measure(output, wanted))
 
 
+@calibrate_app.command("python")
+def calibrate_python(
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
+    ] = Path("catalogue.yaml"),
+    frequency: Annotated[
+        float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
+    ] = None,
+    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    rounds: Annotated[
+        tuple[int, int], typer.Option(metavar="LEAST MOST", help="How often each piece of code is timed.")
+    ] = (9, 31),
+    within: Annotated[
+        float, typer.Option(metavar="PERCENT", help="How well each median is to be known: 95 % intervals.")
+    ] = 3.0,
+    reference: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the table of operations itself, too.")
+    ] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what Python code costs here, and write it as an entry of a catalogue.
+
+    CPU time of some 250 statements and of whole programs: what each kind of operation takes, and how much
+    slower this machine is than the one of volery's table. On a robot's own computer this replaces the
+    estimated factor by a measured one. Exit status: 0 if every time is known as well as asked for, 2 for
+    bad input, 1 otherwise.
+    """
+    from volery.calibrate.python.pieces import Rounds
+    from volery.cli import calibrate_python as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(out, frequency, name, Rounds(*rounds, within / 100.0), reference)
+    run_command(output, lambda: command.python(output, wanted))
+
+
 @model_app.command("check")
 def model_check(
     model: Model,

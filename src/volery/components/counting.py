@@ -39,12 +39,13 @@ class Steps:
     *costs* are nanoseconds by the name of an operation, for all of ``operations.OPERATIONS``; by default
     those that come with volery. Statements add to one cell. Inside expressions, where nothing can be
     assigned, an iterator of ``None`` is advanced, one for each weight: that is cheap, false, and tells how
-    often it was done.
+    often it was done. *exact*: as many weights as it takes, not rounded.
     """
 
-    def __init__(self, costs: Mapping[str, float] | None = None) -> None:
+    def __init__(self, costs: Mapping[str, float] | None = None, exact: bool = False) -> None:
         costs = python_operations().nanoseconds if costs is None else costs
-        self._weights = Weights({name: STEPS_PER_NS * costs[name] for name in operations.OPERATIONS})
+        steps = {name: STEPS_PER_NS * costs[name] for name in operations.OPERATIONS}
+        self._weights = Weights(steps, exact)
         self._cell = [0]
         self._ticks: dict[int, tuple[repeat[None], int]] = {}
 

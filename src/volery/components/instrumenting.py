@@ -28,10 +28,15 @@ _LEADING_BITS = 5
 
 
 class Weights:
-    """What operations and pieces of syntax weigh, in steps. ``weights["load"]`` is that of an operation."""
+    """What operations and pieces of syntax weigh, in steps. ``weights["load"]`` is that of an operation.
 
-    def __init__(self, steps: Mapping[str, float]) -> None:
+    Those of counters inside expressions keep five leading bits (3 %), so that not every expression needs an
+    iterator of its own, unless weights are to be *exact*.
+    """
+
+    def __init__(self, steps: Mapping[str, float], exact: bool = False) -> None:
         self._steps = steps
+        self._exact = exact
         self._made: Mapping[str, list[tuple[str, int]]] = {}
 
     def look_at(self, tree: ast.Module) -> None:
@@ -45,6 +50,12 @@ class Weights:
         """Executing *node* once, without what has a counter of its own."""
         own = sum(self._steps[name] * times for name, times in self._operations(node))
         return own + sum(self.of(part) for part in _parts(node))
+
+    def of_tick(self, steps: float) -> int:
+        """The weight of a counter inside an expression that is to count *steps*."""
+        whole = round(steps)
+        unit = 1 if self._exact else 1 << max(0, whole.bit_length() - _LEADING_BITS)
+        return whole if unit == 1 else round(whole / unit) * unit
 
     def _operations(self, node: ast.AST) -> Iterable[tuple[str, int]]:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self._made:
@@ -109,7 +120,7 @@ class _Counters(ast.NodeTransformer):
 
     # -- statements
 
-    def _block(self, body: list[ast.stmt], extra: float = 0.0) -> list[ast.stmt]:
+    def _block(self, body: list[ast.stmt], extra: float = 0) -> list[ast.stmt]:
         """*body* cut into straight runs: a new one starts behind each statement that may leave the block."""
         counted: list[ast.stmt] = []
         run: list[ast.stmt] = []
@@ -117,7 +128,7 @@ class _Counters(ast.NodeTransformer):
             run.append(statement)
             if _may_leave(statement):
                 counted += self._run(run, extra)
-                run, extra = [], 0.0
+                run, extra = [], 0
         return counted + (self._run(run, extra) if run else [])
 
     def _run(self, statements: list[ast.stmt], extra: float) -> list[ast.stmt]:
@@ -147,7 +158,7 @@ class _Counters(ast.NodeTransformer):
         extra = self._each_time(node)
         for name, value in ast.iter_fields(node):
             if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
-                setattr(node, name, self._block(value, extra if name == "body" else 0.0))
+                setattr(node, name, self._block(value, extra if name == "body" else 0))
             elif isinstance(value, list):
                 setattr(
                     node, name, [self.visit(item) if isinstance(item, ast.AST) else item for item in value]
@@ -163,7 +174,7 @@ class _Counters(ast.NodeTransformer):
             return weights[ROUND] + weights.of(node.target)
         if isinstance(node, ast.While):
             return weights[ROUND] + weights["branch"] + weights.of(node.test)
-        return weights[CAUGHT] if isinstance(node, ast.ExceptHandler) else 0.0
+        return weights[CAUGHT] if isinstance(node, ast.ExceptHandler) else 0
 
     # -- expressions
 
@@ -198,7 +209,7 @@ class _Counters(ast.NodeTransformer):
 
     def _visit_comprehension(self, node: Any) -> ast.AST:
         weights = self._weights
-        pending = 0.0  # steps for each item that reached the next part
+        pending: float = 0  # steps for each item that reached the next part
         for number, generator in enumerate(node.generators):
             steps = pending + weights["loop"] + weights.of(generator.iter)
             generator.iter = self.visit(generator.iter)
@@ -209,9 +220,9 @@ class _Counters(ast.NodeTransformer):
                 steps = pending + sum(weights["branch"] + weights.of(test) for test in generator.ifs)
                 generator.ifs = [self.visit(test) for test in generator.ifs]
                 generator.ifs[0] = self._ticking(steps, generator.ifs[0])
-                pending = 0.0
+                pending = 0
         parts = [name for name in ("key", "value", "elt") if hasattr(node, name)]
-        pending += weights[RESUME] if isinstance(node, ast.GeneratorExp) else 0.0
+        pending += weights[RESUME] if isinstance(node, ast.GeneratorExp) else 0
         pending += sum(weights.of(getattr(node, name)) for name in parts)
         for name in parts:
             setattr(node, name, self.visit(getattr(node, name)))
@@ -223,7 +234,7 @@ class _Counters(ast.NodeTransformer):
 
     def _ticking(self, steps: float, expression: ast.expr) -> ast.expr:
         """``(__volery_tick_7__() or expression)``: the tick gives ``None``."""
-        weight = _few_bits(steps)
+        weight = self._weights.of_tick(steps)
         if not weight:
             return expression
         self.ticks.add(weight)
@@ -238,13 +249,6 @@ def _taker(node: ast.Call) -> str:
     if isinstance(node.func, ast.Name) and node.func.id in SIZED:
         return node.func.id
     return node.func.attr if isinstance(node.func, ast.Attribute) and node.func.attr in SIZED_METHODS else ""
-
-
-def _few_bits(steps: float) -> int:
-    """*steps* to five leading bits (3 %), so that not every expression needs an iterator of its own."""
-    whole = round(steps)
-    unit = 1 << max(0, whole.bit_length() - _LEADING_BITS)
-    return round(whole / unit) * unit
 
 
 def _may_leave(statement: ast.stmt) -> bool:

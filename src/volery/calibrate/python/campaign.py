@@ -19,6 +19,8 @@ import numpy as np
 from volery.calibrate.python.nonnegative import explain
 from volery.calibrate.python.pieces import AS_USUAL, Rounds, Tell, Timed, measure, nobody, programs, snippets
 from volery.components.operations import OPERATIONS
+from volery.cost.code import CodeLaw
+from volery.cost.figure import Figure
 from volery.cost.interpreter import OperationTable, python_operations
 
 FLOOR_NS = 10.0
@@ -49,6 +51,29 @@ class Calibration:
     def program_error(self) -> float:
         """The mean size of the errors of programs."""
         return mean(abs(error) for error in self.programs.values())
+
+    @property
+    def pieces(self) -> int:
+        """How many were timed."""
+        return len(self.statements) + len(self.programs) + 1
+
+    def law(self, machine: str, frequency_mhz: float) -> CodeLaw:
+        """The law of the processor that was measured, which ran at *frequency_mhz*."""
+        source = f"volery calibrate python: CPU time of {len(self.programs)} programs on {machine}"
+        slowdown = Figure(
+            value=round(self.slowdown, 3),
+            error=round(self.slowdown_spread, 3),
+            provenance="measured",
+            source=f"median over the programs, of {self.rounds} rounds or more",
+        )
+        return CodeLaw(
+            language="python",
+            provenance="measured",
+            source=source,
+            validity=interpreter(),
+            at_mhz=frequency_mhz,
+            slowdown=slowdown,
+        )
 
     def table(self, machine: str) -> OperationTable:
         """As the package keeps it; *machine* is what it was measured on."""

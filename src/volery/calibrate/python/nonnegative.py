@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _ROUNDS = 25
-_SWEEPS = 200
+_SWEEPS = 40
 _SMALL = 0.03  # a relative residual below it counts by its square
 
 

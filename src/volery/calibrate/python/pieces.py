@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.resources import files
 from statistics import median, quantiles
 from time import thread_time_ns
@@ -20,7 +21,6 @@ from types import ModuleType
 
 from volery.base.time import MS, Ns
 from volery.calibrate.python.snippets import PREAMBLE, SNIPPETS
-from volery.components import operations
 from volery.components.counting import Steps
 from volery.components.operations import OPERATIONS
 from volery.cost.interpreter import STEPS_PER_NS
@@ -29,13 +29,9 @@ Tell = Callable[[int, int, int], None]
 
 _NO_STATEMENT = "pass"
 _WORTH_TIMING: Ns = 2 * MS
-_BY_THE_WAY = frozenset((operations.ENTER, operations.ROUND, operations.ITEM, operations.RESUME)) | {
-    operations.CAUGHT,
-    "loop",
-    "branch",
-    "load",
-}
-"""Operations that follow from the structure of code and not from one node."""
+_TIMES = 8
+_DIGITS = 32
+"""Bits for how often an operation is done: enough for any piece here."""
 
 
 def nobody(done: int, most: int, pieces: int) -> None:
@@ -52,8 +48,9 @@ class Timed:
     times: int = 1
     nanoseconds: list[float] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self._run = self.load(None)
+    @cached_property
+    def _run(self) -> Callable[[int], object]:
+        return self.load(None)
 
     def warm_up(self) -> None:
         """Find out how often it must be run to be worth timing."""
@@ -90,27 +87,30 @@ class Timed:
 
     def counted_ns(self, costs: Mapping[str, float]) -> float:
         """What one time takes by *costs* of operations."""
-        steps = Steps(costs)
-        run = self.load(steps)
-        run(1)  # what happens at the first time alone does not count
-        steps.take()
-        run(1)
-        once = steps.take()
-        run(9)
-        return (steps.take() - once) / 8 / STEPS_PER_NS
+        return self._counted(Steps(costs)) / STEPS_PER_NS / _TIMES
 
     def counts(self) -> list[float]:
-        """How often each operation is done in one time, in the order of ``OPERATIONS``."""
-        nodes = ast.walk(ast.parse(self.text))
-        possible = {name for node in nodes for name, _ in operations.of(node)} | _BY_THE_WAY
-        possible |= {name for made in operations.made_by(ast.parse(self.text)).values() for name, _ in made}
-        possible |= {name for name in OPERATIONS if name.startswith("item of") and name[8:-2] in self.text}
-        zero = dict.fromkeys(OPERATIONS, 0.0)
-        one = 1.0 / STEPS_PER_NS
-        return [
-            self.counted_ns({**zero, name: one}) * STEPS_PER_NS if name in possible else 0.0
-            for name in OPERATIONS
-        ]
+        """How often each operation is done in one time, in the order of ``OPERATIONS``.
+
+        Each is counted in digits of its own of one great number.
+        """
+        steps = Steps({name: 1 << place * _DIGITS for place, name in enumerate(OPERATIONS)}, exact=True)
+        left = self._counted(steps) // STEPS_PER_NS
+        found = []
+        for _ in OPERATIONS:
+            found.append((left & (1 << _DIGITS) - 1) / _TIMES)
+            left >>= _DIGITS
+        return found
+
+    def _counted(self, steps: Steps) -> int:
+        """Steps of doing it ``_TIMES`` times."""
+        run = self.load(steps)
+        run(0)  # what happens however often it is run does not count
+        steps.take()
+        run(0)
+        nothing = steps.take()
+        run(_TIMES)
+        return steps.take() - nothing
 
 
 def snippets() -> list[Timed]:

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from ruamel.yaml import YAML
-
-from volery.base.errors import UsageError
+from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import Machine
 from volery.calibrate.ros.campaign import Circumstances
 from volery.calibrate.ros.fitting import Cost, Straight
-from volery.cost.catalogue import read, read_file
+from volery.cost.catalogue import read_file
 from volery.cost.figure import Line, through
 from volery.cost.ros import CallFigures, RosLaw
 
@@ -115,35 +112,8 @@ def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
     known = read_file(file).processors.get(machine.name) if file.exists() else None
     before = known.ros.get(law.client) if known is not None else None
     made = joined(before, law) if before is not None else law
-    yaml = YAML()
-    yaml.width = 110
-    data = (yaml.load(file.read_text(encoding="utf-8")) if file.exists() else None) or {}
-    entry = data.setdefault("processors", {}).setdefault(machine.name, _new_entry(machine))
-    entry["least_mhz"] = min(entry["least_mhz"], made.least_mhz)
-    entry["greatest_mhz"] = max(entry["greatest_mhz"], made.greatest_mhz)
-    entry.setdefault("ros", {})[law.client] = _plain(made)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with file.open("w", encoding="utf-8") as out:
-            yaml.dump(data, out)
-    except OSError as error:
-        raise UsageError(f"{file} cannot be written: {error.strerror}") from error
-    read(file.read_text(encoding="utf-8"), str(file))
+    put_law(file, machine, "ros", law.client, made, (made.least_mhz, made.greatest_mhz))
     return made
-
-
-def _new_entry(machine: Machine) -> dict[str, Any]:
-    return {
-        "description": machine.description,
-        "source": "measured by volery calibrate on the machine itself",
-        "cores": machine.cores,
-        "least_mhz": machine.frequency_mhz,
-        "greatest_mhz": machine.frequency_mhz,
-    }
-
-
-def _plain(law: RosLaw) -> dict[str, Any]:
-    return law.model_dump(exclude_defaults=True)
 
 
 def described(line: Straight, call: str) -> str:

@@ -1,0 +1,79 @@
+"""Costs of Python's operations: found again from times that were made up, written where a run finds them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from volery.calibrate.catalogue_file import put_law
+from volery.calibrate.machine import Machine
+from volery.calibrate.python.campaign import evaluate
+from volery.calibrate.python.nonnegative import explain
+from volery.calibrate.python.pieces import Rounds, measure, program, programs, snippets
+from volery.components.operations import OPERATIONS
+from volery.cost import catalogue
+from volery.cost.interpreter import python_operations
+
+HERE = Machine("bench", "A Processor", 4, 2600.0)
+
+
+def test_costs_are_found_again_from_the_times_they_make():
+    random = np.random.default_rng(3)
+    counts = random.integers(0, 5, (60, 12)).astype(float)
+    costs = random.uniform(1.0, 50.0, 12)
+    costs[3] = 0.0
+    assert explain(counts, counts @ costs, np.ones(60), 1.0) == pytest.approx(costs, abs=0.05)
+
+
+def test_no_cost_is_negative_and_one_odd_measurement_changes_little():
+    counts = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [4.0, 1.0], [5.0, 0.0]])
+    times = counts @ np.array([10.0, 3.0])
+    times[2] *= 5.0
+    found = explain(counts, times, np.ones(6), 1.0)
+    assert found == pytest.approx([10.0, 3.0], rel=0.1)
+    assert (explain(counts, counts @ np.array([10.0, -9.0]), np.ones(6), 1.0) >= 0.0).all()
+
+
+def test_a_calibration_whose_programs_run_slower_than_their_operations_finds_by_how_much():
+    made_up = {name: 1.0 + number % 7 for number, name in enumerate(OPERATIONS)}
+    statements, whole = snippets()[::3], programs()[:3]
+    for one in statements:
+        one.nanoseconds += [one.counted_ns(made_up)] * 4
+    for one in whole:
+        one.nanoseconds += [1.5 * one.counted_ns(made_up)] * 4
+    found = evaluate(statements, whole, Rounds(4, 4))
+    assert found.in_context == pytest.approx(1.5, rel=0.1)
+    assert sorted(abs(error) for error in found.statements.values())[60] < 0.05
+    assert found.loose == {}
+    shipped = [one.median / one.counted_ns(python_operations().nanoseconds) for one in whole]
+    assert found.slowdown == sorted(shipped)[1]
+
+
+def test_pieces_are_counted_the_same_each_time():
+    for one in programs():
+        assert one.counted_ns(python_operations().nanoseconds) == one.counted_ns(
+            python_operations().nanoseconds
+        )
+
+
+def test_only_what_is_not_known_well_enough_is_timed_more_than_the_least():
+    text = "def prepare(seed):\n    return seed\ndef run(state):\n    return sum(range(2000))\n"
+    steady, loose = program("steady", text), program("loose", text)
+    steady.nanoseconds += [100.0] * 40
+    loose.nanoseconds += [1.0, 1e6] * 100
+    told = []
+    measure([steady, loose], Rounds(2, 5, 0.5), lambda done, most, pieces: told.append((done, pieces)))
+    assert told == [(0, 2), (1, 2), (2, 1), (3, 1), (4, 1)]
+
+
+def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):
+    statements, whole = snippets()[:40], programs()[:3]
+    for one in [*statements, *whole]:
+        one.nanoseconds += [3.0 * one.counted_ns(python_operations().nanoseconds)] * 4
+    law = evaluate(statements, whole, Rounds(4, 4)).law("A Processor", 2600.0)
+    file = tmp_path / "catalogue.yaml"
+    put_law(file, HERE, "code", "python", law, (2600.0, 2600.0))
+    read = catalogue(file).processor("bench").code_law()
+    assert read.ns_per_step(1300.0) == pytest.approx(0.6)
+    assert read.warnings() == ()
+    assert "measured within" in read.how_good()
