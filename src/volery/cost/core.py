@@ -1,0 +1,107 @@
+"""What compiled code costs on a core: the figures of a model of its pipeline.
+
+Law: ``volery.native.core_model`` executes what ran. Here stand the figures that it needs: for each class of
+operations how long it takes and how many a core starts per cycle, how wide the core is, how far it looks
+ahead, what a wrong prediction costs, and what calls of libraries cost.
+
+Validity: code whose data stay in the first cache. Cycles of the core do not depend on its frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
+from volery.cost.figure import Stated
+
+__all__ = ["CoreLaw", "LibraryLaw", "Operation", "core_law", "cores", "read_cores"]
+
+
+class Operation(BaseModel):
+    """One class of operations: ``latency`` in cycles; ``per_cycle`` of them may start in a cycle."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    latency: float
+    per_cycle: float
+
+
+class LibraryLaw(Stated):
+    """Cycles of calls into libraries, by symbol; any other takes ``unknown``, and a report names it."""
+
+    unknown: float
+    calls: dict[str, float] = Field(default_factory=dict)
+
+
+class CoreLaw(Stated):
+    """A kind of core.
+
+    ``isa`` and ``cpu`` are LLVM's names; code is made for ``cpu``. ``window``: how many instructions may be
+    under way; ``refill``: cycles from the end of a mispredicted branch to the next instruction; ``forward``:
+    from a store to a load of the same place; ``tables``, ``history``: of the prediction of branches, and how
+    many taken ones it looks back on. ``error`` is the honest relative band, ``None`` where it is not known.
+    """
+
+    name: str = ""
+    isa: str
+    cpu: str
+    least_mhz: float
+    greatest_mhz: float
+    width: float
+    window: int
+    refill: float
+    forward: float
+    tables: int
+    history: int
+    error: float | None = None
+    operations: dict[str, Operation]
+    library: LibraryLaw
+
+    def check_frequency(self, frequency_mhz: float) -> None:
+        """``EstimateError`` for a frequency at which this core does not run."""
+        if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
+            raise EstimateError(
+                f"{self.name}: {frequency_mhz:g} MHz is outside the range of its laws, "
+                f"{self.least_mhz:g} to {self.greatest_mhz:g} MHz"
+            )
+
+
+def read_cores(text: str, name: str) -> dict[str, CoreLaw]:
+    """Cores from YAML text, by the kind of processor. ``ModelError`` names the place of what is wrong."""
+    try:
+        data = YAML(typ="safe").load(text)
+    except YAMLError as error:
+        raise ModelError(f"not YAML: {error}", name) from error
+    entries = data.get("cores") if isinstance(data, dict) else None
+    if not isinstance(entries, dict):
+        raise ModelError("no 'cores' in it", name)
+    try:
+        return {kind: CoreLaw.model_validate({"name": kind, **entry}) for kind, entry in entries.items()}
+    except ValidationError as error:
+        said = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3])
+        raise ModelError(said, name) from error
+
+
+@cache
+def cores() -> Mapping[str, CoreLaw]:
+    """The cores that come with volery."""
+    text = files("volery.cost").joinpath("cores.yaml").read_text(encoding="utf-8")
+    return read_cores(text, "cores.yaml")
+
+
+def core_law(kind: str, more: Mapping[str, CoreLaw] | None = None) -> CoreLaw:
+    """The core of a kind of processor, *more* before what comes with volery. ``EstimateError`` if unknown."""
+    known = {**cores(), **(more or {})}
+    law = known.get(kind)
+    if law is None:
+        raise EstimateError(
+            f"no figures of compiled code for processor {kind!r}{did_you_mean(kind, known)}; "
+            f"there are some for {choices(known)}; `volery calibrate processor` adds this machine"
+        )
+    return law

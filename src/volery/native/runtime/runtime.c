@@ -1,0 +1,68 @@
+/* Beside an instrumented program: writes what it counted, or which blocks it entered, when it ends.
+ *
+ * VOLERY_COUNTS=FILE   counters at the end, less those at the beginning (64 bits each)
+ * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE
+ */
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+extern uint64_t volery_counters[] __attribute__((weak));
+extern const uint64_t volery_counters_length __attribute__((weak));
+
+enum { HELD = 1 << 14 };
+
+static uint64_t *before;
+static FILE *trace;
+static uint32_t held[HELD];
+static uint64_t entered, window, stride;
+static unsigned holds;
+
+static uint64_t number(const char *name, uint64_t otherwise) {
+    const char *text = getenv(name);
+    return text ? strtoull(text, NULL, 10) : otherwise;
+}
+
+static void flush(void) {
+    fwrite(held, sizeof *held, holds, trace);
+    holds = 0;
+}
+
+void volery_trace(uint32_t block) {
+    if (!trace || entered++ % stride >= window)
+        return;
+    held[holds++] = block;
+    if (holds == HELD)
+        flush();
+}
+
+void volery_begin(void) {
+    if (getenv("VOLERY_COUNTS") && &volery_counters_length) {
+        before = malloc(volery_counters_length * sizeof *before);
+        memcpy(before, volery_counters, volery_counters_length * sizeof *before);
+    }
+    const char *name = getenv("VOLERY_TRACE");
+    if (name) {
+        window = number("VOLERY_WINDOW", 1);
+        stride = number("VOLERY_STRIDE", 1);
+        trace = fopen(name, "wb");
+    }
+}
+
+void volery_end(void) {
+    if (trace) {
+        flush();
+        fclose(trace);
+        trace = NULL;
+    }
+    const char *name = getenv("VOLERY_COUNTS");
+    FILE *out = before && name ? fopen(name, "wb") : NULL;
+    if (!out)
+        return;
+    for (uint64_t i = 0; i < volery_counters_length; ++i) {
+        uint64_t counted = volery_counters[i] - before[i];
+        fwrite(&counted, sizeof counted, 1, out);
+    }
+    fclose(out);
+}

@@ -1,0 +1,44 @@
+"""Costs that were taken from a trace, kept in the user's cache by what was compiled for what."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from volery.native.costs import Costs
+from volery.native.program import Program
+
+
+def folder() -> Path:
+    """Where costs are kept: ``VOLERY_CACHE``, or ``volery`` in the user's cache."""
+    named = os.environ.get("VOLERY_CACHE")
+    if named:
+        return Path(named)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "volery"
+
+
+def kept_costs(program: Program) -> Costs | None:
+    """The costs kept for this code on this core, if there are any."""
+    try:
+        with np.load(_file(program)) as kept:
+            return Costs(kept["cycles"], kept["instructions"], kept["seen"])
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def keep_costs(program: Program, costs: Costs) -> None:
+    """Keep costs; without a place to write, nothing is kept."""
+    file = _file(program)
+    new = file.with_suffix(f".{os.getpid()}.npz")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(new, cycles=costs.cycles, instructions=costs.instructions, seen=costs.seen)
+        new.replace(file)
+    except OSError:
+        return
+
+
+def _file(program: Program) -> Path:
+    return folder() / "native" / f"{program.key}.npz"
