@@ -543,6 +543,51 @@ def report(
     run_command(output, lambda: command.report(output, folders))
 
 
+@app.command()
+def cost(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Sources in C or C++.")],
+    on: Annotated[
+        str, typer.Option(metavar="KIND[@MHZ]", help="rpi4-cortex-a72@600MHz, intel-i5-3470, ...")
+    ] = "rpi4-cortex-a72",
+    entry: Annotated[
+        str, typer.Option(metavar="CALL", help="A function, such as 'step(3, 0.5)'; by default main.")
+    ] = "",
+    before: Annotated[
+        list[str] | None, typer.Option(metavar="CALL", help="Call this first, uncounted; may be repeated.")
+    ] = None,
+    argument: Annotated[
+        list[str] | None, typer.Option("--arg", help="An argument for main; may be repeated.")
+    ] = None,
+    flag: Annotated[
+        list[str] | None, typer.Option(help="For the compiler, such as -Iinclude; may be repeated.")
+    ] = None,
+    link: Annotated[
+        list[str] | None, typer.Option(help="For the linker, such as -lpthread; may be repeated.")
+    ] = None,
+    cores: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Cores that `volery calibrate processor` wrote.")
+    ] = None,
+    listing: Annotated[
+        bool, typer.Option("--listing", help="Show the sources with each line's share of the cycles.")
+    ] = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Estimate what C or C++ code costs on a processor that is not here.
+
+    The code runs on this machine, once; its blocks are counted and cost what they do on the processor's core:
+    time, cycles, instructions, energy, the lines that take most, and what is left out. Needs LLVM (Debian:
+    clang-19 and llvm-19).
+    """
+    from volery.cli import cost as command
+
+    output = Output(quiet, as_json, debug)
+    run = command.Run(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
+    wanted = command.Wanted(tuple(files), on, run, tuple(flag or ()), cores, listing)
+    run_command(output, lambda: command.cost(output, wanted))
+
+
 def main() -> None:
     """The entry point."""
     try:

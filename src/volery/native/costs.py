@@ -38,7 +38,7 @@ def static_costs(program: Program) -> Costs:
     encoded = encode(program.pieces, program.law, program.defined)
     cycles, instructions = np.zeros(len(program.blocks)), np.zeros(len(program.blocks))
     for block, first in machine.piece_of_block.items():
-        own = _own_pieces(machine, first)
+        own = own_pieces(machine, first)
         repeated = np.array(own * REPEATS, dtype=np.int64)
         took, _ = execute(encoded, repeated, np.zeros(len(repeated), dtype=np.int8))
         cycles[block] = took.sum() / REPEATS
@@ -76,7 +76,7 @@ def execute(encoded: Encoded, pieces: Array, taken: Array) -> tuple[Array, Array
     )  # fmt: skip
 
 
-def _own_pieces(machine: Machine, first: int) -> list[int]:
+def own_pieces(machine: Machine, first: int) -> list[int]:
     """The pieces of a block that follow its first one without another block's beginning."""
     own = [first]
     number = first

@@ -136,7 +136,7 @@ def _function(program: Program, name: str) -> tuple[str, str, list[str]]:
     for returned, symbol, parameters in _DEFINE.findall(program.text):
         took = [_C_TYPES.get(one.split()[0], "") for one in parameters.split(",") if one.strip()]
         back = _C_TYPES.get(returned, "")
-        if back and all(took):
+        if back and all(took) and not symbol.startswith("_GLOBAL_"):
             callable_here[_plain(symbol)] = (symbol, back, took)
     if name not in callable_here:
         raise UsageError(

@@ -1,0 +1,128 @@
+"""``volery cost``: what compiled code costs on a processor of which there is only a catalogue entry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.table import Column, Table
+from rich.text import Text
+
+from volery.base.errors import EstimateError, UsageError
+from volery.cli.console import Output
+from volery.cli.endings import OK
+from volery.cost.catalogue import catalogue
+from volery.cost.core import CoreLaw, core_law, read_cores
+from volery.native.estimate import Estimate, Place, estimate
+from volery.native.program import compile_program
+from volery.native.running import Wanted as Run
+
+TOP = 8
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for: *on* is ``KIND`` or ``KIND@600MHz``; ``cores`` a file that calibrating wrote."""
+
+    sources: tuple[Path, ...]
+    on: str
+    run: Run
+    flags: tuple[str, ...] = ()
+    cores: Path | None = None
+    listing: bool = False
+
+
+def cost(output: Output, wanted: Wanted) -> int:
+    """Estimate and show; the exit status."""
+    law, mhz = _core(wanted)
+    program = compile_program(wanted.sources, law, wanted.flags)
+    found = estimate(program, wanted.run)
+    seconds = found.cycles / (mhz * 1e6)
+    joules = _joules(law, mhz, seconds)
+    output.show(_summary(law, mhz, found, joules), _lines(found.places[:TOP]))
+    for remark in found.left_out:
+        output.show(Text(f"note: {remark}", style="dim"))
+    if wanted.listing:
+        for source in wanted.sources:
+            output.show(_listing(source, found.places))
+    output.give(
+        {
+            "processor": law.name,
+            "frequency_mhz": mhz,
+            "time_s": seconds,
+            "cycles": found.cycles,
+            "instructions": found.instructions,
+            "energy_j": joules,
+            "provenance": law.provenance,
+            "error": law.error,
+            "lines": [{"source": one.source, "share": one.share} for one in found.places[:50]],
+            "library_calls": found.library_calls,
+            "left_out": list(found.left_out),
+        }
+    )
+    return OK
+
+
+def _core(wanted: Wanted) -> tuple[CoreLaw, float]:
+    kind, _, frequency = wanted.on.partition("@")
+    more = {}
+    if wanted.cores is not None:
+        try:
+            more = read_cores(wanted.cores.read_text(encoding="utf-8"), str(wanted.cores))
+        except OSError as error:
+            raise UsageError(f"{wanted.cores} cannot be read: {error.strerror or error}") from error
+    law = core_law(kind, more)
+    text = frequency.lower().removesuffix("mhz")
+    try:
+        mhz = float(text) if frequency else law.greatest_mhz
+    except ValueError:
+        raise UsageError(f"--on {wanted.on}: a frequency such as {kind}@{law.greatest_mhz:g}MHz") from None
+    law.check_frequency(mhz)
+    return law, mhz
+
+
+def _joules(law: CoreLaw, mhz: float, seconds: float) -> float | None:
+    """What the busy core draws on top of idle, where the catalogue knows its power."""
+    try:
+        return catalogue().processor(law.name).power_law().core_w(mhz) * seconds
+    except EstimateError:
+        return None
+
+
+def _summary(law: CoreLaw, mhz: float, found: Estimate, joules: float | None) -> Table:
+    within = f", within {law.error:.0%}" if law.error else ""
+    table = Table(title=f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", show_header=False)
+    table.add_row("time", _si(found.cycles / (mhz * 1e6), "s"))
+    table.add_row("cycles", f"{found.cycles:,.0f}")
+    table.add_row("instructions", f"{found.instructions:,.0f}  (libraries' own not counted)")
+    table.add_row("energy", "no figures of its power" if joules is None else f"{_si(joules, 'J')} above idle")
+    return table
+
+
+def _lines(places: tuple[Place, ...]) -> Table:
+    table = Table(
+        "cycles", Column("line", overflow="fold"), Column("entries", justify="right"), title="where"
+    )
+    for one in places:
+        file, _, line = one.source.rpartition(":")
+        table.add_row(f"{one.share:.1%}", f"{Path(file).name}:{line}", f"{one.entries:,}")
+    return table
+
+
+def _listing(source: Path, places: tuple[Place, ...]) -> Text:
+    """The file, with the share of the cycles before each line."""
+    shares = {one.source: one.share for one in places}
+    listed = Text(f"\n{source}\n", no_wrap=True, overflow="ignore")
+    for number, line in enumerate(source.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        share = shares.get(f"{source.resolve()}:{number}", shares.get(f"{source}:{number}", 0.0))
+        mark = f"{share:6.1%}" if share >= 0.0005 else " " * 6
+        listed.append(f"{mark} ", style="yellow" if share >= 0.05 else "dim")
+        listed.append(f"{number:5} {line}\n", style="" if share >= 0.0005 else "dim")
+    return listed
+
+
+def _si(value: float, unit: str) -> str:
+    for factor, prefix in ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
+        if abs(value) >= factor:
+            return f"{value / factor:.4g} {prefix}{unit}"
+    return f"{value:.4g} {unit}"
