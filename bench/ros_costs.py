@@ -1,7 +1,8 @@
 """ROS calls, estimated and measured on this machine: the paper's Tables III and IV for other nodes.
 
-Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), then five nodes
-of each library run on a real master and are measured from outside. What is estimated is a simulation of the
+Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), while five
+nodes of each library run on a real master and are measured from outside: both see the same machine, whatever
+else it does. What is estimated is a simulation of the
 same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were committed
 before anything was calibrated; nothing is fitted to them. An estimate holds if it is off by at most 15 % or
 half the inter-quartile range of the measured runs.
@@ -40,7 +41,7 @@ from volery.run.vocabulary import vocabulary
 
 NODES = Path(__file__).parent / "ros_nodes"
 PACE = Pace(block_ms=400.0, sleeps_ms=(10.0, 20.0, 50.0, 100.0, 200.0))
-SECONDS = 8
+SECONDS = 10
 
 Done = TypeVar("Done")
 
@@ -73,11 +74,12 @@ class Campaign:
             NODES / f"{self.client}.yaml", vocabulary(), None, None, [f"run.duration={SECONDS} s", *changes]
         )
 
-    def calibrate(self) -> None:
-        self.rounds.append(self.stage.probe(self.plan.pace_of(len(self.rounds))))
-
-    def measure(self) -> None:
-        self.runs.append(self._run())
+    def round(self) -> None:
+        """Calibrate and measure, at the same time: what else the machine does touches both alike."""
+        with ThreadPoolExecutor(1) as pool:
+            probe = pool.submit(self.stage.probe, self.plan.pace_of(len(self.rounds)))
+            self.runs.append(self._run())
+            self.rounds.append(probe.result())
 
     def costs(self) -> dict[str, Cost]:
         return costs(self.rounds)
@@ -122,8 +124,7 @@ def main() -> None:
             together(campaigns, Campaign.open)
             for number in range(wanted.rounds):
                 Console(stderr=True).print(f"round {number + 1} of {wanted.rounds}")
-                together(campaigns, Campaign.calibrate)
-                together(campaigns, Campaign.measure)
+                together(campaigns, Campaign.round)
         finally:
             together(campaigns, Campaign.close)
         machine = campaigns[0].machine

@@ -16,6 +16,9 @@ from volery.calibrate.ros.fitting import Cost, costs
 from volery.calibrate.ros.samples import Round, Sample
 from volery.calibrate.ros.stage import Pace, Stage
 
+PERIODS_MS = (20.0, 50.0)
+"""Of the cycles that calls are measured in, one a round: what has slept longer finds its caches colder."""
+
 LEAST_ROUNDS = 3
 """Fewer say nothing about their spread."""
 
@@ -48,7 +51,8 @@ class Plan:
         sleeps = list(self.pace.sleeps_ms)
         random.shuffle(chosen)
         random.shuffle(sleeps)
-        return replace(self.pace, counts=tuple(chosen), sleeps_ms=tuple(sleeps))
+        period = PERIODS_MS[number % len(PERIODS_MS)]
+        return replace(self.pace, period_ms=period, counts=tuple(chosen), sleeps_ms=tuple(sleeps))
 
 
 @dataclass(frozen=True)

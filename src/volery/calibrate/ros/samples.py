@@ -121,13 +121,12 @@ class _Round:
             yield "publish", whole.x, whole.each(self._clock) - without.each(self._clock)
 
     def hearing(self) -> Iterable[Point]:
-        """Spinning without a message, minus idle cycles; then with messages, minus that."""
-        spinning, receiving = self._by_name.get("spin_once", []), self._by_name.get("receive", [])
-        idle = [one.each(self._clock) for one in self._by_name.get("idle", [])]
-        for one in spinning:
-            if idle and "spin_once_first" in self._by_name:  # rospy has no such call
-                yield "spin_once_next", 0.0, one.each(self._clock) - median(idle)
-        for quiet, one in zip(spinning, receiving, strict=False):
+        """Cycles that spin, minus those that publish alone; waiting with messages, minus without."""
+        alone, spinning = self._by_name.get("publish_alone", []), self._by_name.get("spin_once", [])
+        for without, one in zip(alone, spinning, strict=False):
+            yield "spin_once_next", 0.0, one.each(self._clock) - without.each(self._clock)
+        waiting, receiving = self._by_name.get("wait", []), self._by_name.get("receive", [])
+        for quiet, one in zip(waiting, receiving, strict=False):
             anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
             yield "receive", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
 

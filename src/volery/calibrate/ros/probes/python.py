@@ -14,7 +14,8 @@ from importlib import import_module
 from typing import Any, NamedTuple, Protocol
 
 CONNECT_S, SETTLE_S, GLANCE_S = 10.0, 0.1, 0.05
-FEED_S = 0.05
+SPIN_S = 1.0
+HALF_S = 0.5
 NODE, DEPTH = "calibration_probe", 10
 
 heard = [0]
@@ -91,7 +92,8 @@ class Rospy:
 
     def wait(self, seconds: float) -> None:
         """As ``rospy.spin`` does it: half seconds of sleep."""
-        self._rospy.rostime.wallsleep(seconds)
+        for _ in range(max(1, round(seconds / HALF_S))):
+            self._rospy.rostime.wallsleep(min(seconds, HALF_S))
 
 
 class Rclpy:
@@ -150,8 +152,10 @@ class Rclpy:
         self._rclpy.spin_once(self._node, timeout_sec=0.0)
 
     def wait(self, seconds: float) -> None:
-        """Spin with nothing to do."""
-        self._rclpy.spin_once(self._node, timeout_sec=seconds)
+        """As ``rclpy.spin`` does it."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._rclpy.spin_once(self._node, timeout_sec=left)
 
 
 CLIENTS: dict[str, Callable[[], Client]] = {"rospy": Rospy, "rclpy": Rclpy}
@@ -183,11 +187,15 @@ def once(what: str, call: Callable[[], Any], done: Callable[[], bool] = lambda: 
     """One call, and what it makes the library do shortly after."""
     measured = Measured()
     call()
+    _until(done)
+    time.sleep(SETTLE_S)
+    measured.tell(what, x, 1)
+
+
+def _until(done: Callable[[], bool]) -> None:
     end = time.monotonic() + CONNECT_S
     while not done() and time.monotonic() < end:
         time.sleep(GLANCE_S)
-    time.sleep(SETTLE_S)
-    measured.tell(what, x, 1)
 
 
 class Probe:
@@ -263,27 +271,33 @@ class Probe:
             made[0].close()
             time.sleep(SETTLE_S)
 
+    def spinning(self) -> None:
+        """Publishing cycles with and without a spin: a call that others have gone before is warm."""
+        spin = self._client.spin_once
+        if spin is None:
+            return
+        talking = self._client.advertise("calibration/to_1")
+        _until(lambda: talking.peers() > 0)
+        time.sleep(SETTLE_S)
+        self._block("publish_alone", 0, self._period_s, talking.publish)
+        self._block("spin_once", 0, self._period_s, lambda: (talking.publish(), spin()))
+        talking.close()
+
     def receiving(self) -> None:
-        """Cycles that hear something, and cycles that could but do not."""
-        spin = self._client.spin_once or nothing
-        self._block("spin_once", 0, self._period_s, spin)
-        feed = self._client.subscribe("calibration/feed")
-        end = time.monotonic() + CONNECT_S
-        while heard[0] == 0 and time.monotonic() < end:
-            time.sleep(GLANCE_S)
-            spin()
-        time.sleep(SETTLE_S)
-        sleep, before = self._client.sleeper(self._period_s), heard[0]
-        measured = Measured()
-        while heard[0] < before + self._block_s / FEED_S:
-            spin()
-            sleep()
-        measured.tell("receive", 0, heard[0] - before)
-        feed.close()
+        """Waiting for messages where none come and where some do."""
+        wait = self._client.wait
         time.sleep(SETTLE_S)
         measured = Measured()
-        self._client.wait(self._block_s)
+        wait(SPIN_S)
         measured.tell("wait", 0, 1)
+        feed = self._client.subscribe("calibration/feed")
+        _until(lambda: (wait(GLANCE_S), heard[0] > 0)[1])
+        wait(SETTLE_S)
+        before = heard[0]
+        measured = Measured()
+        wait(SPIN_S)
+        measured.tell("receive", 0, max(1, heard[0] - before))
+        feed.close()
 
 
 def _numbers(text: str) -> list[float]:
@@ -297,6 +311,7 @@ def main(library: str, block_ms: str, period_ms: str, sleeps: str, counts: str) 
     probe.registrations()
     probe.sleeping(_numbers(sleeps))
     probe.publishing(_numbers(counts))
+    probe.spinning()
     probe.receiving()
 
 
