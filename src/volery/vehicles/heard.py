@@ -67,6 +67,7 @@ class Heard:
             raise LinkSilent(f"{self.name}: nothing was heard within {within:g} s")
         if not seen.kind:
             seen.kind = self.kind  # MAVROS does not say what it is
+            self._look()  # what was heard may mean another thing now
         if seen.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {seen.kind}, not a {self.kind}")
         self._tell_if_silent()

@@ -97,6 +97,7 @@ class MavrosCarrier:
         self._spinner.spin_once(0)
         while self._arrived:
             self._arrived.popleft().run()
+        self._hearing.judge_flying()
 
     def problem(self) -> LinkError | None:
         """What is wrong on the way, as far as it shows."""

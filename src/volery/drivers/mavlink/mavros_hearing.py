@@ -38,6 +38,7 @@ class MavrosHearing:
         self._seen = telemetry
         self._geoid = geoid
         self._landed_state = UNDEFINED
+        self._active = False
         self._has_fix = False
         self._has_local_position = False
 
@@ -71,17 +72,22 @@ class MavrosHearing:
         seen.armed = bool(message.armed)
         seen.status = entry_name("MAV_STATE", message.system_status).lower()
         seen.failsafe = message.system_status in FAILSAFE
-        if seen.kind == "rover":
-            seen.flying = seen.armed and seen.mode != self._resting
-        elif self._landed_state == UNDEFINED:
-            seen.flying = seen.armed and message.system_status == ACTIVE
+        self._active = message.system_status == ACTIVE
         self._heard()
 
     def _extended_state(self, message: Any) -> None:
         self._landed_state = message.landed_state
-        if self._landed_state != UNDEFINED and self._seen.kind != "rover":
-            self._seen.flying = self._landed_state != ON_GROUND
         self._heard()
+
+    def judge_flying(self) -> None:
+        """By what was heard, and by its kind, which is told by others and maybe later than that."""
+        seen = self._seen
+        if seen.kind == "rover":
+            seen.flying = seen.armed and seen.mode != self._resting
+        elif self._landed_state == UNDEFINED:
+            seen.flying = seen.armed and self._active
+        else:
+            seen.flying = self._landed_state != ON_GROUND
 
     def _global(self, message: Any) -> None:
         self._has_fix = message.status.status > NO_FIX
