@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from typing import TypeVar, cast
+from weakref import WeakKeyDictionary
 
 from volery.base.errors import LinkSilent, VoleryError
 from volery.base.time import Ns, S, to_seconds
@@ -14,6 +15,7 @@ from volery.kernel.waiting import Signal
 
 T = TypeVar("T")
 PATIENCE: Ns = 10 * S
+_waiting: WeakKeyDictionary[Kernel, int] = WeakKeyDictionary()
 GLANCE_S = 0.05
 """How long after each look one looks again for what the client library does not announce."""
 
@@ -42,12 +44,21 @@ def abroad(kernel: Kernel, what: str, work: Callable[[], T], within: Ns = PATIEN
             kernel.post(partial(finish, value, None))
 
     threading.Thread(target=run, name=what, daemon=True).start()
-    if not ended.wait_for(lambda: outcome, within):
-        raise LinkSilent(f"{what}: no answer within {to_seconds(within):g} s")
+    _waiting[kernel] = _waiting.get(kernel, 0) + 1
+    try:
+        if not ended.wait_for(lambda: outcome, within):
+            raise LinkSilent(f"{what}: no answer within {to_seconds(within):g} s")
+    finally:
+        _waiting[kernel] -= 1
     value, error = outcome[0]
     if error is not None:
         raise error
     return cast("T", value)
+
+
+def under_way(kernel: Kernel) -> int:
+    """How many tasks of *kernel* wait for something that is done abroad."""
+    return _waiting.get(kernel, 0)
 
 
 def until(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 from volery.base.errors import UsageError
 from volery.messages import Message, ServiceType, from_cdr, message_name, to_cdr
 from volery.messages.idl import idl_fields, nested_types
+from volery.transports.ros2.carrier import HEADER, is_carrier, message_carrier, service_carrier
 
 
 def distribution() -> str:
@@ -19,23 +21,37 @@ def distribution() -> str:
 
 @cache
 def rclpy_class(name: str) -> Any:
-    """rclpy's class of a message type. ``UsageError`` if it has none, or one with other fields."""
+    """rclpy's class of a message type, or a carrier of its bytes where the package is not installed.
+
+    ``UsageError`` if neither can be, or if its class has other fields.
+    """
     full = message_name(name)
     found = _installed(full)
+    if found is None:
+        return _carried_as_bytes(full, lambda: message_carrier(full))
     _compare(full, found)
     return found
 
 
+def _carried_as_bytes(full: str, make: Callable[[], type[Any]]) -> type[Any]:
+    try:
+        return make()
+    except UsageError as error:
+        package = full.partition("/")[0]
+        ubuntu = f"ros-{distribution()}-{package.replace('_', '-')}"
+        raise UsageError(
+            f"rclpy has no type support for {full}: its package is not installed ({ubuntu}, or built with "
+            f"colcon), and it cannot be carried without: {error}"
+        ) from error
+
+
 def _installed(full: str) -> Any:
+    """rclpy's class, ``None`` if it has none."""
     package, kind, label = full.split("/")
     try:
         return getattr(import_module(f"{package}.{kind}"), label)
-    except (ImportError, AttributeError) as error:
-        ubuntu = f"ros-{distribution()}-{package.replace('_', '-')}"
-        raise UsageError(
-            f"rclpy has no type support for {full}: it takes only types whose package is installed with it "
-            f"({ubuntu}, or built with colcon), and this Python does not see {package}"
-        ) from error
+    except (ImportError, AttributeError):
+        return None
 
 
 def _compare(full: str, found: Any) -> None:
@@ -51,12 +67,11 @@ def _compare(full: str, found: Any) -> None:
 
 
 def carried(name: str) -> bool:
-    """Whether rclpy carries a message type here."""
+    """Whether a message type is installed here, with our fields."""
     try:
-        rclpy_class(name)
+        return _installed(message_name(name)) is not None and rclpy_class(name) is not None
     except UsageError:
         return False
-    return True
 
 
 class Rclpyed(NamedTuple):
@@ -69,8 +84,11 @@ class Rclpyed(NamedTuple):
 
 @cache
 def rclpy_service(kind: ServiceType) -> Rclpyed:
-    """rclpy's class of a service type. ``UsageError`` as for messages."""
+    """rclpy's class of a service type, or a carrier. ``UsageError`` as for messages."""
     found = _installed(kind.name)
+    if found is None:
+        found = _carried_as_bytes(kind.name, lambda: service_carrier(kind))
+        return Rclpyed(found, found.Request, found.Response)
     for half, ours in ((found.Request, kind.request), (found.Response, kind.response)):
         _compare(ours.__msgtype__, half)
     return Rclpyed(found, found.Request, found.Response)
@@ -78,11 +96,16 @@ def rclpy_service(kind: ServiceType) -> Rclpyed:
 
 def to_rclpy(message: Message, cls: type[Any]) -> Any:
     """Our value as rclpy's."""
-    return _serialization().deserialize_message(to_cdr(message), cls)
+    data = to_cdr(message)
+    if is_carrier(cls):
+        return cls(data[len(HEADER) :])
+    return _serialization().deserialize_message(data, cls)
 
 
 def from_rclpy(name: str, message: Any) -> Any:
     """rclpy's value as ours."""
+    if isinstance(message, bytes):
+        return from_cdr(name, HEADER + message)
     return from_cdr(name, _serialization().serialize_message(message))
 
 
