@@ -104,12 +104,8 @@ def _simulated(system: System, options: Options) -> Run:
 
 def _supervised(system: System, options: Options) -> Run:
     """In a process of its own: C++ components may end it."""
-    compiled = compile_all(system.instances, system, options.tell)
-    libraries = {
-        instance.name: compiled[instance.component.name].library
-        for instance in system.instances
-        if instance.component.name in compiled
-    }
+    ready = compile_all(system, system.instances, options.fidelity, options.tell)
+    libraries = {name: one.compiled.library for name, one in ready.items()}
     supervision = Supervision(build_house(), libraries, PATIENCE_S)
     return supervised(
         lambda show: _simulated(system, replace(options, show=show, tell=None)),
@@ -232,6 +228,7 @@ class _OnGraph(_Simulation):
     def _start(self) -> None:
         self._apart.start()
         super()._start()
+        self._apart.go()
 
     def leave(self) -> list[str]:
         """See ``_Simulation.leave``."""

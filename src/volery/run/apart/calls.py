@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -30,10 +30,10 @@ class FarPort(Port):
     """
 
     def __init__(
-        self, kernel: Kernel, caller: str, callee: Instance, client: Callable[[str], Client], values: Values
+        self, kernel: Kernel, caller: str, callee: Instance, clients: Mapping[str, Client], values: Values
     ) -> None:
         super().__init__(kernel, caller, callee, None, None)
-        self._client = client
+        self._clients = clients
         self._values = values
 
     def _there_and_back(
@@ -42,7 +42,7 @@ class FarPort(Port):
         what = f"the arguments of {self.component}.{operation}"
         asked = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
         try:
-            answer = self._client(operation).call(asked)
+            answer = self._clients[operation].call(asked)
         except ServiceError as error:
             raise ComponentError(self.component, f"{operation} did not come back: {error.what}") from error
         if not answer.done:
@@ -51,7 +51,11 @@ class FarPort(Port):
 
 
 class Reach:
-    """Makes the ports of the components of one process to those of others."""
+    """Makes the ports of the components of one process to those of others.
+
+    Clients are made with the port, long before a call: on ROS 2 an answer gets lost where its server has not
+    discovered yet who asked.
+    """
 
     def __init__(self, kernel: Kernel, system: System, node: Node, values: Values) -> None:
         self._kernel, self._system, self._node, self._values = kernel, system, node, values
@@ -59,11 +63,12 @@ class Reach:
 
     def __call__(self, caller: InstanceModel, callee: InstanceModel) -> FarPort:
         """The port of *caller*, which is here, to *callee*, which is elsewhere."""
-        far = Instance(self._kernel, callee.name, operations=operations(self._system, callee))
-        return FarPort(self._kernel, caller.name, far, partial(self._client, callee), self._values)
+        provided = operations(self._system, callee)
+        far = Instance(self._kernel, callee.name, operations=provided)
+        clients = {name: self._client(service_name(callee, name)) for name in provided}
+        return FarPort(self._kernel, caller.name, far, clients, self._values)
 
-    def _client(self, callee: InstanceModel, operation: str) -> Client:
-        name = service_name(callee, operation)
+    def _client(self, name: str) -> Client:
         known = self._clients.get(name)
         if known is None:
             known = self._clients[name] = self._node.client(name, CALL)

@@ -28,6 +28,7 @@ from volery.run.build import Builder, Built, Part, Truth
 from volery.run.ending import Ending
 from volery.run.graphs import open_graph
 from volery.run.platform import Platform
+from volery.transports.abroad import under_way
 
 READY_S, GONE_S, GLANCE_S = 60.0, 5.0, 0.05
 STDERR = 2
@@ -162,6 +163,7 @@ class Apart:
         self._apart = plan.apart(system)
         self._kernel, self._ending, self._system, self._order = kernel, ending, system, order
         self._processes: list[ComponentProcess] = []
+        self._closed = False
         self._built: Built
         self._truth: Callable[[str], Truth]
         self.graph = open_graph(kernel, order.graph, start_master=True, epoch=0)
@@ -185,7 +187,7 @@ class Apart:
         return next((one for one in found if one is not None), None)
 
     def start(self) -> None:
-        """Start the processes, wait until all are ready, and let them go.
+        """Start the processes and wait until all are ready.
 
         Raises ``ComponentError`` for one that cannot begin, ``LinkSilent`` if they take too long.
         """
@@ -198,11 +200,6 @@ class Apart:
             order = pipe.Order(self._system, model.name, self._order.graph, self._order.seed)
             self._processes.append(ComponentProcess(self._kernel, self._ending, order, self._truth))
         self._ending.vehicles = self._processes
-        self._wait()
-        for process in self._processes:
-            process.go()
-
-    def _wait(self) -> None:
         end = time.monotonic() + READY_S
         while late := [one for one in self._processes if not one.ready]:
             for one in late:
@@ -212,9 +209,21 @@ class Apart:
                 raise LinkSilent(f"not on the graph within {READY_S:g} s: {names}")
             time.sleep(GLANCE_S)
 
+    def go(self) -> None:
+        """Let the nodes of this process join while time stands still; then let the processes begin."""
+        end = time.monotonic() + READY_S
+        self._kernel.run(0)
+        while under_way(self._kernel) and time.monotonic() < end:
+            time.sleep(GLANCE_S / 10)
+            self._kernel.run(0)
+        for process in self._processes:
+            process.go()
+
     def close(self) -> list[str]:
-        """Leave nothing behind; returns the names of components that had to be ended hard."""
+        """Leave nothing behind, once; returns the names of components that had to be ended hard."""
+        if self._closed:
+            return []
+        self._closed = True
         stubborn = [one.name for one in self._processes if not one.stop()]
-        self._processes.clear()
         self.graph.close()
         return stubborn
