@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from volery.base.errors import UsageError
 from volery.base.time import MINUTE, Ns, S
-from volery.vehicles.driver import Step, Sticks
+from volery.vehicles.driver import Repeat, Step, Sticks
 from volery.vehicles.telemetry import Telemetry
 
 ANSWERED_WITHIN: Ns = 5 * S
@@ -25,6 +25,19 @@ def nothing() -> None:
 def at_once(ask: str, action: Callable[[], None], enters: str = "") -> Step:
     """Something that is done as soon as it is sent."""
     return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN, enters=enters)
+
+
+def until_ready(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
+    """Until it could arm and go by position."""
+    return Step(
+        ask="be ready to arm and to go by position",
+        send=nothing,
+        done=lambda seen: seen.ready or seen.armed,
+        within=within,
+        skippable=True,
+        keep=keep,
+        advice=advice,
+    )
 
 
 def heads(degrees: float) -> Callable[[Telemetry], bool]:

@@ -23,9 +23,7 @@ class MavrosCommands(MavrosCarrier):
 
     behind = Behind("ArduPilot", "HOLD")
 
-    def __init__(
-        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96
-    ) -> None:
+    def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         target = "mavros_msgs/msg/GlobalPositionTarget"
         self._target = node.advertise(self._name("setpoint_raw/global"), target)

@@ -6,6 +6,7 @@ from volery.base.time import MS, Ns
 from volery.drivers.ardupilot.commands import RELEASED, Commands
 from volery.drivers.ardupilot.modes import GUIDED
 from volery.drivers.arrival import DRONE_KIND
+from volery.drivers.following import Following
 from volery.kernel.api import Handle, Kernel
 from volery.vehicles.driver import Sticks
 from volery.vehicles.telemetry import Velocity
@@ -29,7 +30,7 @@ class Setpoints:
         self._commands = commands
         self._telemetry = commands.telemetry
         self._refresh: Handle | None = None
-        self._following: Handle | None = None
+        self._following = Following(kernel, commands.telemetry, GUIDED, VELOCITY_PERIOD)
 
     # -- velocity
 
@@ -39,28 +40,16 @@ class Setpoints:
 
     def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
         """From now on for so long; then stop."""
-        self.unfollow()
-        self._commands.follow(velocity, yaw_rate)
         if self._commands.cycle is not None:
-            return
-        until = self._kernel.now() + lasting
-
-        def repeat() -> None:
-            if self._telemetry.mode != GUIDED:
-                self.unfollow()
-            elif self._kernel.now() < until:
-                self._commands.follow(velocity, yaw_rate)
-            else:
-                self.unfollow()
-                self.stand_still()
-
-        self._following = self._kernel.every(VELOCITY_PERIOD, repeat)
+            self._commands.follow(velocity, yaw_rate)
+        else:
+            self._following.begin(
+                lambda: self._commands.follow(velocity, yaw_rate), self.stand_still, lasting
+            )
 
     def unfollow(self) -> None:
         """No velocity is repeated any more."""
-        if self._following is not None:
-            self._following.cancel()
-            self._following = None
+        self._following.end()
 
     # -- sticks
 

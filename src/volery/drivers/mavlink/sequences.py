@@ -11,7 +11,7 @@ from volery.drivers.arrival import ROVER_NEAR_M, distance, standing
 from volery.drivers.eviction import Eviction
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Carrier, Item
-from volery.drivers.steps import ANSWERED_WITHIN, ARMED_WITHIN, nothing
+from volery.drivers.steps import ANSWERED_WITHIN, ARMED_WITHIN, nothing, until_ready
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Capability, Repeat, Step
 from volery.vehicles.mission import MissionItem
@@ -91,16 +91,8 @@ class Sequences:
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Until the arming checks pass and there is a position."""
-        step = Step(
-            ask="be ready to arm and to go by position",
-            send=nothing,
-            done=lambda seen: seen.ready or seen.armed,
-            within=within,
-            skippable=True,
-            keep=Repeat(CHECKS_PERIOD, self._carrier.check),
-            advice="give it a view of the sky, stand it still and level, and look at its arming checks",
-        )
-        return (step,)
+        advice = "give it a view of the sky, stand it still and level, and look at its arming checks"
+        return (until_ready(within, advice, Repeat(CHECKS_PERIOD, self._carrier.check)),)
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in."""

@@ -30,7 +30,7 @@ from volery.drivers.steps import (
     at_once,
     check_not_idle,
     heads,
-    nothing,
+    until_ready,
 )
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Capability, Repeat, Step, Sticks
@@ -104,16 +104,11 @@ class Paparazzi:
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Until it has a fix, an origin and an aligned attitude, and its settings are the ones meant."""
-        step = Step(
-            ask="be ready to arm and to go by position",
-            send=nothing,
-            done=lambda seen: seen.ready or seen.armed,
-            within=within,
-            skippable=True,
-            advice="it needs a 3D fix, an origin (blocks 'Wait GPS' and 'Geo init' done, INS_REF sent), an "
-            "aligned attitude, and to answer GET_SETTING",
+        advice = (
+            "it needs a 3D fix, an origin (blocks 'Wait GPS' and 'Geo init' done, INS_REF sent), an aligned "
+            "attitude, and to answer GET_SETTING"
         )
-        return (step,)
+        return (until_ready(within, advice),)
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""

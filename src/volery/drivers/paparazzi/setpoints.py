@@ -7,6 +7,7 @@ from __future__ import annotations
 from math import radians
 
 from volery.base.time import MS, Ns
+from volery.drivers.following import Following
 from volery.drivers.paparazzi.modes import GUIDED
 from volery.drivers.paparazzi.uplink import BY_VELOCITY, Setpoint, Uplink
 from volery.kernel.api import Handle, Kernel
@@ -27,7 +28,7 @@ class Setpoints:
         self._kernel = kernel
         self._uplink = uplink
         self._refresh: Handle | None = None
-        self._following: Handle | None = None
+        self._following = Following(kernel, uplink.telemetry, GUIDED, VELOCITY_PERIOD)
 
     # -- velocity
 
@@ -37,27 +38,13 @@ class Setpoints:
 
     def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
         """From now on for so long; then stop."""
-        self.unfollow()
-        until = self._kernel.now() + lasting
         north, east, up = velocity
         wanted = Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY)
-
-        def repeat() -> None:
-            if self._uplink.telemetry.mode != GUIDED:
-                self.unfollow()
-            elif self._kernel.now() < until:
-                self._uplink.setpoint(wanted)
-            else:
-                self.unfollow()
-                self.stand_still()
-
-        self._following = self._kernel.every(VELOCITY_PERIOD, repeat)
+        self._following.begin(lambda: self._uplink.setpoint(wanted), self.stand_still, lasting)
 
     def unfollow(self) -> None:
         """No velocity is repeated any more."""
-        if self._following is not None:
-            self._following.cancel()
-            self._following = None
+        self._following.end()
 
     # -- sticks
 

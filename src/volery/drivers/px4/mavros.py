@@ -28,9 +28,7 @@ class MavrosCommands(MavrosCarrier):
 
     behind = Behind("PX4", HOLD)
 
-    def __init__(
-        self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96
-    ) -> None:
+    def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
         self._whole = node.client(self._name("cmd/command_int"), "mavros_msgs/srv/CommandInt")
         self._current = node.client(self._name("mission/set_current"), "mavros_msgs/srv/WaypointSetCurrent")
