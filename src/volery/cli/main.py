@@ -588,6 +588,27 @@ def cost(
     run_command(output, lambda: command.cost(output, wanted))
 
 
+@calibrate_app.command("processor")
+def calibrate_processor(
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="The file of cores to write the entry into; made if need be.")
+    ] = Path("cores.yaml"),
+    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what operations and library calls take on this machine, for `volery cost`.
+
+    Each is timed until its median is known to 1 %, or said to be noisy. Ctrl-C keeps what was measured; the
+    same command goes on from there. Exit status: 0 if every figure is tight, 2 for bad input, 1 otherwise.
+    """
+    from volery.cli import calibrate_processor as command
+
+    output = Output(quiet, as_json, debug)
+    run_command(output, lambda: command.processor(output, command.Wanted(out, name)))
+
+
 def main() -> None:
     """The entry point."""
     try:

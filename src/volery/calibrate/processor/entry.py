@@ -1,0 +1,91 @@
+"""From the times of snippets to the figures of a core, and to a file that ``volery cost --cores`` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import ceil
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from volery.calibrate.machine import Machine
+from volery.calibrate.processor.snippets import SNIPPETS
+from volery.calibrate.processor.timing import CHAIN, FORWARDED, FREE, LIBRARY, NEVER, RANDOM, WIDTH, Taken
+from volery.cost.core import CoreLaw, LibraryLaw, Operation, read_cores
+
+WINDOW, TABLES, HISTORY = 512, 12, 100
+"""Not measured: as of a large current core. The prediction's figures were chosen on calibration inputs."""
+
+SHARE_OF_REFILL = 2.0
+"""Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
+
+PIPES_ARE_WHOLE = 0.2
+"""A core has whole pipes and noise only slows: 2.6 a cycle are three pipes, 2.1 are two."""
+
+ALSO = {"malloc": "_Znwm", "free": "_ZdlPvm", "sin": "sincos"}
+"""Symbols that take what others take: operators new and delete, both functions of an angle."""
+
+
+def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
+    """The core's figures."""
+    operations: dict[str, Operation] = {}
+    for name, snippet in SNIPPETS[isa].items():
+        beside = sum(operations[one].latency for one in snippet.less)
+        latency = max(0.0, (taken[CHAIN + name].cycles - beside) / snippet.links)
+        told = round(latency, 1) if latency >= 0.5 else 0.0
+        operations[name] = Operation(latency=told, per_cycle=_pipes(taken[FREE + name].cycles))
+    for name in ("store", "branch"):  # nothing depends on their end
+        operations[name] = Operation(latency=1.0, per_cycle=operations[name].per_cycle)
+    operations["fp_fma"] = operations["fp_multiply"]
+    mispredicted = 2.0 * (taken[RANDOM].cycles - taken[NEVER].cycles)
+    mhz = round(sorted(one.mhz for one in taken.values())[len(taken) // 2])
+    return CoreLaw(
+        name=machine.name,
+        isa=isa,
+        cpu="x86-64" if isa == "x86_64" else "generic",
+        provenance="measured",
+        source=f"volery calibrate processor on {machine.description}",
+        validity="data in the first cache; the window and the prediction of branches are assumed, not measured",
+        least_mhz=mhz * 0.5,
+        greatest_mhz=mhz,
+        width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),
+        refill=round(max(1.0, mispredicted - SHARE_OF_REFILL), 1),
+        forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency), 1),
+        operations=operations,
+        library=_library(taken),
+        window=WINDOW,
+        tables=TABLES,
+        history=HISTORY,
+    )
+
+
+def write_entry(file: Path, law: CoreLaw) -> None:
+    """Write the core into *file*, in the place of an earlier one of its name."""
+    known = read_cores(file.read_text(encoding="utf-8"), str(file)) if file.exists() else {}
+    known[law.name] = law
+    entries = {name: one.model_dump(exclude={"name"}, exclude_none=True) for name, one in known.items()}
+    with file.open("w", encoding="utf-8") as out:
+        YAML(typ="safe").dump({"cores": entries}, out)
+
+
+def _pipes(cycles: float) -> float:
+    per_cycle = 1.0 / max(cycles, 1e-3)
+    whole = per_cycle > 1.0 - PIPES_ARE_WHOLE
+    return float(max(1, ceil(per_cycle - PIPES_ARE_WHOLE))) if whole else round(per_cycle, 3)
+
+
+def _library(taken: Mapping[str, Taken]) -> LibraryLaw:
+    calls = {
+        name.removeprefix(LIBRARY): round(one.cycles, 1)
+        for name, one in taken.items()
+        if name.startswith(LIBRARY)
+    }
+    both = calls.pop("malloc_free")
+    calls |= {"malloc": round(both / 2.0, 1), "free": round(both / 2.0, 1)}
+    calls |= {symbol: calls[name] for name, symbol in ALSO.items()}
+    return LibraryLaw(
+        provenance="measured",
+        source="calls in a row, with arguments as a robot's code has them",
+        unknown=sorted(calls.values())[len(calls) // 2],
+        calls=calls,
+    )

@@ -1,0 +1,91 @@
+/* Times loops of snippets against a loop of single cycles, in turns: NAME REPETITIONS... -> a line per round.
+ *
+ * A line: the name, nanoseconds of one pass of the snippets, of one of the single cycles (both of process time).
+ * The loops of snippets, tick among them, and the table of CASES are generated before this file.
+ */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now(void) {
+    struct timespec time;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return time.tv_sec * 1e9 + time.tv_nsec;
+}
+
+static uint64_t mixed(uint64_t x) {
+    x ^= x << 13;
+    x ^= x >> 7;
+    return x ^ x << 17;
+}
+
+/* One branch, taken as the lowest bits say: at random, or never. */
+static void branches(long passes, uint64_t state, uint64_t mask) {
+    volatile long sink = 0;
+    long taken = 0;
+    for (long pass = 0; pass < passes; ++pass) {
+        state = mixed(state);
+        uint64_t bits = state & mask;
+        for (int i = 0; i < 64; ++i, bits >>= 1)
+            BRANCH_IF_ODD(bits, taken);
+    }
+    sink = taken;
+    (void)sink;
+}
+
+static void branches_random(long passes) { branches(passes, 88172645463325252ull, ~0ull); }
+static void branches_never(long passes) { branches(passes, 88172645463325252ull, 0); }
+
+static double arguments[64], others[64];
+static char text[64][32], copied[256], source[256];
+static volatile double total;
+static void *volatile held;
+
+#define LIBRARY(name, call)                             \
+    static void library_##name(long passes) {           \
+        double sum = 0.0;                               \
+        for (long pass = 0; pass < passes; ++pass)      \
+            for (int i = 0; i < 64; ++i)                \
+                sum += call;                            \
+        total = sum;                                    \
+    }
+#define X arguments[i]
+#define Y others[i]
+#include "library.h"
+
+typedef struct {
+    const char *name;
+    void (*run)(long);
+} Case;
+
+static const Case cases[] = {CASES{"branches_random", branches_random}, {"branches_never", branches_never}};
+
+static double timed(void (*run)(long), long passes) {
+    double start = now();
+    run(passes);
+    return (now() - start) / passes;
+}
+
+int main(int count, char **words) {
+    for (int i = 0; i < 64; ++i) {
+        arguments[i] = 0.02 + 0.0456 * i;
+        others[i] = 1.7 - 0.03 * i;
+        snprintf(text[i], sizeof text[i], "%.6f", arguments[i]);
+    }
+    memset(source, 'x', sizeof source - 1);
+    for (int word = 1; word + 1 < count; word += 2)
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+            if (strcmp(cases[i].name, words[word]) != 0)
+                continue;
+            long passes = 1;
+            while (timed(cases[i].run, passes) * passes < 50e3)
+                passes *= 2;
+            for (int round = atoi(words[word + 1]); round > 0; --round) {
+                double before = timed(tick, 100), took = timed(cases[i].run, passes), after = timed(tick, 100);
+                printf("%s %.6f %.6f\n", cases[i].name, took, (before + after) / 2);
+            }
+        }
+}

@@ -1,0 +1,55 @@
+"""``volery calibrate processor``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from volery.calibrate.machine import this_machine
+from volery.calibrate.processor.campaign import loose, measure
+from volery.calibrate.processor.entry import law_of, write_entry
+from volery.calibrate.processor.timing import isa
+from volery.cli.console import Output
+from volery.cli.endings import FAILED, OK
+from volery.cost.core import CoreLaw
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for. ``name``: of the core in the file; empty: made from the processor's own."""
+
+    out: Path
+    name: str = ""
+
+
+def processor(output: Output, wanted: Wanted) -> int:
+    """Measure and write; the exit status, 1 if a figure is not tight."""
+    machine, here = this_machine(wanted.name), isa()
+    notes = wanted.out.with_name(f"{wanted.out.name}.notes")
+    bar = Progress(TextColumn("{task.description}"), BarColumn(), console=output.notes)
+    bar.disable = not output.shows_progress
+    with bar:
+        line = bar.add_task("building")
+        taken = measure(
+            notes, lambda name, done, whole: bar.update(line, description=name, completed=done, total=whole)
+        )
+    law = law_of(machine, here, taken)
+    write_entry(wanted.out, law)
+    notes.unlink(missing_ok=True)
+    output.show(_table(law))
+    output.give(law.model_dump())
+    output.note(f"{law.name} in {wanted.out}: volery cost FILE --on {law.name} --cores {wanted.out}")
+    noisy = loose(taken)
+    if noisy:
+        output.note(f"not tight, the machine was busy: {', '.join(noisy)}")
+    return FAILED if noisy else OK
+
+
+def _table(law: CoreLaw) -> Table:
+    table = Table("operation", "cycles", "starts per cycle", title=f"{law.name} at {law.greatest_mhz:g} MHz")
+    for name, one in law.operations.items():
+        table.add_row(name, f"{one.latency:g}", f"{one.per_cycle:g}")
+    return table
