@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from volery.base.time import S, clock
 from volery.cli.console import Output
 from volery.cli.endings import OK
@@ -39,6 +41,7 @@ def bridge(output: Output, wanted: Bridging) -> int:
         f"bridging {wanted.url} to {wanted.graph} under {made.names}'s names, {below}/...; Ctrl-C stops it"
     )
     made.every(S, lambda: told.status(made.kernel.now(), made.status))
+    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))  # of a service
     try:
         made.run()
     except KeyboardInterrupt:

@@ -6,11 +6,15 @@ The simulated vehicles live four times as fast as real time.
 
 from __future__ import annotations
 
+import os
 import re
 import signal
+import socket
 import subprocess
 import time
+import tty
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +22,9 @@ import pytest
 
 import volery
 from volery import AboveHome, Position
+from volery.links.link import Frame
+from volery.links.mavlink import encode
+from volery.links.parser import MAVLINK
 from volery.transports.ros1 import Roscore
 from volery.transports.ros1.packages import write_package
 
@@ -140,3 +147,46 @@ def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) 
         raise
     assert bridge.returncode == 2
     assert "a node named /taken/mavros is there already" in " ".join(said.split())
+
+
+BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "system_status": 3}, 1, 1), 0)
+
+
+def asks_for_streams(heard: Callable[[], bytes]) -> None:
+    """What arrives there is a request for all streams at 20 Hz."""
+    parser = MAVLINK.parser()
+    while True:
+        for frame in parser.feed(heard()):
+            if frame.name == "REQUEST_DATA_STREAM":
+                asked = (frame.fields["req_stream_id"], frame.fields["req_message_rate"], frame.system)
+                assert asked == (0, 20, 254)
+                return
+
+
+def test_over_a_serial_line_it_asks_as_it_is_told(roscore: Roscore, start: Start) -> None:
+    autopilot, line = os.openpty()
+    tty.setraw(line)
+    address = f"ardupilot+serial://{os.ttyname(line)}?baud=57600"
+    options = ("--names", "roscopter", "--namespace", "/serial", "--rate", "20", "--source-system", "254")
+    bridge = start(*COMMAND, "bridge", address, *options)
+    assert "bridging" in bridge.stdout.readline()
+    os.write(autopilot, BEAT)
+    asks_for_streams(lambda: os.read(autopilot, 4096))
+    bridge.send_signal(signal.SIGTERM)  # as a service is ended
+    assert bridge.wait(10) == 0
+    os.close(autopilot)
+    os.close(line)
+
+
+def test_a_link_that_breaks_is_opened_again(roscore: Roscore, start: Start) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as autopilot:
+        autopilot.settimeout(LIMIT_S)
+        address = f"ardupilot+tcp://127.0.0.1:{autopilot.getsockname()[1]}"
+        options = ("--names", "roscopter", "--namespace", "/broken", "--rate", "20", "--source-system", "254")
+        start(*COMMAND, "bridge", address, *options)
+        for _ in range(2):
+            connection, _ = autopilot.accept()
+            with connection:
+                connection.settimeout(LIMIT_S)
+                connection.sendall(BEAT)
+                asks_for_streams(partial(connection.recv, 4096))
