@@ -159,7 +159,9 @@ class Ros2Served:
                 raise NoAnswerError
             return to_rclpy(answer, types.response)
 
-        self._service = node.create_service(types.type, name, handle)
+        # in a group that lets others in: a request that is being answered must not hold up its node
+        group = import_module("rclpy.callback_groups").ReentrantCallbackGroup()
+        self._service = node.create_service(types.type, name, handle, callback_group=group)
 
     def close(self) -> None:
         """Take it away."""
