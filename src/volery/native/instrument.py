@@ -17,12 +17,14 @@ from volery.native.store import kept_costs
 class Instrumented:
     """An object that exports ``uint64_t volery_counters[]`` and ``volery_counters_length``; costs by counter.
 
-    ``estimated`` says what a report has to say, empty where the costs come from a trace of this very code.
+    ``functions`` are the symbols of the functions that the counters are in. ``estimated`` says what a report
+    has to say, empty where the costs come from a trace of this very code.
     """
 
     object_file: Path
     costs: Costs
     law: CoreLaw
+    functions: tuple[str, ...]
     estimated: str = ""
 
     def time(self, cycles: float, frequency_mhz: float) -> Ns:
@@ -40,9 +42,10 @@ def instrument(sources: Sequence[Path], law: CoreLaw, out: Path, flags: Sequence
     """
     program = compile_program(sources, law, flags)
     program.counted_object(out)
+    functions = tuple(block.function for block in program.blocks)
     kept = kept_costs(program)
     if kept is not None:
-        return Instrumented(out, kept, law)
+        return Instrumented(out, kept, law, functions)
     names = ", ".join(source.name for source in sources)
     said = f"the cost of {names} on {law.name} comes from its code alone: `volery cost` calibrates it"
-    return Instrumented(out, static_costs(program), law, said)
+    return Instrumented(out, static_costs(program), law, functions, said)

@@ -70,6 +70,7 @@ class Built:
     starters: tuple[Callable[[], object], ...]
     loader: Loader
     instances: Mapping[str, Instance]
+    doubts: tuple[str, ...] = ()
 
     def start(self) -> None:
         """Every check comes first: nothing has started when something is missing."""
@@ -77,12 +78,12 @@ class Built:
             starter()
 
     def warnings(self) -> list[str]:
-        """What the counting of code has left out."""
+        """What the counting of code has left out, and what is doubtful about it."""
         if self.loader.steps is None or not self.loader.libraries:
-            return []
+            return list(self.doubts)
         names = ", ".join(sorted(self.loader.libraries))
         what = f"what components computed inside libraries was not counted: {names}"
-        return [f"{what}; state it with volery.add_time()"]
+        return [*self.doubts, f"{what}; state it with volery.add_time()"]
 
 
 Truth = Callable[[], Position]
@@ -141,13 +142,13 @@ class Builder:
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component))
         launches = self._launches()
-        compiled = compile_all(self._models, self._system)
-        self._cpp = CppPrograms(self._kernel, self._graph, compiled, launches, self._nodes)
+        ready = compile_all(self._system, self._models, fidelity)
+        self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes)
         modules = importable(self._graph, launches, self._nodes)
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
-        return Built(starters, loader, self._instances)
+        return Built(starters, loader, self._instances, tuple(self._cpp.warnings()))
 
     def _launches(self) -> dict[str, Launch]:
         return {
@@ -163,7 +164,7 @@ class Builder:
             self._platform.seat(model),
             self._platform.pricing(model),
             tuple(self._operations(model)),
-            steps.take if steps else None,
+            self._cpp.meters.get(model.name) or (steps.take if steps else None),
         )
 
     def _operations(self, model: InstanceModel) -> dict[str, str]:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 from volery.base.errors import ModelError
 from volery.components.cpp.build import Compiled, CppComponent, Face, compile_component
 from volery.components.cpp.interfaces import DRONE, Required, operations
+from volery.components.cpp.meter import Meter
 from volery.components.cpp.program import CppProgram
 from volery.components.cpp.sources import find_sources
 from volery.components.cpp.toolchain import Tell
+from volery.cost.core import CoreLaw
 from volery.faces import roscpp
 from volery.faces.launch import Launch
 from volery.graph import Node, RosGraph
 from volery.kernel.api import Kernel
 from volery.model.system import ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component, System
 from volery.model.system import Instance as InstanceModel
+from volery.run.counted import Counting, core_of
 
 LANGUAGES = ("c++", "roscpp")
 _ROSCPP = Face((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
@@ -31,21 +35,35 @@ def has_cpp(system: System) -> bool:
     return any(is_cpp(instance.component) for instance in system.instances)
 
 
+class Ready(NamedTuple):
+    """What an instance is to run, and how its code counts itself (``None``: it does not)."""
+
+    compiled: Compiled
+    counting: Counting | None = None
+
+
 def compile_all(
-    instances: Iterable[InstanceModel], system: System, tell: Tell | None = None
-) -> dict[str, Compiled]:
-    """The C++ components of *instances* by their names, compiled as far as they are not yet.
+    system: System, instances: Iterable[InstanceModel], fidelity: str, tell: Tell | None = None
+) -> dict[str, Ready]:
+    """What the C++ components among *instances* are to run, by their names, compiled if it is not yet.
 
     ``ModelError`` with the compiler's words for one that does not compile; ``UsageError`` if there is no
     compiler.
     """
-    wanted = {one.component.name: one.component for one in instances if is_cpp(one.component)}
-    return {name: _compiled(system, component, tell) for name, component in wanted.items()}
+    return {
+        one.name: _ready(system, one.component, core_of(system, fidelity, one), tell)
+        for one in instances
+        if is_cpp(one.component)
+    }
 
 
-def _compiled(system: System, component: Component, tell: Tell | None) -> Compiled:
+def _ready(system: System, component: Component, core: CoreLaw | None, tell: Tell | None) -> Ready:
     face = _ROSCPP if component.language == "roscpp" else Face()
-    return compile_component(described(system, component), face, tell)
+    wanted = described(system, component)
+    if core is None:
+        return Ready(compile_component(wanted, face, tell))
+    counting = Counting(core)
+    return Ready(compile_component(wanted, face, tell, counting), counting)
 
 
 def described(system: System, component: Component) -> CppComponent:
@@ -91,21 +109,31 @@ class CppPrograms:
         self,
         kernel: Kernel,
         graph: RosGraph,
-        compiled: Mapping[str, Compiled],
+        ready: Mapping[str, Ready],
         launches: Mapping[str, Launch],
         nodes: Mapping[str, Node],
     ) -> None:
         self._kernel = kernel
         self._graph = graph
-        self._compiled = compiled
+        self._ready = ready
         self._launches = launches
         self._nodes = nodes
+        self.meters = {name: Meter() for name, one in ready.items() if one.counting is not None}
+
+    def warnings(self) -> list[str]:
+        """What is doubtful about what they count."""
+        said = (one.counting.estimated for one in self._ready.values() if one.counting is not None)
+        return [warning for warning in dict.fromkeys(said) if warning]
 
     def program(self, model: InstanceModel) -> CppProgram:
         """What the instance is to run."""
-        compiled = self._compiled[model.component.name]
-        if model.component.language != "roscpp":
-            return CppProgram(self._kernel, model.name, compiled)
-        launch = self._launches.get(model.name, Launch())
-        session = roscpp.Session(self._graph, model.name, launch, self._nodes)
-        return CppProgram(self._kernel, model.name, compiled, roscpp.answers(session), session.end)
+        compiled, counting = self._ready[model.name]
+        if model.component.language == "roscpp":
+            launch = self._launches.get(model.name, Launch())
+            session = roscpp.Session(self._graph, model.name, launch, self._nodes)
+            made = CppProgram(self._kernel, model.name, compiled, roscpp.answers(session), session.end)
+        else:
+            made = CppProgram(self._kernel, model.name, compiled)
+        if counting is not None:
+            made.count(self.meters[model.name], counting.worth())
+        return made

@@ -23,6 +23,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
+from volery.run.counted import core_of, ns_per_step
 
 CALL_WITHIN: Ns = 10 * S
 """A call whose arguments or result have not arrived by then raises ``LinkLost`` at its caller."""
@@ -116,6 +117,9 @@ class Platform:
         if self._fidelity == "code" and component.path:
             if component.language not in CPP_LANGUAGES:
                 return self._counted(instance, instance.processor)
+            core = core_of(self._system, self._fidelity, instance)
+            if core is not None:
+                return Counted(ns_per_step(core, self._models[instance.processor].frequency_mhz))
             if not (component.activation or component.operations):
                 what = f"what {instance.name} computes is not counted: it is C++"
                 self.warnings[f"{what}; state times in the model, or call uc_add_times()"] = None

@@ -52,7 +52,14 @@ Simulate = Callable[..., Outcome]
 def run_model(tmp_path: Path) -> Simulate:
     """Simulate a model's text, with *files* of this folder and others by their texts beside it."""
 
-    def run(model: str, *files: str, seed: int = 1, out: str = "out", **texts: str) -> Outcome:
+    def run(
+        model: str,
+        *files: str,
+        seed: int = 1,
+        out: str = "out",
+        fidelity: str = "times",
+        **texts: str,
+    ) -> Outcome:
         for name in files:
             source = FILES / name
             copy = shutil.copytree if source.is_dir() else shutil.copyfile
@@ -61,6 +68,6 @@ def run_model(tmp_path: Path) -> Simulate:
         for name, text in texts.items():
             (tmp_path / f"{name}.py").write_text(text)
         (tmp_path / "model.yaml").write_text(model)
-        return Outcome(simulate(tmp_path, Options("code", seed, out=tmp_path / out)))
+        return Outcome(simulate(tmp_path, Options(fidelity, seed, out=tmp_path / out)))
 
     return run

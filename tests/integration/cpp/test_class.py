@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 from volery.trace.events import Charge, Milestone, Text
@@ -25,8 +27,22 @@ components:
     requires: {list: Listing}
     parameters: {rounds: 3}
     active: true
-  Lister: {language: python, path: lister.py, provides: {list: Listing}}
-  Caller: {language: python, path: caller.py, requires: {one: Adding, other: Adding}, active: true}
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    activation: {time: 10 us}
+    operations: {add: {time: 10 us}, shifted: {time: 10 us}}
+  Lister:
+    language: python
+    path: lister.py
+    provides: {list: Listing}
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    operations: {names: {time: 10 us}}
+  Caller:
+    language: python
+    path: caller.py
+    requires: {one: Adding, other: Adding}
+    active: true
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    activation: {time: 10 us}
 application:
   one: {is: Adder, list: lister.list}
   other: {is: Adder, list: lister.list, parameters: {rounds: 0}}
@@ -94,3 +110,16 @@ def test_the_same_seed_gives_the_same_trace(run_model, tmp_path):
         run_model(MODEL, "adder.cpp", lister=LISTER, caller=CALLER, out=out)
     first, second = ((tmp_path / out / "trace.mcap").read_bytes() for out in ("first", "second"))
     assert first == second
+
+
+@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
+    outcome = run_model(MODEL, "adder.cpp", fidelity="code", lister=LISTER, caller=CALLER)
+    assert outcome.run.completed, outcome.run.record.outcome
+    counted = dict.fromkeys(("one", "other"), 0)
+    for one in outcome.of(Charge):
+        if one.kind == "code" and one.component in counted:
+            counted[one.component] += one.caller
+    assert 0 < counted["other"] < counted["one"] < 100_000, "one of them does a few rounds more"
+    [doubt] = [one.text for one in outcome.of(Text) if one.source == "volery"]
+    assert "comes from its code alone" in doubt

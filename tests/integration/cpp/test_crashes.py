@@ -17,8 +17,18 @@ MODEL = """
 volery: 1
 name: crash
 components:
-  Crash: {{language: roscpp, path: crash.cpp, active: true}}
-  Other: {{language: python, path: other.py, active: true}}
+  Crash:
+    language: roscpp
+    path: crash.cpp
+    active: true
+    at: {{processor: intel-i5-3470, frequency: 3000 MHz}}
+    activation: {{time: 1 us}}
+  Other:
+    language: python
+    path: other.py
+    active: true
+    at: {{processor: intel-i5-3470, frequency: 3000 MHz}}
+    activation: {{time: 1 us}}
 application:
   crash: {{is: Crash, parameters: {{how: {how}}}}}
   other: {{is: Other}}

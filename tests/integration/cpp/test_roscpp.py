@@ -19,8 +19,18 @@ MODEL = """
 volery: 1
 name: keeping
 components:
-  Keeper: {language: roscpp, path: pose_keeper.cpp, active: true}
-  Plant: {language: roscpp, path: plant.cpp, active: true}
+  Keeper:
+    language: roscpp
+    path: pose_keeper.cpp
+    active: true
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    activation: {time: 10 us}
+  Plant:
+    language: roscpp
+    path: plant.cpp
+    active: true
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    activation: {time: 10 us}
 application:
   keeper:
     is: Keeper

@@ -53,6 +53,24 @@ const char* run(std::int64_t number, Reader argument, Writer& result) {
 
 }  // namespace
 
+Reader ask(const char* question, const Writer& with) {
+    auto const& bytes = with.bytes();
+    switch (volery_ask(question, bytes.data(), bytes.size(), std::uncaught_exceptions() > 0)) {
+        case VOLERY_ANSWER: break;
+        case VOLERY_END: throw Ended{};
+        case VOLERY_FAIL: throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
+        default:
+            throw std::logic_error(std::string(question) + ": a component has one flow of control: nothing is asked "
+                                   "before main() or in a thread of its own");
+    }
+    return Reader(volery_here()->reply, volery_here()->reply_size);
+}
+
+bool tell(const char* question, const Writer& with) noexcept {
+    auto const& bytes = with.bytes();
+    return volery_ask(question, bytes.data(), bytes.size(), true) == VOLERY_ANSWER;
+}
+
 std::int64_t enlist(Callable callable) {
     auto const number = callables().next++;
     enlist_as(number, std::move(callable));

@@ -77,22 +77,10 @@ private:
 };
 
 // Ask, and give what comes back: valid until the next question.
-inline Reader ask(const char* question, const Writer& with = {}) {
-    auto const& bytes = with.bytes();
-    switch (volery_ask(question, bytes.data(), bytes.size(), std::uncaught_exceptions() > 0)) {
-        case VOLERY_ANSWER: break;
-        case VOLERY_END: throw Ended{};
-        case VOLERY_FAIL: throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
-        default: throw std::logic_error(std::string(question) + ": a component has one flow of control; not before main(), and not in a thread of its own");
-    }
-    return Reader(volery_here()->reply, volery_here()->reply_size);
-}
+Reader ask(const char* question, const Writer& with = {});
 
 // The same for destructors and for functions that must not throw. Whether there was an answer.
-inline bool tell(const char* question, const Writer& with = {}) noexcept {
-    auto const& bytes = with.bytes();
-    return volery_ask(question, bytes.data(), bytes.size(), true) == VOLERY_ANSWER;
-}
+bool tell(const char* question, const Writer& with = {}) noexcept;
 
 // What the house may call, by number.
 using Callable = std::function<void(Reader, Writer&)>;
