@@ -48,7 +48,12 @@ BESIDE = ("receive", "connect", "accept", "wait")
 connection; x microseconds pass in ``spin``. Without a figure they cost nothing, and a report says so.
 """
 
-_DEPENDENT = ("publish", "sleep", "wait")
+AWAKE = {"publish_next": "publish"}
+"""A call that finds the library's threads awake, since they have just sent or received, and what it costs
+where a law does not tell them apart.
+"""
+
+_DEPENDENT = ("publish", "publish_next", "sleep", "wait")
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
 
 
@@ -154,6 +159,8 @@ class Tariff:
         name = _SPIN.get(x, call) if call == "spin_once" else call
         if name in BESIDE and name not in self._parts:
             return NOTHING
+        if name not in self._parts:
+            name = AWAKE.get(name, name)
         if name not in self._parts:
             raise EstimateError(
                 f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "

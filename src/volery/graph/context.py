@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
-from volery.base.time import US, Ns, S
+from volery.base.time import MS, US, Ns, S
 from volery.graph.node import Carry, NodeId, Price
 from volery.graph.parameters import Parameters
 from volery.kernel.api import Kernel
@@ -66,6 +66,9 @@ class Context:
 KEEP_UP: Ns = S
 """How often a node pays for the time that it neither sleeps nor calls."""
 
+AWAKE: Ns = MS
+"""For so long after it has sent or received something a node's threads, and its caches, are still warm."""
+
 _CALLS = ("publish", "sleep", "spin_once")
 _KINDS = {call: f"ros:{call}" for call in _CALLS}
 """What is charged often, so that its text is made once."""
@@ -74,7 +77,7 @@ _KINDS = {call: f"ros:{call}" for call in _CALLS}
 class Member:
     """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
 
-    __slots__ = ("_since", "_slept", "_waited", "closed", "context", "id", "place")
+    __slots__ = ("_awake", "_since", "_slept", "_waited", "closed", "context", "id", "place")
 
     def __init__(self, context: Context, name: str, place: Place) -> None:
         processor = place.processor.name if place.processor else ""
@@ -83,6 +86,7 @@ class Member:
         self.place = place
         self.closed = False
         self._since = context.kernel.now()
+        self._awake: Ns = -AWAKE
         self._slept = self._waited = 0.0
 
     @property
@@ -98,7 +102,7 @@ class Member:
         context = self.context
         kernel = context.kernel
         who = self.id
-        cost = context.price(who, call, x)
+        cost = context.price(who, self._priced_as(call), x)
         caller, background = cost.caller, cost.background
         if call == "sleep":
             self._slept += x
@@ -112,11 +116,22 @@ class Member:
         if background and self.place.processor is not None:
             self.place.processor.load(self.place, background)
 
+    def _priced_as(self, call: str) -> str:
+        """Sending wakes the client library's threads, unless they are awake."""
+        if call != "publish":
+            return call
+        now = self.context.kernel.now()
+        awake = now - self._awake < AWAKE
+        self._awake = now
+        return "publish_next" if awake else call
+
     def bear(self, what: str, x: float = 0.0) -> None:
         """Have executed what happens to the node beside its calls; nothing where that has no price."""
         context, who = self.context, self.id
         if self.place.processor is None:
             return
+        if what == "receive":
+            self._awake = context.kernel.now()
         cost = context.price(who, what, x)
         background = cost.caller + cost.background
         if not background:

@@ -75,10 +75,11 @@ class Cost(Protocol):
 
 Price = Callable[[NodeId, str, float], Cost]
 """``price(node, call, x)``. The calls are ``init``, ``node_handle``, ``advertise``, ``subscribe``,
-``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the topic), ``sleep`` (x =
-microseconds slept) and ``spin_once`` (x = 1 for the first of this node, 0 after it). Beside its calls a node
-meets ``receive`` (a message arrives), ``connect`` (a subscription of it finds a publisher), ``accept`` (a
-publisher of it finds a subscription) and ``wait`` (x = microseconds in which it did not sleep)."""
+``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the topic), ``publish_next`` (the
+same where the node has sent or received something a moment ago), ``sleep`` (x = microseconds slept) and
+``spin_once`` (x = 1 for the first of this node, 0 after it). Beside its calls a node meets ``receive`` (a
+message arrives), ``connect`` (a subscription of it finds a publisher), ``accept`` (a publisher of it finds a
+subscription) and ``wait`` (x = microseconds in which it did not sleep)."""
 
 Carry = Callable[[NodeId, NodeId, int, bool, Callable[[], None], Callable[[], None]], None]
 """``carry(sender, receiver, size, reliable, deliver, lost)``: bring *size* bytes from node to node, then call

@@ -17,10 +17,10 @@ def xyz(vector: Any) -> tuple[float, float, float]:
 
 def test_nobody_is_told_what_nobody_wants(aviary: Any) -> None:
     aviary.connect()
-    before = sum(call == "publish" for _, call in aviary.priced)
+    before = sum(call.startswith("publish") for _, call in aviary.priced)
     aviary.say("SERVO_OUTPUT_RAW", servo1_raw=1100)
     aviary.run(200 * MS)
-    assert sum(call == "publish" for _, call in aviary.priced) == before
+    assert sum(call.startswith("publish") for _, call in aviary.priced) == before
 
 
 def test_the_receivers_own_speed_and_satellites(aviary: Any) -> None:

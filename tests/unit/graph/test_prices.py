@@ -159,3 +159,32 @@ def test_a_node_pays_for_the_time_in_which_it_does_not_sleep(rig: Any) -> None:
     rig.kernel.run(4 * S)
     paid = [(one.at, one.kind, one.background) for one in rig.of(Charge) if one.background]
     assert paid == [(0, "ros:sleep", 5 * MS), (3 * S, "ros:wait", 1 * MS), (4 * S, "ros:wait", 2 * MS)]
+
+
+def test_who_publishes_again_at_once_finds_the_library_awake(rig: Any) -> None:
+    def talker() -> None:
+        publisher = rig.graph.node("talker").advertise("chat", STRING)
+        for pause in (0, 100 * MS, 0):
+            rig.kernel.sleep_until(rig.kernel.now() + pause)
+            publisher.publish(messages.new(STRING))
+
+    def answerer() -> None:
+        node = rig.graph.node("answerer")
+        publisher = node.advertise("answers", STRING)
+        node.subscribe("chat", STRING, publisher.publish)
+        while node.spin_once(S):
+            pass
+
+    rig.task(answerer, "answerer", on_processor=True)
+    rig.task(talker, "talker", on_processor=True)
+    rig.kernel.run(S)
+    calls = [(name, call) for name, call, _ in rig.asked if call.startswith("publish")]
+    assert calls == [
+        ("/talker", "publish"),
+        ("/answerer", "publish_next"),
+        ("/talker", "publish"),
+        ("/talker", "publish_next"),
+        ("/answerer", "publish_next"),
+        ("/answerer", "publish_next"),
+    ]
+    assert {event.kind for event in rig.of(Charge) if "publish" in event.kind} == {"ros:publish"}

@@ -7,6 +7,7 @@ joins it to lines over the frequency, as in the paper.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from volery.calibrate.catalogue_file import put_law
@@ -20,12 +21,17 @@ from volery.cost.ros import CallFigures, RosLaw
 CALLBACK = ("spin_once_first", "spin_once_next")
 """What the embedded graph prices when a callback begins."""
 
-_UNITS = {"publish": "subscriber", "sleep": "microsecond slept", "wait": "microsecond"}
+_UNITS = {
+    "publish": "subscriber",
+    "publish_next": "subscriber",
+    "sleep": "microsecond slept",
+    "wait": "microsecond",
+}
 
 
 def law_of(costs: Mapping[str, Cost], under: Circumstances) -> RosLaw:
     """The law that holds at the frequency of one campaign."""
-    calls = {call: _figures(cost) for call, cost in costs.items()}
+    calls = {call: _figures(cost) for call, cost in _with_slope(costs).items()}
     if CALLBACK[1] not in calls and "receive" in calls:  # rospy: its threads call back as messages come
         received = calls.pop("receive").model_copy(
             update={"note": "rospy has no spinOnce: this is what a message takes until its callback begins"}
@@ -42,6 +48,24 @@ def law_of(costs: Mapping[str, Cost], under: Circumstances) -> RosLaw:
         greatest_mhz=under.frequency_mhz,
         calls=calls,
     )
+
+
+def _with_slope(costs: Mapping[str, Cost]) -> dict[str, Cost]:
+    """``publish_next`` is measured at one number of subscribers: what each adds is what it adds elsewhere."""
+    first, following = costs.get("publish"), costs.get("publish_next")
+    if first is None or following is None:
+        return dict(costs)
+    [x] = following.points
+    whole, caller = (
+        _through_point(x, getattr(following, part).at(x), getattr(first, part).per_x)
+        for part in ("whole", "caller")
+    )
+    return {**costs, "publish_next": replace(following, whole=whole, caller=caller)}
+
+
+def _through_point(x: float, value: float, per_x: float) -> Straight:
+    per_x = min(per_x, value / x)
+    return Straight(value - per_x * x, per_x)
 
 
 def _common(costs: Mapping[str, Cost]) -> list[Cost]:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from volery.base.seeds import stream
 from volery.calibrate.ros.samples import Points, Round, merged, points_of
 
-TYPICAL_X = {"publish": 4.0, "sleep": 50_000.0, "wait": 1_000_000.0}
-"""Where a law is judged: four subscribers, 50 ms, a second."""
+TYPICAL_X = {"publish": 4.0, "publish_next": 2.0, "sleep": 50_000.0, "wait": 1_000_000.0}
+"""Where a law is judged: four subscribers (two), 50 ms, a second."""
 
 DRAWS = 200
 NEGLIGIBLE_NS = 2_000.0

@@ -119,11 +119,14 @@ class _Round:
         idle, publish = self._by_name.get("idle", []), self._by_name.get("publish", [])
         for without, whole in zip(idle, publish, strict=False):
             yield "publish", whole.x, whole.each(self._clock) - without.each(self._clock)
+        alone, both = self._by_name.get("publish_alone", []), self._by_name.get("publish_both", [])
+        for without, whole in zip(alone, both, strict=False):
+            yield "publish_next", whole.x, whole.each(self._clock) - without.each(self._clock)
 
     def hearing(self) -> Iterable[Point]:
-        """Cycles that spin, minus those that publish alone; waiting with messages, minus without."""
-        alone, spinning = self._by_name.get("publish_alone", []), self._by_name.get("spin_once", [])
-        for without, one in zip(alone, spinning, strict=False):
+        """Cycles that publish and spin, minus those that publish; waiting with messages, minus without."""
+        both, spinning = self._by_name.get("publish_both", []), self._by_name.get("spin_once", [])
+        for without, one in zip(both, spinning, strict=False):
             yield "spin_once_next", 0.0, one.each(self._clock) - without.each(self._clock)
         waiting, receiving = self._by_name.get("wait", []), self._by_name.get("receive", [])
         for quiet, one in zip(waiting, receiving, strict=False):

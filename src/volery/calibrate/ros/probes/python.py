@@ -272,16 +272,19 @@ class Probe:
             time.sleep(SETTLE_S)
 
     def spinning(self) -> None:
-        """Publishing cycles with and without a spin: a call that others have gone before is warm."""
-        spin = self._client.spin_once
-        if spin is None:
-            return
-        talking = self._client.advertise("calibration/to_1")
-        _until(lambda: talking.peers() > 0)
+        """Cycles that publish once, twice, and twice with a spin: who comes next finds the library awake."""
+        first = self._client.advertise("calibration/to_1")
+        other = self._client.advertise("calibration/to_2")
+        _until(lambda: first.peers() > 0 and other.peers() > 1)
         time.sleep(SETTLE_S)
-        self._block("publish_alone", 0, self._period_s, talking.publish)
-        self._block("spin_once", 0, self._period_s, lambda: (talking.publish(), spin()))
-        talking.close()
+        self._block("publish_alone", 0, self._period_s, first.publish)
+        self._block("publish_both", 2, self._period_s, lambda: (first.publish(), other.publish()))
+        spin = self._client.spin_once
+        if spin is not None:
+            both = (first.publish, other.publish, spin)
+            self._block("spin_once", 0, self._period_s, lambda: [call() for call in both])
+        first.close()
+        other.close()
 
     def receiving(self) -> None:
         """Waiting for messages where none come and where some do."""

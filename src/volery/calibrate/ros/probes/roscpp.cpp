@@ -131,16 +131,22 @@ void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const 
   }
 }
 
-// Publishing cycles with and without a spin: a call that others have gone before finds its way warm.
+// Cycles that publish once, twice, and twice with a spin: who comes next finds the library's threads awake.
 void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
   Message message;
   message.data.resize(4);
-  ros::Publisher publisher = node.advertise<Message>("calibration/to_1", 10);
-  until([&] { return publisher.getNumSubscribers() > 0; });
+  ros::Publisher first = node.advertise<Message>("calibration/to_1", 10);
+  ros::Publisher next = node.advertise<Message>("calibration/to_2", 10);
+  until([&] { return first.getNumSubscribers() > 0 && next.getNumSubscribers() > 1; });
   pause(kSettleMs);
-  block("publish_alone", 0, period_ms, block_ms, [&] { publisher.publish(message); });
+  const auto both = [&] {
+    first.publish(message);
+    next.publish(message);
+  };
+  block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
+  block("publish_both", 2, period_ms, block_ms, both);
   block("spin_once", 0, period_ms, block_ms, [&] {
-    publisher.publish(message);
+    both();
     ros::spinOnce();
   });
 }
