@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import NoReturn
 
 from volery.faces import rclpy, rospy, tf2
-from volery.faces.launch import Launch
+from volery.faces.launch import AtEnd, Launch, never
 from volery.graph import Node, RosGraph
 
 _ABSENT = {
@@ -24,9 +24,11 @@ def importable(
     graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
     nodes: Mapping[str, Node] | None = None,
+    at_end: AtEnd = never,
 ) -> dict[str, ModuleType]:
-    """The modules by name; *launched* and *nodes* as in ``faces.rospy.modules``."""
-    found = {**rospy.modules(graph, launched, nodes), **rclpy.modules(graph, launched, nodes)}
+    """The modules by name; *launched*, *nodes* and *at_end* as in ``faces.rospy.modules``."""
+    given = launched, nodes, at_end
+    found = {**rospy.modules(graph, *given), **rclpy.modules(graph, *given)}
     transforms = tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"])
     return {**found, **transforms, **{name: _absent(name, instead) for name, instead in _ABSENT.items()}}
 

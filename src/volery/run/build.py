@@ -144,11 +144,11 @@ class Builder:
         launches = self._launches()
         ready = compile_all(self._system, self._models, fidelity)
         self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes)
-        modules = importable(self._graph, launches, self._nodes)
+        modules = importable(self._graph, launches, self._nodes, self._ending.farewell)
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
-        return Built(starters, loader, self._instances, tuple(self._cpp.warnings()))
+        return Built(starters, loader, self._instances, tuple(self._cpp.warnings(self._models)))
 
     def _launches(self) -> dict[str, Launch]:
         return {
@@ -190,7 +190,7 @@ class Builder:
 
     def _program(self, model: InstanceModel, loader: Loader) -> Program:
         component = model.component
-        if not component.path:
+        if not component.path or (is_cpp(component) and model.name not in self._cpp):
             period = model.activity.period_ns if model.activity else None
             return StubProgram(self._kernel, self._operations(model), period)
         if is_cpp(component):

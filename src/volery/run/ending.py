@@ -1,22 +1,23 @@
 """How a run ends, whatever ends it: time, a goal that is reached, a failure, Ctrl-C, SIGTERM.
 
 The order is always the same: components are cancelled; safety tasks bring every armed vehicle down that no
-operator has taken; the rest is cancelled; the kernel names whoever would not go. The first signal does this,
-a second one is hard.
+operator has taken, while components do what they want done last; the rest is cancelled; the kernel names
+whoever would not go. The first signal does this, a second one is hard.
 """
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from types import FrameType
 from typing import Protocol
 
 from volery.base.errors import VoleryError
-from volery.base.time import MINUTE, Ns
+from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place, Scope
 from volery.requirements.record import Status
@@ -26,6 +27,9 @@ FOREVER: Ns = 2**63 - 1
 
 SAFETY_WITHIN: Ns = 10 * MINUTE
 """Of run time: a vehicle that is not down by then is left to its autopilot, and named."""
+
+FAREWELL_WITHIN: Ns = 5 * S
+"""Of run time: what a component does last and has not done by then is cut off, and named."""
 
 
 class Lands(Protocol):
@@ -51,7 +55,8 @@ class Ending:
         self.reason = ""
         self.error: VoleryError | None = None
         self.begun = False
-        self._flying = 0
+        self._farewells: list[tuple[Place, Callable[[], object]]] = []
+        self._left = 0
 
     def failed(self, who: str, error: Exception) -> None:
         """A component's flow of control has ended with *error*."""
@@ -66,21 +71,52 @@ class Ending:
         self.begun = True
         self.status, self.reason = status, reason
         self._kernel.cancel(self.users, reason)
-        self._flying = len(self.vehicles)
+        self._left = len(self.vehicles) + len(self._farewells)
         for vehicle in self.vehicles:
             name = f"safety of {vehicle.name}"
             self._kernel.spawn(partial(self._bring_down, vehicle), name, Place(name), self._safety)
-        if not self.vehicles:
+        for place, last in self._farewells:
+            self._part_with(place, last)
+        if not self._left:
             self._kernel.cancel(self._kernel.root, reason)
         self._kernel.call_at(self._kernel.now() + SAFETY_WITHIN, self._give_up)
+
+    def farewell(self, place: Place, last: Callable[[], object]) -> None:
+        """Have *last* done at *place* when the run ends, after the components have been cancelled."""
+        self._farewells.append((place, last))
+
+    def _part_with(self, place: Place, last: Callable[[], object]) -> None:
+        who = place.component
+        scope = self._safety.child(f"farewell of {who}")
+
+        def body() -> None:
+            try:
+                last()
+            except Exception as error:
+                what = f"failed at the end of the run: {type(error).__name__}: {error}"
+                self._kernel.record(Failure(self._kernel.now(), who, what))
+            finally:
+                self._one_less()
+
+        def cut_off() -> None:
+            if scope.tasks:
+                what = f"was not through {FAREWELL_WITHIN // S} s after the end of the run"
+                self._kernel.record(Failure(self._kernel.now(), who, what))
+                self._kernel.cancel(scope, self.reason)
+
+        self._kernel.spawn(body, f"{who} (at the end)", replace(place, deadline=None, on_release=None), scope)
+        self._kernel.call_at(self._kernel.now() + FAREWELL_WITHIN, cut_off)
 
     def _bring_down(self, vehicle: Lands) -> None:
         try:
             vehicle.come_to_rest()
         except VoleryError as error:
             self._kernel.record(Failure(self._kernel.now(), vehicle.name, f"not brought down: {error}"))
-        self._flying -= 1
-        if not self._flying:
+        self._one_less()
+
+    def _one_less(self) -> None:
+        self._left -= 1
+        if not self._left:
             self._kernel.cancel(self._kernel.root, self.reason)
 
     def _give_up(self) -> None:

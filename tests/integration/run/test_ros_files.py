@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import ModelError
+from volery.base.time import S
 from volery.run.simulate import Options, simulate
-from volery.trace.events import Text
+from volery.trace.events import Failure, Published, Text
 from volery.trace.reader import read
 
 pytestmark = pytest.mark.integration
@@ -117,3 +118,64 @@ def test_an_interface_that_is_no_definition(workspace: Path) -> None:
     (workspace / "robot_msgs/srv/Reset.srv").write_text("float64 turns\n")
     with pytest.raises(ModelError, match=r"encoder.py:1: robot_msgs/srv/Reset: .* one line '---'"):
         simulate(workspace / "model.yaml", Options("code", out=workspace / "out"))
+
+
+STOPPING = """
+import rospy
+from geometry_msgs.msg import Twist
+
+rospy.init_node("odometer")
+commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+
+
+def stop():
+    commands.publish(Twist())
+    rospy.loginfo("stopped, over: %s", rospy.is_shutdown())
+
+
+rospy.on_shutdown(stop)
+rospy.on_shutdown(lambda: rospy.loginfo("good-bye"))
+rate = rospy.Rate(1)
+while not rospy.is_shutdown():
+    commands.publish(Twist())
+    rate.sleep()
+"""
+LEAVING = """
+import rclpy
+
+rclpy.init()
+node = rclpy.create_node("encoder")
+rclpy.get_default_context().on_shutdown(lambda: node.get_logger().info("rclpy, too"))
+rclpy.spin(node)
+"""
+
+
+def test_shutdown_hooks_are_called_when_the_run_ends(workspace: Path) -> None:
+    (workspace / "odometer.py").write_text(STOPPING)
+    (workspace / "encoder.py").write_text(LEAVING)
+    run = simulate(workspace / "model.yaml", Options("code", out=workspace / "out"))
+    assert run.completed, run.error
+    events = read(workspace / "out/trace.mcap").events
+    assert [event.text for event in events if isinstance(event, Text)] == [
+        "rclpy, too",
+        "stopped, over: True",
+        "good-bye",
+    ]
+    assert [event.at // S for event in events if isinstance(event, Published)] == [*range(10), 10]
+
+
+@pytest.mark.parametrize(
+    ("hook", "said"),
+    [
+        ("time.sleep(60)", "was not through 5 s after the end of the run"),
+        ("{}['x']", "shutdown hook raised KeyError: 'x' (line 3)"),
+    ],
+)
+def test_a_hook_that_hangs_or_fails_is_named(workspace: Path, hook: str, said: str) -> None:
+    text = f"import rospy, time\nrospy.init_node('o')\nrospy.on_shutdown(lambda: {hook})\nrospy.spin()\n"
+    (workspace / "odometer.py").write_text(text)
+    (workspace / "encoder.py").write_text(LEAVING)
+    run = simulate(workspace / "model.yaml", Options("code", out=workspace / "out"))
+    assert run.record.sim_s < 16.0
+    events = read(workspace / "out/trace.mcap").events
+    assert [(event.who, event.what) for event in events if isinstance(event, Failure)] == [("odometer", said)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.faces.launch import Launch
+from volery.faces.launch import AtEnd, Launch, never
 from volery.faces.rclpy.errors import NameValidationException, NotInitializedException
 from volery.graph import Node, RosGraph
 from volery.kernel.waiting import Signal, current_task
@@ -32,7 +32,8 @@ class Context:
         self._launch = launch
         self._given = node
         self._nodes: list[Node] = []
-        self._started = False
+        self._started = self._asked = False
+        self.at_end: AtEnd = never
         self._hooks: list[Callable[[], Any]] = []
         self.kernel = graph.kernel
         self.changed = Signal(graph.kernel, f"{component} (rclpy)")
@@ -57,8 +58,15 @@ class Context:
         return self._started
 
     def on_shutdown(self, callback: Callable[[], Any]) -> None:
-        """Call it at shutdown."""
-        self._hooks.append(callback)
+        """Call it at shutdown, or when the run ends."""
+        if not self._asked:
+            self._asked = True
+            self.at_end(self.task.place, self.try_shutdown)
+        self.when_over(callback)
+
+    def when_over(self, action: Callable[[], Any]) -> None:
+        """``on_shutdown`` of the house's own: nothing that keeps a run from ending."""
+        self._hooks.append(action)
 
     def shutdown(self) -> None:
         """End it: who spins returns. Nodes stay until they are destroyed, but nothing spins them."""
@@ -128,12 +136,17 @@ class Contexts:
     """All components of one run that import rclpy."""
 
     def __init__(
-        self, graph: RosGraph, launched: Mapping[str, Launch], nodes: Mapping[str, Node] | None = None
+        self,
+        graph: RosGraph,
+        launched: Mapping[str, Launch] | None = None,
+        nodes: Mapping[str, Node] | None = None,
+        at_end: AtEnd = never,
     ) -> None:
         self.graph = graph
         self.kernel = graph.kernel
-        self._launched = launched
+        self._launched = {} if launched is None else launched
         self._nodes = {} if nodes is None else nodes
+        self._at_end = at_end
         self._contexts: dict[str, Context] = {}
 
     def here(self) -> Context:
@@ -143,6 +156,7 @@ class Contexts:
         if found is None:
             launch, node = self._launched.get(component), self._nodes.get(component)
             found = self._contexts[component] = Context(self.graph, component, launch, node)
+            found.at_end = self._at_end
         return found
 
     def now(self) -> Ns:

@@ -42,7 +42,7 @@ class Executor:
         self._tasks: deque[tuple[Ns, Task]] = deque()
         self._filled = Signal(self._kernel, "an executor's callbacks")
         self._over = False
-        self._context.on_shutdown(self.wake)
+        self._context.when_over(self.wake)
 
     @property
     def context(self) -> Context:

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from volery import messages
-from volery.faces.launch import Launch
+from volery.faces.launch import AtEnd, Launch, never
 from volery.faces.module import face_module
 from volery.faces.rclpy import action, callback_groups, entities, errors, executors, logging, parameters, qos
 from volery.faces.rclpy import task as tasks
@@ -25,12 +25,13 @@ def modules(
     graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
     nodes: Mapping[str, GraphNode] | None = None,
+    at_end: AtEnd = never,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rclpy``, ``rclpy.node``, ``std_msgs.msg`` and so on, by name.
 
-    *launched* and *nodes* as in ``faces.rospy.modules``.
+    *launched*, *nodes* and *at_end* as in ``faces.rospy.modules``.
     """
-    contexts = Contexts(graph, {} if launched is None else launched, nodes)
+    contexts = Contexts(graph, launched, nodes, at_end)
     bound = _bound(contexts)
     parts = _parts(bound)
     names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": parameters.Parameter}

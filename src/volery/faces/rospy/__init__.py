@@ -7,7 +7,8 @@ serves all components of a run. As a launch file does, the component's name name
 Differences from the real one, on purpose: an attribute that is not there yet says so; a topic has one thread
 a subscription and a service one a request, as there, but they never run at the same instant as each other's
 Python code; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternion`` starts as no rotation
-(ROS 2) and not as zero; shutdown hooks run on ``signal_shutdown``, not when the run ends the component.
+(ROS 2) and not as zero; a node joins ``/rosout`` with its first line that somebody listens for; when the run
+ends, shutdown hooks are called, but what a file does behind ``spin`` is not.
 """
 
 from volery.faces.launch import Launch

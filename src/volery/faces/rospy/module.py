@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from volery import messages
-from volery.faces.launch import Launch
+from volery.faces.launch import AtEnd, Launch, never
 from volery.faces.module import face_module
 from volery.faces.rospy import parameters, services, time, topics
 from volery.faces.rospy.anymsg import AnyMsg
@@ -32,13 +32,15 @@ def modules(
     graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
     nodes: Mapping[str, Node] | None = None,
+    at_end: AtEnd = never,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
 
     *launched* says for each component what a launch file would (by the component's name, which names its
     node then). *nodes* holds, by component, nodes that are there already: ``init_node`` finds its own there.
+    *at_end* has shutdown hooks called when the run ends.
     """
-    sessions = Sessions(graph, {} if launched is None else launched, nodes)
+    sessions = Sessions(graph, launched, nodes, at_end)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
         names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})
@@ -99,8 +101,8 @@ def signal_shutdown(sessions: Sessions, reason: str = "") -> None:
 
 
 def on_shutdown(sessions: Sessions, h: Callable[[], Any]) -> None:
-    """Call *h* when this node shuts down."""
-    sessions.early().hooks.append(h)
+    """Call *h* when this node shuts down, or the run ends."""
+    sessions.early().on_shutdown(h)
 
 
 def spin(sessions: Sessions) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.base.time import Ns
-from volery.faces.launch import Launch
+from volery.faces.launch import AtEnd, Launch, never
 from volery.faces.rosout import Rosout
 from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
 from volery.graph import LATCHED, Group, Node, RosGraph, Work
@@ -32,6 +32,7 @@ class Session:
     kernel: Kernel
     ended: Signal
     rosout: Rosout
+    at_end: AtEnd
     shutdown: str = ""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
     failures: set[str] = field(default_factory=set)
@@ -47,12 +48,18 @@ class Session:
         if self.shutdown:
             raise ROSInterruptException(f"rospy shutdown: {self.shutdown}")
 
+    def on_shutdown(self, hook: Callable[[], Any]) -> None:
+        """Call it when the node shuts down, by itself or with the run."""
+        if not self.hooks:
+            self.at_end(self.node.place, lambda: self.end("the run has ended"))
+        self.hooks.append(hook)
+
     def end(self, why: str) -> None:
         """Shut down: hooks first, then leave the graph."""
         if not self.shutdown:
             self.shutdown = why or "signal_shutdown"
             for hook in self.hooks:
-                hook()
+                self._guarded(hook, "shutdown hook")
             self.node.close()
             self.ended.notify()
 
@@ -114,12 +121,17 @@ class Sessions:
     """All components of one run that are nodes."""
 
     def __init__(
-        self, graph: RosGraph, launched: Mapping[str, Launch], nodes: Mapping[str, Node] | None = None
+        self,
+        graph: RosGraph,
+        launched: Mapping[str, Launch] | None = None,
+        nodes: Mapping[str, Node] | None = None,
+        at_end: AtEnd = never,
     ) -> None:
         self.graph = graph
         self.kernel = graph.kernel
-        self._launched = launched
+        self._launched = {} if launched is None else launched
         self._nodes = {} if nodes is None else nodes
+        self._at_end = at_end
         self._open: dict[str, Session] = {}
 
     def _component(self) -> str:
@@ -145,7 +157,9 @@ class Sessions:
             node.set_parameter(f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
         rosout = Rosout(self.graph, node, "rosgraph_msgs/msg/Log", LATCHED)
-        made = self._open[component] = Session(self.graph, node, task.scope, self.kernel, ended, rosout)
+        made = self._open[component] = Session(
+            self.graph, node, task.scope, self.kernel, ended, rosout, self._at_end
+        )
         return made
 
     def here(self) -> Session:
