@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import cache, partial
 
-from volery.autopilots.px4 import boot, commands, missions, modes, radio, tuning
-from volery.autopilots.px4.commander import READY_AFTER, of
+from volery.autopilots.px4 import commands, missions, modes, radio, tuning
+from volery.autopilots.px4.commander import of
+from volery.autopilots.px4.firmware import px4
 from volery.autopilots.px4.flying import Descent, Hold, Offboard, Orbit, Position, Return, TakeOff
 from volery.autopilots.px4.honoured import COPTER as HONOURED
 from volery.autopilots.px4.mavlink import mavlink
 from volery.autopilots.px4.returning import tell_stage
 from volery.autopilots.px4.watching import on_step
-from volery.autopilots.simulated.dialect import Dialect
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission
 from volery.autopilots.simulated.manoeuvres.pilot import AltitudeHold, Stabilize
 from volery.autopilots.simulated.mavlink.face import MavlinkFace
@@ -98,38 +98,17 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.autopilots.px4", "data/copter.parameters")
 
 
-COPTER = Dialect(
-    name="px4",
+COPTER = px4(
     kind="multirotor",
     face=partial(MavlinkFace, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
-    memory=boot.memory,
     boot_mode=MODES[modes.LOITER],
-    boot_events=boot.EVENTS,
-    ready_after=boot.STREAMS,
-    origin_after=boot.HOME,
-    position_after=READY_AFTER,
-    local_position_after=boot.STREAMS,
-    on_warm=boot.stand,
-    on_warm_position=boot.on_position,
-    watch_every=1,
-    each_second=boot.nothing,
     modes=MODES,
     tuning=tuning.copter,
-    transmitter=(1500,) * 4 + (0,) * 12,
     stands=True,
     spool_time=1 * S,
     takeoff_slew=200 * MS,
     resigns_after=1500 * MS,
     on_step=_on_step,
-    on_disarmed=boot.nothing,
-    throttle_centred=True,
-    first_item=0,
-    actions_count=True,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_ended=missions.ended,
-    mission_action=missions.act,
     parameters=parameters,
-    own_parameters=boot.own_parameters,
     honoured=HONOURED,
 )

@@ -7,13 +7,13 @@ from __future__ import annotations
 from functools import cache, partial
 from math import atan2, hypot, isfinite
 
-from volery.autopilots.px4 import boot, commands, copter, missions, modes, radio, tuning
-from volery.autopilots.px4.commander import READY_AFTER, of
+from volery.autopilots.px4 import commands, copter, modes, radio, tuning
+from volery.autopilots.px4.commander import of
+from volery.autopilots.px4.firmware import px4
 from volery.autopilots.px4.honoured import ROVER as HONOURED
 from volery.autopilots.px4.mavlink import mavlink
 from volery.autopilots.px4.offboard import AttitudeTarget, Target
 from volery.autopilots.px4.watching import on_step
-from volery.autopilots.simulated.dialect import Dialect
 from volery.autopilots.simulated.flight import Control, Setpoint
 from volery.autopilots.simulated.manoeuvres.guided import Turn
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission
@@ -173,35 +173,14 @@ def parameters() -> tuple[Parameter, ...]:
     return (*shared, *ASSUMED)
 
 
-ROVER = Dialect(
-    name="px4",
+ROVER = px4(
     kind="rover",
     face=partial(MavlinkFace, mavlink(GROUND_ROVER, COMMANDS, radio.ROVER)),
-    memory=boot.memory,
     boot_mode=MODES[modes.LOITER],
-    boot_events=boot.EVENTS,
-    ready_after=boot.STREAMS,
-    origin_after=boot.HOME,
-    position_after=READY_AFTER,
-    local_position_after=boot.STREAMS,
-    on_warm=boot.stand,
-    on_warm_position=boot.on_position,
-    watch_every=1,
-    each_second=boot.nothing,
     modes=MODES,
     tuning=tuning.rover,
-    transmitter=copter.COPTER.transmitter,
     stands=False,
     on_step=on_step,
-    on_disarmed=boot.nothing,
-    throttle_centred=True,
-    first_item=0,
-    actions_count=True,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_ended=missions.ended,
-    mission_action=missions.act,
     parameters=parameters,
-    own_parameters=boot.own_parameters,
     honoured=HONOURED,
 )
