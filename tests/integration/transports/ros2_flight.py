@@ -1,0 +1,25 @@
+"""Flies a vehicle behind MAVROS's names on real ROS 2, in the environment that has rclpy; says as JSON
+how it went.
+"""
+
+import json
+import sys
+
+import volery
+from volery import AboveHome, Position
+
+
+def main(url: str) -> None:
+    with volery.connect(url) as drone:
+        drone.wait_ready()
+        home = drone.home
+        drone.takeoff(4.0)
+        drone.goto(Position(home.latitude + 0.00008, home.longitude, AboveHome(5.0)))
+        went = drone.position.latitude - home.latitude
+        drone.land()
+        found = {"home": home.altitude.metres, "went": went, "armed": drone.armed}
+    sys.stdout.write(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

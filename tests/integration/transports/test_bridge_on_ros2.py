@@ -1,0 +1,66 @@
+"""``volery bridge`` on real ROS 2: plain rclpy hears the vehicle and arms it, and we fly one behind
+MAVROS's names.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from .conftest import HERE
+from .test_dji_on_ros1 import COMMAND
+from .test_ros2 import _DOMAINS, python_of, surroundings
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
+
+Beside = Callable[..., dict[str, Any]]
+
+
+@pytest.fixture
+def beside() -> Iterator[Beside]:
+    """Starts a bridge with these options; runs a script beside it and gives what it printed."""
+    python, around = python_of("jazzy"), surroundings(next(_DOMAINS))
+    started: list[subprocess.Popen[str]] = []
+
+    def run(script: str, argument: str, *options: str) -> dict[str, Any]:
+        bridge = (
+            python,
+            *COMMAND[1:],
+            "bridge",
+            "sim:ardupilot?start=warm",
+            "--graph",
+            "ros2",
+            "--speed",
+            "4",
+        )
+        started.append(subprocess.Popen([*bridge, *options, "--quiet"], env=around))
+        command = [python, str(HERE / script), argument]
+        done = subprocess.run(command, env=around, capture_output=True, text=True, timeout=150, check=False)
+        assert done.returncode == 0, done.stderr[-3000:]
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+    yield run
+    for bridge in started:
+        bridge.send_signal(signal.SIGINT)
+        assert bridge.wait(20) == 0
+
+
+def test_plain_rclpy_hears_a_vehicle_and_arms_it(beside: Beside) -> None:
+    found = beside("rclpy_ground.py", "/craft", "--names", "roscopter", "--namespace", "/craft")
+    assert found["place"] == pytest.approx([46.0825, -103.8995, 900.0], abs=10.0)
+    assert found["place"][0] == pytest.approx(46.0825, abs=0.001)
+    assert found["armed"]
+    assert "roscopter" in found["nodes"]
+
+
+def test_a_vehicle_behind_mavros(beside: Beside) -> None:
+    found = beside("ros2_flight.py", "mavros+ros2:///mavros")
+    assert found["home"] == pytest.approx(900.0, abs=2.0)
+    assert found["went"] == pytest.approx(0.00008, abs=1e-5)
+    assert not found["armed"]
