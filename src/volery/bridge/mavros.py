@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from volery.bridge import inertial, missions, parameters, placing, status, targets
+from volery.base.time import Ns
+from volery.bridge import diagnostics, inertial, missions, parameters, placing, status, targets, transforms
 from volery.bridge.commands import Commands
 from volery.bridge.offering import Names, Offering, Surroundings, together
 from volery.bridge.setpoints import subscriptions
@@ -24,6 +25,8 @@ TOPICS = (
     *targets.TOPICS,
     *missions.TOPICS,
     *parameters.TOPICS,
+    *transforms.TOPICS,
+    *diagnostics.TOPICS,
 )
 
 
@@ -31,13 +34,19 @@ def offer(around: Surroundings) -> Offering:
     """All that is served."""
     said, asked = status.Status(around), Commands(around)
     stored, kept = missions.Missions(around), parameters.Parameters(around)
-    heard = (said, placing.Placing(around), inertial.Inertial(around), targets.Targets(around), stored, kept)
+    placed, health = placing.Placing(around), diagnostics.Diagnostics(around)
+    moving = (inertial.Inertial(around), targets.Targets(around), transforms.Transforms(around))
+
+    def disconnected(stamp: Ns) -> None:
+        said.disconnected(stamp)
+        health.disconnected(stamp)
+
     return Offering(
         topics=TOPICS,
-        translators=together(*(part.translators() for part in heard)),
+        translators=together(*(part.translators() for part in (said, placed, *moving, stored, kept, health))),
         subscriptions=subscriptions(around.geoid),
         services={**asked.services(), **stored.services(), **kept.services()},
-        disconnected=said.disconnected,
+        disconnected=disconnected,
     )
 
 

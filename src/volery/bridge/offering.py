@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import Ns, S
 from volery.bridge.wire import Wire
@@ -64,7 +65,7 @@ class Surroundings:
     """What an offering is made with.
 
     ``wanted(topic)``: it is worth while to publish; ``warn`` records what went wrong; *control*:
-    roscopter may be told to send sticks.
+    roscopter may be told to send sticks; *origin*: what ``map`` is about, where that is agreed.
     """
 
     node: Node
@@ -74,6 +75,7 @@ class Surroundings:
     warn: Callable[[str], None]
     geoid: Geoid = EGM96
     control: bool = False
+    origin: LocalFrame | None = None
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
 from volery.bridge.mavros import MAVROS
@@ -47,7 +48,8 @@ class VehicleNodeOptions:
     ``period`` of its loop, ``None``: as frames arrive; ``streams`` it asks the autopilot for (hertz by
     MAV_DATA_STREAM), those of the names unless given; ``silent`` until the autopilot counts as disconnected;
     ``system`` and ``component`` are its MAVLink ids, ``vehicle`` the autopilot's, 0: whichever is heard
-    first; ``control``: roscopter's ``send_rc`` is taken.
+    first; ``control``: roscopter's ``send_rc`` is taken; ``origin``: what the frame ``map`` is about, the
+    autopilot's own unless given.
     """
 
     names: Names = MAVROS
@@ -59,6 +61,7 @@ class VehicleNodeOptions:
     vehicle: int = 0
     geoid: Geoid = EGM96
     control: bool = False
+    origin: LocalFrame | None = None
 
 
 class VehicleNode:
@@ -104,7 +107,14 @@ class VehicleNode:
         aside = replace(place, deadline=None, on_release=None)
         offering = options.names.offer(
             Surroundings(
-                node, self.wire, self._publish, self._wanted, self._warn, options.geoid, options.control
+                node,
+                self.wire,
+                self._publish,
+                self._wanted,
+                self._warn,
+                options.geoid,
+                options.control,
+                options.origin,
             )
         )
         self.wire.only(offering.translators)

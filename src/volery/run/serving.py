@@ -13,8 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from volery.base.errors import CapabilityError
+from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
-from volery.bridge import serve_pprzros, serve_vehicle
+from volery.bridge import VehicleNodeOptions, serve_pprzros, serve_vehicle
 from volery.graph import RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
@@ -25,10 +26,19 @@ from volery.run.graph_wire import GraphWire, private_graph
 from volery.run.simulated import Simulated, link_to
 from volery.vehicles.driver import Driver, Opener, drivers
 
-Serve = Callable[[RosGraph, Link, str, Place], object]
-"""``serve(graph, link, vehicle, place)``."""
+Serve = Callable[[RosGraph, Link, str, Place, LocalFrame], object]
+"""``serve(graph, link, vehicle, place, origin)``."""
 
-NODES: Mapping[str, Serve] = {"MAVLink": serve_vehicle, "pprzlink": serve_pprzros}
+
+def _mavros(graph: RosGraph, link: Link, vehicle: str, place: Place, origin: LocalFrame) -> object:
+    return serve_vehicle(graph, link, vehicle, place, VehicleNodeOptions(origin=origin))
+
+
+def _pprzros(graph: RosGraph, link: Link, vehicle: str, place: Place, origin: LocalFrame) -> object:
+    return serve_pprzros(graph, link, vehicle, place)
+
+
+NODES: Mapping[str, Serve] = {"MAVLink": _mavros, "pprzlink": _pprzros}
 """By the codec's name."""
 
 
@@ -60,7 +70,7 @@ def serve(graph: RosGraph, airfield: Airfield, vehicle: str, how: Serving, place
     if codec is None:
         airfield.autopilots[vehicle].join(graph, how.namespace, place)
         return
-    NODES[codec.name](graph, airfield.link(vehicle), vehicle, place)
+    NODES[codec.name](graph, airfield.link(vehicle), vehicle, place, airfield.frame)
 
 
 class PrivateGraph:
