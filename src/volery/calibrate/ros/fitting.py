@@ -19,8 +19,8 @@ TYPICAL_X = {"publish": 4.0, "publish_next": 2.0, "sleep": 50_000.0, "wait": 1_0
 """Where a law is judged: four subscribers (two), 50 ms, a second."""
 
 DRAWS = 200
-NEGLIGIBLE_NS = 2_000.0
-"""An interval narrower than this is tight whatever the figure."""
+NEGLIGIBLE_NS = 5_000.0
+"""An interval of less to each side is tight whatever the figure: a twentieth of what a cycle takes."""
 
 LOW, HIGH = 0.025, 0.975
 

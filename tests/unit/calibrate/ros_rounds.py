@@ -1,0 +1,61 @@
+"""Rounds of a probe whose calls cost exactly what a law says, but for noise."""
+
+from __future__ import annotations
+
+from volery.base.seeds import stream
+from volery.calibrate.ros.samples import Round, Sample
+
+OWN, IDLE = 40_000.0, 0.001
+"""ns that the probe's own looking takes; ns of the library's threads for each ns on the wall."""
+
+ONCE = {
+    "init": 200_000.0,
+    "node_handle": 1_500_000.0,
+    "advertise": 190_000.0,
+    "subscribe": 250_000.0,
+    "connect": 250_000.0 + 800_000.0,
+    "service_client": 7_000.0,
+    "advertise_service": 38_000.0,
+}
+PUBLISH, PER_SUBSCRIBER, AGAIN = 75_000.0, 18_000.0, 40_000.0
+SLEEP, PER_US = 14_000.0, 1.05
+ACCEPT, SPIN, RECEIVE = 480_000.0, 5_000.0, 90_000.0
+PERIOD_US = 50_000.0
+
+
+class Probe:
+    """``noise`` is relative, on every sample of its own."""
+
+    def __init__(self, seed: int = 1, noise: float = 0.0, spins: bool = True) -> None:
+        self._random = stream(seed, "probe")
+        self._noise, self._spins = noise, spins
+
+    def _sample(self, what: str, x: float, cycles: int, each: float, waited: float = 1e8) -> Sample:
+        process = each * cycles * (1.0 + self._random.gauss(0.0, self._noise))
+        return Sample(what, x, cycles, round(waited), round(process), round(process / 2))
+
+    def _once(self, what: str, cost: float, x: float = 0.0) -> Sample:
+        return self._sample(what, x, 1, OWN + cost + IDLE * 1e8)
+
+    def round(self, counts: tuple[int, ...] = (1, 2, 4, 8)) -> Round:
+        idle = SLEEP + PER_US * PERIOD_US
+        samples = [self._sample("nothing", 0, 1, OWN)]
+        samples += [self._once(what, cost) for what, cost in ONCE.items()]
+        samples += [self._once("settle", 0.0), self._once("settle", 0.0)]
+        for ms in (10, 20, 50, 100):
+            samples.append(self._sample("sleep", ms * 1000, 12, SLEEP + PER_US * ms * 1000))
+        for count in counts:
+            cost = PUBLISH + PER_SUBSCRIBER * count
+            samples.append(self._once("accept", ONCE["advertise"] + ACCEPT * count, count))
+            samples.append(self._sample("idle", 0, 12, idle))
+            samples.append(self._sample("publish", count, 12, idle + cost))
+        alone = idle + PUBLISH + PER_SUBSCRIBER
+        both = alone + AGAIN + 2 * PER_SUBSCRIBER
+        samples.append(self._sample("publish_alone", 0, 12, alone))
+        samples.append(self._sample("publish_both", 2, 12, both))
+        if self._spins:
+            samples.append(self._sample("spin_once_first", 0, 1, 20_000.0))
+            samples.append(self._sample("spin_once", 0, 12, both + SPIN))
+        samples.append(self._sample("wait", 0, 1, 2e6, 1e9))
+        samples.append(self._sample("receive", 0, 20, 1e5 + RECEIVE, 1e9))
+        return tuple(samples)

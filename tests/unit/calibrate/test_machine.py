@@ -1,0 +1,53 @@
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.calibrate.machine import Machine, at_frequency, this_machine
+
+INTEL = "model name\t: Intel(R) Core(TM) i5-3470 CPU @ 3.20GHz\ncpu MHz\t\t: 1599.998\n" * 2
+
+
+def cpuinfo(folder: Path, text: str = INTEL) -> Path:
+    file = folder / "cpuinfo"
+    file.write_text(text)
+    return file
+
+
+def test_a_machine_is_named_after_its_processor(tmp_path: Path) -> None:
+    machine = this_machine(cpuinfo=cpuinfo(tmp_path))
+    assert (machine.name, machine.frequency_mhz) == ("intel-core-i5-3470", 1600.0)
+    assert machine.description == "Intel(R) Core(TM) i5-3470 CPU @ 3.20GHz"
+    assert this_machine("desk", cpuinfo(tmp_path)).name == "desk"
+
+
+def test_no_linux_is_said(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="calibrating needs Linux"):
+        this_machine(cpuinfo=tmp_path / "nowhere")
+
+
+MACHINE = Machine("m", "a machine", 2, 2600.0)
+
+
+def test_where_the_frequency_cannot_be_set_it_is_as_it_is(tmp_path: Path) -> None:
+    with at_frequency(MACHINE, None, tmp_path) as mhz:
+        assert mhz == 2600.0
+    with at_frequency(MACHINE, 2601.0, tmp_path) as mhz:
+        assert mhz == 2601.0
+    refused = pytest.raises(UsageError, match="runs at 2600 MHz, and its frequency cannot be set here")
+    with refused, at_frequency(MACHINE, 1300.0, tmp_path):
+        pass
+
+
+def test_it_is_set_on_all_cores_and_set_back(tmp_path: Path) -> None:
+    limits = {}
+    for number in range(2):
+        folder = tmp_path / f"cpu{number}" / "cpufreq"
+        folder.mkdir(parents=True)
+        for name, khz in (("scaling_min_freq", "800000"), ("scaling_max_freq", "2600000")):
+            limits[folder / name] = khz
+            (folder / name).write_text(khz)
+    with at_frequency(MACHINE, 1300.0, tmp_path) as mhz:
+        assert mhz == 1300.0
+        assert {file.read_text() for file in limits} == {"1300000"}
+    assert {file: file.read_text() for file in limits} == limits

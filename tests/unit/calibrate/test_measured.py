@@ -1,0 +1,94 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import ModelError, UsageError
+from volery.base.time import S
+from volery.calibrate.measured.campaign import compare
+from volery.calibrate.measured.comparison import Compared, Estimate, compared
+from volery.calibrate.measured.programs import programs
+from volery.model.reader import load
+from volery.run.vocabulary import vocabulary
+
+MODEL = """
+volery: 1
+name: nodes
+components:
+  Node: {language: rospy, path: node.py, active: true}
+  Other: {language: LANGUAGE, path: other.py, active: true}
+application:
+  node: {is: Node, namespace: /drone, remap: {a: /b}, parameters: {rate: 10.0, name: x}}
+environment:
+  components:
+    other: {is: Other}
+platform:
+  processors: {host: {is: intel-i5-3470, frequency: 3000 MHz}}
+allocations:
+  only: {node: host}
+"""
+
+
+def nodes(folder: Path, other: str = "print()\n", language: str = "rospy") -> Path:
+    (folder / "node.py").write_text("import rospy\nrospy.init_node('n')\n")
+    (folder / "other.py").write_text(other)
+    (folder / "model.yaml").write_text(MODEL.replace("LANGUAGE", language))
+    return folder
+
+
+def test_a_script_is_started_as_roslaunch_would(tmp_path: Path) -> None:
+    other, node = programs(load(nodes(tmp_path), vocabulary()))
+    assert (other.instance, other.measured, node.measured) == ("other", False, True)
+    assert node.node == "/drone/node"
+    assert node.command[2:] == (
+        str(tmp_path / "node.py"),
+        "__name:=node",
+        "__ns:=/drone",
+        "a:=/b",
+        "_rate:=10.0",
+        '_name:="x"',
+    )
+
+
+def test_what_is_no_node_cannot_be_measured(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"model\.yaml:6.*other is python.*rospy and roscpp"):
+        programs(load(nodes(tmp_path, language="python"), vocabulary()))
+    with pytest.raises(ModelError, match="other is a class"):
+        programs(load(nodes(tmp_path, "class Other:\n    def run(self): ...\n"), vocabulary()))
+
+
+ESTIMATE = Estimate(ros_s=0.110, code_s=0.010, calls={"publish": 100})
+NODE = Compared("n", "rospy", ESTIMATE, (0.100, 0.102, 0.098, 0.100))
+
+
+def test_a_node_in_the_tables() -> None:
+    assert NODE.measured_s == pytest.approx(0.1)
+    assert NODE.difference == pytest.approx(0.2)
+    assert NODE.spread_s == pytest.approx(0.001)
+    assert (NODE.allowed, NODE.holds) == (0.15, False)
+    assert NODE.measured_ros_s == pytest.approx(0.09)
+    assert NODE.ros_share == pytest.approx(0.9)
+    assert NODE.ros_error == pytest.approx(0.02 / 0.09)
+    assert NODE.impact == pytest.approx(0.9 * 0.02 / 0.09)
+
+
+def test_runs_that_differ_allow_more() -> None:
+    wide = replace(NODE, runs_s=(0.05, 0.08, 0.1, 0.13, 0.15))
+    assert wide.spread_s == pytest.approx(0.05)
+    assert wide.allowed == pytest.approx(0.25)
+    assert wide.holds
+
+
+def test_one_run_has_no_spread() -> None:
+    assert replace(NODE, runs_s=(0.1,)).spread_s == 0.0
+
+
+def test_runs_are_put_beside_estimates() -> None:
+    [one] = compared({"n": "rospy"}, {"n": ESTIMATE}, [{"n": S // 10}, {"n": S // 5}])
+    assert one.runs_s == (0.1, 0.2)
+    assert one.as_data()["measured_s"] == pytest.approx(0.15)
+
+
+def test_without_a_run_there_is_nothing_to_compare(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no run was measured"):
+        compare(load(nodes(tmp_path), vocabulary()), {}, [])

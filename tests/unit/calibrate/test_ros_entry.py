@@ -1,0 +1,102 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import EstimateError, ModelError
+from volery.calibrate.machine import Machine
+from volery.calibrate.ros.campaign import Circumstances
+from volery.calibrate.ros.entry import described, law_of, write_entry
+from volery.calibrate.ros.fitting import costs
+from volery.calibrate.ros.plot import picture
+from volery.cost import RosLaw, catalogue
+
+from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe
+
+MACHINE = Machine("my-computer", "A Processor of Mine", 2, 2600.0)
+
+
+def law(client: str = "roscpp", mhz: float = 2600.0, spins: bool = True) -> RosLaw:
+    rounds = [Probe(spins=spins).round() for _ in range(3)]
+    return law_of(costs(rounds), Circumstances(client, MACHINE.description, mhz))
+
+
+def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
+    file = tmp_path / "deeper" / "catalogue.yaml"
+    write_entry(file, MACHINE, law())
+    entry = catalogue(file).processor("my-computer")
+    assert (entry.cores, entry.least_mhz, entry.greatest_mhz) == (2, 2600, 2600)
+    prices = entry.ros_law("roscpp").at(2600)
+    publish = prices("publish", 3)
+    assert publish.caller + publish.background == pytest.approx(PUBLISH + 3 * PER_SUBSCRIBER, rel=1e-3)
+    assert publish.caller == pytest.approx((PUBLISH + 3 * PER_SUBSCRIBER) / 2, rel=1e-3)
+    again = prices("publish_next", 3)
+    assert again.caller + again.background == pytest.approx(AGAIN + 3 * PER_SUBSCRIBER, rel=1e-3)
+    sleep = prices("sleep", 100_000)
+    assert (sleep.caller, sleep.background) == (0, pytest.approx(SLEEP + PER_US * 100_000, rel=1e-3))
+    assert prices("receive").background == pytest.approx(RECEIVE, rel=1e-3)
+    assert publish.flags == ()
+
+
+def test_it_holds_at_its_frequency_only(tmp_path: Path) -> None:
+    write_entry(tmp_path / "one.yaml", MACHINE, law())
+    entry = catalogue(tmp_path / "one.yaml").processor("my-computer")
+    with pytest.raises(EstimateError, match="1300 MHz is outside"):
+        entry.check_frequency(1300)
+
+
+def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
+    file = tmp_path / "two.yaml"
+    write_entry(file, MACHINE, law())
+    slower = law(mhz=1300.0)
+    doubled = {
+        call: one.model_copy(update={"constant": one.constant.model_copy(update={"offset": 2e5})})
+        for call, one in slower.calls.items()
+        if one.constant is not None
+    }
+    made = write_entry(
+        file, replace(MACHINE, frequency_mhz=1300.0), slower.model_copy(update={"calls": doubled})
+    )
+    assert (made.least_mhz, made.greatest_mhz) == (1300, 2600)
+    entry = catalogue(file).processor("my-computer")
+    assert (entry.least_mhz, entry.greatest_mhz) == (1300, 2600)
+    halfway = entry.ros_law("roscpp").price("receive", 0, 1950)
+    assert halfway.background == pytest.approx((2e5 + RECEIVE) / 2, rel=1e-3)
+    assert "1300 to 2600 MHz" in entry.ros["roscpp"].validity
+
+
+def test_rospys_callbacks_pay_for_their_messages(tmp_path: Path) -> None:
+    write_entry(tmp_path / "all.yaml", MACHINE, law("rospy", spins=False))
+    prices = catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
+    callback = prices("spin_once", 0)
+    assert callback.caller + callback.background == pytest.approx(RECEIVE, rel=1e-3)
+    assert prices("receive") == (0, 0, ())
+
+
+def test_what_else_the_file_says_stays(tmp_path: Path) -> None:
+    file = tmp_path / "all.yaml"
+    write_entry(file, MACHINE, law("roscpp"))
+    file.write_text("# mine\n" + file.read_text())
+    write_entry(file, MACHINE, law("rospy", spins=False))
+    assert file.read_text().startswith("# mine\n")
+    assert sorted(catalogue(file).processor("my-computer").ros) == ["roscpp", "rospy"]
+
+
+def test_a_file_that_is_no_catalogue_is_not_touched(tmp_path: Path) -> None:
+    file = tmp_path / "letter.yaml"
+    file.write_text("dear: reader\n")
+    with pytest.raises(ModelError, match=r"letter\.yaml"):
+        write_entry(file, MACHINE, law())
+    assert file.read_text() == "dear: reader\n"
+
+
+def test_in_words_and_as_a_picture() -> None:
+    found = costs([Probe().round() for _ in range(3)])
+    assert described(found["publish"].whole, "publish") == "75.0 µs + 18.0 µs per subscriber"
+    assert described(found["sleep"].whole, "sleep") == "14.0 µs + 1.050 ns per microsecond slept"
+    drawn = picture(found, "roscpp <here>")
+    assert drawn.startswith("<svg")
+    assert "roscpp &lt;here&gt;" in drawn
+    assert drawn.count('class="point"') == sum(
+        len(values) for call in ("publish", "sleep") for values in found[call].points.values()
+    )

@@ -1,0 +1,87 @@
+import json
+from math import isclose
+
+import pytest
+
+from volery.base.errors import LinkError
+from volery.calibrate.ros.fitting import costs, fit
+from volery.calibrate.ros.samples import points_of, read_round
+
+from .ros_rounds import ACCEPT, AGAIN, ONCE, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, SPIN, Probe
+
+
+def test_an_exact_probe_gives_back_its_law() -> None:
+    found = costs([Probe().round() for _ in range(3)])
+    assert isclose(found["publish"].whole.constant, PUBLISH, rel_tol=1e-3)
+    assert isclose(found["publish"].whole.per_x, PER_SUBSCRIBER, rel_tol=1e-3)
+    assert isclose(found["sleep"].whole.constant, SLEEP, rel_tol=1e-3)
+    assert isclose(found["sleep"].whole.per_x, PER_US, rel_tol=1e-3)
+    once = {**ONCE, "connect": 800_000.0, "accept": ACCEPT, "spin_once_next": SPIN, "receive": RECEIVE}
+    for call, cost in once.items():
+        assert found[call].typical == pytest.approx(cost, rel=1e-3), call
+    assert found["publish_next"].typical == pytest.approx(AGAIN + 2 * PER_SUBSCRIBER, rel=1e-3)
+    assert found["wait"].typical == pytest.approx(2e6, rel=1e-3)
+
+
+def test_exact_points_leave_no_residual_and_are_tight() -> None:
+    for cost in costs([Probe().round() for _ in range(3)]).values():
+        assert cost.residual < 1e-3
+        assert cost.spread < 1e-3
+        assert cost.is_tight(0.01)
+
+
+def test_noise_widens_the_interval_and_more_rounds_narrow_it() -> None:
+    def publish(rounds: int) -> float:
+        return costs([Probe(seed, noise=0.1).round() for seed in range(rounds)])["publish"].half_width
+
+    assert publish(4) > publish(40) > 0.0
+    found = costs([Probe(seed, noise=0.1).round() for seed in range(40)])["publish"]
+    assert found.low < PUBLISH + 4 * PER_SUBSCRIBER < found.high
+    assert not costs([Probe(seed, noise=0.3).round() for seed in range(4)])["publish"].is_tight(0.02)
+
+
+def test_the_same_rounds_give_the_same_figures() -> None:
+    rounds = [Probe(seed, noise=0.2).round() for seed in range(5)]
+    assert costs(rounds) == costs(rounds)
+
+
+def test_one_wild_round_does_not_move_a_median() -> None:
+    rounds = [Probe().round() for _ in range(4)]
+    wild = tuple(one._replace(process_ns=one.process_ns * 7) for one in Probe().round())
+    assert costs([*rounds, wild])["publish"].whole.constant == pytest.approx(PUBLISH, rel=1e-3)
+
+
+def test_the_callers_part_goes_by_its_own_clock() -> None:
+    points = points_of(Probe().round(), "caller_ns")
+    assert points["publish"][8.0] == [pytest.approx((PUBLISH + 8 * PER_SUBSCRIBER) / 2, rel=1e-3)]
+
+
+def test_rospy_has_no_spin_once() -> None:
+    found = costs([Probe(spins=False).round() for _ in range(3)])
+    assert not {"spin_once_first", "spin_once_next"} & set(found)
+    assert found["receive"].typical == pytest.approx(RECEIVE, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("points", "line"),
+    [
+        ({0.0: [3.0, 1.0, 2.0]}, (2.0, 0.0)),
+        ({4.0: [8.0]}, (0.0, 2.0)),
+        ({1.0: [3.0], 2.0: [5.0]}, (1.0, 2.0)),
+        ({1.0: [5.0], 2.0: [3.0]}, (4.0, 0.0)),  # a cost does not fall
+        ({10.0: [1.0], 20.0: [4.0]}, (0.0, 0.15)),  # nor is any below zero
+        ({0.0: [-1.0]}, (0.0, 0.0)),
+    ],
+)
+def test_lines(points: dict[float, list[float]], line: tuple[float, float]) -> None:
+    assert fit(points) == pytest.approx(line)
+
+
+def test_what_a_probe_prints_is_read() -> None:
+    sample = Probe().round()[0]
+    lines = ["[INFO] something of ROS", json.dumps(sample._asdict())]
+    assert read_round(lines) == (sample,)
+    with pytest.raises(LinkError, match="no measurement"):
+        read_round(['{"what": "idle"}'])
+    with pytest.raises(LinkError, match="no measurement"):
+        read_round(["{half"])
