@@ -11,7 +11,7 @@ from volery.components.cpp.interfaces import DRONE, Required, operations
 from volery.components.cpp.meter import Meter
 from volery.components.cpp.program import CppProgram
 from volery.components.cpp.sources import find_sources
-from volery.components.cpp.toolchain import Tell
+from volery.components.cpp.toolchain import GET_ONE, Tell, has_compiler
 from volery.cost.core import CoreLaw
 from volery.faces import roscpp
 from volery.faces.launch import Launch
@@ -48,8 +48,10 @@ def compile_all(
     """What the C++ components among *instances* are to run, by their names, compiled if it is not yet.
 
     ``ModelError`` with the compiler's words for one that does not compile; ``UsageError`` if there is no
-    compiler.
+    compiler, but nothing at fidelity ``times``, where components without code take their stated times.
     """
+    if fidelity == "times" and not has_compiler():
+        return {}
     return {
         one.name: _ready(system, one.component, core_of(system, fidelity, one), tell)
         for one in instances
@@ -120,10 +122,17 @@ class CppPrograms:
         self._nodes = nodes
         self.meters = {name: Meter() for name, one in ready.items() if one.counting is not None}
 
-    def warnings(self) -> list[str]:
-        """What is doubtful about what they count."""
-        said = (one.counting.estimated for one in self._ready.values() if one.counting is not None)
-        return [warning for warning in dict.fromkeys(said) if warning]
+    def warnings(self, instances: Iterable[InstanceModel]) -> list[str]:
+        """What is doubtful about what they count, and who of *instances* could not be compiled."""
+        said = {one.counting.estimated: None for one in self._ready.values() if one.counting is not None}
+        missing = [one.name for one in instances if is_cpp(one.component) and one.name not in self]
+        if missing:
+            said[f"{', '.join(missing)}: stated times alone, for there is no C++ compiler: {GET_ONE}"] = None
+        return [warning for warning in said if warning]
+
+    def __contains__(self, name: str) -> bool:
+        """Whether the instance called *name* has a program here."""
+        return name in self._ready
 
     def program(self, model: InstanceModel) -> CppProgram:
         """What the instance is to run."""

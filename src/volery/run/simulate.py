@@ -105,6 +105,8 @@ def _simulated(system: System, options: Options) -> Run:
 def _supervised(system: System, options: Options) -> Run:
     """In a process of its own: C++ components may end it."""
     ready = compile_all(system, system.instances, options.fidelity, options.tell)
+    if not ready:
+        return _simulated(system, options)
     libraries = {name: one.compiled.library for name, one in ready.items()}
     supervision = Supervision(build_house(), libraries, PATIENCE_S)
     return supervised(

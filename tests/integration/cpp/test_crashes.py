@@ -96,6 +96,9 @@ def test_no_compiler(run_model, monkeypatch):
     monkeypatch.setenv("PATH", os.devnull)
     try:
         with pytest.raises(UsageError, match=r"need a compiler.*apt install g\+\+"):
-            run_model(MODEL.format(how="not"), "crash.cpp", other=OTHER)
+            run_model(MODEL.format(how="not"), "crash.cpp", fidelity="code", other=OTHER)
+        outcome = run_model(MODEL.format(how="not"), "crash.cpp", other=OTHER)
+        assert outcome.run.ok
+        assert any("no C++ compiler" in one.text for one in outcome.of(Text) if one.source == "volery")
     finally:
         toolchain.compiler.cache_clear()

@@ -22,12 +22,14 @@ components:
   Keeper:
     language: roscpp
     path: pose_keeper.cpp
+    build: {flags: -O0}
     active: true
     at: {processor: intel-i5-3470, frequency: 3000 MHz}
     activation: {time: 10 us}
   Plant:
     language: roscpp
     path: plant.cpp
+    build: {flags: -O0}
     active: true
     at: {processor: intel-i5-3470, frequency: 3000 MHz}
     activation: {time: 10 us}

@@ -39,6 +39,15 @@ class Compiler:
     version: str
 
 
+def has_compiler() -> bool:
+    """Whether there is one."""
+    try:
+        compiler()
+    except UsageError:
+        return False
+    return True
+
+
 @cache
 def compiler() -> Compiler:
     """The first of ``$CXX``, g++, clang++ and c++ that is there; ``UsageError`` names what to install."""
@@ -51,7 +60,7 @@ def compiler() -> Compiler:
     missing = f"$CXX is {asked!r}, which is not there" if asked else f"there is no {', '.join(COMPILERS)}"
     raise UsageError(
         f"components in C++ need a compiler, but {missing}: {GET_ONE}; "
-        "without one, leave out their `path` and run with fidelity 'times'"
+        "without one they take their stated times at fidelity 'times' and do nothing else"
     )
 
 
