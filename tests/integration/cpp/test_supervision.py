@@ -1,0 +1,76 @@
+"""The process that a run with C++ components lives in: what it raises, how it dies, what it shows."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import Any
+
+import pytest
+
+from volery.base.errors import LinkSilent, UsageError, VoleryError
+from volery.components.cpp.build import build_house
+from volery.run.supervised import Supervision, supervised
+
+pytestmark = pytest.mark.integration
+
+
+def _supervised(work: Any, show: Any = None) -> tuple[Any, list[tuple[str, str]]]:
+    mourned: list[tuple[str, str]] = []
+
+    def salvage(error: VoleryError, blamed: str) -> Any:
+        mourned.append((blamed, str(error)))
+
+    return supervised(work, show, Supervision(build_house(), {}, 5.0), salvage), mourned
+
+
+def test_what_the_run_comes_to_arrives():
+    shown: list[Any] = []
+
+    def work(show: Any) -> Any:
+        show("half of it")
+        return {"pid": os.getpid()}
+
+    result, mourned = _supervised(work, shown.append)
+    assert result["pid"] != os.getpid()
+    assert shown == ["half of it"]
+    assert not mourned
+
+
+@pytest.mark.parametrize("error", [UsageError("no such thing"), LinkSilent("nobody there")])
+def test_what_it_raises_is_raised(error):
+    def work(show: Any) -> Any:
+        raise error
+
+    with pytest.raises(type(error), match=str(error)):
+        _supervised(work)
+
+
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        (lambda: os._exit(9), "exit status 9"),
+        (lambda: os.kill(os.getpid(), signal.SIGKILL), "SIGKILL"),
+        (lambda: os.kill(os.getpid(), signal.SIGSEGV), "SIGSEGV"),  # not a component's doing
+    ],
+)
+def test_a_process_that_dies_is_mourned(end, said):
+    _, mourned = _supervised(lambda show: end())
+    [(blamed, error)] = mourned
+    assert blamed == "run"
+    assert said in error
+
+
+def test_ctrl_c_is_passed_on():
+    parent = os.getpid()
+
+    def work(show: Any) -> Any:
+        try:
+            os.kill(parent, signal.SIGINT)
+            signal.pause()
+        except KeyboardInterrupt:
+            return "interrupted"
+        return "not interrupted"
+
+    result, _ = _supervised(work)
+    assert result == "interrupted"
