@@ -21,7 +21,6 @@ from typing import Any
 import pytest
 
 import volery
-from volery import AboveHome, Position
 from volery.links.link import Frame
 from volery.links.mavlink import encode
 from volery.links.parser import MAVLINK
@@ -109,15 +108,6 @@ def test_the_session_of_a_thesis(debian: Run, start: Start, types: str) -> None:
     assert "/gps" not in debian("rostopic", "list")
 
 
-def test_without_leave_it_takes_no_sticks(debian: Run, start: Start) -> None:
-    bridged(start, "sim:ardupilot?start=warm", "--names", "roscopter", "--namespace", "/left_alone")
-    listed = debian("rostopic", "list").split()
-    assert "/left_alone/vfr_hud" in listed
-    assert "/left_alone/send_rc" not in listed
-    kind = debian("rostopic", "type", "/left_alone/raw_imu").strip()
-    assert kind == "roscopter/Mavlink_RAW_IMU"
-
-
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_a_vehicle_behind_mavros(
     roscore: Roscore, start: Start, monkeypatch: pytest.MonkeyPatch, autopilot: str
@@ -129,10 +119,8 @@ def test_a_vehicle_behind_mavros(
         drone.wait_ready()
         home = drone.home
         assert home.altitude.metres == pytest.approx(900.0, abs=2.0)  # there and back through the geoid
-        drone.takeoff(4.0)
-        goal = Position(home.latitude + 0.00008, home.longitude, AboveHome(5.0))
-        drone.goto(goal)
-        assert drone.position.latitude == pytest.approx(goal.latitude, abs=1e-5)
+        drone.takeoff(3.0)
+        assert drone.altitude.metres == pytest.approx(3.0, abs=0.5)
         drone.land()
         assert not drone.armed
 
@@ -163,7 +151,7 @@ def asks_for_streams(heard: Callable[[], bytes]) -> None:
                 return
 
 
-def test_over_a_serial_line_it_asks_as_it_is_told(roscore: Roscore, start: Start) -> None:
+def test_over_a_serial_line_it_asks_as_it_is_told(ros: Run, start: Start) -> None:
     autopilot, line = os.openpty()
     tty.setraw(line)
     address = f"ardupilot+serial://{os.ttyname(line)}?baud=57600"
@@ -172,6 +160,9 @@ def test_over_a_serial_line_it_asks_as_it_is_told(roscore: Roscore, start: Start
     assert "bridging" in bridge.stdout.readline()
     os.write(autopilot, BEAT)
     asks_for_streams(lambda: os.read(autopilot, 4096))
+    listed = ros("rostopic", "list").split()
+    assert "/serial/vfr_hud" in listed
+    assert "/serial/send_rc" not in listed  # nobody has allowed it
     bridge.send_signal(signal.SIGTERM)  # as a service is ended
     assert bridge.wait(10) == 0
     os.close(autopilot)
