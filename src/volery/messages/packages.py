@@ -39,7 +39,7 @@ class _Definitions(ModuleType):
         return made
 
 
-def _service_class(full: str) -> type:
+def service_class(full: str) -> type:
     """What ``from package.srv import Name`` gives: a class that carries ``Request`` and ``Response``."""
     pair = service(full)
     members = {
@@ -58,8 +58,8 @@ def _action_class(full: str) -> type:
     members = {
         "_type": full,
         **{part: message_class(f"{inner}_{part}") for part in ("Goal", "Result", "Feedback")},
-        "SendGoal": _service_class(f"{full}_SendGoal"),
-        "GetResult": _service_class(f"{full}_GetResult"),
+        "SendGoal": service_class(f"{full}_SendGoal"),
+        "GetResult": service_class(f"{full}_GetResult"),
         "FeedbackMessage": message_class(f"{full}_FeedbackMessage"),
     }
     return type(full.rpartition("/")[2], (), members)
@@ -67,7 +67,7 @@ def _action_class(full: str) -> type:
 
 _MAKERS: dict[str, Callable[[str], type]] = {
     "msg": message_class,
-    "srv": _service_class,
+    "srv": service_class,
     "action": _action_class,
 }
 

@@ -24,6 +24,7 @@ CASES = {
     ),
     "services": Case({"switch": {}, "asker": {"listeners": 0}}, {"/told": (STRING, 11)}),
     "parameters": Case({"parameters": {"my_parameter": "earth", "listeners": 0}}, {"/told": (STRING, 10)}),
+    "lifecycle": Case({"managed": {}, "station": {"listeners": 0}}, {"/told": (STRING, 20)}),
     "controller": Case(
         {"controller": {**GAINS, "listeners": 0}, "plant": {"steps": 250, "listeners": 1}},
         {

@@ -374,7 +374,7 @@ def test_what_is_not_there_says_so(stage: Stage) -> None:
         "user",
         """
         import rclpy
-        for name in ("lifecycle", "logging"):
+        for name in ("components", "logging"):
             try:
                 out(getattr(rclpy, name).__name__)
             except AttributeError as error:
@@ -391,7 +391,7 @@ def test_what_is_not_there_says_so(stage: Stage) -> None:
         """,
     )
     assert stage.run(S) == [
-        "rclpy.lifecycle is not there on the embedded graph",
+        "rclpy.components is not there on the embedded graph",
         "rclpy.logging",
         "NotInitializedException",
         "NameValidationException",
@@ -433,33 +433,3 @@ def test_a_quality_of_service_that_is_none(stage: Stage, given: str) -> None:
         """,
     )
     assert stage.run(S) == ["ValueError" if given == "-1" else "TypeError"]
-
-
-def test_the_log_is_a_topic_for_who_listens(stage: Any) -> None:
-    stage.script(
-        "station",
-        """
-        import rclpy
-        from rcl_interfaces.msg import Log
-        rclpy.init()
-        node = rclpy.create_node("station", enable_rosout=False)
-        node.create_subscription(Log, "/rosout", lambda m: out((m.level, m.name, m.msg, m.line)), 9)
-        node.get_logger().info("not told")
-        rclpy.spin(node)
-        """,
-    )
-    stage.script(
-        "robot",
-        """
-        import rclpy
-        from rclpy.logging import get_logger
-        rclpy.init()
-        node = rclpy.create_node("robot")
-        rclpy.spin_once(node, timeout_sec=0.5)
-        node.get_logger().warning("hot")
-        node.get_logger().get_child("motor").log("hotter", 40)
-        node.get_logger().debug("not told")
-        get_logger("apart").info("of no node")
-        """,
-    )
-    assert stage.run(2 * S) == [(30, "robot", "hot", 7), (40, "robot.motor", "hotter", 8)]

@@ -146,6 +146,7 @@ class Contexts:
         self.kernel = graph.kernel
         self._launched = {} if launched is None else launched
         self._nodes = {} if nodes is None else nodes
+        self.levels: dict[str, int] = {}  # of loggers, by name
         self._at_end = at_end
         self._contexts: dict[str, Context] = {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from functools import partial
 from typing import Any, ClassVar
@@ -39,7 +40,6 @@ class Logger:
     def __init__(self, name: str, rosout: Rosout | None = None) -> None:
         self.name = name
         self._rosout = rosout
-        self._level = LoggingSeverity.INFO
         self._last: dict[str, Ns] = {}
         self._seen: set[str] = set()
 
@@ -48,16 +48,19 @@ class Logger:
         return type(self)(f"{self.name}.{name}", self._rosout)
 
     def set_level(self, level: int) -> None:
-        """Log nothing that is less severe."""
-        self._level = LoggingSeverity(level)
+        """Log nothing that is less severe; for the loggers below this one, too."""
+        self.contexts.levels[self.name] = int(level)
 
     def get_effective_level(self) -> LoggingSeverity:
-        """What is logged at least."""
-        return self._level
+        """What is logged at least: its own level, or that of the nearest logger above it."""
+        name = self.name
+        while name and name not in self.contexts.levels:
+            name = name.rpartition(".")[0]
+        return LoggingSeverity(self.contexts.levels.get(name, LoggingSeverity.INFO))
 
     def is_enabled_for(self, severity: int) -> bool:
         """Whether a line of that severity would be logged."""
-        return severity >= self._level
+        return severity >= self.get_effective_level()
 
     def log(self, message: Any, severity: int, **options: Any) -> bool:
         """Log a line; False if it was left out."""
@@ -65,7 +68,7 @@ class Logger:
 
     def _log(self, message: Any, level: LoggingSeverity, where: Caller, options: dict[str, Any]) -> bool:
         text = str(message)
-        if level < self._level or self._left_out(text, options):
+        if level < self.get_effective_level() or self._left_out(text, options):
             return False
         self.contexts.here().say(_SYSLOG[level], text)
         if self._rosout is not None:
@@ -115,3 +118,27 @@ class Logger:
     def fatal(self, message: Any, **options: Any) -> bool:
         """It cannot go on."""
         return self._log(message, LoggingSeverity.FATAL, caller(1), options)
+
+
+def functions(loggers: type[Logger]) -> dict[str, Callable[..., Any]]:
+    """The functions of ``rclpy.logging``."""
+
+    def set_logger_level(name: str, level: int, detailed_error: bool = False) -> None:
+        loggers(name).set_level(level)
+
+    def get_logger_effective_level(name: str) -> LoggingSeverity:
+        return loggers(name).get_effective_level()
+
+    def get_logger_level(name: str) -> LoggingSeverity:
+        return LoggingSeverity(loggers.contexts.levels.get(name, LoggingSeverity.UNSET))
+
+    def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
+        return LoggingSeverity[log_severity.upper()]
+
+    found: tuple[Any, ...] = (
+        set_logger_level,
+        get_logger_effective_level,
+        get_logger_level,
+        get_logging_severity_from_string,
+    )
+    return {"get_logger": loggers, **{one.__name__: one for one in found}}

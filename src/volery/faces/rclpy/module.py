@@ -10,7 +10,17 @@ from typing import Any
 from volery import messages
 from volery.faces.launch import AtEnd, Launch, never
 from volery.faces.module import face_module
-from volery.faces.rclpy import action, callback_groups, entities, errors, executors, logging, parameters, qos
+from volery.faces.rclpy import (
+    action,
+    callback_groups,
+    entities,
+    errors,
+    executors,
+    lifecycle,
+    logging,
+    parameters,
+    qos,
+)
 from volery.faces.rclpy import task as tasks
 from volery.faces.rclpy import time as times
 from volery.faces.rclpy.context import Context, Contexts
@@ -53,7 +63,11 @@ def _bound(contexts: Contexts) -> dict[str, Any]:
         kind.__name__: type(kind.__name__, (kind,), {"contexts": contexts}) for kind in kinds
     }
     members = {"contexts": contexts, "loggers": bound["Logger"], "clocks": bound["Clock"]}
-    return {**bound, "Node": type("Node", (Node,), members)}
+    nodes = {
+        "Node": type("Node", (Node,), members),
+        "LifecycleNode": type("LifecycleNode", (lifecycle.LifecycleNode,), members),
+    }
+    return {**bound, **nodes}
 
 
 def _parts(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -82,7 +96,12 @@ def _parts(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             "SingleThreadedExecutor": bound["SingleThreadedExecutor"],
             "TimeoutException": errors.TimeoutException,
         },
-        "logging": {"LoggingSeverity": logging.LoggingSeverity, "get_logger": bound["Logger"]},
+        "lifecycle": {
+            **lifecycle.LIFECYCLE,
+            "LifecycleNode": bound["LifecycleNode"],
+            "Node": bound["LifecycleNode"],
+        },
+        "logging": {"LoggingSeverity": logging.LoggingSeverity, **logging.functions(bound["Logger"])},
         "node": {"Node": bound["Node"]},
         "parameter": {"Parameter": parameters.Parameter},
         "publisher": {"Publisher": entities.Publisher},

@@ -12,18 +12,20 @@ from volery.faces.rclpy.context import Context, Contexts
 from volery.faces.rclpy.entities import Client, Publisher, Service, Subscription, Timer, period_of
 from volery.faces.rclpy.executors import Executor
 from volery.faces.rclpy.logging import Logger
-from volery.faces.rclpy.parameters import Declared, Parameter, Watcher
+from volery.faces.rclpy.node_parameters import NodeParameters
+from volery.faces.rclpy.parameter_services import serve_parameters
+from volery.faces.rclpy.parameters import Declared, Parameter
 from volery.faces.rclpy.task import Task
 from volery.faces.rclpy.time import Clock, ClockType, Rate
 from volery.faces.rosout import Rosout
-from volery.graph import RELIABLE, TRANSIENT_LOCAL, QoS
+from volery.graph import RELIABLE, TRANSIENT_LOCAL, Graph, QoS
 from volery.graph.group import Work
 
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
 _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")
 
 
-class Node:
+class Node(NodeParameters):
     """A node. As a launch file does, the component's name names its first node."""
 
     contexts: ClassVar[Contexts]
@@ -59,6 +61,8 @@ class Node:
         if automatically_declare_parameters_from_overrides:
             for override in parameter_overrides or ():
                 self._declared.declare(override.name, override.value)
+        if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, Graph):
+            serve_parameters(self)  # elsewhere the transport's own node does
 
     # -- who it is
 
@@ -288,73 +292,6 @@ class Node:
     def timers(self) -> list[Timer]:
         """All of them."""
         return self._of(Timer)
-
-    # -- parameters
-
-    def declare_parameter(
-        self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False
-    ) -> Parameter:
-        """Declare a parameter with its default; what a launch file gives comes first."""
-        return self._declared.declare(name, value, descriptor, ignore_override)
-
-    def declare_parameters(
-        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
-    ) -> list[Parameter]:
-        """Several: ``(name,)``, ``(name, value)`` or ``(name, value, descriptor)``."""
-        prefix = f"{namespace}." if namespace else ""
-        declared = []
-        for name, *rest in parameters:
-            value, descriptor = (*rest, None, None)[:2]
-            declared.append(self._declared.declare(prefix + name, value, descriptor, ignore_override))
-        return declared
-
-    def undeclare_parameter(self, name: str) -> None:
-        """Forget it."""
-        self._declared.forget(name)
-
-    def has_parameter(self, name: str) -> bool:
-        """Whether it is declared."""
-        return self._declared.has(name)
-
-    def get_parameter(self, name: str) -> Parameter:
-        """Its value now."""
-        return self._declared.get(name)
-
-    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Several."""
-        return [self._declared.get(name) for name in names]
-
-    def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
-        """Its value now, or the alternative."""
-        known = self._declared.has(name)
-        return self._declared.get(name) if known else alternative_value or Parameter(name)
-
-    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Those below *prefix*, without it."""
-        start = f"{prefix}." if prefix else ""
-        names = [name for name in self._declared.names() if name.startswith(start)]
-        return {name.removeprefix(start): self._declared.get(name) for name in names}
-
-    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[Any]:
-        """Each for itself."""
-        return [self._declared.set([one]) for one in parameter_list]
-
-    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> Any:
-        """All or none."""
-        return self._declared.set(parameter_list)
-
-    def describe_parameter(self, name: str) -> Any:
-        """Its descriptor."""
-        return self._declared.descriptor(name)
-
-    def add_on_set_parameters_callback(self, callback: Watcher) -> Watcher:
-        """Ask it before values are set."""
-        self._declared.watch(callback)
-        return callback
-
-    def remove_on_set_parameters_callback(self, callback: Watcher) -> None:
-        """Ask it no longer."""
-        self._declared.unwatch(callback)
 
     # -- the graph
 

@@ -62,6 +62,17 @@ class Parameter:
         if not self.type_.check(value):
             raise ValueError(f"Type '{self.type_.name}' and value '{value}' do not agree")
 
+    @classmethod
+    def from_parameter_msg(cls, message: Any) -> Parameter:
+        """From ``rcl_interfaces/msg/Parameter``."""
+        kind = Parameter.Type(message.value.type)
+        value: Any = getattr(message.value, f"{kind.name.lower()}_value") if kind else None
+        if kind is Parameter.Type.BYTE_ARRAY:
+            value = bytes(value)
+        elif isinstance(value, np.ndarray):
+            value = value.tolist()
+        return cls(message.name, kind, value)
+
     def get_parameter_value(self) -> Any:
         """As ``rcl_interfaces/msg/ParameterValue``."""
         message = new("rcl_interfaces/msg/ParameterValue", type=int(self.type_))
