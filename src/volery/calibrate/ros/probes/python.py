@@ -14,7 +14,8 @@ from importlib import import_module
 from typing import Any, NamedTuple, Protocol
 
 CONNECT_S, SETTLE_S, GLANCE_S = 10.0, 0.1, 0.05
-SPIN_S = 1.0
+SPIN_BLOCKS = 2.5
+"""Messages are rarer than cycles."""
 HALF_S = 0.5
 NODE, DEPTH = "calibration_probe", 10
 
@@ -291,14 +292,15 @@ class Probe:
         wait = self._client.wait
         time.sleep(SETTLE_S)
         measured = Measured()
-        wait(SPIN_S)
+        wait(SPIN_BLOCKS * self._block_s)
         measured.tell("wait", 0, 1)
         feed = self._client.subscribe("calibration/feed")
-        _until(lambda: (wait(GLANCE_S), heard[0] > 0)[1])
+        none = heard[0]
+        _until(lambda: (wait(GLANCE_S), heard[0] > none)[1])
         wait(SETTLE_S)
         before = heard[0]
         measured = Measured()
-        wait(SPIN_S)
+        wait(SPIN_BLOCKS * self._block_s)
         measured.tell("receive", 0, max(1, heard[0] - before))
         feed.close()
 
@@ -315,6 +317,7 @@ def main(library: str, block_ms: str, period_ms: str, sleeps: str, counts: str) 
     probe.sleeping(_numbers(sleeps))
     probe.publishing(_numbers(counts))
     probe.spinning()
+    probe.receiving()
     probe.receiving()
 
 
