@@ -77,7 +77,7 @@ class VehicleNode:
         self.namespace, self.options = namespace, options
         self.wire = Wire(graph.kernel, link, options.system, options.component, options.vehicle)
         rates = options.names.streams if options.streams is None else options.streams
-        self._streams = Streams(self.wire, rates, home=options.names.home)
+        self._streams = Streams(self.wire, rates, home=options.names.home and bool(rates))
         self._publishers: dict[str, Publisher] = {}
         self._on_demand: set[str] = set()
         self._warned: set[str] = set()

@@ -22,7 +22,7 @@ from volery.links.link import Link
 from volery.run.graphs import GRAPHS, open_graph
 from volery.trace.events import Record, ignore
 from volery.vehicles.address import Address, parse
-from volery.vehicles.carriers import open_link
+from volery.vehicles.carriers import ANSWERS_TO, SENDS_FROM, open_link
 from volery.vehicles.driver import drivers
 
 MAVLINK_NAMES: Mapping[str, Names] = {"mavros": MAVROS, "roscopter": ROSCOPTER}
@@ -74,6 +74,7 @@ class Bridge:
             self.kernel = VirtualKernel(record, pace=wanted.speed)
             self._link = _simulated_link(self.kernel, address, wanted.seed)
         else:
+            address.only("baud", "system", SENDS_FROM, ANSWERS_TO)
             self.kernel = WallKernel(record)
             self._link = open_link(self.kernel, address, drivers.load(address.driver).codec)
         try:
