@@ -22,16 +22,20 @@ from volery.graph import Graph, Node, RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.messages import define_imported
-from volery.model.system import Connection, System, TargetKind
+from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.run.airfield import Airfield
 from volery.run.cpp import CppPrograms, compile_all, is_cpp
-from volery.run.ending import Ending
+from volery.run.ending import Ending, Lands
 from volery.run.fences import fence_of
 from volery.run.platform import Platform, commanded_by, is_node
 from volery.run.serving import serve, serving
 from volery.run.setup import node_name
-from volery.vehicles import Drone, Rover, Vehicle
+from volery.run.unattended import Unattended
+from volery.vehicles import Drone, Rover
+
+INTERFACES = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
+"""By the kind of vehicle."""
 
 PYTHON_ROS = ("rospy", "rclpy")
 """Languages whose files import interfaces of ROS."""
@@ -132,7 +136,7 @@ class Builder:
         self._models = part.instances if part else system.instances
         self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.carry)
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
-        self._vehicles: dict[str, Vehicle] = {}
+        self._lands: dict[str, Lands] = {}
         self._instances: dict[str, Instance] = {}
 
     def build(self, fidelity: str, seed: int) -> Built:
@@ -250,17 +254,18 @@ class Builder:
         return found
 
     def _vehicle(self, node: Node, name: str, interface: str) -> Drone | Rover:
+        vehicle = self._open(node, name, interface)
+        self._lands.setdefault(name, vehicle)  # one of its commanders brings it down in the end
+        self._ending.vehicles = tuple(self._lands.values())
+        return vehicle
+
+    def _open(self, node: Node, name: str, interface: str) -> Drone | Rover:
         served = serving(self._autopilot(name), name)
         driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace})
         truth = self._truth(name) if self._truth else None
-        vehicle = (
-            Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
-            if interface == "Drone"
-            else Rover(self._kernel, name, driver, truth=truth)
-        )
-        self._vehicles.setdefault(name, vehicle)  # one of its commanders brings it down in the end
-        self._ending.vehicles = tuple(self._vehicles.values())
-        return vehicle
+        if interface == "Drone":
+            return Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
+        return Rover(self._kernel, name, driver, truth=truth)
 
     # -- nodes that serve vehicles
 
@@ -271,7 +276,14 @@ class Builder:
         for vehicle in self._system.vehicles:
             if vehicle.name in commanded or vehicle.processor is not None:
                 serving(vehicle.autopilot, vehicle.name)  # one that cannot be served is told before the start
+                if vehicle.name not in commanded:
+                    self._leave_unattended(vehicle.name, INTERFACES[vehicle.kind])
                 yield partial(self._serve, self._airfield, vehicle.name, vehicle.processor)
+
+    def _leave_unattended(self, name: str, interface: str) -> None:
+        opened = partial(self._open, name=name, interface=interface)
+        self._lands[name] = Unattended(self._graph, name, opened)
+        self._ending.vehicles = tuple(self._lands.values())
 
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)

@@ -26,3 +26,12 @@ def test_the_same_mission_twice(tmp_path):
         cost = run.record.components[name]
         assert 0.0 < cost.ros_cpu_s < cost.cpu_s, "ROS takes a part of it, and the report can say which"
         assert cost.ros_calls["publish"] > 0
+
+
+def test_what_is_commanded_by_messages_alone_is_brought_down_at_the_end(tmp_path):
+    early = ["application.by_hand.active.start=0 s", "run.duration=10 s"]
+    run = simulate(EXAMPLE, Options("times", out=tmp_path), overrides=early)
+    assert run.completed
+    vehicle = run.record.vehicles["drone_2"]
+    assert vehicle.airborne_s > 0.0
+    assert vehicle.landed
