@@ -53,7 +53,7 @@ $(VENV)/dev.stamp: $(VENV)/volery.stamp
 $(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages $(VENV)/ros1.stamp $(ROS2)
 	@echo "setting up $(VENV): independent MAVLink clients"
 	@$(PIP) install --group clients
-	@scripts/debian-packages chromium
+	@scripts/debian-packages chromium native
 	@touch $@
 
 $(VENV)/ros1.stamp: $(VENV)/volery.stamp scripts/debian-packages scripts/ros1-modules
@@ -68,7 +68,8 @@ $(VENV)/ros2-%.stamp: $(VENV)/volery.stamp scripts/ros2-venv
 	@scripts/ros2-venv $(VENV) $*
 	@touch $@
 
-$(VENV)/bench.stamp: $(VENV)/dev.stamp
+$(VENV)/bench.stamp: $(VENV)/dev.stamp scripts/debian-packages
+	@scripts/debian-packages native qemu
 	@$(PIP) install --group bench
 	@touch $@
 

@@ -64,6 +64,16 @@ def driver(program: Program, wanted: Wanted) -> str:
     )
 
 
+def timing_driver(program: Program, wanted: Wanted) -> str:
+    """What stands before ``timing.c``: the activation, and what prepares it."""
+    if not wanted.entry:
+        raise UsageError("only a function can be timed again and again: say which, with an entry")
+    declared: dict[str, str] = {}
+    before = "; ".join(_call(program, text, declared) for text in wanted.before) or "(void)0"
+    activation = _call(program, wanted.entry, declared)
+    return "".join(declared.values()) + f"#define PREPARE() {before}\n#define ACTIVATE() {activation}\n"
+
+
 def build(program: Program, wanted: Wanted, instrumented: Path, folder: Path) -> Path:
     """Link an instrumented object with its driver; the executable in *folder*."""
     source = folder / "driver.c"
@@ -74,6 +84,22 @@ def build(program: Program, wanted: Wanted, instrumented: Path, folder: Path) ->
         command = [clang, "-O2", "-x", "c", str(source), str(runtime), "-x", "none", str(instrumented)]
         run_tool([*command, *wanted.links, "-lm", "-o", str(out)])
     return out
+
+
+def build_timing(program: Program, wanted: Wanted, code: Path, folder: Path) -> Path:
+    """Link an object with what times its activations here; run it with how often."""
+    source = folder / "timing.c"
+    timing = files("volery.native").joinpath("runtime/timing.c").read_text(encoding="utf-8")
+    source.write_text(timing_driver(program, wanted) + timing, encoding="utf-8")
+    out = folder / "timing"
+    command = [toolchain().clang, "-O1", "-w", "-x", "c", str(source), "-x", "none", str(code)]
+    run_tool([*command, *wanted.links, "-lm", "-o", str(out)])
+    return out
+
+
+def timed(executable: Path, activations: int) -> list[float]:
+    """Cycles of this machine's core, of each activation."""
+    return [float(line) for line in run_tool([str(executable), str(activations)]).split()]
 
 
 def counts(executable: Path, wanted: Wanted, folder: Path) -> Array:

@@ -13,8 +13,8 @@ from volery.calibrate.processor.snippets import SNIPPETS
 from volery.calibrate.processor.timing import CHAIN, FORWARDED, FREE, LIBRARY, NEVER, RANDOM, WIDTH, Taken
 from volery.cost.core import CoreLaw, LibraryLaw, Operation, read_cores
 
-WINDOW, TABLES, HISTORY = 512, 12, 100
-"""Not measured: as of a large current core. The prediction's figures were chosen on calibration inputs."""
+WINDOW, TABLES, HISTORY = 512, 12, 60
+"""Not measured, as of a large core; the prediction's were chosen on calibration inputs."""
 
 SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
@@ -27,13 +27,12 @@ ALSO = {"malloc": "_Znwm", "free": "_ZdlPvm", "sin": "sincos"}
 
 
 def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
-    """The core's figures."""
+    """The core's figures. Latencies are whole cycles; below half a cycle, nothing is executed at all."""
     operations: dict[str, Operation] = {}
     for name, snippet in SNIPPETS[isa].items():
         beside = sum(operations[one].latency for one in snippet.less)
         latency = max(0.0, (taken[CHAIN + name].cycles - beside) / snippet.links)
-        told = round(latency, 1) if latency >= 0.5 else 0.0
-        operations[name] = Operation(latency=told, per_cycle=_pipes(taken[FREE + name].cycles))
+        operations[name] = Operation(latency=round(latency), per_cycle=_pipes(taken[FREE + name].cycles))
     for name in ("store", "branch"):  # nothing depends on their end
         operations[name] = Operation(latency=1.0, per_cycle=operations[name].per_cycle)
     operations["fp_fma"] = operations["fp_multiply"]
@@ -45,12 +44,12 @@ def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
         cpu="x86-64" if isa == "x86_64" else "generic",
         provenance="measured",
         source=f"volery calibrate processor on {machine.description}",
-        validity="data in the first cache; the window and the prediction of branches are assumed, not measured",
+        validity="data in the first cache; the window and the prediction of branches are assumed",
         least_mhz=mhz * 0.5,
         greatest_mhz=mhz,
         width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),
         refill=round(max(1.0, mispredicted - SHARE_OF_REFILL), 1),
-        forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency), 1),
+        forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency)),
         operations=operations,
         library=_library(taken),
         window=WINDOW,
