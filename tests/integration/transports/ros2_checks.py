@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import resource
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from volery.base.errors import UsageError
@@ -67,6 +71,46 @@ def a_message_that_is_none(site: Site, texts: list[str]) -> None:
     demand(len(told) == 2, f"told {told}")
 
 
+@contextmanager
+def stranger(what: str, topic: str) -> Iterator[Any]:
+    """Plain rclpy in a process of its own that does what it should not."""
+    program = str(Path(__file__).with_name("rclpy_stranger.py"))
+    process = subprocess.Popen([sys.executable, program, what, topic], stdout=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def a_subscriber_that_never_reads(site: Site, texts: list[str]) -> None:
+    speaker, listener = site.node("speaker"), site.node("listener")
+    heard: list[str] = []
+    listener.subscribe("chat", STRING, lambda one: heard.append(one.data[:3]))
+    publisher = speaker.advertise("chat", STRING)
+    with stranger("deaf", publisher.topic) as process:
+        site.until(speaker, lambda: publisher.subscribers() == 2, "both connect")
+        demand(process.stdout.readline() == "deaf\n", "it did not get so far")
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for _ in range(2_000):
+            publisher.publish(new(STRING, data="x" * 10_000))
+        publisher.publish(new(STRING, data="end"))
+        site.spin_until(listener, lambda: heard[-1:] == ["end"], "who reads hears the last")
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+        demand(grown < 60, f"memory has grown by {grown:.0f} MB")
+
+
+def another_type_on_our_topic(site: Site, texts: list[str]) -> None:
+    listener = site.node("listener")
+    heard: list[Any] = []
+    subscription: Any = listener.subscribe("chat", STRING, heard.append)
+    with stranger("numbers", subscription.topic):
+        site.until(listener, lambda: any("std_msgs/msg/Int32" in one for one in texts), "it is told")
+    told = next(one for one in texts if "std_msgs/msg/Int32" in one)
+    demand(f"{subscription.topic} carries several types" in told and "Int32 of /stranger" in told, told)
+    demand(not heard, f"heard {heard}")
+
+
 def a_thousand_topics(site: Site, texts: list[str]) -> None:
     speaker, listener = site.node("speaker"), site.node("listener")
     heard: list[str] = []
@@ -84,6 +128,8 @@ FAULTS = (
     a_type_with_other_fields,
     a_flood,
     a_message_that_is_none,
+    a_subscriber_that_never_reads,
+    another_type_on_our_topic,
     a_thousand_topics,
 )
 

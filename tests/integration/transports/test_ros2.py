@@ -24,6 +24,8 @@ FAULTS = (
     "fault-a-type-with-other-fields",
     "fault-a-flood",
     "fault-a-message-that-is-none",
+    "fault-a-subscriber-that-never-reads",
+    "fault-another-type-on-our-topic",
     "fault-a-thousand-topics",
     "the-end",
 )

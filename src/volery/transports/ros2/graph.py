@@ -35,6 +35,8 @@ from volery.transports.wire import Arrived, Asked
 DISCOVERY_S = 0.6
 """How long after its start a process is taken to know who is there already."""
 GOODBYE_S = 2.0
+WATCH_S = 1.0
+"""How often it looks for topics that carry several types."""
 HIDDEN = "_volery"
 """Names that begin so are the transport's own and are not shown."""
 _MISSING = (
@@ -127,6 +129,7 @@ class Ros2:
         self._executor = import_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
         self._over = threading.Event()
         self._left: set[str] = set()
+        self._told: set[str] = set()
         self.say: Callable[[str], None] = lambda text: None
         self._own = self._create(
             f"{HIDDEN}_{os.getpid()}", "/", enable_rosout=False, start_parameter_services=False
@@ -146,7 +149,11 @@ class Ros2:
         )
 
     def _spin(self) -> None:
+        looked = time.monotonic()
         while not self._over.is_set():
+            if time.monotonic() - looked > WATCH_S:
+                looked = time.monotonic()
+                self._tell_of_types()
             try:
                 self._executor.spin_once(timeout_sec=0.5)
             except NoAnswerError:
@@ -154,6 +161,17 @@ class Ros2:
             except Exception as error:  # rclpy raises what went wrong anywhere in it; the others go on
                 if not self._over.is_set():
                     self.say(f"rclpy: {type(error).__name__}: {error}")
+
+    def _tell_of_types(self) -> None:
+        """DDS leaves ends of different types unconnected without a word; each such topic is told once."""
+        for name, kinds in self._own.get_topic_names_and_types():
+            if len(kinds) > 1 and name not in self._told:
+                self._told.add(name)
+                ends = self._own.get_publishers_info_by_topic(name)
+                ends += self._own.get_subscriptions_info_by_topic(name)
+                by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
+                said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
+                self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
 
     def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Wire:
         """Make a node."""
