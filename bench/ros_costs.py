@@ -29,7 +29,7 @@ from volery.calibrate.measured.campaign import compare, estimated, prepared
 from volery.calibrate.measured.comparison import Compared
 from volery.calibrate.measured.runs import Run, running
 from volery.calibrate.ros.campaign import Circumstances, Plan
-from volery.calibrate.ros.entry import described, law_of, write_entry
+from volery.calibrate.ros.entry import in_figures, law_of, write_entry
 from volery.calibrate.ros.fitting import Cost, costs
 from volery.calibrate.ros.samples import Round
 from volery.calibrate.ros.stage import Pace, own_master, stage
@@ -134,10 +134,13 @@ def main() -> None:
 
 
 def show(console: Console, one: Campaign) -> None:
-    console.print(f"\n[bold]{one.client}: what calls cost, medians of {len(one.rounds)} rounds")
+    rounds = len(one.rounds)
+    console.print(
+        f"\n[bold]{one.client}: what calls cost the process, µs (n subscribers, ms slept), {rounds} rounds"
+    )
     for call, cost in one.costs().items():
         sure = f"known to {cost.half_width:.0%}, quartiles ±{cost.spread / 2:.0%}"
-        console.print(f"  {call:<18}{described(cost.whole, call):<52}{sure}", highlight=False)
+        console.print(f"  {call:<18}{in_figures(cost.whole, call):<20}{sure}", highlight=False)
     system, found = one.result()
     console.print(*tables(found, system))
     off = median(abs(node.difference) for node in found)

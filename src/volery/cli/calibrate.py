@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rich import box
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -22,10 +23,10 @@ from volery.calibrate.ros.campaign import (
     pursue,
 )
 from volery.calibrate.ros.campaign import Progress as Rounds
-from volery.calibrate.ros.entry import described, law_of, write_entry
+from volery.calibrate.ros.entry import in_figures, law_of, write_entry
 from volery.calibrate.ros.fitting import Cost, costs
 from volery.calibrate.ros.plot import picture
-from volery.calibrate.ros.stage import stage
+from volery.calibrate.ros.stage import check_client, stage
 from volery.cli.console import Output
 from volery.cli.endings import FAILED, OK
 
@@ -47,6 +48,7 @@ def ros(output: Output, wanted: Wanted) -> int:
 
     1 if it was broken off, or if a figure is not known as well as was asked for.
     """
+    check_client(wanted.client, wanted.python)  # before any file is made
     plan = wanted.plan
     machine = this_machine(wanted.name)
     rounds_file = wanted.out.with_name(f"{wanted.out.name}.{wanted.client}.rounds")
@@ -111,16 +113,17 @@ def _shown(output: Output, client: str) -> Iterator[Show]:
 
 
 def _table(found: Mapping[str, Cost], title: str) -> Table:
-    table = Table(title=title, title_justify="left")
-    for heading in ("call", "CPU time of the process", "of it the caller's", "95 %", "quartiles", "residual"):
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in ("call", "process µs", "caller µs", "known to", "quartiles", "residual"):
         table.add_column(heading, justify="left" if heading == "call" else "right", no_wrap=True)
     for cost in found.values():
         table.add_row(
             cost.call,
-            described(cost.whole, cost.call),
-            described(cost.caller, cost.call),
+            in_figures(cost.whole, cost.call),
+            in_figures(cost.caller, cost.call),
             f"±{cost.half_width:.0%}",
             f"±{cost.spread / 2.0:.0%}",
             f"{cost.residual:.0%}" if len(cost.points) > 1 else "",
         )
+    table.caption = "n: subscribers; ms: slept or waited; µs of CPU time"
     return table

@@ -6,7 +6,7 @@ import pytest
 from volery.base.errors import EstimateError, ModelError
 from volery.calibrate.machine import Machine
 from volery.calibrate.ros.campaign import Circumstances
-from volery.calibrate.ros.entry import described, law_of, write_entry
+from volery.calibrate.ros.entry import in_figures, law_of, write_entry
 from volery.calibrate.ros.fitting import costs
 from volery.calibrate.ros.plot import picture
 from volery.cost import RosLaw, catalogue
@@ -92,8 +92,10 @@ def test_a_file_that_is_no_catalogue_is_not_touched(tmp_path: Path) -> None:
 
 def test_in_words_and_as_a_picture() -> None:
     found = costs([Probe().round() for _ in range(3)])
-    assert described(found["publish"].whole, "publish") == "75.0 µs + 18.0 µs per subscriber"
-    assert described(found["sleep"].whole, "sleep") == "14.0 µs + 1.050 ns per microsecond slept"
+    assert in_figures(found["publish"].whole, "publish") == "75.0 + 18.0 n"
+    assert in_figures(found["sleep"].whole, "sleep") == "14.0 + 1.050 ms"
+    assert in_figures(found["wait"].whole, "wait") == "2.000 ms"
+    assert in_figures(found["receive"].whole, "receive") == "90.0"
     drawn = picture(found, "roscpp <here>")
     assert drawn.startswith("<svg")
     assert "roscpp &lt;here&gt;" in drawn

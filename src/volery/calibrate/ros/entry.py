@@ -53,8 +53,8 @@ def law_of(costs: Mapping[str, Cost], under: Circumstances) -> RosLaw:
 def _with_slope(costs: Mapping[str, Cost]) -> dict[str, Cost]:
     """``publish_next`` is measured at one number of subscribers: what each adds is what it adds elsewhere."""
     first, following = costs.get("publish"), costs.get("publish_next")
-    if first is None or following is None:
-        return dict(costs)
+    if first is None or following is None or following.typical <= 0.0:
+        return {call: cost for call, cost in costs.items() if call != "publish_next"}
     [x] = following.points
     whole, caller = (
         _through_point(x, getattr(following, part).at(x), getattr(first, part).per_x)
@@ -140,11 +140,12 @@ def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
     return made
 
 
-def described(line: Straight, call: str) -> str:
-    """In words: microseconds, and what each unit of x adds."""
+def in_figures(line: Straight, call: str) -> str:
+    """Microseconds, and what each subscriber (n) or millisecond adds."""
     unit = _UNITS.get(call)
     if unit is None:
-        return f"{line.constant / 1e3:.1f} µs"
-    if unit.startswith("microsecond"):
-        return f"{line.constant / 1e3:.1f} µs + {line.per_x:.3f} ns per {unit}"
-    return f"{line.constant / 1e3:.1f} µs + {line.per_x / 1e3:.1f} µs per {unit}"
+        return f"{line.constant / 1e3:.1f}"
+    constant = f"{line.constant / 1e3:.1f} + " if line.constant else ""
+    if unit == "subscriber":
+        return f"{constant}{line.per_x / 1e3:.1f} n"
+    return f"{constant}{line.per_x:.3f} ms"
