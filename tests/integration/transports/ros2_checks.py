@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -10,25 +11,56 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.graph import QoS
+from volery.graph import LATCHED, QoS
 from volery.kernel.wall import WallKernel
-from volery.messages import new
+from volery.messages import new, request, service
 from volery.testing.checks import demand, raising
 from volery.testing.transports import ROS2, Site, no_fault, run_checks
 from volery.trace.events import Text
 from volery.transports.ros2 import carried, ros2_graph
 
 STRING = "std_msgs/msg/String"
+STATE, SET_MODE = "mavros_msgs/msg/State", "mavros_msgs/srv/SetMode"
+
+
+@contextmanager
+def surroundings(**changed: str) -> Iterator[None]:
+    """These variables of the environment for a while."""
+    before = {name: os.environ.get(name) for name in changed}
+    os.environ.update(changed)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
 
 
 def a_type_without_support(site: Site, texts: list[str]) -> None:
-    with raising(UsageError, naming="mavros_msgs") as caught:
-        site.node("node").advertise("state", "mavros_msgs/msg/State")
-    demand("no type support" in caught.text and "colcon" in caught.text, caught.text)
+    """It is carried as bytes, and its services are; where that cannot be, it is said what is missing."""
+    node, other = site.node("node"), site.spinning(site.node("other"))
+    with TemporaryDirectory() as nothing, surroundings(CXX="no-compiler", XDG_CACHE_HOME=nothing):
+        with raising(UsageError, naming="mavros_msgs") as caught:
+            node.advertise("state", STATE)
+        words = ("no type support", "colcon", "no C++ compiler")
+        demand(all(one in caught.text for one in words), caught.text)
+    heard: list[str] = []
+    other.subscribe("state", STATE, lambda one: heard.append(one.mode))
+    publisher = node.advertise("state", STATE, LATCHED)
+    publisher.publish(new(STATE, mode="GUIDED"))
+    site.until(other, lambda: heard == ["GUIDED"], "it hears the mode")
+    kind = service(SET_MODE)
+    node.serve("set_mode", SET_MODE, lambda asked: kind.response(asked.custom_mode == "LAND"))
+    site.spinning(node)
+    client = other.client("set_mode", SET_MODE)
+    demand(client.wait(10 * S), "it is served")
+    demand(client.call(request(SET_MODE, custom_mode="LAND"), 10 * S).mode_sent, "it is answered")
 
 
 def a_type_with_other_fields(site: Site, texts: list[str]) -> None:
