@@ -19,11 +19,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from rich.console import Console
-from ruamel.yaml import YAML
 
+from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import this_machine
 from volery.calibrate.measured.campaign import compare, estimated, prepared
 from volery.calibrate.measured.comparison import Compared
@@ -60,7 +60,7 @@ class Campaign:
 
     def open(self) -> None:
         """Compile, and start all that stays."""
-        system = self.system("platform.processors.host.frequency=3000 MHz")
+        system = self.system()
         nodes = prepared(system)
         self.stage = self._stack.enter_context(stage(self.client))
         master = self._stack.enter_context(own_master())
@@ -86,25 +86,14 @@ class Campaign:
 
     def result(self) -> tuple[System, tuple[Compared, ...]]:
         """Estimated with all rounds, beside all runs."""
-        machine = self.machine
-        under = Circumstances(self.client, machine.description, machine.frequency_mhz)
+        machine, mhz = self.machine, self.machine.frequency_mhz
+        under = Circumstances(self.client, machine.description, mhz)
         write_entry(self.catalogue, machine, law_of(self.costs(), under))
-        _with_code(self.catalogue, machine.name)
-        host = f"{{is: {machine.name}, frequency: {machine.frequency_mhz:g} MHz}}"
+        code = catalogue().processor("generic-host").code["python"]  # a thousandth of what the nodes take
+        put_law(self.catalogue, machine, "code", "python", code, (mhz, mhz))
+        host = f"{{is: {machine.name}, frequency: {mhz:g} MHz}}"
         system = self.system(f"platform.catalogues={self.catalogue}", f"platform.processors.host={host}")
         return system, compare(system, estimated(system), self.runs)
-
-
-def _with_code(file: Path, name: str) -> None:
-    """The nodes' own code is priced as that of any computer: it is a thousandth of what they take."""
-    yaml = YAML()
-    data: Any = yaml.load(file.read_text(encoding="utf-8"))
-    laws = catalogue().processor("generic-host").code
-    data["processors"][name]["code"] = {
-        key: law.model_dump(exclude_defaults=True) for key, law in laws.items()
-    }
-    with file.open("w", encoding="utf-8") as out:
-        yaml.dump(data, out)
 
 
 def together(campaigns: list[Campaign], what: Callable[[Campaign], Done]) -> list[Done]:
