@@ -147,11 +147,11 @@ def compare(what: str, chunks: Chunks, rounds: int) -> None:
 # -- many vehicles
 
 
-def replay(chunks: Chunks, ports: list[int], seconds: float) -> None:
-    """To all of them at once, over and over."""
+def replay(chunks: Chunks, ports: list[int]) -> None:
+    """To all of them at once, over and over, until the process is ended."""
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     began, turn = perf_counter(), 0
-    while perf_counter() - began < seconds:
+    while True:
         when, data = chunks[turn % len(chunks)]
         wait = when / S + SECONDS * (turn // len(chunks)) - (perf_counter() - began)
         if wait > 0:
@@ -175,17 +175,16 @@ def many(chunks: Chunks, seconds: float) -> None:
         file = Path(folder) / "chunks"
         file.write_text("\n".join(f"{when} {data.hex()}" for when, data in chunks))
         ports = ",".join(str(link.port) for link in links)
-        child = subprocess.Popen(
-            [sys.executable, __file__, "--replay", str(file), "--ports", ports, "--for", str(seconds + 4)]
-        )
-        sleep(3.0)
+        child = subprocess.Popen([sys.executable, __file__, "--replay", str(file), "--ports", ports])
+        while not all(drone.telemetry.heard >= 0 for drone in drones):
+            sleep(0.1)
         heard = sum(link.heard.frames for link in links)
         start, began = process_time(), perf_counter()
         sleep(seconds)
         share = (process_time() - start) / (perf_counter() - began)
         heard = sum(link.heard.frames for link in links) - heard
+        child.terminate()
         child.wait()
-    assert all(drone.telemetry.heard >= 0 for drone in drones)
     for drone in drones:
         drone.close()
     kernel.close()
@@ -202,13 +201,11 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one short round")
     parser.add_argument("--replay", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--ports", default="", help=argparse.SUPPRESS)
-    parser.add_argument("--for", dest="seconds", type=float, default=0.0, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.replay:
         lines = (line.split() for line in options.replay.read_text().splitlines())
         chunks = [(int(when), bytes.fromhex(data)) for when, data in lines]
-        replay(chunks, [int(port) for port in options.ports.split(",")], options.seconds)
-        return
+        replay(chunks, [int(port) for port in options.ports.split(",")])
     default = telemetry(SECONDS, 0)
     cores = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(cores)})

@@ -12,13 +12,15 @@ from math import isfinite
 from volery.base.errors import UsageError
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Altitude:
     metres: float
 
-    def __post_init__(self) -> None:
-        if not isfinite(self.metres):
-            raise UsageError(f"an altitude of {self.metres} m is not a number one can fly to")
+    def __init__(self, metres: float) -> None:
+        """Written out, as that of ``Position``: both are made for most messages of a vehicle."""
+        if not isfinite(metres):
+            raise UsageError(f"an altitude of {metres} m is not a number one can fly to")
+        self.__dict__["metres"] = metres
 
     def __str__(self) -> str:
         return f"{self.metres:g} m {self.reference}"
@@ -56,7 +58,7 @@ class AboveGround(_Altitude):
 Altitude = AMSL | Ellipsoidal | AboveHome | AboveGround
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Position:
     """A point: WGS-84 degrees, north and east positive, and a typed altitude."""
 
@@ -64,13 +66,13 @@ class Position:
     longitude: float
     altitude: Altitude
 
-    def __post_init__(self) -> None:
-        if not -90.0 <= self.latitude <= 90.0:
-            raise UsageError(f"latitude {self.latitude} is off the globe: -90 to 90 degrees, north positive")
-        if not -180.0 <= self.longitude <= 180.0:
-            raise UsageError(
-                f"longitude {self.longitude} is off the globe: -180 to 180 degrees, east positive"
-            )
+    def __init__(self, latitude: float, longitude: float, altitude: Altitude) -> None:
+        if not -90.0 <= latitude <= 90.0:
+            raise UsageError(f"latitude {latitude} is off the globe: -90 to 90 degrees, north positive")
+        if not -180.0 <= longitude <= 180.0:
+            raise UsageError(f"longitude {longitude} is off the globe: -180 to 180 degrees, east positive")
+        own = self.__dict__
+        own["latitude"], own["longitude"], own["altitude"] = latitude, longitude, altitude
 
     def __str__(self) -> str:
         return f"{self.latitude:.7f}, {self.longitude:.7f}, {self.altitude}"

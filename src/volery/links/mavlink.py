@@ -36,7 +36,10 @@ class _Field(NamedTuple):
 
 
 class MessageType:
-    """One message of the dialect: its id and how its fields lie on the wire."""
+    """One message of the dialect: its id and how its fields lie on the wire.
+
+    ``size`` is that of the payload with nothing cut off.
+    """
 
     def __init__(self, definition: Any) -> None:
         self.name: str = definition.msgname
@@ -44,6 +47,7 @@ class MessageType:
         self.field_names: tuple[str, ...] = tuple(definition.fieldnames)
         self._extra = bytes([definition.crc_extra])
         self._struct: struct.Struct = definition.unpacker
+        self.size: int = self._struct.size
         self._fields = tuple(self._laid_out(definition))
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)
@@ -60,11 +64,6 @@ class MessageType:
             _Field(name, length, name in texts)
             for name, length in zip(definition.ordered_fieldnames, definition.array_lengths, strict=True)
         ]
-
-    @property
-    def size(self) -> int:
-        """Bytes of the payload with nothing cut off."""
-        return self._struct.size
 
     def pack(self, fields: Mapping[str, Any]) -> bytes:
         """The whole payload. Raises ``UsageError`` naming a field that does not exist or does not fit."""
@@ -99,9 +98,8 @@ class MessageType:
 
     def unpack(self, payload: bytes) -> dict[str, Any]:
         """The fields of a payload, which may be shorter (zeros were cut off) or longer (a newer sender)."""
-        size = self._struct.size
-        if len(payload) != size:
-            payload = payload[:size].ljust(size, b"\0")
+        if len(payload) != self.size:
+            payload = payload[: self.size].ljust(self.size, b"\0")
         values = self._struct.unpack(payload)
         if self._plain:
             return dict(zip(self._names, values))  # noqa: B905  # as long, by construction; strict costs

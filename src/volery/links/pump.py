@@ -13,7 +13,8 @@ _JOIN_S = 5.0
 class Pump:
     """Runs *body* in a thread of its own from ``start`` to ``stop``. *body* waits only in ``readable``.
 
-    What *body* hands to the house may be looked at before ``start`` returns: let go of it when all is in place.
+    What *body* hands to the house may be looked at before ``start`` returns: let go of it when all is in
+    place.
     """
 
     def __init__(self, name: str, body: Callable[[Pump], None]) -> None:
