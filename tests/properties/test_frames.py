@@ -20,6 +20,7 @@ from volery.base.frames import (
     heading_to_yaw,
     multiply,
     quaternion_to_euler,
+    world_to_body,
     wrap,
 )
 
@@ -93,3 +94,11 @@ def test_the_heading_of_an_attitude_is_the_yaw_of_it_in_the_other_frame(
     assert found[0] == pytest.approx(roll, abs=1e-7)
     assert found[1] == pytest.approx(-pitch, abs=1e-7)  # nose up is positive in NED, negative in ENU
     assert wrap(found[2] - heading_to_yaw(heading)) == pytest.approx(0.0, abs=1e-7)
+
+
+@given(ANGLES, ANGLES, ANGLES, OFFSETS)
+def test_what_the_body_sees_of_its_own_axes_is_the_world_turned_back(
+    roll: float, pitch: float, yaw: float, v: Vector
+) -> None:
+    attitude = euler_to_quaternion(roll, pitch, yaw)
+    assert world_to_body(attitude, rotate(attitude, v)) == pytest.approx(v, abs=1e-9 * 30_000)

@@ -31,6 +31,7 @@ PX4 = {sub << 24 | main << 16: name for main, sub, name in _PX4_MODES}
 
 ARDUPILOT_ID, PX4_ID = 3, 12
 """MAV_AUTOPILOT."""
+AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4"}
 
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""

@@ -22,7 +22,7 @@ from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
 from volery.bridge.mavros import MAVROS
-from volery.bridge.modes import mode_name
+from volery.bridge.modes import AUTOPILOTS, mode_name
 from volery.bridge.offering import Names, Offering, Service, Subscription, Surroundings
 from volery.bridge.streams import Streams
 from volery.bridge.wire import Heard, Wire
@@ -30,7 +30,6 @@ from volery.graph import Node, Publisher, RosGraph
 from volery.graph.group import Work
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Link
-from volery.links.mavlink import entry_name
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
@@ -96,7 +95,8 @@ class VehicleNode:
         beat = self.wire.last("HEARTBEAT")
         if beat is None or not self.connected:
             return ""
-        who = entry_name("MAV_AUTOPILOT", beat["autopilot"]).lower()
+        number = beat["autopilot"]
+        who = AUTOPILOTS.get(number, f"autopilot {number}")
         mode = mode_name(self.wire.firmware, beat["custom_mode"])
         armed = "armed" if beat["base_mode"] & SAFETY_ARMED else "disarmed"
         return f"{who} (system {self.wire.target[0]}): {mode}, {armed}"

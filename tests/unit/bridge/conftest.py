@@ -56,7 +56,11 @@ class Aviary:
 
     def say(self, name: str, /, **fields: Any) -> None:
         """The autopilot sends a message."""
-        self._theirs.send(Frame(name, fields, 1, 1))
+        self.say_as(1, name, **fields)
+
+    def say_as(self, system: int, name: str, /, **fields: Any) -> None:
+        """A vehicle with that system id sends a message."""
+        self._theirs.send(Frame(name, fields, system, 1))
 
     def heartbeat(self, **fields: Any) -> None:
         self.say("HEARTBEAT", **{"type": 2, "autopilot": 3, "base_mode": 81, "system_status": 3, **fields})

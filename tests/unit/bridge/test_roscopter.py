@@ -166,3 +166,16 @@ def test_a_px4_is_asked_for_messages(roscopter: Any) -> None:
     asked = {one["param1"]: one["param2"] for one in roscopter.asked("COMMAND_LONG") if one["command"] == 511}
     assert {1.0, 24.0, 30.0, 65.0, 74.0, 105.0} <= set(asked)
     assert set(asked.values()) == {100_000.0}
+
+
+def test_of_several_on_one_link_the_one_that_is_wanted_is_heard(aviary_of: Any) -> None:
+    aviary = aviary_of(names=ROSCOPTER, period=None, vehicle=7)
+    heard = aviary.hear("state", "roscopter/State")
+    aviary.heartbeat()  # of system 1
+    aviary.run(S)
+    assert heard == []
+    assert aviary.node.summary == ""
+    aviary.say_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
+    aviary.run(S)
+    assert [message.mode for message in heard] == ["GUIDED"]
+    assert aviary.node.summary == "ArduPilot (system 7): GUIDED, armed"
