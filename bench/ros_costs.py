@@ -23,6 +23,7 @@ from typing import TypeVar
 
 from rich.console import Console
 
+from volery.base.errors import UsageError
 from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import this_machine
 from volery.calibrate.measured.campaign import compare, estimated, prepared
@@ -32,7 +33,7 @@ from volery.calibrate.ros.campaign import Circumstances, Plan
 from volery.calibrate.ros.entry import in_figures, law_of, write_entry
 from volery.calibrate.ros.fitting import Cost, costs
 from volery.calibrate.ros.samples import Round
-from volery.calibrate.ros.stage import Pace, own_master, stage
+from volery.calibrate.ros.stage import Pace, check_client, own_master, stage
 from volery.cli.measure import tables
 from volery.cost import catalogue
 from volery.model.reader import load
@@ -106,9 +107,16 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=10, help="of calibration and measurement each")
     parser.add_argument("--client", action="append", choices=("roscpp", "rospy"))
     wanted = parser.parse_args()
+    clients = wanted.client or ("roscpp", "rospy")
+    try:
+        for client in clients:
+            check_client(client)
+    except UsageError as error:
+        print(error)
+        return
     console = Console(width=120)
     with TemporaryDirectory() as folder:
-        campaigns = [Campaign(client, Path(folder)) for client in wanted.client or ("roscpp", "rospy")]
+        campaigns = [Campaign(client, Path(folder)) for client in clients]
         try:
             together(campaigns, Campaign.open)
             for number in range(wanted.rounds):

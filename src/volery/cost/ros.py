@@ -39,7 +39,8 @@ from volery.cost.figure import Line, Stated, through
 NOT_COUNTED = (
     "ROS service calls (left out of the law: negligible beside the service's own execution)",
     "ROS parameter, name and time look-ups",
-    "ROS discovery, connection set-up and the master",
+    "ROS discovery and the master",
+    "connections, messages received and time spent in spin, where a law has no figures for them (the paper's)",
 )
 """What the law leaves out, in words for a report."""
 

@@ -175,3 +175,12 @@ def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
 def test_a_client_without_a_law_of_its_own_is_told_how_to_get_one() -> None:
     with pytest.raises(EstimateError, match="volery calibrate ros --client rclpy"):
         measured_law("rclpy")
+
+
+def test_publishing_again_costs_the_same_where_a_law_does_not_tell_it_apart() -> None:
+    paper, mine = law(INTEL), measured_law("rospy")
+    assert paper.price("publish_next", 3, 3000) == paper.price("publish", 3, 3000)
+    assert mine.price("publish_next", 3, 2600) == mine.price("publish", 3, 2600)
+    told = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
+    apart = read(told).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
+    assert (apart.caller, apart.background) == (7000, 0)

@@ -10,6 +10,8 @@ from volery.calibrate.ros.fitting import Cost
 
 WIDE, HIGH, LEFT, TOP = 420, 260, 64, 44
 ROW = 24
+LABEL = 22.0
+"""Room for a label below an axis."""
 _STYLE = """
 text { font: 12px ui-monospace, monospace; fill: #1d2733; }
 .title { font-weight: 600; }
@@ -62,8 +64,12 @@ def _chart(cost: Cost, left: float, unit: str, scale: float) -> Iterator[str]:
 
 def _labels(cost: Cost, left: float, most: tuple[float, float], unit: str, scale: float) -> Iterator[str]:
     most_x, most_y = most
+    last = left - LABEL
     for x in sorted(cost.points):
         at = left + WIDE * x / most_x
+        if at - last < LABEL:
+            continue
+        last = at
         where = f'x="{at:.1f}" y="{TOP + HIGH + 16}" text-anchor="middle"'
         yield f'<text class="small" {where}>{x * scale:g}</text>'
     yield f'<text class="small" x="{left + WIDE}" y="{TOP + HIGH + 34}" text-anchor="end">{unit}</text>'
