@@ -22,7 +22,7 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
 from volery.kernel.task import Place, Task
 from volery.kernel.virtual import FOREVER, VirtualKernel
-from volery.trace.events import Slice
+from volery.trace.events import Preemption, Slice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from volery.kernel.api import Handle
 
 NO_CORE = -1
+
+QUANTUM: Ns = 10 * MS
+"""The usual time slice of round-robin."""
 
 
 @dataclass(eq=False, slots=True)
@@ -77,7 +80,7 @@ class Processor:
         *,
         cores: int = 1,
         scheduler: str = "fixed-priority",
-        quantum: Ns = 10 * MS,
+        quantum: Ns = QUANTUM,
         context_switch: Ns = 0,
     ) -> None:
         if scheduler not in SCHEDULERS:
@@ -149,15 +152,22 @@ class Processor:
         self._arrivals += 1
         job.arrival = self._arrivals
         insort(self._jobs, job, key=self._order)
+        self._make_way(job.name)
         self._dispatch()
         return job
 
-    def _dispatch(self) -> None:
+    def _make_way(self, urgent: str) -> None:
+        """Who has a core and no right to it any more stops for *urgent*, who has just come."""
         for job in self._jobs[self.cores :]:
             if job.core != NO_CORE:
+                core = job.core
                 self._stop(job)
                 if job.remaining == 0:  # it would have ended at this very instant
                     self._complete(job)
+                else:
+                    self._kernel.record(Preemption(self._kernel.now(), self.name, core, job.name, urgent))
+
+    def _dispatch(self) -> None:
         for job in self._jobs[: self.cores]:
             if job.core == NO_CORE:
                 self._start(job)

@@ -9,19 +9,25 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from volery.model.fields import Bandwidth, Form, Frequency, Listed, Loss, Name, OrNothing, Period, Time
+from volery.model.fields import Bandwidth, Form, Frequency, Listed, Load, Loss, Name, OrNothing, Period, Time
 from volery.model.form_component import ComponentForm, InstanceForm, SignatureForm
 from volery.model.form_environment import EnvironmentForm
 
 
 class ProcessorForm(Form):
-    """A computer of a kind in the catalogue."""
+    """A computer of a kind in the catalogue.
+
+    `context_switch` is what it takes to put another task on a core. `load` is the share of each core that
+    something else takes, before all components: `20 %`.
+    """
 
     kind: str = Field(alias="is")
     frequency: Frequency
     cores: int | None = Field(default=None, ge=1)
     scheduler: Literal["fixed-priority", "round-robin", "fifo"] = "fixed-priority"
     quantum: Period | None = None
+    context_switch: Time = 0
+    load: Load = 0.0
     carried_by: str | None = None
     powered_by: str | None = None
 
@@ -90,7 +96,11 @@ class ScenarioForm(Form):
 
 
 class ModelForm(Form):
-    """A system model."""
+    """A system model.
+
+    `chains` are rows of topics by their full names, `[/drone_1/mavros/state, ...]`, whose end-to-end latency
+    can be observed: `observe: NAME.latency`.
+    """
 
     volery: Literal[1]
     name: str
@@ -102,5 +112,6 @@ class ModelForm(Form):
     allocations: dict[Name, AllocationForm] = {}
     environment: EnvironmentForm = EnvironmentForm()
     scenarios: dict[Name, ScenarioForm] = {}
+    chains: dict[Name, Annotated[list[str], Field(min_length=1)]] = {}
     requirements: dict[Name, BoundForm] = {}
     run: RunForm = RunForm()

@@ -27,7 +27,7 @@ from volery.model.resolve_platform import (
     processors,
     with_catalogues,
 )
-from volery.model.resolve_requirements import limits, requirements
+from volery.model.resolve_requirements import chains, limits, requirements
 from volery.model.system import System, Vocabulary
 from volery.model.validation import validate
 
@@ -100,6 +100,7 @@ def _resolve(context: Context, made: Assembly, options: tuple[str, ...]) -> Syst
         processors=processors(context),
         networks=networks(context),
         environment=environment(context, where),
+        chains=chains(context),
         requirements=requirements(context),
         limits=limits(context),
         components=library,

@@ -54,6 +54,8 @@ def _processor(context: Context, name: str, form: ProcessorForm) -> Processor:
         cores=form.cores or (kind.cores if kind else 1),
         scheduler=form.scheduler,
         quantum_ns=form.quantum,
+        context_switch_ns=form.context_switch,
+        load=form.load,
         carried_by=form.carried_by,
         powered_by=None if powered_by == "mains" else powered_by,
         where=context.where(path),
@@ -84,6 +86,7 @@ def check_names(context: Context) -> None:
         (("environment", "components"), list(environment.components), "a component instance"),
         (("environment", "vehicles"), list(environment.vehicles), "a vehicle"),
         (("platform", "processors"), list(context.form.platform.processors), "a processor"),
+        (("chains",), list(context.form.chains), "a chain"),
     )
     for section, names, what in sections:
         for name in names:

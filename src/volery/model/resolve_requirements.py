@@ -7,7 +7,7 @@ from volery.base.units import Kind, NotAQuantity
 from volery.model.context import Context
 from volery.model.form import BoundForm
 from volery.model.problems import Path
-from volery.model.system import Bound, Observable, RunLimits
+from volery.model.system import Bound, Chain, Observable, RunLimits
 
 APPLICATION = "application"
 
@@ -18,6 +18,17 @@ def requirements(context: Context) -> tuple[Bound, ...]:
         bound(context, ("requirements", name), name, form) for name, form in context.form.requirements.items()
     )
     return tuple(requirement for requirement in found if requirement is not None)
+
+
+def chains(context: Context) -> tuple[Chain, ...]:
+    """The model's chains of topics."""
+    for name, topics in context.form.chains.items():
+        for place, topic in enumerate(topics):
+            if not topic.startswith("/"):
+                context.problems.add(
+                    ("chains", name, place), f"{topic!r}: write a topic's full name, such as '/{topic}'"
+                )
+    return tuple(Chain(name, tuple(topics)) for name, topics in context.form.chains.items())
 
 
 def limits(context: Context) -> RunLimits:
@@ -81,4 +92,5 @@ def subjects(context: Context) -> dict[str, str]:
         **dict.fromkeys(form.environment.components, "component"),
         **dict.fromkeys(form.platform.processors, "processor"),
         **dict.fromkeys(form.environment.vehicles, "vehicle"),
+        **dict.fromkeys(form.chains, "chain"),
     }

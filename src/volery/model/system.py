@@ -214,6 +214,8 @@ class Processor:
 
     ``carried_by`` names the vehicle it rides on; ``powered_by`` the vehicle whose battery its power drains,
     ``None`` for mains. ``quantum_ns`` is the time slice of round-robin, ``None`` for the kernel's own choice.
+    ``context_switch_ns`` is charged when a core goes on with another task; ``load`` is the share of each
+    core, 0..1, that something else takes before all components.
     """
 
     name: str
@@ -224,6 +226,8 @@ class Processor:
     quantum_ns: Ns | None = None
     carried_by: str | None = None
     powered_by: str | None = None
+    context_switch_ns: Ns = 0
+    load: float = 0.0
     where: Location | None = field(default=None, compare=False)
 
     @property
@@ -242,6 +246,14 @@ class Network:
     latency_ns: Ns
     loss: float = 0.0
     where: Location | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A row of topics by their full names: a node hears one and says the next."""
+
+    name: str
+    topics: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +299,8 @@ class Source:
 class Observable:
     """A quantity that requirements may bound: ``<subject>.<quantity>``.
 
-    ``subject`` is the kind of thing it is of: ``component``, ``processor``, ``vehicle`` or ``application``.
+    ``subject`` is the kind of thing it is of: ``component``, ``processor``, ``vehicle``,
+    ``chain`` or ``application``.
     """
 
     subject: str
@@ -344,6 +357,7 @@ class System:
     processors: tuple[Processor, ...] = ()
     networks: tuple[Network, ...] = ()
     environment: Environment = field(default_factory=Environment)
+    chains: tuple[Chain, ...] = ()
     requirements: tuple[Bound, ...] = ()
     limits: RunLimits = field(default_factory=lambda: RunLimits(15 * MINUTE))
     components: Mapping[str, Component] = field(default_factory=dict)

@@ -20,7 +20,7 @@ from volery.report.grids import (
     total,
     verdict,
 )
-from volery.requirements.record import ComponentRecord, RunRecord, VehicleRecord
+from volery.requirements.record import ComponentRecord, LatencyRecord, RunRecord, VehicleRecord
 
 
 def _names(dictionaries: Iterable[Iterable[str]]) -> list[str]:
@@ -166,6 +166,22 @@ def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) ->
     return Grid("Processors", columns, tuple(rows))
 
 
+def chain_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each chain of topics: how old what arrives is, run beside run."""
+    rows = []
+    for name in _names(record.chains for record in records):
+        found = [record.chains.get(name) for record in records]
+        latencies = [one.latency_s if one else LatencyRecord() for one in found]
+        for first, question, values in (
+            (name, "p95 ms", [one.p95 for one in latencies]),
+            ("", "max ms", [one.max for one in latencies]),
+        ):
+            cells = [Cell(milliseconds(value), share=value) for value in values]
+            rows.append((Cell(first), Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("chain"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Latency along chains of topics", columns, tuple(rows))
+
+
 _VEHICLE_QUESTIONS: tuple[tuple[str, Callable[[VehicleRecord], Cell]], ...] = (
     ("distance m", lambda one: Cell(number(one.distance_m), share=one.distance_m)),
     ("airborne s", lambda one: Cell(number(one.airborne_s), share=one.airborne_s)),
@@ -203,6 +219,7 @@ def all_comparisons(labels: Sequence[str], records: Sequence[RunRecord]) -> list
         outcome_comparison(labels, records),
         requirements_comparison(labels, records),
         cost_comparison(labels, records),
+        chain_comparison(labels, records),
         processor_comparison(labels, records),
         vehicle_comparison(labels, records),
     )

@@ -169,6 +169,13 @@ def cost_grid(record: RunRecord) -> Grid:
         Column("mean ms", True, "response time of activations, else of calls served", False),
         Column("p95 ms", True, "95 % of all responses took no longer"),
         Column("max ms", True, "", False),
+        Column(
+            "bound ms",
+            True,
+            "analysis of fixed priorities, with the longest executions and shortest distances of releases "
+            "seen; waiting for messages, networks and locks is not in it",
+            False,
+        ),
         Column("energy", True, "stated for its operations, else what its execution takes above idle"),
     )
     return Grid("What each component costs", columns, rows)
@@ -190,8 +197,46 @@ def _cost_row(name: str, one: ComponentRecord, longest: float) -> tuple[Cell, ..
         Cell(milliseconds(response.mean)),
         Cell(milliseconds(response.p95)),
         Cell(milliseconds(response.max)),
+        Cell(milliseconds(one.response_bound_s)),
         Cell(energy(one.energy_j)),
     )
+
+
+def chains_grid(record: RunRecord) -> Grid:
+    """End-to-end latencies along chains of topics."""
+    rows = tuple(
+        (
+            Cell(name),
+            Cell(" → ".join(one.topics), status="quiet"),
+            Cell(count(one.latency_s.count)),
+            Cell(milliseconds(one.latency_s.mean)),
+            Cell(milliseconds(one.latency_s.p95)),
+            Cell(milliseconds(one.latency_s.max)),
+        )
+        for name, one in record.chains.items()
+    )
+    columns = (
+        Column("chain"),
+        Column("topics", essential=False),
+        Column("arrivals", True, "messages on its last topic that go back to one on its first"),
+        Column("mean ms", True, "age of what arrived: since the first message was sent"),
+        Column("p95 ms", True),
+        Column("max ms", True),
+    )
+    return Grid("Latency along chains of topics", columns, rows)
+
+
+MOST_PREEMPTIONS = 20
+
+
+def preemptions_grid(record: RunRecord) -> Grid:
+    """Who had to make way for whom; the most frequent."""
+    rows = tuple(
+        (Cell(one.processor), Cell(one.preempted), Cell(one.by), Cell(count(one.count)))
+        for one in record.preemptions[:MOST_PREEMPTIONS]
+    )
+    columns = (Column("processor"), Column("task"), Column("preempted by"), Column("times", True))
+    return Grid("Preemptions", columns, rows)
 
 
 def ros_calls_grid(record: RunRecord) -> Grid:
@@ -344,6 +389,7 @@ def all_grids(record: RunRecord) -> list[Grid]:
     made = (
         requirements_grid(record),
         cost_grid(record),
+        chains_grid(record),
         processors_grid(record),
         vehicles_grid(record),
         parcels_grid(record),

@@ -13,6 +13,8 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
+from volery.requirements.chains import ChainLedger
+from volery.requirements.demand import Demands
 from volery.requirements.ledgers import ComponentLedger, EnergyLaw, VehicleLedger, known, linear_energy
 from volery.requirements.record import (
     ComponentRecord,
@@ -20,6 +22,7 @@ from volery.requirements.record import (
     LawRecord,
     OutcomeRecord,
     ParcelRecord,
+    PreemptionRecord,
     ProcessorRecord,
     RequirementRecord,
     RunRecord,
@@ -27,13 +30,16 @@ from volery.requirements.record import (
     StepRecord,
 )
 from volery.trace.events import (
+    NONE,
     Activation,
     Call,
     Charge,
     Event,
     Failure,
+    Message,
     Milestone,
     Operation,
+    Preemption,
     Record,
     Slice,
     Text,
@@ -76,11 +82,16 @@ class Accounts:
         self._vehicles = {one.name: VehicleLedger(one) for one in setup.vehicles}
         self._parcels: dict[str, list[Milestone]] = {}
         self._verdicts: dict[str, Verdict] = {}
+        self._chains = {one.name: ChainLedger(one) for one in setup.chains}
+        self._demands = Demands()
+        self._preemptions: dict[tuple[str, str, str], int] = {}
         self._failures: list[Failure] = []
         self._warnings = dict.fromkeys(setup.warnings)
         self.last: Ns = 0
         self._folds: dict[type[Any], Callable[[Any], Ns]] = {
             Slice: self._slice,
+            Preemption: self._preemption,
+            Message: self._message,
             Charge: self._charge,
             Activation: self._activation,
             Call: self._call,
@@ -120,7 +131,18 @@ class Accounts:
             self._processors[event.processor] = ProcessorSetup(event.processor)
             self._busy[event.processor] = 0
         self._busy[event.processor] += ran
+        self._demands.slice(event)
         return event.end
+
+    def _preemption(self, event: Preemption) -> Ns:
+        who = event.processor, event.preempted, event.by
+        self._preemptions[who] = self._preemptions.get(who, 0) + 1
+        return event.at
+
+    def _message(self, event: Message) -> Ns:
+        for chain in self._chains.values():
+            chain.message(event)
+        return event.sent if event.received == NONE else event.received
 
     def _charge(self, event: Charge) -> Ns:
         self._component(event.component, event.processor).charge(event)
@@ -128,6 +150,7 @@ class Accounts:
 
     def _activation(self, event: Activation) -> Ns:
         self._component(event.component, "").activation(event)
+        self._demands.activation(event)
         return event.finished
 
     def _call(self, event: Call) -> Ns:
@@ -189,6 +212,8 @@ class Accounts:
             vehicles={name: ledger.record() for name, ledger in self._vehicles.items()},
             parcels={subject: _parcel(steps) for subject, steps in self._parcels.items()},
             requirements=self._requirements(),
+            chains={name: chain.record() for name, chain in self._chains.items()},
+            preemptions=self._preemption_records(),
             failures=[_failure(one) for one in self._failures],
             laws=[LawRecord.model_validate(asdict(law)) for law in setup.laws],
             not_counted=[*setup.not_counted, *self._not_counted()],
@@ -201,11 +226,27 @@ class Accounts:
 
     def _component_records(self) -> dict[str, ComponentRecord]:
         """Without the house's own flows of control, which were neither set up nor allocated."""
+        bounds = self._response_bounds()
         return {
-            name: ledger.record(self._above_idle(ledger.processor))
+            name: ledger.record(self._above_idle(ledger.processor), bounds.get(name))
             for name, ledger in self._components.items()
             if ledger.processor or name in self._declared
         }
+
+    def _response_bounds(self) -> dict[str, Ns | None]:
+        known = {one.name: one for one in self.setup.components}
+        bounds = {name: self._demands.bounds(one, known) for name, one in self._processors.items()}
+        return {
+            name: bounds[one.processor].get(name) for name, one in known.items() if one.processor in bounds
+        }
+
+    def _preemption_records(self) -> list[PreemptionRecord]:
+        """The most frequent first."""
+        often = sorted(self._preemptions.items(), key=lambda one: (-one[1], one[0]))
+        return [
+            PreemptionRecord(processor=processor, preempted=preempted, by=by, count=count)
+            for (processor, preempted, by), count in often
+        ]
 
     def _above_idle(self, processor: str) -> Callable[[float], float | None]:
         setup = self._processors.get(processor)

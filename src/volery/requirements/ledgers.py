@@ -89,7 +89,9 @@ class ComponentLedger:
         """It worked, but no computing of its own was ever charged."""
         return not self.charges and bool(self.activations.count or self.calls.count)
 
-    def record(self, energy: Callable[[float], float | None]) -> ComponentRecord:
+    def record(
+        self, energy: Callable[[float], float | None], response_bound: Ns | None = None
+    ) -> ComponentRecord:
         """Its row; *energy* gives joules above idle for busy core-seconds of its processor."""
         unpriced = self.unpriced_s()
         by_law = energy(unpriced)
@@ -104,6 +106,7 @@ class ComponentLedger:
             deadline_misses=self.misses,
             calls=self.calls.count,
             response_s=self._response(),
+            response_bound_s=None if response_bound is None else to_seconds(response_bound),
         )
 
     def _response(self) -> ResponseRecord:

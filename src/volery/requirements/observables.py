@@ -44,6 +44,11 @@ _DESCRIBED: dict[str, dict[str, tuple[str, str]]] = {
         "energy": ("J", "energy drawn from the battery"),
         "failures": ("", "operations that did not succeed"),
     },
+    "chain": {
+        "latency": ("s", "greatest age of what arrived at the end of a chain of topics"),
+        "latency_mean": ("s", "mean age"),
+        "latency_p95": ("s", "age that 95 % do not exceed, at most 0.2 % too high"),
+    },
     "application": {
         "ordered": ("", "parcels ordered"),
         "delivered": ("", "parcels delivered"),
@@ -58,6 +63,7 @@ _MAKERS: dict[str, dict[str, Make]] = {
     "component": observers.COMPONENT,
     "processor": observers.PROCESSOR,
     "vehicle": observers.VEHICLE,
+    "chain": observers.CHAIN,
     "application": observers.APPLICATION,
 }
 
@@ -95,6 +101,7 @@ def _kind(subject: str, quantity: str, setup: RunSetup) -> str:
         ("component", setup.components),
         ("processor", setup.processors),
         ("vehicle", setup.vehicles),
+        ("chain", setup.chains),
     ):
         if any(one.name == subject for one in things):
             return kind

@@ -12,6 +12,7 @@ from math import isnan, nan
 from typing import Any
 
 from volery.base.time import Ns, S, to_seconds
+from volery.requirements.chains import ChainLedger
 from volery.requirements.distribution import Distribution
 from volery.requirements.ledgers import ComponentLedger, VehicleLedger
 from volery.trace.events import (
@@ -270,6 +271,17 @@ def _lost_messages(application: str, setup: RunSetup) -> Observer:
     return _count(Message, lambda event: event.received == NONE)
 
 
+# -- chains of topics
+
+
+def _latency(reading: Callable[[Distribution], float | None]) -> Make:
+    def make(chain: str, setup: RunSetup) -> Observer:
+        ledger = ChainLedger(next(one for one in setup.chains if one.name == chain))
+        return Observer((Message,), ledger.message, lambda at: _seconds(reading(ledger.latencies)))
+
+    return make
+
+
 LANDINGS = ("land", "return_home")
 """Operations that end on the ground."""
 
@@ -298,6 +310,11 @@ VEHICLE: dict[str, Make] = {
     "airborne_time": _vehicle(lambda ledger: to_seconds(ledger.airborne)),
     "energy": _vehicle(lambda ledger: ledger.joules if ledger.metered else nan),
     "failures": _failed_operations,
+}
+CHAIN: dict[str, Make] = {
+    "latency": _latency(_largest),
+    "latency_mean": _latency(Distribution.mean),
+    "latency_p95": _latency(lambda spread: spread.quantile(0.95)),
 }
 APPLICATION: dict[str, Make] = {
     "ordered": _parcels(ORDERED),

@@ -42,12 +42,37 @@ class ResponseRecord(_Part):
     max: float | None = None
 
 
+class LatencyRecord(_Part):
+    """How long it took, in seconds."""
+
+    count: int = 0
+    mean: float | None = None
+    p95: float | None = None
+    max: float | None = None
+
+
+class ChainRecord(_Part):
+    """A chain of topics, and how old what arrived at its end was."""
+
+    topics: list[str]
+    latency_s: LatencyRecord
+
+
+class PreemptionRecord(_Part):
+    """How often a task had to make way for another one on a processor."""
+
+    processor: str
+    preempted: str
+    by: str
+    count: int
+
+
 class ComponentRecord(_Part):
     """What a component cost. ``cpu_s`` was executed on its processor; ``ros_cpu_s`` is the part owed to ROS
     calls.
 
     ``energy_j`` is what the model states for its operations, else by the energy law of its processor above
-    idle.
+    idle. ``response_bound_s`` is the bound of its response time by analysis, where there is one.
     """
 
     processor: str
@@ -60,6 +85,7 @@ class ComponentRecord(_Part):
     deadline_misses: int
     calls: int
     response_s: ResponseRecord
+    response_bound_s: float | None = None
 
 
 class ProcessorRecord(_Part):
@@ -173,6 +199,8 @@ class RunRecord(_Part):
     vehicles: dict[str, VehicleRecord]
     parcels: dict[str, ParcelRecord]
     requirements: dict[str, RequirementRecord]
+    chains: dict[str, ChainRecord] = {}
+    preemptions: list[PreemptionRecord] = []
     failures: list[FailureRecord]
     laws: list[LawRecord]
     not_counted: list[str]

@@ -18,11 +18,12 @@ from volery.components.pricing import FREE, Cost, Counted, Pricing, Stated
 from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
 from volery.graph.node import NodeId
 from volery.kernel.network import Network
-from volery.kernel.processor import Processor
+from volery.kernel.processor import QUANTUM, Processor
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
+from volery.run.background import occupy
 from volery.run.counted import core_of, ns_per_step
 
 CALL_WITHIN: Ns = 10 * S
@@ -69,17 +70,21 @@ class Platform:
         known = catalogue(*system.catalogues)
         self._entries = {model.name: known.processor(model.kind) for model in system.processors}
         self.processors = {model.name: self._processor(model) for model in system.processors}
+        for model in system.processors:
+            occupy(kernel, self.processors[model.name], model, seed)
         self._networks = {model.name: self._network(model, seed) for model in system.networks}
         self._languages = {instance.name: ros_language(instance) for instance in system.instances}
         self._tariffs: dict[tuple[str, str], Tariff] = {}
         self.warnings: dict[str, None] = {}  # an ordered set
 
     def _processor(self, model: ProcessorModel) -> Processor:
-        kernel = self._kernel
-        if model.quantum_ns is None:
-            return Processor(kernel, model.name, cores=model.cores, scheduler=model.scheduler)
         return Processor(
-            kernel, model.name, cores=model.cores, scheduler=model.scheduler, quantum=model.quantum_ns
+            self._kernel,
+            model.name,
+            cores=model.cores,
+            scheduler=model.scheduler,
+            quantum=QUANTUM if model.quantum_ns is None else model.quantum_ns,
+            context_switch=model.context_switch_ns,
         )
 
     def _network(self, model: NetworkModel, seed: int) -> Network:

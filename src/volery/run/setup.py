@@ -16,6 +16,7 @@ from volery.trace.scenery import Area, Line, Origin, Place, Scenery, scenery_to_
 from volery.trace.setup import (
     MODEL_ATTACHMENT,
     WORLD_ATTACHMENT,
+    ChainSetup,
     ComponentSetup,
     LawSetup,
     ProcessorSetup,
@@ -47,6 +48,7 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
         ),
         processors=tuple(_processor(model, platform.entry(model.name)) for model in system.processors),
         vehicles=tuple(VehicleSetup(one.name, one.autopilot, one.kind) for one in system.vehicles),
+        chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
         requirements=tuple(
             RequirementSetup(one.name, one.observe, one.relation, one.bound, one.unit)
             for one in system.requirements

@@ -26,6 +26,7 @@ from volery.trace.events import (
     Message,
     Milestone,
     Operation,
+    Preemption,
     Published,
     Slice,
     Text,
@@ -34,6 +35,7 @@ from volery.trace.events import (
 )
 from volery.trace.scenery import Area, Origin, Place, Scenery
 from volery.trace.setup import (
+    ChainSetup,
     ComponentSetup,
     LawSetup,
     ProcessorSetup,
@@ -124,6 +126,7 @@ def sample_setup(seed: int = 7, onboard_mhz: float = 1500.0) -> RunSetup:
             VehicleSetup(name, "ardupilot", "rover" if name.startswith("rover") else "multirotor")
             for name in _ROUTES
         ),
+        chains=(ChainSetup("state_to_control", ("/drone_1/state",)),),
         requirements=_REQUIREMENTS,
         laws=_LAWS,
         not_counted=("operating system and ROS master",),
@@ -288,6 +291,7 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
         yield Slice(at + 5 * MS, at + 23 * MS, "ground", 1, "central", "planner")
         yield Charge(at, "central", "ground", "operation:order", 2 * MS, 0, 0.003)
         yield Slice(at + 23 * MS, at + 25 * MS, "ground", 1, "central", "central")
+        yield Preemption(at + 25 * MS, "ground", 1, "central", "planner")
         for after, state, component, detail in _PARCEL_STEPS if number == 1 else _PARCEL_STEPS[: 4 - number]:
             yield Milestone(at + from_seconds(after), component, "parcel", f"parcel_{number}", state, detail)
     names = ["takeoff", "goto", "goto", "land", "takeoff", "goto", "goto", "land"]

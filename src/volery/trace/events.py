@@ -26,6 +26,16 @@ class Slice(NamedTuple):
     component: str
 
 
+class Preemption(NamedTuple):
+    """A task had to leave its core because a more urgent one came. Both are named as in ``Slice.task``."""
+
+    at: Ns
+    processor: str
+    core: int
+    preempted: str
+    by: str
+
+
 class Charge(NamedTuple):
     """Computing was added to what a component owes its processor.
 
@@ -200,6 +210,7 @@ class Verdict(NamedTuple):
 
 Event = (
     Slice
+    | Preemption
     | Charge
     | Activation
     | Call

@@ -70,6 +70,14 @@ class VehicleSetup:
 
 
 @dataclass(frozen=True)
+class ChainSetup:
+    """A row of topics whose end-to-end latency is observed."""
+
+    name: str
+    topics: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class RequirementSetup:
     """A bound on an observed quantity; ``relation`` is ``max`` or ``min``."""
 
@@ -108,6 +116,7 @@ class RunSetup:
     components: tuple[ComponentSetup, ...] = ()
     processors: tuple[ProcessorSetup, ...] = ()
     vehicles: tuple[VehicleSetup, ...] = ()
+    chains: tuple[ChainSetup, ...] = ()
     requirements: tuple[RequirementSetup, ...] = ()
     laws: tuple[LawSetup, ...] = ()
     not_counted: tuple[str, ...] = ()

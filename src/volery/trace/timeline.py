@@ -2,8 +2,9 @@
 
 The trace-event format (*Trace Event Format*, Google, 2016) as its JSON array, which by its definition may
 lack the closing bracket: a file whose writer was killed opens as far as it goes. A process of the timeline is
-a processor of the run and a thread one of its cores; activations, calls, vehicle operations and what the
-application follows have tracks of their own. The format's time is microseconds; three decimals keep the
+a processor of the run and a thread one of its cores; who preempted whom is marked there. Activations (with
+the names that ros2_tracing has for their begin and end), calls, vehicle operations and what the application
+follows have tracks of their own. The format's time is microseconds; three decimals keep the
 nanoseconds.
 """
 
@@ -23,6 +24,7 @@ from volery.trace.events import (
     LinkState,
     Milestone,
     Operation,
+    Preemption,
     Record,
     Slice,
     Verdict,
@@ -31,6 +33,7 @@ from volery.trace.output import Output
 
 _quote = json.JSONEncoder(ensure_ascii=False).encode
 
+_CALLBACK = '"begin": "callback_start", "end": "callback_end"'
 _ACTIVATIONS = "activations"
 _CALLS = "calls"
 _OPERATIONS = "vehicle operations"
@@ -60,6 +63,7 @@ class TimelineWriter:
         self._last: Ns = 0
         self._writers: dict[type[Any], Callable[[Any], None]] = {
             Slice: self._slice,
+            Preemption: self._preemption,
             Activation: self._activation,
             Call: self._call,
             Operation: self._operation,
@@ -119,8 +123,16 @@ class TimelineWriter:
             name = self._names[event[4:]] = _quote(whole)
         self._complete(name, start, event.end, where)
 
+    def _preemption(self, event: Preemption) -> None:
+        """On the track of the core, at the seam between the two."""
+        where = self._cores.get(event[1:3]) or self._thread(
+            event.processor, str(event.core), f"core {event.core}"
+        )
+        name = _quote(f"{event.by} preempts {event.preempted}")
+        self._line(f'{{"name":{name},"ph":"i","s":"t","ts":{_microseconds(event.at)},{where}}}')
+
     def _activation(self, event: Activation) -> None:
-        details = f'{{"deadline": {event.deadline}}}'
+        details = f'{{"deadline": {event.deadline}, {_CALLBACK}}}'
         self._span(_ACTIVATIONS, _quote(event.component), event.released, event.finished, details)
 
     def _call(self, event: Call) -> None:

@@ -14,6 +14,7 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import at
+from volery.trace.events import Event, Preemption
 
 Slices = Callable[[], list[tuple[float, float, str, str]]]
 
@@ -322,3 +323,13 @@ def test_a_processor_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(UsageError, match=said):
         Processor(virtual, "cpu", **wrong)
+
+
+def test_who_preempted_whom_is_told(virtual: VirtualKernel, events: list[Event]) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "low", at=0, ms=10, priority=1)
+    compute(virtual, core, "high", at=4, ms=3, priority=2)
+    compute(virtual, core, "equal", at=8, ms=3, priority=1)
+    virtual.run(S)
+    told = [event for event in events if isinstance(event, Preemption)]
+    assert told == [Preemption(4 * MS, "cpu", 0, "low", "high")]

@@ -12,13 +12,13 @@ SPOILT = {
         ("environment:\n", "enviroment:\n"),
         "enviroment:",
         "enviroment",
-        ["unknown key (did you mean 'environment'?)", "valid here: allocations, application, components"],
+        ["unknown key (did you mean 'environment'?)", "valid here: allocations, application, chains"],
     ),
     "typo in a nested key": (
         ("drone_1}\n  networks", "drone_1, freqency: 3}\n  networks"),
         "onboard: {is",
         "platform.processors.onboard.freqency",
-        ["unknown key (did you mean 'frequency'?)", "carried_by, cores, frequency, is"],
+        ["unknown key (did you mean 'frequency'?)", "carried_by, context_switch, cores, frequency, is"],
     ),
     "missing key": (
         ("{is: intel-i5-3470, frequency: 3000 MHz}", "{frequency: 3000 MHz}"),

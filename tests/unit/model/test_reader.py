@@ -9,7 +9,7 @@ import pytest
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import MS, S
 from volery.model.reader import check, load
-from volery.model.system import Activity, Connection, Figure, ProcessorKind, Target, TargetKind
+from volery.model.system import Activity, Chain, Connection, Figure, ProcessorKind, Target, TargetKind
 
 
 def test_units_are_si_and_times_nanoseconds(workshop):
@@ -27,6 +27,32 @@ def test_units_are_si_and_times_nanoseconds(workshop):
 def test_cores_come_from_the_catalogue_unless_stated(workshop):
     assert workshop.load().processor("ground").cores == 4
     assert workshop.load(None, None, "platform.processors.ground.cores=2").processor("ground").cores == 2
+
+
+def test_a_processor_may_be_loaded_and_switching_may_cost(workshop):
+    assert (
+        workshop.load().processor("ground").load,
+        workshop.load().processor("ground").context_switch_ns,
+    ) == (
+        0.0,
+        0,
+    )
+    changes = ("platform.processors.ground.load=20 %", "platform.processors.ground.context_switch=5 us")
+    ground = workshop.load(None, None, *changes).processor("ground")
+    assert ground.load == pytest.approx(0.2)
+    assert ground.context_switch_ns == 5000
+
+
+def test_a_chain_of_topics_can_be_observed(workshop):
+    changes = (
+        "chains.sight=[/camera, /set_point]",
+        "requirements.quick={observe: sight.latency_p95, max: 80 ms}",
+    )
+    system = workshop.load(None, None, *changes)
+    assert system.chains == (Chain("sight", ("/camera", "/set_point")),)
+    assert system.requirements[-1].bound == pytest.approx(0.08)
+    with pytest.raises(ModelError, match="full name, such as '/camera'"):
+        workshop.load(None, None, "chains.sight=[camera]")
 
 
 def test_ports_are_connected(workshop):

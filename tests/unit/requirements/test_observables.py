@@ -20,12 +20,20 @@ from volery.trace.events import (
     Slice,
     VehicleState,
 )
-from volery.trace.setup import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
+from volery.trace.setup import (
+    ChainSetup,
+    ComponentSetup,
+    ProcessorSetup,
+    RequirementSetup,
+    RunSetup,
+    VehicleSetup,
+)
 
 SETUP = RunSetup(
     components=(ComponentSetup("loop", period=100 * MS), ComponentSetup("server")),
     processors=(ProcessorSetup("onboard", cores=4),),
     vehicles=(VehicleSetup("drone_1", kind="multirotor"),),
+    chains=(ChainSetup("chain", ("/a", "/b")),),
     requirements=(RequirementSetup("r", "loop.deadline_misses", "max", 0.0),),
 )
 
@@ -165,13 +173,30 @@ def test_failures_and_lost_messages():
 
 @pytest.mark.parametrize("published", OBSERVABLES, ids=lambda one: f"{one.subject}.{one.quantity}")
 def test_everything_published_can_be_observed(published):
-    subject = {"component": "loop", "processor": "onboard", "vehicle": "drone_1"}.get(
+    subject = {"component": "loop", "processor": "onboard", "vehicle": "drone_1", "chain": "chain"}.get(
         published.subject, "application"
     )
     watching = observer(f"{subject}.{published.quantity}", SETUP)
     assert isinstance(watching.value(1 * S), float)
     assert published.description
     unit(published.unit)
+
+
+def test_latency_goes_back_to_what_a_node_had_heard_when_it_spoke():
+    def heard(topic, sent, received, publisher="camera", subscriber="/finder"):
+        return Message(sent * MS, received * MS, topic, publisher, subscriber, 1)
+
+    events = [
+        heard("/a", 0, 5),
+        heard("/a", 10, 15),
+        Message(20 * MS, NONE, "/a", "camera", "/finder", 1),
+        heard("/a", 30, 42),
+        heard("/b", 40, 50, "finder", "/pilot"),  # the third picture came after it was said
+        heard("/b", 44, 46, "finder", "/pilot"),
+        heard("/b", 60, 61, "stranger", "/pilot"),  # made from nothing
+    ]
+    assert observed("chain.latency", events) == pytest.approx(0.040)
+    assert observed("chain.latency_mean", events) == pytest.approx(0.028)
 
 
 def test_an_unknown_quantity_is_refused_with_the_choices():
