@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from volery.base import frames
 from volery.base.time import Ns
-from volery.bridge.offering import Fields, Surroundings, Topic, Translate, stamped
+from volery.bridge.offering import BODY, Fields, Surroundings, Topic, Translate, stamped
 from volery.bridge.wire import Wire
 from volery.messages import message_class, new
 
@@ -20,7 +20,6 @@ TESLA = 1e-4
 """Of a gauss."""
 PASCALS = 100.0
 """Of a hectopascal."""
-BODY = "base_link"
 IMU = "sensor_msgs/msg/Imu"
 UNKNOWN = -1.0
 """First in a covariance: there is no such measurement (sensor_msgs/Imu)."""

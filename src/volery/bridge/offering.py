@@ -15,6 +15,8 @@ from volery.bridge.wire import Wire
 from volery.graph import DEFAULT, TRANSIENT_LOCAL, Handler, Node, QoS
 from volery.messages import message_class
 
+BODY = "base_link"
+"""The frame of the vehicle's body: forward, left, up."""
 LATCHED_STATE = QoS(10, durability=TRANSIENT_LOCAL)
 
 Fields = dict[str, Any]

@@ -8,7 +8,7 @@ is heard.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from volery.base.errors import VoleryError
@@ -46,7 +46,7 @@ class Parameters:
         """Handlers by the service's name, with its type."""
         return {
             "param/get": ("mavros_msgs/srv/ParamGet", self.get),
-            "param/set": ("mavros_msgs/srv/ParamSet", self.set),
+            "param/set": ("mavros_msgs/srv/ParamSet", self.put),
             "param/pull": ("mavros_msgs/srv/ParamPull", self.pull),
             "param/push": ("mavros_msgs/srv/ParamPush", self.push),
         }
@@ -73,11 +73,14 @@ class Parameters:
         given = {"real": value} if said["param_type"] in (REAL32, REAL64) else {"integer": round(value)}
         return new("mavros_msgs/msg/ParamValue", **given)
 
-    def _heard(self, said: Fields, at: Ns) -> None:
+    def _note(self, said: Fields) -> None:
         name = said["param_id"]
         self._types[name], self._values[name] = said["param_type"], self._value(said)
+
+    def _heard(self, said: Fields, at: Ns) -> None:
+        self._note(said)
         if self._around.wanted("param/param_value"):
-            message = new(VALUE, header=stamped(at), param_id=name, value=self._message(said))
+            message = new(VALUE, header=stamped(at), param_id=said["param_id"], value=self._message(said))
             message.param_index, message.param_count = said["param_index"], said["param_count"]
             self._around.publish("param/param_value", message)
 
@@ -106,7 +109,7 @@ class Parameters:
         answer = self._ask(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
         return self._response("mavros_msgs/srv/ParamGet", answer)
 
-    def set(self, request: Any) -> Any:
+    def put(self, request: Any) -> Any:
         """``param/set``: an integer that is not 0 counts, else the real."""
         known = self._ask(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
         if known is not None:
@@ -131,40 +134,33 @@ class Parameters:
         return value if self._types[name] in (REAL32, REAL64) else round(value)
 
     def _read_all(self) -> bool:
-        """Ask for the list, then for each that was lost on the way."""
-        found: dict[int, str] = {}
-        count = -1
+        """Ask for the list, then for each that was lost on the way, until there is silence."""
+        found: set[int] = set()
+        count = 0
         with self._wire.listen("PARAM_VALUE") as ear:
             for _ in range(TRIES):
                 self._wire.send_to("PARAM_REQUEST_LIST", {})
-                count = self._collect(ear.next, found)
+                while (answer := ear.next(ANSWER_WITHIN)) is not None:
+                    count = self._keep(answer.fields, found)
+                    if len(found) == count:
+                        return True
                 if found:
                     break
             for _ in range(TRIES):
-                for index in (index for index in range(count) if index not in found):
+                while (index := _first_missing(found, count)) is not None:
                     self._wire.send_to("PARAM_REQUEST_READ", {"param_id": "", "param_index": index})
-                    count = max(count, self._collect(ear.next, found, 1))
-        return bool(found) and len(found) >= count
+                    answer = ear.next(ANSWER_WITHIN)
+                    if answer is None or answer.fields["param_index"] != index:
+                        break
+                    self._keep(answer.fields, found)
+        return bool(found) and len(found) == count
 
-    def _collect(
-        self, hear: Callable[[Ns], Frame | None], found: dict[int, str], at_most: int | None = None
-    ) -> int:
-        """Take values until there is silence, or all are there, or *at_most* have come; how many there
-        are.
-        """
-        count = taken = 0
-        while at_most is None or taken < at_most:
-            answer = hear(ANSWER_WITHIN)
-            if answer is None:
-                break
-            said, taken = answer.fields, taken + 1
-            if said["param_index"] < said["param_count"]:
-                found[said["param_index"]] = said["param_id"]
-                self._types[said["param_id"]] = said["param_type"]
-                self._values[said["param_id"]] = self._value(said)
-            count = max(count, said["param_count"])
-            if len(found) >= count:
-                break
+    def _keep(self, said: Fields, found: set[int]) -> int:
+        """Note a value; how many there are."""
+        count: int = said["param_count"]
+        if said["param_index"] < count:
+            found.add(said["param_index"])
+        self._note(said)
         return count
 
     def push(self, request: Any) -> Any:
@@ -178,3 +174,7 @@ class Parameters:
                     return response(False, sent)
                 sent += 1
         return response(True, sent)
+
+
+def _first_missing(found: set[int], count: int) -> int | None:
+    return next((index for index in range(count) if index not in found), None)

@@ -14,8 +14,7 @@ from typing import Any
 from volery.base import frames
 from volery.base.time import Ns
 from volery.bridge.inertial import body_rates, orientation
-from volery.bridge.offering import LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
-from volery.bridge.status import BODY
+from volery.bridge.offering import BODY, LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
 from volery.messages import message_class, new
 
 MAP = "map"

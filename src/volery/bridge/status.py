@@ -11,10 +11,9 @@ from math import nan
 
 from volery.base.time import Ns
 from volery.bridge.modes import Firmware, mode_name
-from volery.bridge.offering import LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
+from volery.bridge.offering import BODY, LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
 from volery.messages import new
 
-BODY = "base_link"
 _UNKNOWN_U16 = 65535
 _SERVOS = 16
 _SYS_STATUS = {

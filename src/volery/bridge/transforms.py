@@ -23,9 +23,8 @@ from typing import Any
 from volery.base import frames
 from volery.base.time import Ns
 from volery.bridge.inertial import orientation
-from volery.bridge.offering import Fields, Surroundings, Topic, Translate, stamped
+from volery.bridge.offering import BODY, Fields, Surroundings, Topic, Translate, stamped
 from volery.bridge.placing import MAP
-from volery.bridge.status import BODY
 from volery.graph import LATCHED, QoS
 from volery.messages import message_class, new
 

@@ -95,3 +95,13 @@ def test_silence_is_no_success(aviary: Any) -> None:
     aviary.connect()
     answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (False, 0)
+
+
+def test_what_is_never_answered_does_not_hold_up_for_long(aviary: Any) -> None:
+    aviary.connect()
+    serve(aviary, lost=lambda name: name != "SYSID")
+    del aviary.answers["PARAM_REQUEST_READ"]
+    start = aviary.kernel.now()
+    answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
+    assert (answer.success, answer.param_received) == (False, 1)
+    assert aviary.kernel.now() - start < 6 * S
