@@ -18,7 +18,7 @@ from volery.trace.reader import read
 
 from .conftest import HERE
 
-LIMIT_S = 30
+LIMIT_S = 60
 Said = dict[str, list[bytes]]
 
 MODEL = """
