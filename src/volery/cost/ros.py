@@ -40,7 +40,7 @@ NOT_COUNTED = (
     "ROS service calls (left out of the law: negligible beside the service's own execution)",
     "ROS parameter, name and time look-ups",
     "ROS discovery and the master",
-    "connections, messages received and time spent in spin, where a law has no figures for them (the paper's)",
+    "connections, messages received and time spent in spin, where a law has no figures for them",
 )
 """What the law leaves out, in words for a report."""
 

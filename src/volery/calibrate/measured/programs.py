@@ -11,12 +11,12 @@ from pathlib import Path
 
 from volery.base.errors import Location, ModelError
 from volery.calibrate.ros.stage import roscpp_program
+from volery.components.cpp.sources import find_sources
 from volery.components.python import script_or_class
 from volery.model.system import Instance, System
 from volery.run.platform import commanded_by
 
 METERS = Path(str(files("volery.calibrate.measured").joinpath("meters")))
-CPP = (".cpp", ".cc", ".cxx")
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,7 @@ def _cannot(instance: Instance, what: str) -> ModelError:
 def _program(system: System, instance: Instance) -> NodeProgram:
     file = system.file_of(instance.component)
     if instance.component.language == "roscpp":
-        sources = sorted(one for one in file.iterdir() if one.suffix in CPP) if file.is_dir() else [file]
-        start: tuple[str, ...] = (str(roscpp_program(instance.name, [*sources, METERS / "roscpp.cpp"])),)
+        start: tuple[str, ...] = (str(_compiled(instance, file)),)
     else:
         start = (sys.executable, str(METERS / "rospy.py"), str(file))
     return NodeProgram(
@@ -70,6 +69,13 @@ def _program(system: System, instance: Instance) -> NodeProgram:
         (*start, *_arguments(instance)),
         not instance.is_environment,
     )
+
+
+def _compiled(instance: Instance, file: Path) -> Path:
+    component = instance.component
+    sources = [*find_sources(file, component.where).compiled, METERS / "roscpp.cpp"]
+    options = component.build
+    return roscpp_program(instance.name, sources, options.flags, options.libraries)
 
 
 def _arguments(instance: Instance) -> Iterator[str]:

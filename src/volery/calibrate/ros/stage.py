@@ -22,6 +22,9 @@ from volery.transports.ros1.roscore import environment
 
 CLIENTS = ("roscpp", "rospy", "rclpy")
 PROBES = Path(str(files("volery.calibrate.ros").joinpath("probes")))
+MESSAGES = ("geometry_msgs", "sensor_msgs", "nav_msgs")
+"""Packages that nodes like to include, where they are installed."""
+
 GOOD_BYE_S = 10.0
 LIMIT_S = 120.0
 _DOMAIN = "77"
@@ -112,7 +115,8 @@ def roscpp_flags() -> tuple[list[str], list[str]]:
     """What to compile and what to link a roscpp node with. ``UsageError`` names the missing package."""
     if shutil.which("pkg-config") is None:
         raise UsageError("roscpp is found by pkg-config, which is not there: on Debian install pkg-config")
-    modules = ("roscpp", "std_msgs", "std_srvs")
+    there = [one for one in MESSAGES if not subprocess.call(["pkg-config", "--exists", one])]
+    modules = ("roscpp", "std_msgs", "std_srvs", *there)
     found = []
     for option in ("--cflags", "--libs"):
         asked = subprocess.run(["pkg-config", option, *modules], capture_output=True, text=True, check=False)
@@ -125,11 +129,17 @@ def roscpp_flags() -> tuple[list[str], list[str]]:
     return found[0], found[1]
 
 
-def roscpp_program(name: str, sources: Sequence[Path]) -> Path:
-    """The program of *sources*, compiled and linked against roscpp, or as it was made before."""
+def roscpp_program(
+    name: str, sources: Sequence[Path], flags: Sequence[str] = (), libraries: Sequence[str] = ()
+) -> Path:
+    """The program of *sources*, compiled and linked against roscpp, or as it was made before.
+
+    *flags* go to the compiler, *libraries* to the linker, by the names that follow ``-l``.
+    """
     compile_with, link_with = roscpp_flags()
     tools = Toolchain(name)
-    return tools.executable([tools.object_file(one, flags=compile_with) for one in sources], link_with)
+    objects = [tools.object_file(one, flags=[*compile_with, *flags]) for one in sources]
+    return tools.executable(objects, [*(f"-l{one}" for one in libraries), *link_with])
 
 
 @contextmanager
