@@ -213,9 +213,7 @@ def main() -> None:
     paths = [KERNELS / f"{name}.cpp" for name in given.kernels] or sorted(KERNELS.glob("*.cpp"))
     on_this_machine(paths, given.rounds)
     if given.no_qemu or shutil.which("qemu-aarch64") is None:
-        print(
-            "without qemu-aarch64 (Debian: scripts/debian-packages native qemu) instructions are not compared\n"
-        )
+        print("no qemu-aarch64 (scripts/debian-packages native qemu): instructions are not compared\n")
     else:
         on_a72(paths)
     anchors()

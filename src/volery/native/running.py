@@ -82,8 +82,14 @@ def build(program: Program, wanted: Wanted, instrumented: Path, folder: Path) ->
     clang = toolchain().clang
     with as_file(files("volery.native").joinpath("runtime/runtime.c")) as runtime:
         command = [clang, "-O2", "-x", "c", str(source), str(runtime), "-x", "none", str(instrumented)]
-        run_tool([*command, *wanted.links, "-lm", "-o", str(out)])
+        run_tool([*command, *_linked(program, wanted), "-o", str(out)])
     return out
+
+
+def _linked(program: Program, wanted: Wanted) -> tuple[str, ...]:
+    """The linker's options; where a function is called, the driver's main comes before the program's own."""
+    first = ("-Wl,-z,muldefs",) if wanted.entry and "main" in program.defined else ()
+    return (*first, *wanted.links, "-lm")
 
 
 def build_timing(program: Program, wanted: Wanted, code: Path, folder: Path) -> Path:
@@ -93,7 +99,7 @@ def build_timing(program: Program, wanted: Wanted, code: Path, folder: Path) -> 
     source.write_text(timing_driver(program, wanted) + timing, encoding="utf-8")
     out = folder / "timing"
     command = [toolchain().clang, "-O1", "-w", "-x", "c", str(source), "-x", "none", str(code)]
-    run_tool([*command, *wanted.links, "-lm", "-o", str(out)])
+    run_tool([*command, *_linked(program, wanted), "-o", str(out)])
     return out
 
 

@@ -1,0 +1,137 @@
+"""With the real compiler: counts that are known exactly, costs that scale, errors that are the compiler's."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import subprocess
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.base.errors import UsageError
+from volery.cli.main import app
+from volery.cost.core import core_law
+from volery.native import CompilerError, compile_program, instrument
+from volery.native.estimate import estimate
+from volery.native.running import Wanted
+from volery.native.toolchain import toolchain
+
+pytestmark = pytest.mark.integration
+
+SOURCE = """
+#include <cmath>
+static volatile double kept;
+double work(int rounds) {
+    double sum = 0.0;
+    for (int i = 1; i <= rounds; ++i)
+        sum = sum * 0.5 + std::sin(sum + i);
+    kept = sum;
+    return sum;
+}
+int main() { work(100); }
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _llvm(tmp_path_factory):
+    try:
+        toolchain()
+    except UsageError as error:
+        if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
+            pytest.fail(f"{error}, and VOLERY_REQUIRE_ALL=1 asks for it")
+        pytest.skip(str(error))
+    os.environ["VOLERY_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    yield
+    del os.environ["VOLERY_CACHE"]
+
+
+@pytest.fixture
+def source(tmp_path):
+    file = tmp_path / "work.cpp"
+    file.write_text(SOURCE, encoding="utf-8")
+    return file
+
+
+def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
+    program = compile_program([source], core_law("rpi4-cortex-a72"))
+    once, twice = (estimate(program, Wanted(f"work({rounds})")) for rounds in (1000, 2000))
+    assert once.library_calls == {"sin": 1000}
+    assert twice.cycles == pytest.approx(2 * once.cycles, rel=0.03)
+    assert any("sin" in remark for remark in once.left_out)
+    assert once.places[0].source.endswith("work.cpp:7")
+
+
+def test_the_same_run_costs_the_same_each_time(source):
+    program = compile_program([source], core_law("intel-i5-3470"))
+    first, second = (estimate(program, Wanted("work(500)")) for _ in range(2))
+    assert (first.cycles, first.instructions) == (second.cycles, second.instructions)
+    assert (first.counts == second.counts).all()
+
+
+def test_components_get_an_object_that_counts(source, tmp_path):
+    law = core_law("rpi4-cortex-a72")
+    made = instrument([source], law, tmp_path / "work.o")
+    library = tmp_path / "libwork.so"
+    subprocess.run([toolchain().clang, "-shared", made.object_file, "-lm", "-o", library], check=True)
+    loaded = ctypes.CDLL(str(library))
+    length = ctypes.c_uint64.in_dll(loaded, "volery_counters_length").value
+    counters = (ctypes.c_uint64 * length).in_dll(loaded, "volery_counters")
+    loaded._Z4worki(300)
+    rounds = max(counters)
+    assert rounds in (300, 150, 75)  # the loop may be unrolled
+    assert made.costs.total(list(counters)) > 300 * 10
+    assert "code alone" in made.estimated
+    assert made.time(1500.0, 1500.0) == 1000
+
+
+def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
+    law = core_law("rpi4-cortex-a72")
+    estimate(compile_program([source], law), Wanted("work(50)"))
+    assert instrument([source], law, tmp_path / "work.o").estimated == ""
+
+
+def test_the_command_gives_time_and_energy(source):
+    done = CliRunner().invoke(app, ["cost", str(source), "--on", "rpi4-cortex-a72@600MHz", "--json"])
+    told = json.loads(done.stdout)
+    assert done.exit_code == 0
+    assert told["time_s"] == pytest.approx(told["cycles"] / 600e6)
+    assert told["energy_j"] > 0.0
+    assert told["provenance"] == "estimated"
+
+
+def test_a_compiler_error_is_the_compilers(tmp_path):
+    wrong = tmp_path / "wrong.cpp"
+    wrong.write_text("int main() { return nobody; }", encoding="utf-8")
+    with pytest.raises(CompilerError, match=r"wrong.cpp:1:21: error: use of undeclared identifier 'nobody'"):
+        compile_program([wrong], core_law("rpi4-cortex-a72"))
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("wrok", "did you mean 'work'"),
+        ("work", r"takes 1 arguments, not 0: work\(int\)"),
+        ("work(x)", "no number"),
+    ],
+)
+def test_a_wrong_entry_is_told(source, entry, said):
+    program = compile_program([source], core_law("rpi4-cortex-a72"))
+    with pytest.raises(UsageError, match=said):
+        estimate(program, Wanted(entry))
+
+
+def test_a_crash_is_told(tmp_path):
+    crashing = tmp_path / "crash.cpp"
+    crashing.write_text("int main() { volatile int *p = nullptr; return *p; }", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"SIGSEGV|SIGILL|SIGTRAP"):
+        estimate(compile_program([crashing], core_law("rpi4-cortex-a72")), Wanted())
+
+
+def test_without_llvm_the_error_names_the_packages(monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    toolchain.cache_clear()
+    with pytest.raises(UsageError, match="apt install clang-19 llvm-19"):
+        toolchain()
+    toolchain.cache_clear()

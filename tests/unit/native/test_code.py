@@ -1,0 +1,61 @@
+from volery.native.code import Block, blocks, counted, retarget, traced
+
+TEXT = """\
+target datalayout = "e-m:e"
+target triple = "x86_64-pc-linux-gnu"
+define dso_local i32 @step(i32 noundef %x) local_unnamed_addr #0 personality ptr @gxx {
+entry:
+  %cmp = icmp sgt i32 %x, 0
+  br i1 %cmp, label %"odd name", label %exit
+"odd name":
+  %once = phi i32 [ %x, %entry ]
+  %y = mul i32 %once, 3
+  invoke void @far() to label %exit unwind label %lpad
+lpad:
+  %caught = landingpad { ptr, i32 }
+          cleanup, !dbg !3
+  br label %exit
+exit:
+  %r = phi i32 [ 0, %entry ], [ 1, %"odd name" ], [ 2, %lpad ]
+  ret i32 %r
+}
+define void @bare() {
+  ret void
+}
+attributes #0 = { "target-cpu"="x86-64" "tune-cpu"="generic" }
+"""
+
+
+def test_blocks_are_found_in_order_with_and_without_labels():
+    assert blocks(TEXT) == [
+        Block("step", "entry", True),
+        Block("step", "odd name"),
+        Block("step", "lpad"),
+        Block("step", "exit"),
+        Block("bare", "", True),
+    ]
+
+
+def test_a_counter_comes_after_what_must_stand_first_in_a_block():
+    lines = counted(TEXT).splitlines()
+    landing = lines.index("          cleanup, !dbg !3")
+    assert lines[landing + 1].startswith("  %volery.seen.2 = load i64")
+    phi = next(number for number, line in enumerate(lines) if line.startswith("  %r = phi"))
+    assert lines[phi + 1].startswith("  %volery.seen.3 = load i64")
+
+
+def test_the_array_has_one_counter_for_each_block():
+    assert "@volery_counters = alias [5 x i64]" in counted(TEXT)
+    assert "@volery_counters_length = constant i64 5" in counted(TEXT)
+
+
+def test_a_trace_calls_with_the_number_of_each_block():
+    assert [f"@volery_trace(i32 {number})" in traced(TEXT) for number in range(6)] == [True] * 5 + [False]
+
+
+def test_retargeted_code_leans_towards_no_processor():
+    text = retarget(TEXT, "aarch64-unknown-linux-gnu", "e-m:e-i8:8:32")
+    assert 'target triple = "aarch64-unknown-linux-gnu"' in text
+    assert 'target datalayout = "e-m:e-i8:8:32"' in text
+    assert "target-cpu" not in text
+    assert "{ }" not in text  # a group of attributes may not be empty
