@@ -83,7 +83,11 @@ class Roscore:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
-        self._wait(log)
+        try:
+            self._wait(log)
+        except BaseException:  # Ctrl-C as well: nobody else knows of it yet
+            self.stop()
+            raise
 
     def _wait(self, log: Path) -> None:
         assert self._process is not None
@@ -92,7 +96,6 @@ class Roscore:
             over = self._process.poll() is not None
             if over or time.monotonic() > end:
                 said = log.read_text(errors="replace")[-1000:]
-                self.stop()
                 what = "ended" if over else f"did not answer within {READY_S:g} s"
                 raise LinkSilent(f"roscore at {self.uri} {what}; it said: {said}")
             time.sleep(GLANCE_S)
