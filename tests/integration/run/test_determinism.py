@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -46,6 +49,18 @@ def test_twice_in_one_process_and_with_somebody_who_watches(delivery, flown, tmp
     assert digest(again.folder) == digest(flown)
     assert len(seen) > 30
     assert (again.folder / "timeline.json").read_bytes() == (flown / "timeline.json").read_bytes()
+
+
+def test_beside_programs_that_take_all_the_time_they_get(delivery, flown, tmp_path):
+    forever = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(forever) for _ in range(os.cpu_count() or 1)]
+    try:
+        again = pocket(delivery, tmp_path)
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    assert digest(again.folder) == digest(flown)
 
 
 def test_what_is_not_kept_is_the_same_run(delivery, tmp_path, flown):
