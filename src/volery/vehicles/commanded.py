@@ -7,7 +7,7 @@ What ends an operation and what is then done with the vehicle:
 |---|---|---|
 | it strays out of limits or fence | ``OutOfBounds`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
-| somebody else changes the mode, or its target | ``Overridden``, ``Failsafe`` | is theirs; nothing is sent to it |
+| somebody else changes its mode or target | ``Overridden``, ``Failsafe`` | is theirs; nothing is sent to it |
 | another task of this program asks for hold, return home, land or kill | ``Overridden`` | does that |
 | the link falls silent | ``LinkLost`` | does what its parameters say: ``if_silent`` |
 
