@@ -3,7 +3,8 @@
 The same functions talk and listen everywhere: on the embedded graph as components that import our ``rospy``
 and ``rclpy``, on real ROS as two processes that import the real ones. Latency is the wall's time from just
 before ``publish`` to the begin of the callback, one message at a time; throughput is how many of a burst are
-heard a second. Medians over rounds that take turns. What is not installed is left out, and said.
+heard a second; CPU is what a message of the burst takes of both processes' time, which a busy machine
+disturbs least. Medians over rounds that take turns. What is not installed is left out, and said.
 
     python bench/transports.py [--quick]
 """
@@ -22,7 +23,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
@@ -39,13 +40,22 @@ TIMEOUT_S = 120
 DISTRIBUTIONS = ("jazzy", "kilted")
 
 
+class Taken(NamedTuple):
+    """Median latency in us; messages heard per second; us of CPU time per message."""
+
+    latency: float
+    throughput: float
+    cpu: float
+
+
 @dataclass
 class Heard:
-    """What a listener notes: seconds from publish to callback, and a burst's times of arrival."""
+    """What a listener notes: seconds from publish to callback, a burst's times of arrival, its CPU time."""
 
     latencies: list[float] = field(default_factory=list)
     burst: list[float] = field(default_factory=list)
     begun: float = 0.0
+    cpu: float = 0.0
     ended: bool = False
 
     def hear(self, message: Any) -> None:
@@ -53,13 +63,17 @@ class Heard:
         if phase == "single":
             self.latencies.append(now - sent)
         elif phase == "burst":
-            self.begun = self.begun or sent
+            if not self.burst:
+                self.begun, self.cpu = sent, -process_time()
             self.burst.append(now)
-        self.ended = phase == "end"
+        elif phase == "end":
+            self.cpu += process_time()
+            self.ended = True
 
-    def result(self) -> tuple[float, float]:
-        """Median latency in us; messages heard per second."""
-        return median(self.latencies) * 1e6, len(self.burst) / (self.burst[-1] - self.begun)
+    def result(self, cpu: float) -> Taken:
+        """*cpu*: seconds that the burst took of all processes."""
+        heard, lasted = len(self.burst), self.burst[-1] - self.begun
+        return Taken(median(self.latencies) * 1e6, heard / lasted, cpu / heard * 1e6)
 
 
 def talk(
@@ -68,27 +82,31 @@ def talk(
     listeners: Callable[[], int],
     pause: Callable[[float], None],
     count: int,
-) -> None:
-    """Singles, a burst, and the end, once somebody listens and until nobody does."""
+) -> float:
+    """Singles, a burst, and the end, while somebody listens; gives the CPU seconds of the burst."""
     while not listeners():
         pause(0.05)
     pause(0.5)
+    used = {}
     for phase, gap in (("single", SPACING_S), ("burst", 0.0), ("end", 0.0)):
         pose.header.frame_id = phase
+        before = process_time()
         for _ in range({"single": count // 20, "burst": count, "end": 1}[phase]):
             pose.pose.position.x = perf_counter()
             publish(pose)
             if gap:
                 pause(gap)
         pause(1.0)
+        used[phase] = process_time() - before
     while listeners():
         pause(0.05)
+    return used["burst"]
 
 
-def rospy_talker(rospy: Any, kind: Any, count: int) -> None:
+def rospy_talker(rospy: Any, kind: Any, count: int) -> float:
     rospy.init_node("talker", disable_signals=True)
     publisher = rospy.Publisher("pose", kind, queue_size=count)
-    talk(kind(), publisher.publish, publisher.get_num_connections, rospy.sleep, count)
+    return talk(kind(), publisher.publish, publisher.get_num_connections, rospy.sleep, count)
 
 
 def rospy_listener(rospy: Any, kind: Any, heard: Heard, count: int) -> None:
@@ -99,7 +117,7 @@ def rospy_listener(rospy: Any, kind: Any, heard: Heard, count: int) -> None:
     subscriber.unregister()
 
 
-def rclpy_talker(rclpy: Any, kind: Any, count: int) -> None:
+def rclpy_talker(rclpy: Any, kind: Any, count: int) -> float:
     rclpy.init()
     node = rclpy.create_node("talker")
     publisher = node.create_publisher(kind, "pose", count)
@@ -108,7 +126,7 @@ def rclpy_talker(rclpy: Any, kind: Any, count: int) -> None:
     def pause(seconds: float) -> None:
         clock.sleep_for(rclpy.duration.Duration(seconds=seconds))
 
-    talk(kind(), publisher.publish, publisher.get_subscription_count, pause, count)
+    return talk(kind(), publisher.publish, publisher.get_subscription_count, pause, count)
 
 
 def rclpy_listener(rclpy: Any, kind: Any, heard: Heard, count: int) -> None:
@@ -132,8 +150,8 @@ class Free(NamedTuple):
 FREE = Free()
 
 
-def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
-    """Both as components of one run in virtual time."""
+def embedded(library: str, recorded: bool, count: int) -> Taken:
+    """Both as components of one run in virtual time, so that the talker's CPU time is that of both."""
     kernel = VirtualKernel()
 
     def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
@@ -143,26 +161,27 @@ def embedded(library: str, recorded: bool, count: int) -> tuple[float, float]:
     face = importable(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
     kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))
-    kernel.spawn(lambda: TALKERS[library](face, kind, count), "talker", Place("talker"))
+    used: list[float] = []
+    kernel.spawn(lambda: used.append(TALKERS[library](face, kind, count)), "talker", Place("talker"))
     kernel.call_at(TIMEOUT_S * S + 1, lambda: None)  # the listener's threads wait for ever: no deadlock
     kernel.run(TIMEOUT_S * S)
-    return heard.result()
+    return heard.result(used[0])
 
 
 def peer(library: str, role: str, count: int) -> None:
-    """One of the two processes on real ROS; the listener prints what it has found."""
+    """One of the two processes on real ROS; each prints its CPU time, the listener all that it has found."""
     real = importlib.import_module(library)
     kind = importlib.import_module("geometry_msgs.msg").PoseStamped
     if role == "talker":
-        TALKERS[library](real, kind, count)
+        print(TALKERS[library](real, kind, count), flush=True)
     else:
         heard = Heard()
         LISTENERS[library](real, kind, heard, count)
-        print(json.dumps(heard.result()), flush=True)
+        print(json.dumps(heard.result(heard.cpu)), flush=True)
     os._exit(0)  # the libraries' own ends take seconds and are not measured
 
 
-def real_ros(python: str, library: str, surroundings: Mapping[str, str], count: int) -> tuple[float, float]:
+def real_ros(python: str, library: str, surroundings: Mapping[str, str], count: int) -> Taken:
     """Two processes that import the real library."""
     asked = [python, __file__, "--count", str(count), "--library", library, "--role"]
     with ExitStack() as stack:
@@ -171,12 +190,12 @@ def real_ros(python: str, library: str, surroundings: Mapping[str, str], count: 
             started = subprocess.Popen([*asked, role], env=surroundings, stdout=subprocess.PIPE, text=True)
             processes[role] = stack.enter_context(started)
             stack.callback(started.kill)
-        said, _ = processes["listener"].communicate(timeout=TIMEOUT_S)
-    latency, throughput = json.loads(said)
-    return latency, throughput
+        listened = Taken(*json.loads(processes["listener"].communicate(timeout=TIMEOUT_S)[0]))
+        talking = float(processes["talker"].communicate(timeout=TIMEOUT_S)[0])
+    return listened._replace(cpu=listened.cpu + talking / count * 1e6)
 
 
-Measure = Callable[[], tuple[float, float]]
+Measure = Callable[[], Taken]
 
 
 def ros1(stack: ExitStack, count: int) -> dict[str, Measure]:
@@ -213,13 +232,17 @@ def ros2(count: int) -> dict[str, Measure]:
     return found
 
 
-def show(taken: Mapping[str, list[tuple[float, float]]]) -> None:
-    print(f"{'':<34}{'latency':>12}{'':>9}{'throughput':>14}")
+def show(taken: Mapping[str, list[Taken]]) -> None:
+    print(f"{'':<28}{'latency':>11}{'':>8}{'throughput':>14}{'':>8}{'CPU':>12}")
     for name, values in taken.items():
         library = name.split()[-1] if name.startswith("embedded") else name.partition(" ")[0]
-        base_us, base_hz = (median(column) for column in zip(*taken[f"embedded, {library}"], strict=True))
-        us, hz = (median(column) for column in zip(*values, strict=True))
-        print(f"{name:<34}{us:>9.1f} us{us / base_us:>7.1f} x{hz:>9.0f} 1/s{base_hz / hz:>7.1f} x")
+        base = Taken(*map(median, zip(*taken[f"embedded, {library}"], strict=True)))
+        here = Taken(*map(median, zip(*values, strict=True)))
+        print(
+            f"{name:<28}{here.latency:>8.1f} us{here.latency / base.latency:>6.1f} x"
+            f"{here.throughput:>10.0f} 1/s{base.throughput / here.throughput:>6.1f} x"
+            f"{here.cpu:>9.1f} us{here.cpu / base.cpu:>6.1f} x"
+        )
 
 
 def main() -> None:
@@ -241,7 +264,7 @@ def main() -> None:
             **ros1(stack, count),
             **ros2(count),
         }
-        taken: dict[str, list[tuple[float, float]]] = {name: [] for name in what}
+        taken: dict[str, list[Taken]] = {name: [] for name in what}
         for _ in range(rounds):
             for name, measure in what.items():
                 taken[name].append(measure())
