@@ -113,3 +113,17 @@ out((rospy.search_param("speed"), rospy.search_param("slowness"), rospy.get_para
 """,
     )
     assert stage.run(S) == [3, "ROSException", "ROSInitException", ("/speed", None, 3)]
+
+
+def test_times_are_cut_as_genpy_cuts_them(stage: Any) -> None:
+    stage.component(
+        "node",
+        """
+rospy.init_node("node")
+out([rospy.Time.from_sec(one).to_nsec() for one in (0.3, 1.1, 2.3)])
+out((rospy.Duration(2.3).to_sec(), rospy.Time(1, 100_000_000).to_time(), rospy.Rate(60).sleep_dur.to_nsec()))
+""",
+    )
+    nanoseconds, seconds = stage.run(S)
+    assert nanoseconds == [300_000_000, 1_100_000_000, 2_299_999_999]  # as genpy 0.6.16 has them
+    assert seconds == (2.299999999, 1.1, 16_666_666)

@@ -8,6 +8,9 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
+from volery.faces.tf2.errors import ExtrapolationException, InvalidArgumentException
+from volery.faces.tf2.geometry import IDENTITY
+from volery.faces.tf2.tree import Tree
 
 BROADCASTER = """
 import rospy
@@ -228,3 +231,21 @@ except Exception as error:
 def test_a_library_that_is_not_there_is_named(stage: Any, line: str) -> None:
     with pytest.raises(ImportError, match="actionlib is not there on the embedded graph; make topics"):
         stage.load(line)
+
+
+def test_old_transforms_are_forgotten_and_wrong_ones_refused() -> None:
+    tree = Tree(cache=10 * S)
+    for second in range(1, 30):
+        tree.learn("base", "odom", second * S, IDENTITY)
+    tree.learn("base", "odom", 5 * S, IDENTITY)  # too late to matter
+    assert tree.look_up("odom", "base", 19 * S)[0] == 19 * S
+    with pytest.raises(ExtrapolationException, match=r"earliest data is at time 19\.0"):
+        tree.look_up("odom", "base", 18 * S)
+    for child, parent, rigid in (
+        ("a", "a", IDENTITY),
+        ("", "a", IDENTITY),
+        ("/a", "b", IDENTITY),
+        ("a", "b", IDENTITY._replace(rotation=(0.0, 0.0, 0.0, 0.0))),
+    ):
+        with pytest.raises(InvalidArgumentException):
+            tree.learn(child, parent, S, rigid)
