@@ -16,6 +16,7 @@ _LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
 _CAME_FROM = re.compile(r'(?:#|//) %("[^"]+"|[^\s"]+)')
 _PLACE = re.compile(r"^\t\.loc\t(\d+) (\d+)")
 _FILE = re.compile(r'^\t\.file\t(\d+) (?:"([^"]*)" )?"([^"]*)"')
+_ALIGN = re.compile(r"^\t\.p2align\t(\d+)(?:, [^,]*, (\d+))?")
 _COMMENT = re.compile(r"\s+(?:#|//) .*$|\s+//.*$")
 _DIRECT = re.compile(r"^[.\w$]+(?:@PLT)?$")
 
@@ -56,18 +57,21 @@ class Piece:
     target: str = ""
 
 
-def pieces(text: str) -> list[Piece]:
-    """All pieces of a file of assembly, in its order: what falls through goes on in the next."""
+def pieces(text: str, bytes_each: int = 0) -> list[Piece]:
+    """All pieces of a file of assembly, in its order: what falls through goes on in the next.
+
+    Where all instructions are *bytes_each* long, those that pad the code to an alignment are entered, too.
+    """
     found: list[Piece] = []
     files: dict[str, str] = {}
-    function, source = "", ""
+    function, source, offset = "", "", 0
     for line in text.splitlines():
         if named := _FILE.match(line):
             files[named[1]] = (
                 f"{named[2]}/{named[3]}" if named[2] and not named[3].startswith("/") else named[3]
             )
         elif begins := _FUNCTION.match(line):
-            function = begins[1].strip('"')
+            function, offset = begins[1].strip('"'), 0
         elif line.startswith(".Lfunc_end"):
             function = ""
         elif not function:
@@ -77,9 +81,23 @@ def pieces(text: str) -> list[Piece]:
             found.append(Piece(function, label[1] or "", came[1].strip('"') if came else None))
         elif place := _PLACE.match(line):
             source = f"{files.get(place[1], '?')}:{place[2]}" if place[2] != "0" else ""
+        elif bytes_each and (aligned := _ALIGN.match(line)):
+            offset += _pad(found, aligned, offset, bytes_each)
         elif line.startswith("\t") and line[1:2] not in ".#/" and found:
             _enter(found, _instruction(line, source))
+            offset += bytes_each
     return found
+
+
+def _pad(found: list[Piece], aligned: re.Match[str], offset: int, bytes_each: int) -> int:
+    """Enter what pads from *offset* on, where it is run through; how many bytes that is."""
+    padding = -offset % (1 << int(aligned[1]))
+    if padding > int(aligned[2] or padding):
+        return 0
+    if found and found[-1].end in (End.FALLS, End.BRANCH, End.CALL):
+        for _ in range(padding // bytes_each):
+            _enter(found, Instruction("nop", (), ""))
+    return padding
 
 
 def _enter(found: list[Piece], one: Instruction) -> None:

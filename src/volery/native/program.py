@@ -64,7 +64,7 @@ class Program:
     @cached_property
     def pieces(self) -> tuple[Piece, ...]:
         """The target's machine code."""
-        return tuple(pieces(self.assembly))
+        return tuple(pieces(self.assembly, 4 if self.law.isa == "aarch64" else 0))
 
     @cached_property
     def defined(self) -> frozenset[str]:

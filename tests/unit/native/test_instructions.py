@@ -106,3 +106,10 @@ def test_every_operation_has_figures_on_every_core():
     from volery.cost.core import cores
 
     assert all(set(law.operations) == set(OPERATIONS) for law in cores().values())
+
+
+def test_instructions_that_align_a_loop_are_run_through():
+    begin = "f:  // @f\n// %bb.0:  // %entry\n\tnop\n\tnop\n\tb.eq\t.LBB0_1\n"
+    text = begin + "\t.p2align\t4, , 8\n.LBB0_1:  // %exit\n\tret\n"
+    assert [len(piece.instructions) for piece in pieces(text, bytes_each=4)] == [3, 1, 1]
+    assert [len(piece.instructions) for piece in pieces(text)] == [3, 1]
