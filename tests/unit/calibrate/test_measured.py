@@ -1,3 +1,5 @@
+import os
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,7 +9,9 @@ from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
 from volery.calibrate.measured.campaign import compare
 from volery.calibrate.measured.comparison import Compared, Estimate, compared
+from volery.calibrate.measured.meters.rospy import imported
 from volery.calibrate.measured.programs import programs
+from volery.calibrate.measured.runs import process_cpu
 from volery.model.reader import load
 from volery.run.vocabulary import vocabulary
 
@@ -92,3 +96,22 @@ def test_runs_are_put_beside_estimates() -> None:
 def test_without_a_run_there_is_nothing_to_compare(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no run was measured"):
         compare(load(nodes(tmp_path), vocabulary()), {}, [])
+
+
+def test_a_process_is_read_from_outside() -> None:
+    before = time.process_time_ns()
+    taken = process_cpu(os.getpid())
+    assert before <= taken <= time.process_time_ns()
+
+
+def test_the_meter_imports_what_is_no_part_of_the_node() -> None:
+    source = """
+import math, numpy
+import rospy
+from std_msgs.msg import String
+from tutorials.srv import AddTwoInts
+from mine import thing
+from . import beside
+"""
+    found = ["math", "rospy", "std_msgs.msg", "tutorials.srv"]
+    assert list(imported(source)) == found
