@@ -10,7 +10,6 @@ from pathlib import Path
 from volery.base.errors import ComponentError
 from volery.components.cpp.errors import CppError, Exited, no_answer
 from volery.faces.wire import Answers, Reader
-from volery.kernel.task import STUBBORN
 
 _CALL, _ANSWER, _FAIL, _END = range(4)
 STACK_BYTES = 8 * 1024 * 1024
@@ -18,6 +17,12 @@ STACK_BYTES = 8 * 1024 * 1024
 
 Hear = Callable[[str], None]
 """Told what the code has printed."""
+
+MOST_REFUSALS = 1000
+"""So often may code ask something after it was ended before it is left where it stands."""
+
+_NO = bytes(64)
+"""Zeros, false, empty text: an answer to any question."""
 
 _RETURNED, _FAILED, _THREW, _ENDED = b"returned", b"failed", b"threw", b"ended"
 
@@ -50,9 +55,6 @@ class House:
         self.resume = library.volery_resume
         self.resume.argtypes = (ctypes.POINTER(_Shared),)
         self.resume.restype = None
-        self.free = library.volery_flow_free
-        self.free.argtypes = (ctypes.POINTER(_Shared),)
-        self.free.restype = None
         self._supervise = library.volery_supervise
         self._supervise.argtypes = (ctypes.c_int32, ctypes.c_double)
 
@@ -122,7 +124,7 @@ class Flow:
     def _do(self, question: str, data: bytes) -> tuple[int, bytes]:
         """Answer a question: how to go on, and the reply. Raises where there is no going on."""
         if self._end is not None:
-            return self._insist(self._end)
+            return self._put_off(self._end)
         cannot_throw = self._shared.cannot_throw
         answer = self._answers.get(question)
         try:
@@ -142,13 +144,15 @@ class Flow:
             self._end = end
             return _END, b""
 
-    def _insist(self, end: BaseException) -> tuple[int, bytes]:
-        """It asks although it was ended: destructors may do that, others are told again."""
-        self._refusals += not self._shared.cannot_throw
-        if self._refusals > STUBBORN:
+    def _put_off(self, end: BaseException) -> tuple[int, bytes]:
+        """It asks although it was ended, as destructors do, or as code that swallows everything: nothing is
+        done, all answers are no.
+        """
+        self._refusals += 1
+        if self._refusals > MOST_REFUSALS:
             self.lost = True
             raise end
-        return (_FAIL if self._shared.cannot_throw else _END), b""
+        return _ANSWER, _NO
 
     def _what_came_out(self, how: bytes, data: bytes) -> BaseException:
         if how == _ENDED and self._end is not None:

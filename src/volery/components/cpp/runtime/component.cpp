@@ -54,11 +54,15 @@ const char* run(std::int64_t number, Reader argument, Writer& result) {
 }  // namespace
 
 Reader ask(const char* question, const Writer& with) {
+    static const char no[64] = {};
+    bool const unwinding = std::uncaught_exceptions() > 0;  // what is thrown now would end the program
     auto const& bytes = with.bytes();
-    switch (volery_ask(question, bytes.data(), bytes.size(), std::uncaught_exceptions() > 0)) {
+    switch (volery_ask(question, bytes.data(), bytes.size(), unwinding)) {
         case VOLERY_ANSWER: break;
         case VOLERY_END: throw Ended{};
-        case VOLERY_FAIL: throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
+        case VOLERY_FAIL:
+            if (unwinding) return Reader(no, sizeof no);
+            throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
         default:
             throw std::logic_error(std::string(question) + ": a component has one flow of control: nothing is asked "
                                    "before main() or in a thread of its own");

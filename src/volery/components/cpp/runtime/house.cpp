@@ -36,7 +36,6 @@ struct Flow : volery_flow {
     Exceptions exceptions;
     volery_dispatch dispatch;
     char* memory;  // the guard, then the stack
-    std::size_t bytes;
     char component[128];
     std::string printed;
 };
@@ -77,6 +76,7 @@ void body(unsigned int high, unsigned int low) {
 
 }  // namespace
 
+// It lives as long as the process: code may be left in the middle of anything.
 volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, std::uint64_t stack_bytes) {
     std::size_t const bytes = GUARD_BYTES + stack_bytes;
     int const flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK;
@@ -86,7 +86,6 @@ volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, st
     auto* flow = new Flow{};
     flow->dispatch = dispatch;
     flow->memory = static_cast<char*>(memory);
-    flow->bytes = bytes;
     std::snprintf(flow->component, sizeof flow->component, "%s", component);
     getcontext(&flow->inside);
     flow->inside.uc_stack.ss_sp = flow->memory + GUARD_BYTES;
@@ -96,12 +95,6 @@ volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, st
     makecontext(&flow->inside, reinterpret_cast<void (*)()>(body), 2, static_cast<unsigned int>(address >> 32),
                 static_cast<unsigned int>(address));
     return flow;
-}
-
-void volery_flow_free(volery_flow* which) {
-    auto* flow = static_cast<Flow*>(which);
-    munmap(flow->memory, flow->bytes);
-    delete flow;
 }
 
 void volery_resume(volery_flow* which) {

@@ -36,7 +36,6 @@ typedef void (*volery_dispatch)(volery_flow*);
 
 // -- asked by Python
 volery_flow* volery_flow_new(const char* component, volery_dispatch dispatch, std::uint64_t stack_bytes);
-void volery_flow_free(volery_flow* flow);
 void volery_resume(volery_flow* flow);  // returns when it asks the next question, or returns from a callable
 void volery_supervise(std::int32_t report, double patience_s);
 
