@@ -23,12 +23,12 @@ from volery.transports.ros1.roscore import master_answers
 
 from .conftest import Ours, python_of, surroundings
 
-pytestmark = pytest.mark.integration
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 THE_WAY = ["ordered", "to_port", "at_port", "in_flight", "arrived", "last_mile", "delivered"]
 VOLERY = "from volery.cli.main import main; main()"
-LIMIT_S = 150
+LIMIT_S = 200
 
 MODEL = """
 volery: 1
