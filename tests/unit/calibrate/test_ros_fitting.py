@@ -85,3 +85,11 @@ def test_what_a_probe_prints_is_read() -> None:
         read_round(['{"what": "idle"}'])
     with pytest.raises(LinkError, match="no measurement"):
         read_round(["{half"])
+
+
+def test_what_takes_next_to_nothing_is_judged_by_what_is_negligible() -> None:
+    rounds = [Probe(seed, noise=0.2).round() for seed in range(6)]
+    shy = costs(rounds)["service_client"]
+    assert shy.typical < 60_000.0
+    assert 0.0 < shy.half_width < 10.0
+    assert 0.0 < shy.spread < 20.0

@@ -61,8 +61,8 @@ class Cost:
 
     @property
     def half_width(self) -> float:
-        """Half of the interval, relative to a typical call."""
-        return (self.high - self.low) / 2.0 / self.typical if self.typical > 0.0 else 0.0
+        """Half of the interval, relative to a typical call, or to ``NEGLIGIBLE_NS`` if that takes less."""
+        return (self.high - self.low) / 2.0 / max(self.typical, NEGLIGIBLE_NS)
 
     def is_tight(self, within: float) -> bool:
         """Whether it is known to *within* (relative)."""
@@ -88,7 +88,7 @@ def fit(by_x: dict[float, list[float]]) -> Straight:
 
 def _least_squares(medians: dict[float, float]) -> tuple[float, float]:
     """Constant and slope, residuals weighted by the value."""
-    weights = {x: 1.0 / max(value, 1.0) ** 2 for x, value in medians.items()}
+    weights = {x: max(value, NEGLIGIBLE_NS) ** -2 for x, value in medians.items()}
     total = sum(weights.values())
     mean_x = sum(weights[x] * x for x in medians) / total
     mean_y = sum(weights[x] * value for x, value in medians.items()) / total
@@ -111,11 +111,14 @@ def _cost(
     call: str, by_x: dict[float, list[float]], of_caller: dict[float, list[float]], drawn: list[float]
 ) -> Cost:
     line = fit(by_x)
-    typical = max(line.at(TYPICAL_X.get(call, 0.0)), 1.0)
     away = sorted(
-        (value - line.at(x)) / max(line.at(x), 1.0) for x, values in by_x.items() for value in values
+        (value - line.at(x)) / max(line.at(x), NEGLIGIBLE_NS)
+        for x, values in by_x.items()
+        for value in values
     )
-    from_line = [abs(median(values) - line.at(x)) / max(line.at(x), typical) for x, values in by_x.items()]
+    from_line = [
+        abs(median(values) - line.at(x)) / max(line.at(x), NEGLIGIBLE_NS) for x, values in by_x.items()
+    ]
     return Cost(
         call=call,
         whole=line,
