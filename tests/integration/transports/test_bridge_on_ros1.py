@@ -104,7 +104,7 @@ def test_the_session_of_a_thesis(debian: Run, start: Start, types: str) -> None:
     before = heading(debian)
     until(lambda: abs((heading(debian) - before + 180) % 360 - 180) > 20, "it to turn")
     bridge.send_signal(signal.SIGINT)
-    assert bridge.wait(10) == 0
+    assert bridge.wait(LIMIT_S) == 0
     assert "/gps" not in debian("rostopic", "list")
 
 
@@ -129,7 +129,7 @@ def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) 
     ours.graph.node("mavros", "/taken")
     bridge = start(*COMMAND, "bridge", "sim:ardupilot", "--namespace", "/taken")
     try:
-        said, _ = bridge.communicate(timeout=LIMIT_S)
+        said, _ = bridge.communicate(timeout=2 * LIMIT_S)
     except subprocess.TimeoutExpired:
         bridge.kill()
         raise
@@ -164,7 +164,7 @@ def test_over_a_serial_line_it_asks_as_it_is_told(ros: Run, start: Start) -> Non
     assert "/serial/vfr_hud" in listed
     assert "/serial/send_rc" not in listed  # nobody has allowed it
     bridge.send_signal(signal.SIGTERM)  # as a service is ended
-    assert bridge.wait(10) == 0
+    assert bridge.wait(LIMIT_S) == 0
     os.close(autopilot)
     os.close(line)
 

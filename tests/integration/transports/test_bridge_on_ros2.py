@@ -48,7 +48,7 @@ def beside() -> Iterator[Beside]:
     yield run
     for bridge in started:
         bridge.send_signal(signal.SIGINT)
-        assert bridge.wait(20) == 0
+        assert bridge.wait(60) == 0
 
 
 def test_plain_rclpy_hears_a_vehicle_and_arms_it(beside: Beside) -> None:
