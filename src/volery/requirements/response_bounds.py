@@ -28,6 +28,9 @@ WINDOW: Ns = 10 * MS
 STEP: Ns = 10 * US
 """A bound on several cores is found to so much: it is looked for in steps, from below."""
 
+MOST_STEPS = 2000
+"""After so many it is given up: the cores are as good as full."""
+
 
 @dataclass(frozen=True)
 class Demand:
@@ -66,7 +69,9 @@ def _bound(
     task: Demand, urgent: Sequence[Demand], bounds: dict[str, Ns | None], loads: Sequence[Load], cores: int
 ) -> Ns | None:
     response = task.cost
-    while response <= task.period:
+    for _ in range(MOST_STEPS):
+        if response > task.period:
+            break
         if cores == 1:
             interference = sum(-(-response // one.period) * one.cost for one in urgent)
             interference += sum(min(load.within(response), response) for load in loads)
