@@ -39,12 +39,12 @@ double range(double x, double y, double angle, double most) {
 
 void prepare(int input) {
     Numbers numbers(input);
-    width = input == JUDGING ? 200 : 150;
-    rays = input == JUDGING ? 270 : 180;
+    width = of(input, 150, 200, 170);
+    rays = of(input, 180, 270, 360);
     wall.assign(width * width, 0);
     for (int i = 0; i < width; ++i)
         wall[i] = wall[(width - 1) * width + i] = wall[i * width] = wall[i * width + width - 1] = 1;
-    for (int i = 0; i < (input == JUDGING ? 60 : 40); ++i) {
+    for (int i = 0; i < of(input, 40, 60, 80); ++i) {
         int x = numbers.below(width - 6), y = numbers.below(width - 6), size = 1 + numbers.below(5);
         for (int k = 0; k < size * size; ++k)
             wall[(y + k / size) * width + x + k % size] = 1;

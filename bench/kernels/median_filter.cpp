@@ -12,11 +12,11 @@ std::vector<std::uint16_t> image, out;
 
 void prepare(int input) {
     Numbers numbers(input);
-    width = input == JUDGING ? 96 : 64;
-    height = input == JUDGING ? 72 : 48;
+    width = of(input, 64, 96, 80);
+    height = of(input, 48, 72, 80);
     image.resize(width * height);
     out.resize(width * height);
-    int missing = input == JUDGING ? 15 : 5;
+    int missing = of(input, 5, 15, 25);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
             image[y * width + x] = numbers.below(100) < missing

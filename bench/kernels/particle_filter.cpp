@@ -21,10 +21,10 @@ void prepare(int input) {
     start.clear();
     landmarks.clear();
     ranges.clear();
-    rounds = input == JUDGING ? 4 : 6;
-    for (int i = 0; i < (input == JUDGING ? 400 : 250); ++i)
+    rounds = of(input, 6, 4, 5);
+    for (int i = 0; i < of(input, 250, 400, 300); ++i)
         start.push_back({numbers.between(-5, 5), numbers.between(-5, 5), numbers.between(-M_PI, M_PI), 0.0});
-    for (int i = 0; i < (input == JUDGING ? 6 : 4); ++i) {
+    for (int i = 0; i < of(input, 4, 6, 8); ++i) {
         landmarks.push_back(numbers.between(-10, 10));
         landmarks.push_back(numbers.between(-10, 10));
         ranges.push_back(numbers.between(2, 12));

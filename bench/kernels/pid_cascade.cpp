@@ -30,8 +30,8 @@ std::vector<Sample> samples;
 
 void prepare(int input) {
     Numbers numbers(input);
-    samples.resize(input == JUDGING ? 3000 : 2000);
-    double reach = input == JUDGING ? 0.9 : 0.4;
+    samples.resize(of(input, 2000, 3000, 2500));
+    double reach = of(input, 0.4, 0.9, 0.6);
     for (Sample& sample : samples) {
         for (int axis = 0; axis < 3; ++axis) {
             sample.wanted[axis] = numbers.between(-reach, reach);
