@@ -91,18 +91,19 @@ PARTS: tuple[Part, ...] = (
         "mavsdk", distribution("mavsdk"), "flying `volery vehicle` with MAVSDK", "pip install 'mavsdk>=3,<4'"
     ),
     Part("MAVProxy", distribution("MAVProxy"), "fly `volery vehicle` by typing", "pip install MAVProxy"),
-    Part(
-        "rospy",
-        module("rospy"),
-        "later: a real ROS 1",
-        "apt install python3-rospy",
-    ),
-    Part("rclpy", module("rclpy"), "later: a real ROS 2", "source your ROS 2 set-up"),
+    Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),
+    Part("rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"),
     Part(
         "g++ or clang++",
         program("g++", "clang++"),
         "components in C++ (language c++ or roscpp)",
         "apt install g++",
+    ),
+    Part(
+        "LLVM 17 to 19",
+        program("opt-19", "opt-18", "opt-17"),
+        "what blocks of C++ code cost on another processor",
+        "apt install clang-19 llvm-19",
     ),
     Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
     Part(

@@ -14,7 +14,7 @@ from volery.calibrate.processor.timing import CHAIN, FORWARDED, FREE, LIBRARY, N
 from volery.cost.core import CoreLaw, LibraryLaw, Operation, read_cores
 
 WINDOW, TABLES, HISTORY = 512, 12, 60
-"""Not measured, as of a large core; the prediction's were chosen on calibration inputs."""
+"""Not measured, as of a large core; the prediction's were chosen looking at the kernels' first two inputs."""
 
 SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
