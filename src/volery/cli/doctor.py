@@ -101,7 +101,7 @@ PARTS: tuple[Part, ...] = (
     ),
     Part(
         "LLVM 17 to 19",
-        program("opt-19", "opt-18", "opt-17"),
+        program("opt-19", "opt-18", "opt-17", "opt"),
         "what blocks of C++ code cost on another processor",
         "apt install clang-19 llvm-19",
     ),
