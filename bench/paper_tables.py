@@ -18,7 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from volery.run.simulate import Options, simulate
+from volery.run.options import Options
+from volery.run.simulate import simulate
 
 SLEEPS = 2566
 

@@ -35,7 +35,8 @@ from volery.kernel.wall import WallKernel
 from volery.links.parser import MAVLINK
 from volery.links.udp import UdpLink
 from volery.links.wire import Wire
-from volery.run.simulated import airfield_of, link_to, simulated
+from volery.run.airfield import airfield_of
+from volery.run.simulated import link_to, simulated
 from volery.testing.hostile import Besieged
 from volery.vehicles import Drone
 from volery.vehicles.address import parse

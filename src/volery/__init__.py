@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from volery.components.services import add_time, log, note, now, sleep
     from volery.run.connect import connect, connect_fleet
     from volery.run.fly import fly
+    from volery.run.options import Options
     from volery.run.result import Run
-    from volery.run.simulate import Options, simulate
+    from volery.run.simulate import simulate
     from volery.vehicles import Drone, Fence, Fleet, Limits, Rover, Zone
 
 _HOME_OF = {
@@ -27,7 +28,7 @@ _HOME_OF = {
     "Fence": "vehicles",
     "Fleet": "vehicles",
     "Limits": "vehicles",
-    "Options": "run.simulate",
+    "Options": "run.options",
     "Position": "base.position",
     "Rover": "vehicles",
     "Run": "run.result",

@@ -47,3 +47,11 @@ def test_help_is_light(word):
     arguments = ["volery", *word.split()]
     statement = f"sys.argv = {arguments}; from volery.cli.main import main; main()"
     assert not loaded_by(statement) & {"numba", "pymavlink", "rosbags", "matplotlib", "networkx"}
+
+
+@pytest.mark.parametrize(
+    "module", ["run.connect", "run.fly", "cli.fly", "cli.bridge", "run.apart.hosted", "run.platform"]
+)
+def test_where_no_world_is_needed_nothing_of_the_simulation_is_loaded(module):
+    """On board of a real vehicle, and in the processes of components that are on a real graph."""
+    assert "numba" not in loaded_by(f"import volery.{module}")

@@ -7,8 +7,8 @@ from pathlib import Path
 from volery.cli.console import Output
 from volery.cli.endings import FAILED, OK
 from volery.cli.folders import example
+from volery.cli.outcome import unmet
 from volery.cli.side_by_side import Job, Outcome, run_all
-from volery.cli.simulate import unmet
 from volery.model.reader import load
 from volery.report.comparison import write_comparison
 from volery.report.terminal import short_comparison

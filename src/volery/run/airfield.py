@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import cos, pi, radians, sin
 
 from volery.autopilots.simulated.autopilot import Autopilot
@@ -19,12 +20,10 @@ from volery.links.link import Link
 from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
+from volery.run.simulated import LINK_DELAY, Simulated
 from volery.world.specs import Battery, BodySpec, Multirotor, Rover
 from volery.world.wind import Wind
 from volery.world.world import World
-
-LINK_DELAY: Ns = 2 * MS
-"""One way between an autopilot and the computer beside it, over a serial line."""
 
 CELL_NOMINAL_VOLTS = 3.7
 
@@ -148,3 +147,17 @@ def body_of(vehicle: VehicleModel) -> BodySpec:
 def _battery(model: BatteryModel, usual: Battery) -> Battery:
     cells = usual.cells if model.voltage_v is None else max(1, round(model.voltage_v / CELL_NOMINAL_VOLTS))
     return Battery(model.capacity_coulomb / 3600.0, cells, usual.resistance_ohm, model.charge)
+
+
+def airfield_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Airfield:
+    """A world with these vehicles in it: its origin and its wind are the first one's."""
+    first = wanted[0]
+    vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
+    systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
+    return Airfield(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
+
+
+def _placed(vehicle: VehicleModel, frame: LocalFrame) -> VehicleModel:
+    at = vehicle.at
+    east, north, _ = frame.to_enu(at.latitude, at.longitude, at.amsl_m)
+    return replace(vehicle, at=replace(at, east_m=east, north_m=north))

@@ -20,6 +20,7 @@ from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.run.graphs import GRAPHS, open_graph
+from volery.run.simulated import link_to, simulated
 from volery.trace.events import Record, ignore
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import ANSWERS_TO, SENDS_FROM, open_link
@@ -160,7 +161,7 @@ def _names(address: Address, wanted: str) -> str:
 
 
 def _simulated_link(kernel: Kernel, address: Address, seed: int) -> Link:
-    from volery.run.simulated import airfield_of, link_to, simulated
+    from volery.run.airfield import airfield_of
 
     wanted = simulated(address, address.driver)
     return link_to(kernel, airfield_of(kernel, [wanted], seed), wanted, seed)

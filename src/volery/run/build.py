@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from volery.base.position import Position
 from volery.components.body import Body
@@ -24,7 +24,6 @@ from volery.kernel.task import Place
 from volery.messages import define_imported
 from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
-from volery.run.airfield import Airfield
 from volery.run.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.ending import Ending, Lands
 from volery.run.fences import fence_of
@@ -33,6 +32,9 @@ from volery.run.serving import serve, serving
 from volery.run.setup import node_name
 from volery.run.unattended import Unattended
 from volery.vehicles import Drone, Rover
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 INTERFACES = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
 """By the kind of vehicle."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from volery.components.cpp.meter import Counters, Worth
 from volery.components.cpp.toolchain import Toolchain, cache_folder
 from volery.cost.core import CoreLaw, cores
 from volery.model.system import CPP_LANGUAGES, Instance, System
-from volery.native import Costs, instrument
+
+Cycles = np.ndarray[Any, np.dtype[Any]]
+"""Of each block."""
 
 _OURS = re.compile(r'"?_ZNK?(?:6volery|3ros)')
 """Symbols of the border and of client libraries: what calls into these take has prices of its own."""
@@ -47,7 +50,7 @@ class Counting:
 
     def __init__(self, law: CoreLaw) -> None:
         self._law = law
-        self._costs: Costs | None = None
+        self._cycles: Cycles | None = None
         self.estimated = ""
 
     def __call__(
@@ -62,7 +65,7 @@ class Counting:
                 tools.tell(f"counting {tools.component} on {self._law.name}")
             self._make(sources, include, flags, made)
         with np.load(costs) as kept:
-            self._costs = Costs(kept["cycles"], kept["instructions"], kept["seen"])
+            self._cycles = kept["cycles"]
             self.estimated = str(kept["estimated"])
         return [made]
 
@@ -73,6 +76,8 @@ class Counting:
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
     ) -> None:
+        from volery.native import instrument
+
         options = ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path)))]
         new = made.with_suffix(".new.o")
         found = instrument(sources, self._law, new, [*options, *flags])
@@ -89,8 +94,8 @@ class Counting:
 
     def worth(self) -> Worth:
         """What counts amount to in steps, once it has compiled. All numbers are whole: nothing is rounded."""
-        assert self._costs is not None
-        steps = np.rint(self._costs.cycles * PER_CYCLE).astype(np.int64)
+        assert self._cycles is not None
+        steps = np.rint(self._cycles * PER_CYCLE).astype(np.int64)
 
         def worth(counters: Counters) -> int:
             return int((np.ctypeslib.as_array(counters).view(np.int64) * steps).sum())

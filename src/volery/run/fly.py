@@ -20,11 +20,11 @@ from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.run.ending import Ending
 from volery.run.opening import Opened, Stated, open_vehicles
+from volery.run.options import AS_USUAL, Options
 from volery.run.progress import Reporter, Teller
 from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import setup_of_flight
-from volery.run.simulate import AS_USUAL, Options
 from volery.run.simulated import HOME
 from volery.trace.events import Failure
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle

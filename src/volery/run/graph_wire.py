@@ -18,7 +18,7 @@ from volery.graph import Graph
 from volery.graph.node import NodeId
 from volery.kernel.api import Action, Kernel
 from volery.links.wire import OVERTAKEN, WireFaults
-from volery.run.airfield import LINK_DELAY
+from volery.run.simulated import LINK_DELAY
 
 FREE = Price(0, 0)
 FRAME = 30

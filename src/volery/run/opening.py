@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
 from volery.base.position import Position
@@ -14,15 +15,17 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.links.shared import SharedLink
-from volery.run.airfield import Airfield
 from volery.run.graphs import GRAPHS, open_graph
 from volery.run.serving import open_simulated
-from volery.run.simulated import HOME, Simulated, airfield_of, simulated
+from volery.run.simulated import HOME, Simulated, simulated
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, parse
 from volery.vehicles.carriers import open_link
 from volery.vehicles.driver import Driver, DriverFactory, drivers
 from volery.vehicles.limits import excludes_home
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 EMBEDDED = "graph"
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
@@ -67,6 +70,14 @@ def open_vehicles(urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], s
         drivers.load(address.driver)  # a name that is none is told before anything else
     if any(address.carrier != "sim" for address in addresses.values()):
         return _open_real(addresses, kinds, stated)
+    return _open_simulated(addresses, kinds, stated)
+
+
+def _open_simulated(
+    addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: Stated
+) -> Opened:
+    from volery.run.airfield import airfield_of
+
     wanted = [
         simulated(address, name, KINDS[kinds[name]], stated.home) for name, address in addresses.items()
     ]

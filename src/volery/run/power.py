@@ -6,11 +6,15 @@ payload power for the next period: the battery is late by one period and misses 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from volery.base.errors import EstimateError
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.run.airfield import Airfield
 from volery.run.platform import Platform
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 PERIOD: Ns = 500 * MS
 

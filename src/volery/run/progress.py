@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
-from volery.run.airfield import Airfield
 from volery.trace.events import Event, Milestone, Text
 from volery.vehicles.heard import IF_SILENT
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 PERIOD: Ns = S
 

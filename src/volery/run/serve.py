@@ -10,10 +10,10 @@ from volery.base.errors import UsageError
 from volery.kernel.task import Place
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded import CodedLink
-from volery.run.airfield import Airfield
+from volery.run.airfield import Airfield, airfield_of
 from volery.run.graphs import open_graph
 from volery.run.serving import serving
-from volery.run.simulated import Simulated, airfield_of
+from volery.run.simulated import Simulated
 from volery.vehicles.address import Address, parse_listen
 from volery.vehicles.carriers import listen
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError
 from volery.base.frames import LocalFrame
@@ -21,10 +22,12 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
 from volery.links.wire import WireFaults
-from volery.run.airfield import Airfield
 from volery.run.graph_wire import GraphWire, private_graph
 from volery.run.simulated import Simulated, link_to
 from volery.vehicles.driver import Driver, Opener, drivers
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 Serve = Callable[[RosGraph, Link, str, Place, LocalFrame], object]
 """``serve(graph, link, vehicle, place, origin)``."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from volery.cost import NOT_COUNTED, ProcessorEntry
 from volery.model.environment import Environment, Prism, Ways
-from volery.model.system import Instance, Processor, System
-from volery.run.opening import Opened
+from volery.model.system import CPP_LANGUAGES, Instance, Processor, System
+from volery.run.counted import core_of
 from volery.run.platform import Platform
 from volery.trace.events import NONE
 from volery.trace.mcap_writer import Attachment
@@ -26,6 +27,9 @@ from volery.trace.setup import (
 )
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
+
+if TYPE_CHECKING:
+    from volery.run.opening import Opened
 
 ALWAYS_LEFT_OUT = (
     "the operating system and everything else that runs on a computer",
@@ -103,27 +107,35 @@ def _processor(model: Processor, entry: ProcessorEntry) -> ProcessorSetup:
 
 def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetup]:
     """One entry per kind of processor and law, whatever the number of computers of that kind."""
-    seen: set[str] = set()
-    for model in system.processors:
-        if model.kind in seen:
-            continue
-        seen.add(model.kind)
+    first: dict[str, Processor] = {}
+    for one in system.processors:
+        first.setdefault(one.kind, one)
+    for kind, model in first.items():
         entry = platform.entry(model.name)
         for law in entry.ros.values():
-            warning = "; ".join(
-                law.model_copy(update={"processor": model.kind}).warnings(model.frequency_mhz)
-            )
-            yield LawSetup(
-                f"{law.client} calls on {model.kind}", law.source, law.provenance, law.validity, warning
-            )
-        for code in entry.code.values() if fidelity == "code" else ():
-            warning = "; ".join(code.model_copy(update={"processor": model.kind}).warnings())
-            name = f"counted {code.language} code on {model.kind}"
+            warning = "; ".join(law.model_copy(update={"processor": kind}).warnings(model.frequency_mhz))
+            yield LawSetup(f"{law.client} calls on {kind}", law.source, law.provenance, law.validity, warning)
+        if fidelity == "code":
+            yield from _code_laws(system, entry, kind)
+        if entry.power is not None:
+            name = f"power of {kind}"
+            yield LawSetup(name, entry.power.source, entry.power.provenance, entry.power.validity)
+
+
+def _code_laws(system: System, entry: ProcessorEntry, kind: str) -> Iterable[LawSetup]:
+    """The laws that the code of components is counted by, as far as there are such components."""
+    kinds = {one.name: one.kind for one in system.processors}
+    there = [one for one in system.instances if kinds.get(one.processor or "") == kind and one.component.path]
+    if any(one.component.language not in CPP_LANGUAGES for one in there):
+        for code in entry.code.values():
+            warning = "; ".join(code.model_copy(update={"processor": kind}).warnings())
+            name = f"counted {code.language} code on {kind}"
             validity = f"{code.validity}; {code.how_good()}"
             yield LawSetup(name, code.source, code.provenance, validity, warning)
-        if entry.power is not None:
-            name = f"power of {model.kind}"
-            yield LawSetup(name, entry.power.source, entry.power.provenance, entry.power.validity)
+    core = next(filter(None, (core_of(system, "code", one) for one in there)), None)
+    if core is not None:
+        validity = f"code whose data stay in the first cache; {core.how_good()}"
+        yield LawSetup(f"counted C++ code on {kind}", core.source, core.provenance, validity)
 
 
 def _missing_networks(system: System) -> Iterable[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,9 +20,10 @@ from volery.run.build import Builder, Built
 from volery.run.cpp import compile_all, has_cpp
 from volery.run.ending import Ending
 from volery.run.faults import inject
+from volery.run.options import AS_USUAL, Options
 from volery.run.platform import Platform
 from volery.run.power import PowerFeed
-from volery.run.progress import Reporter, Show, Tell
+from volery.run.progress import Reporter
 from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.salvage import salvage
@@ -44,26 +45,6 @@ PATIENCE_S = 30.0
 
 GOAL_PERIOD: Ns = 100 * MS
 """How often it is looked whether the model's ``until`` holds."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes.
-
-    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once. ``graph``
-    (``ros1``, ``ros2``): with the components as processes on that graph, at a pace of 1 unless one is given.
-    """
-
-    fidelity: str = "times"
-    seed: int = 1
-    pace: float | None = None
-    out: Path | None = None
-    show: Show | None = None
-    tell: Tell | None = None
-    graph: str = ""
-
-
-AS_USUAL = Options()
 
 
 def simulate(

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.seeds import stream
+from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.links.wire import FAULT_OPTIONS, WireFaults, faults_of, wire
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
-from volery.run.airfield import LINK_DELAY, Airfield
 from volery.vehicles.address import Address
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
 """Where simulated vehicles stand unless an address or a mission says otherwise."""
@@ -35,6 +38,9 @@ OPTIONS = (
 """What may follow ``sim:AUTOPILOT?``."""
 
 CARRIERS = ("values", "bytes")
+
+LINK_DELAY: Ns = 2 * MS
+"""One way between an autopilot and the computer beside it, over a serial line."""
 
 
 @dataclass(frozen=True)
@@ -125,20 +131,6 @@ def _faults(address: Address) -> WireFaults | None:
             raise UsageError(f"{address}: {choices(wanted)} happens to bytes; add wire=bytes")
         return None
     return faults_of(wanted)
-
-
-def airfield_of(kernel: Kernel, wanted: Sequence[Simulated], seed: int) -> Airfield:
-    """A world with these vehicles in it: its origin and its wind are the first one's."""
-    first = wanted[0]
-    vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
-    systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
-    return Airfield(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
-
-
-def _placed(vehicle: Vehicle, frame: LocalFrame) -> Vehicle:
-    at = vehicle.at
-    east, north, _ = frame.to_enu(at.latitude, at.longitude, at.amsl_m)
-    return replace(vehicle, at=replace(at, east_m=east, north_m=north))
 
 
 def link_to(kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int) -> Link:

@@ -14,8 +14,9 @@ from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.wire import WireFaults
+from volery.run.airfield import airfield_of
 from volery.run.opening import KINDS
-from volery.run.simulated import airfield_of, simulated
+from volery.run.simulated import simulated
 from volery.testing.access import Hand, access_to
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage

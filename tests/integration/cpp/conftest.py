@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from volery.run.options import Options
 from volery.run.result import Run
-from volery.run.simulate import Options, simulate
+from volery.run.simulate import simulate
 from volery.trace.events import Event
 from volery.trace.reader import read
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from volery.run.simulate import Options, simulate
+from volery.run.options import Options
+from volery.run.simulate import simulate
 
 pytestmark = pytest.mark.integration
 

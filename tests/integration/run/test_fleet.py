@@ -23,7 +23,8 @@ from volery.base.errors import (
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.run.simulated import airfield_of, simulated
+from volery.run.airfield import airfield_of
+from volery.run.simulated import simulated
 from volery.vehicles.address import parse
 
 HOME = Position(46.0825, -103.8995, AMSL(900))

@@ -1,8 +1,5 @@
 """``volery bridge``: what makes no sense is told before anything is opened."""
 
-import subprocess
-import sys
-
 import pytest
 from typer.testing import CliRunner
 
@@ -40,12 +37,6 @@ def said_of(*arguments: str) -> str:
 )
 def test_what_makes_no_sense(arguments: tuple[str, ...], says: str) -> None:
     assert says in said_of(*arguments)
-
-
-def test_on_board_nothing_of_the_simulation_is_imported() -> None:
-    script = "import sys, volery.cli.bridge; print('numba' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
 
 
 def test_what_happens_is_told_when_it_changes(capsys: pytest.CaptureFixture[str]) -> None:

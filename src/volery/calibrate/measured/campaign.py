@@ -11,7 +11,8 @@ from volery.calibrate.measured.programs import NodeProgram, programs
 from volery.calibrate.measured.runs import Run, running
 from volery.calibrate.ros.stage import check_client, own_master
 from volery.model.system import System
-from volery.run.simulate import Options, simulate
+from volery.run.options import Options
+from volery.run.simulate import simulate
 
 Show = Callable[[int], None]
 """Told how many runs are done."""

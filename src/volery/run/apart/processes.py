@@ -12,14 +12,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from types import ModuleType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from volery.base.errors import ComponentError, LinkSilent, choices
 from volery.graph.clock import CLOCK_PERIOD
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Signal
 from volery.model.system import System
-from volery.run.airfield import Airfield
 from volery.run.apart import pipe, plan
 from volery.run.apart.calls import Desk, Reach
 from volery.run.apart.pipe import Pipe
@@ -29,6 +28,9 @@ from volery.run.ending import Ending
 from volery.run.graphs import open_graph
 from volery.run.platform import Platform
 from volery.transports.abroad import under_way
+
+if TYPE_CHECKING:
+    from volery.run.airfield import Airfield
 
 READY_S, GONE_S, GLANCE_S = 60.0, 5.0, 0.05
 STDERR = 2

@@ -1,0 +1,28 @@
+"""How to run, for what is flown as for what is simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.run.progress import Show, Tell
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes.
+
+    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once. ``graph``
+    (``ros1``, ``ros2``): with the components as processes on that graph, at a pace of 1 unless one is given.
+    """
+
+    fidelity: str = "times"
+    seed: int = 1
+    pace: float | None = None
+    out: Path | None = None
+    show: Show | None = None
+    tell: Tell | None = None
+    graph: str = ""
+
+
+AS_USUAL = Options()
