@@ -17,6 +17,7 @@ from volery.components.instance import Failed, Instance
 from volery.components.loading import Loader, Source, parse
 from volery.components.services import serve
 from volery.kernel.task import Scope, Task
+from volery.kernel.waiting import sleep
 
 RUN = "run"
 
@@ -222,7 +223,7 @@ def start(
 
     def body() -> None:
         if _construct(instance, program, given) and active:
-            instance.kernel.sleep_until(instance.seat.starts_at)
+            sleep(instance.kernel, instance.seat.starts_at - instance.kernel.now())
             instance.guard(lambda: program.run(instance.object), RUN)
 
     return instance.kernel.spawn(body, instance.name, instance.place, scope)

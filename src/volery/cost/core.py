@@ -63,6 +63,10 @@ class CoreLaw(Stated):
     operations: dict[str, Operation]
     library: LibraryLaw
 
+    def how_good(self) -> str:
+        """The honest band, in words."""
+        return "its error is not known" if self.error is None else f"within {self.error:.0%}"
+
     def check_frequency(self, frequency_mhz: float) -> None:
         """``EstimateError`` for a frequency at which this core does not run."""
         if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
