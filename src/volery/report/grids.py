@@ -172,8 +172,8 @@ def cost_grid(record: RunRecord) -> Grid:
         Column(
             "bound ms",
             True,
-            "analysis of fixed priorities, with the longest executions and shortest distances of releases "
-            "seen; waiting for messages, networks and locks is not in it",
+            "analysis of fixed priorities, with the longest executions and densest releases that were seen "
+            "or that the period allows; waiting for messages, networks and locks is not in it",
             False,
         ),
         Column("energy", True, "stated for its operations, else what its execution takes above idle"),
