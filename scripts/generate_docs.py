@@ -61,13 +61,20 @@ def processors() -> str:
             f"\n## {name}\n",
             f"{entry.description}. {entry.cores} cores, {entry.least_mhz:g} to {entry.greatest_mhz:g} MHz.\n",
         ]
+        if entry.settings is not None:
+            settings = entry.settings
+            note = f" Note: {settings.note}." if settings.note else ""
+            lines.append(
+                f"- Can be set to: {settings.least_mhz:g} to {settings.greatest_mhz:g} MHz in steps of "
+                f"{settings.step_mhz:g} MHz; {settings.provenance}, from {settings.source}.{note}"
+            )
         for client, law in entry.ros.items():
             lines.append(
                 f"- ROS calls ({client}): {law.provenance}; {law.source}. Valid: {law.validity}. {law.note}"
             )
         if entry.power is not None:
             power = entry.power
-            words = f"{power.provenance}, within {power.band():.0%}; {power.source}. Valid: {power.validity}"
+            words = f"{power.provenance}, {power.how_good()}; {power.source}. Valid: {power.validity}"
             lines.append(f"- Power: {words}.")
         for language, code in entry.code.items():
             good = code.how_good().capitalize()

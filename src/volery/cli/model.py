@@ -30,7 +30,8 @@ def check(output: Output, model: Path, overrides: tuple[str, ...]) -> int:
     words = vocabulary()
     system = check_model(model, words, overrides)
     missing = {fidelity: [str(gap) for gap in gaps(system, fidelity, words)] for fidelity in FIDELITIES}
-    output.show(_summary(system), _instances(system), *_readiness(missing))
+    doubts = [Text(f"⚠ {warning}", style="yellow") for warning in system.warnings]
+    output.show(_summary(system), _instances(system), *_readiness(missing), *doubts)
     output.give(
         {
             "name": system.name,
@@ -39,6 +40,7 @@ def check(output: Output, model: Path, overrides: tuple[str, ...]) -> int:
             "instances": {one.name: one.component.name for one in system.instances},
             "requirements": [one.name for one in system.requirements],
             "missing": missing,
+            "warnings": list(system.warnings),
         }
     )
     return OK

@@ -6,25 +6,39 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
 from volery.cost.code import CodeLaw
 from volery.cost.energy import PowerLaw
-from volery.cost.figure import Figure
+from volery.cost.figure import Figure, Stated
 from volery.cost.ros import RosLaw
 
-__all__ = ["Catalogue", "Figure", "ProcessorEntry", "catalogue", "read"]
+__all__ = ["Catalogue", "Figure", "ProcessorEntry", "Settings", "catalogue", "read"]
 
 ROSCPP = "roscpp"
+
+
+class Settings(Stated):
+    """The frequencies that a processor can be set to (its DVFS set), in equal steps."""
+
+    least_mhz: float = Field(gt=0)
+    greatest_mhz: float = Field(gt=0)
+    step_mhz: float = Field(gt=0)
+
+    def mhz(self) -> tuple[float, ...]:
+        """All of them, ascending."""
+        count = round((self.greatest_mhz - self.least_mhz) / self.step_mhz)
+        return tuple(self.least_mhz + number * self.step_mhz for number in range(count + 1))
 
 
 class ProcessorEntry(BaseModel):
     """One kind of processor.
 
-    Its cores, the frequencies it runs at, and its laws as far as there are figures.
+    Its cores, the range of frequencies that its laws hold for, the ``settings`` it has where they are known,
+    and its laws as far as there are figures.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -35,6 +49,7 @@ class ProcessorEntry(BaseModel):
     cores: int
     least_mhz: float
     greatest_mhz: float
+    settings: Settings | None = None
     power: PowerLaw | None = None
     ros: dict[str, RosLaw] = {}
     code: dict[str, CodeLaw] = {}
@@ -46,6 +61,11 @@ class ProcessorEntry(BaseModel):
                 f"{self.name}: {frequency_mhz:g} MHz is outside the range of its laws, "
                 f"{self.least_mhz:g} to {self.greatest_mhz:g} MHz"
             )
+
+    def set_to(self) -> tuple[float, ...]:
+        """The settings within the range of its laws, in MHz; empty where they are not known."""
+        known = self.settings.mhz() if self.settings else ()
+        return tuple(one for one in known if self.least_mhz <= one <= self.greatest_mhz)
 
     def ros_law(self, language: str) -> RosLaw:
         """The law of ROS calls for nodes written in *language* (``roscpp``, ``rospy``, ``rclpy``).
@@ -140,7 +160,14 @@ def _joined(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
         "least_mhz": min(known.least_mhz, new.least_mhz),
         "greatest_mhz": max(known.greatest_mhz, new.greatest_mhz),
     }
-    return known.model_copy(update={**laws, **reach, "power": new.power or known.power})
+    return known.model_copy(
+        update={
+            **laws,
+            **reach,
+            "power": new.power or known.power,
+            "settings": new.settings or known.settings,
+        }
+    )
 
 
 def read_file(file: Path) -> Catalogue:

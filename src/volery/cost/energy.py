@@ -39,6 +39,10 @@ class PowerLaw(Stated):
         """The larger of its figures' relative errors."""
         return max(self.idle_w.error or 0.0, self.busy_core_w.error or 0.0)
 
+    def how_good(self) -> str:
+        """The band in words."""
+        return f"within {self.band():.0%}" if self.band() else "its error is not known"
+
     def cycle_ratio(self, stated_mhz: float, frequency_mhz: float) -> float:
         """Energy of one clock cycle at *frequency_mhz* over that at *stated_mhz*.
 

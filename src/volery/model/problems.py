@@ -37,6 +37,7 @@ class Problems:
     def __init__(self, locate: Locate) -> None:
         self._locate = locate
         self._found: list[ModelError] = []
+        self._warnings: dict[str, None] = {}  # an ordered set
 
     def __bool__(self) -> bool:
         return bool(self._found)
@@ -50,6 +51,15 @@ class Problems:
     def unknown(self, path: Path, name: object, noun: str, valid: Iterable[str]) -> None:
         """Note a *name* that nothing goes by; *valid* are the names there are."""
         self.add(path, no_such(name, noun, valid))
+
+    def warn(self, path: Path, what: str) -> None:
+        """Note that *what* is doubtful at *path*; the model stands nevertheless."""
+        self._warnings[f"{written(path)}: {what}"] = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was found to be doubtful, once each."""
+        return tuple(self._warnings)
 
     def where(self, path: Path) -> Location | None:
         """Where *path* stands."""

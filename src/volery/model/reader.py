@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from volery.base.errors import ModelError
@@ -63,15 +64,17 @@ def load(
 def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
     """Read the model with each of its allocations and each of its scenarios; return it as it stands.
 
-    Raises what ``load`` raises, for all of them together.
+    It has the warnings of all of them. Raises what ``load`` raises, for all of them together.
     """
     options = tuple(overrides)
     system = load(path, vocabulary, overrides=options)
     found: dict[str, ModelError] = {}
+    warnings = dict.fromkeys(system.warnings)
     variants = [(None, name) for name in system.allocations] + [(name, None) for name in system.scenarios]
     for scenario, allocation in variants:
         try:
-            load(path, vocabulary, scenario, allocation, options)
+            variant = load(path, vocabulary, scenario, allocation, options)
+            warnings.update(dict.fromkeys(variant.warnings))
         except CollectedModelError as several:
             found |= {str(error): error for error in several.errors}
         except ModelError as error:
@@ -80,7 +83,7 @@ def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = (
         raise next(iter(found.values()))
     if found:
         raise CollectedModelError(found.values())
-    return system
+    return replace(system, warnings=tuple(warnings))
 
 
 def _file(path: Path) -> Path:
@@ -117,4 +120,4 @@ def _resolve(context: Context, made: Assembly, options: tuple[str, ...]) -> Syst
     )
     check_reach(context, system.instances, system.networks)
     problems.raise_if_any()
-    return system
+    return replace(system, warnings=problems.warnings)

@@ -10,7 +10,7 @@ from volery.model.context import RESERVED, Context
 from volery.model.form import NetworkForm, ProcessorForm
 from volery.model.problems import Path
 from volery.model.resolve_library import check_processor
-from volery.model.system import Instance, Network, Processor, TargetKind
+from volery.model.system import Instance, Network, Processor, ProcessorKind, TargetKind
 from volery.model.text import Node
 
 
@@ -40,6 +40,8 @@ def _processor(context: Context, name: str, form: ProcessorForm) -> Processor:
     path: Path = ("platform", "processors", name)
     check_processor(context, path, "is", form.kind, form.frequency)
     kind = context.vocabulary.processors.get(form.kind)
+    if kind is not None:
+        _check_setting(context, (*path, "frequency"), form, kind)
     vehicles = context.form.environment.vehicles
     for key, vehicle in (("carried_by", form.carried_by), ("powered_by", form.powered_by)):
         if vehicle is not None and (key, vehicle) != ("powered_by", "mains"):
@@ -60,6 +62,18 @@ def _processor(context: Context, name: str, form: ProcessorForm) -> Processor:
         powered_by=None if powered_by == "mains" else powered_by,
         where=context.where(path),
     )
+
+
+def _check_setting(context: Context, path: Path, form: ProcessorForm, kind: ProcessorKind) -> None:
+    """Warn of a frequency between two that the processor can be set to."""
+    below = [one for one in kind.settings_hz if one < form.frequency]
+    above = [one for one in kind.settings_hz if one > form.frequency]
+    if form.frequency not in kind.settings_hz and below and above:
+        context.problems.warn(
+            path,
+            f"{form.kind} cannot be set to {form.frequency / 1e6:g} MHz; "
+            f"the nearest settings are {below[-1] / 1e6:g} and {above[0] / 1e6:g} MHz",
+        )
 
 
 def networks(context: Context) -> tuple[Network, ...]:

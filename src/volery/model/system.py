@@ -311,11 +311,15 @@ class Observable:
 
 @dataclass(frozen=True, slots=True)
 class ProcessorKind:
-    """What the catalogue says of a processor: its cores and the range in which its laws are valid."""
+    """What the catalogue says of a processor: its cores and the range in which its laws are valid.
+
+    ``settings_hz`` are the frequencies within it that can be set, ascending; empty where they are not known.
+    """
 
     cores: int
     least_hz: float
     greatest_hz: float
+    settings_hz: tuple[float, ...] = ()
 
 
 Kinds = Mapping[str, ProcessorKind]
@@ -349,7 +353,8 @@ class System:
     ``instances`` holds the application's components, then the environment's. ``allocation`` and ``scenario``
     name what was chosen (``scenario`` empty: none), ``allocations`` and ``scenarios`` what there is to choose
     from. ``overrides`` are the ``path=value`` texts that were applied. ``folder`` is where relative paths
-    start. ``catalogues`` are the files of processors that the model brings along.
+    start. ``catalogues`` are the files of processors that the model brings along. ``warnings`` say what is
+    doubtful about it.
     """
 
     name: str
@@ -371,6 +376,7 @@ class System:
     sources: tuple[Source, ...] = ()
     folder: Path = field(default=Path(), compare=False)
     catalogues: tuple[Path, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def vehicles(self) -> tuple[Vehicle, ...]:

@@ -22,6 +22,11 @@ def vocabulary() -> Vocabulary:
 
 def _kinds(*more: Path) -> dict[str, ProcessorKind]:
     return {
-        name: ProcessorKind(entry.cores, entry.least_mhz * 1e6, entry.greatest_mhz * 1e6)
+        name: ProcessorKind(
+            entry.cores,
+            entry.least_mhz * 1e6,
+            entry.greatest_mhz * 1e6,
+            tuple(one * 1e6 for one in entry.set_to()),
+        )
         for name, entry in catalogue(*more).processors.items()
     }

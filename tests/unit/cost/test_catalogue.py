@@ -41,6 +41,15 @@ def test_processors_and_their_ranges() -> None:
             arm.check_frequency(outside)
 
 
+def test_the_settings_of_processors() -> None:
+    intel, arm = catalogue().processor(INTEL), catalogue().processor(ARM)
+    assert arm.set_to() == (600, 700, 800, 900, 1000, 1100, 1200, 1300, 1400, 1500)
+    assert intel.settings is not None
+    assert intel.settings.mhz() == tuple(range(1600, 3201, 100))
+    assert intel.set_to()[-1] == 3000  # the laws end there
+    assert catalogue().processor(HOST).set_to() == ()
+
+
 def test_an_unknown_processor_names_the_known_ones() -> None:
     with pytest.raises(
         EstimateError, match=r"'rpi4-cortex-a27'.*did you mean 'rpi4-cortex-a72'.*generic-host"
@@ -153,6 +162,7 @@ def test_a_catalogue_of_ones_own_adds_processors_and_laws(tmp_path: Path) -> Non
     arm = more.processor(ARM)
     assert (arm.least_mhz, arm.greatest_mhz, sorted(arm.ros)) == (600, 1800, ["roscpp", "rospy"])
     assert arm.power == catalogue().processor(ARM).power
+    assert arm.settings == catalogue().processor(ARM).settings
     assert "my-computer" not in catalogue().processors
 
 

@@ -248,6 +248,32 @@ def test_unknown_scenario_and_allocation_are_the_callers_fault(workshop):
         workshop.load(None, "x")
 
 
+BOARD = "platform.processors.ground={is: rpi4-cortex-a72, frequency: %s MHz}"
+
+
+@pytest.mark.parametrize("mhz", [600, 700, 1500])
+def test_a_frequency_that_can_be_set_is_not_warned_of(workshop, mhz):
+    assert workshop.load(None, None, BOARD % mhz).warnings == ()
+
+
+def test_a_frequency_between_two_settings_is_a_warning_that_names_them(workshop):
+    system = workshop.load(None, None, BOARD % 1450)
+    assert system.processor("ground").frequency_mhz == 1450
+    assert system.warnings == (
+        "platform.processors.ground.frequency: rpi4-cortex-a72 cannot be set to 1450 MHz; "
+        "the nearest settings are 1400 and 1500 MHz",
+    )
+
+
+def test_a_processor_whose_settings_are_not_known_is_not_warned_of(workshop):
+    board = "platform.processors.ground={is: intel-i5-3470, frequency: 1650 MHz}"
+    assert workshop.load(None, None, board).warnings == ()
+
+
+def test_a_check_tells_the_warnings_of_every_variant_once(workshop):
+    assert len(check(workshop.file, workshop.vocabulary, [BOARD % 1450]).warnings) == 1
+
+
 def test_a_catalogue_that_the_model_brings_along(workshop):
     def read_catalogue(file: Path):
         if file.name != "mine.yaml":
