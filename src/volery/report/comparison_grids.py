@@ -19,6 +19,7 @@ from volery.report.grids import (
     number,
     total,
     verdict,
+    widest_band,
 )
 from volery.requirements.record import ComponentRecord, LatencyRecord, RunRecord, VehicleRecord
 
@@ -39,11 +40,15 @@ def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> G
         ("simulated s", [Cell(number(record.sim_s, 1)) for record in records]),
         ("faster than real time", [Cell(number(record.real_time_factor, 0, "×")) for record in records]),
         ("parcels", [Cell(_parcels(record)) for record in records]),
-        ("energy of computers", [Cell(energy(total(_computers(record)))) for record in records]),
+        ("energy of computers", [Cell(_of_computers(record)) for record in records]),
         ("energy of vehicles", [Cell(energy(total(_vehicles(record)))) for record in records]),
     ]
     columns = (Column(""), *(Column(label, True) for label in labels))
     return Grid("The runs", columns, tuple((Cell(name), *cells) for name, cells in rows))
+
+
+def _of_computers(record: RunRecord) -> str:
+    return " ".join(filter(None, (energy(total(_computers(record))), widest_band(record))))
 
 
 def _outcome(record: RunRecord) -> Cell:

@@ -35,6 +35,7 @@ from volery.report.grids import (
     ros_calls_grid,
     total,
     vehicles_grid,
+    widest_band,
 )
 from volery.requirements.accounts import Accounts
 from volery.requirements.observables import Observers, bounds_of
@@ -213,7 +214,7 @@ def _facts(record: RunRecord) -> list[Fact]:
     computers = total([one.energy_j for one in record.processors.values()])
     vehicles = total([one.energy_j for one in record.vehicles.values()])
     if computers is not None:
-        facts.append(Fact("energy of computers", energy(computers)))
+        facts.append(Fact("energy of computers", energy(computers), widest_band(record)))
     if vehicles is not None:
         facts.append(Fact("energy of vehicles", energy(vehicles)))
     misses = sum(one.deadline_misses for one in record.components.values())

@@ -86,6 +86,17 @@ def energy(joules: float | None) -> str:
     return number(joules / 1e3, 1, "kJ") if abs(joules) >= 1e4 else figure(joules, "J")
 
 
+def band(error: float | None) -> str:
+    """``± 20 %``; empty where it is unknown."""
+    return "" if error is None else f"±\N{NO-BREAK SPACE}{number(100.0 * error, 0, '%')}"
+
+
+def widest_band(record: RunRecord) -> str:
+    """The widest band of the energies of a run's processors; empty if none is known."""
+    known = [one.energy_error for one in record.processors.values() if one.energy_error is not None]
+    return band(max(known, default=None))
+
+
 def total(values: list[float | None]) -> float | None:
     """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
     known = [value for value in values if value is not None]
@@ -176,9 +187,18 @@ def cost_grid(record: RunRecord) -> Grid:
             "or that the period allows; waiting for messages, networks and locks is not in it",
             False,
         ),
-        Column("energy", True, "stated for its operations, else what its execution takes above idle"),
+        Column(
+            _energy_title(record),
+            True,
+            "stated for its operations, else what its execution takes above idle, within the band of its "
+            "processor's power figures",
+        ),
     )
     return Grid("What each component costs", columns, rows)
+
+
+def _energy_title(record: RunRecord) -> str:
+    return "\n".join(filter(None, ("energy", widest_band(record))))
 
 
 def _cost_row(name: str, one: ComponentRecord, longest: float) -> tuple[Cell, ...]:
@@ -264,6 +284,7 @@ def processors_grid(record: RunRecord) -> Grid:
             Cell(one.scheduler, status="quiet"),
             Cell(number(100.0 * one.utilisation, 2, "%"), share=min(1.0, one.utilisation)),
             Cell(energy(one.energy_j)),
+            Cell(band(one.energy_error) or NOTHING),
         )
         for name, one in record.processors.items()
     )
@@ -275,6 +296,7 @@ def processors_grid(record: RunRecord) -> Grid:
         Column("scheduler", essential=False),
         Column("utilisation", True, "busy share of all cores over the whole run"),
         Column("energy", True, "idle power included"),
+        Column("band", True, "of the power figures that the energy comes from"),
     )
     return Grid("Processors", columns, rows)
 

@@ -265,6 +265,7 @@ class Accounts:
             cores=setup.cores,
             utilisation=busy / (elapsed * setup.cores) if elapsed else 0.0,
             energy_j=None if by_law is None else by_law + stated,
+            energy_error=None if by_law is None else setup.power_error,
         )
 
     def _requirements(self) -> dict[str, RequirementRecord]:

@@ -89,7 +89,11 @@ class ComponentRecord(_Part):
 
 
 class ProcessorRecord(_Part):
-    """A processor; ``utilisation`` is the busy share of all its cores over the run, 0..1."""
+    """A processor; ``utilisation`` is the busy share of all its cores over the run, 0..1.
+
+    ``energy_error`` is the relative band of its power figures (0.2: within 20 per cent), ``None`` where it is
+    unknown.
+    """
 
     kind: str
     frequency_mhz: float
@@ -97,6 +101,7 @@ class ProcessorRecord(_Part):
     cores: int
     utilisation: float
     energy_j: float | None
+    energy_error: float | None = None
 
 
 class OffsetRecord(_Part):

@@ -102,6 +102,7 @@ def _processor(model: Processor, entry: ProcessorEntry) -> ProcessorSetup:
         cores=model.cores,
         idle_w=power.watts(0.0, model.frequency_mhz) if power else None,
         busy_w=power.watts(model.cores, model.frequency_mhz) if power else None,
+        power_error=power.band() or None if power else None,
     )
 
 
@@ -119,7 +120,8 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
             yield from _code_laws(system, entry, kind)
         if entry.power is not None:
             name = f"power of {kind}"
-            yield LawSetup(name, entry.power.source, entry.power.provenance, entry.power.validity)
+            validity = f"{entry.power.validity}; {entry.power.how_good()}"
+            yield LawSetup(name, entry.power.source, entry.power.provenance, validity)
 
 
 def _code_laws(system: System, entry: ProcessorEntry, kind: str) -> Iterable[LawSetup]:

@@ -48,7 +48,8 @@ class ComponentSetup:
 class ProcessorSetup:
     """A processor. ``idle_w`` and ``busy_w`` are watts of the whole of it, idle and with all cores busy.
 
-    They are ``None`` where nobody stated them: then its energy is not counted.
+    They are ``None`` where nobody stated them: then its energy is not counted. ``power_error`` is their
+    relative band (0.2: within 20 per cent), ``None`` where it is unknown.
     """
 
     name: str
@@ -58,6 +59,7 @@ class ProcessorSetup:
     cores: int = 1
     idle_w: float | None = None
     busy_w: float | None = None
+    power_error: float | None = None
 
 
 @dataclass(frozen=True)

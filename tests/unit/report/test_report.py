@@ -301,3 +301,17 @@ def test_a_narrow_terminal_drops_columns_but_never_digits(runs: tuple[Path, Path
     for text in (wide, narrow):
         assert misses in text
         assert "drone_control" in text
+
+
+def test_the_band_of_power_figures_is_shown_where_energy_is(tmp_path: Path) -> None:
+    known = make_run(tmp_path / "run")
+
+    def told(error: float | None) -> str:
+        processors = {
+            name: one.model_copy(update={"energy_error": error}) for name, one in known.processors.items()
+        }
+        return shown(summary_table(known.model_copy(update={"processors": processors})))
+
+    assert "±" not in told(None)
+    in_words = "±\N{NO-BREAK SPACE}20\N{NO-BREAK SPACE}%"
+    assert told(0.2).count(in_words) == 1 + len(known.processors)  # the components' heading, each processor

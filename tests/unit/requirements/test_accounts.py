@@ -97,6 +97,14 @@ def test_no_power_figures_no_energy() -> None:
     assert any("z80" in line for line in found.not_counted)
 
 
+def test_the_band_of_power_figures_stands_beside_the_energy() -> None:
+    known = ProcessorSetup("p", "board", 1500.0, "fixed-priority", 1, 2.0, 3.0, 0.2)
+    setup = RunSetup(processors=(known, ProcessorSetup("q", "z80", power_error=0.2)))
+    found = Accounts(setup).record("completed").processors
+    assert found["p"].energy_error == 0.2
+    assert found["q"].energy_error is None  # no figures, no energy
+
+
 def test_an_energy_law_can_be_handed_in() -> None:
     accounts = Accounts(SETUP, lambda processor, busy, elapsed: 100.0 * busy + elapsed)
     accounts(Slice(0, S, "onboard", 0, "t", "control"))
