@@ -102,7 +102,7 @@ def simulate(
 
 def deliver(python: str, out: Path, graph: str, env: Mapping[str, str]) -> dict[str, Any]:
     """One parcel, by processes on *graph*; its run's record."""
-    options = ("--scenario", "pocket", "--seed", "7", "--speed", "4", "--set", "run.duration=300 s")
+    options = ("--scenario", "pocket", "--seed", "7", "--speed", "2.5", "--set", "run.duration=300 s")
     done = simulate(python, DELIVERY, out, "--graph", graph, *options, env=env)
     assert (out / "run.json").exists(), done.stderr
     record: dict[str, Any] = json.loads((out / "run.json").read_text())
