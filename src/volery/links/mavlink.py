@@ -9,8 +9,8 @@ an older sender does not know. Signatures are neither written nor checked.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -33,6 +33,17 @@ class _Field(NamedTuple):
     name: str
     length: int  # 0 for a single value, else how many
     text: bool
+
+
+def _naming(names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
+    """What makes a dictionary of values in the order of *names*: code written for them, twice as fast as zip.
+
+    A name may be a word of Python's, so arguments are numbered.
+    """
+    arguments = [f"value_{number}" for number in range(len(names))]
+    items = ", ".join(f"{name!r}: {value}" for name, value in zip(names, arguments, strict=True))
+    named: Callable[..., dict[str, Any]] = eval(f"lambda {', '.join(arguments)}: {{{items}}}")
+    return named
 
 
 class MessageType:
@@ -102,7 +113,7 @@ class MessageType:
             payload = payload[: self.size].ljust(self.size, b"\0")
         values = self._struct.unpack(payload)
         if self._plain:
-            return dict(zip(self._names, values))  # noqa: B905  # as long, by construction; strict costs
+            return self._named(*values)
         fields: dict[str, Any] = {}
         place = 0
         for field in self._fields:
@@ -117,9 +128,14 @@ class MessageType:
                 place += field.length
         return fields
 
+    @cached_property
+    def _named(self) -> Callable[..., dict[str, Any]]:
+        return _naming(self._names)
+
     def checksum(self, covered: bytes) -> int:
         """X.25 (CRC-16/MCRF4XX) over everything after STX and the message's own extra byte."""
-        return int(mcrf4xx(covered + self._extra))
+        crc: int = mcrf4xx(covered + self._extra)
+        return crc
 
 
 _TYPES = {definition.id: MessageType(definition) for definition in (*NEWER, *dialect.mavlink_map.values())}

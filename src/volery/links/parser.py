@@ -26,7 +26,8 @@ from volery.links.mavlink import (
 )
 
 _STARTS = frozenset((STX, STX_V1))
-_AROUND = HEADER.size + CHECKSUM.size
+_BEFORE, _AFTER = HEADER.size, CHECKSUM.size
+_AROUND = _BEFORE + _AFTER
 _WHAT_COUNTS = struct.Struct("<xBBxxBBHB")
 """Of ``HEADER``: length, what one must understand, system, component, id low, high."""
 
@@ -115,14 +116,14 @@ class Parser:
         size: int
         size, incompatible, system, component, low, high = _WHAT_COUNTS.unpack_from(octets, start)
         kind = message_type_of(low | high << 16)
-        end = start + HEADER.size + size
-        if incompatible or kind is None or size > kind.size or end + CHECKSUM.size > len(octets):
+        end = start + _BEFORE + size
+        if incompatible or kind is None or size > kind.size or end + _AFTER > len(octets):
             return 0
         body = octets[start + 1 : end]
         if kind.checksum(body) != octets[end] | octets[end + 1] << 8:
             return 0
         self.heard.frames += 1
-        frames.append(Frame(kind.name, kind.unpack(body[HEADER.size - 1 :]), system, component))
+        frames.append(Frame(kind.name, kind.unpack(body[_BEFORE - 1 :]), system, component))
         return size + _AROUND
 
     def _unusual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
