@@ -39,7 +39,7 @@ class Controller:
         self.pids = [Pid() for _ in range(4)]
         self.stamp = None
         self.goal = 0
-        self.commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self.commands = rospy.Publisher("cmd_vel", Twist, queue_size=100)
         self.reached = rospy.Publisher("reached", Int32, queue_size=10)
         while self.reached.get_num_connections() < rospy.get_param("~listeners"):
             rospy.sleep(0.05)

@@ -13,7 +13,7 @@ class Plant:
     def __init__(self):
         self.steps = 0
         self.place = [0.0, 0.0, 0.0, 0.0]
-        self.poses = rospy.Publisher("pose", PoseStamped, queue_size=10)
+        self.poses = rospy.Publisher("pose", PoseStamped, queue_size=100)
         rospy.Subscriber("cmd_vel", Twist, self.obey)
 
     def tell(self):

@@ -40,7 +40,7 @@ class Controller(Node):
         self.pids = [Pid(gains) for _ in range(4)]
         self.stamp = None
         self.goal = 0
-        self.commands = self.create_publisher(Twist, "cmd_vel", 1)
+        self.commands = self.create_publisher(Twist, "cmd_vel", 100)
         self.reached = self.create_publisher(Int32, "reached", 10)
         listeners = self.declare_parameter("listeners", 1).value
         while (
