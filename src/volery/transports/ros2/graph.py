@@ -37,6 +37,8 @@ DISCOVERY_S = 0.6
 GOODBYE_S = 2.0
 WATCH_S = 1.0
 """How often it looks for topics that carry several types."""
+NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"
+"""What DDS calls the node of an end that was discovered before its node was."""
 HIDDEN = "_volery"
 """Names that begin so are the transport's own and are not shown."""
 _MISSING = (
@@ -166,9 +168,11 @@ class Ros2:
         """DDS leaves ends of different types unconnected without a word; each such topic is told once."""
         for name, kinds in self._own.get_topic_names_and_types():
             if len(kinds) > 1 and name not in self._told:
-                self._told.add(name)
                 ends = self._own.get_publishers_info_by_topic(name)
                 ends += self._own.get_subscriptions_info_by_topic(name)
+                if any(one.node_name == NOT_KNOWN_YET for one in ends):
+                    continue  # the next look tells who it is
+                self._told.add(name)
                 by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
                 said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
                 self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
