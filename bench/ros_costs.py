@@ -4,7 +4,8 @@ Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost 
 nodes of each library run on a real master and are measured from outside: both see the same machine, whatever
 else it does. What is estimated is a simulation of the
 same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were committed
-before anything was calibrated; nothing is fitted to them. An estimate holds if it is off by at most 15 % or
+before anything was calibrated. No coefficient is fitted to them, but what a law distinguishes was extended
+after looking at their differences (docs/calibration.md). An estimate holds if it is off by at most 15 % or
 half the inter-quartile range of the measured runs.
 
     python bench/ros_costs.py [--rounds 10] [--client roscpp --client rospy]
