@@ -7,7 +7,7 @@ from math import isfinite, isnan
 
 from volery.autopilots.px4 import events, modes
 from volery.autopilots.px4.commander import CRITICAL, FORCE, INFO, of
-from volery.autopilots.px4.flying import Hold
+from volery.autopilots.px4.planned import Hold
 from volery.autopilots.simulated.mavlink.command_service import (
     ACCEPTED,
     DENIED,

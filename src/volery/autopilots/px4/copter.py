@@ -7,9 +7,11 @@ from functools import cache, partial
 from volery.autopilots.px4 import commands, missions, modes, radio, tuning
 from volery.autopilots.px4.commander import of
 from volery.autopilots.px4.firmware import px4
-from volery.autopilots.px4.flying import Descent, Hold, Offboard, Orbit, Position, Return, TakeOff
 from volery.autopilots.px4.honoured import COPTER as HONOURED
 from volery.autopilots.px4.mavlink import mavlink
+from volery.autopilots.px4.piloted import Position
+from volery.autopilots.px4.planned import Descent, Hold, Orbit, Return, TakeOff
+from volery.autopilots.px4.pursuit import Offboard
 from volery.autopilots.px4.returning import tell_stage
 from volery.autopilots.px4.watching import on_step
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission

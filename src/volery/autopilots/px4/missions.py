@@ -5,7 +5,7 @@ from __future__ import annotations
 from volery.autopilots.px4 import events, modes
 from volery.autopilots.px4.commander import INFO, of
 from volery.autopilots.px4.commands import on_return
-from volery.autopilots.px4.flying import Descent, Hold, TakeOff
+from volery.autopilots.px4.planned import Descent, Hold, TakeOff
 from volery.autopilots.simulated.manoeuvres.mission import FOREVER, Leg, item_point, point_height
 from volery.autopilots.simulated.manoeuvres.points import bearing
 from volery.autopilots.simulated.mavlink.command_service import Command

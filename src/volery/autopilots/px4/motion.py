@@ -6,8 +6,8 @@ from math import atan2, degrees, hypot, nan
 
 from volery.autopilots.px4 import modes
 from volery.autopilots.px4.commander import ATTITUDE_AFTER, of
-from volery.autopilots.px4.flying import Orbit
 from volery.autopilots.px4.offboard import AttitudeTarget
+from volery.autopilots.px4.planned import Orbit
 from volery.autopilots.simulated.mavlink import telemetry
 from volery.autopilots.simulated.mavlink.numbers import short, word
 from volery.autopilots.simulated.mavlink.telemetry import EPOCH_US, Fields, boot_ms, boot_us, heading_cdeg

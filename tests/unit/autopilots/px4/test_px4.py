@@ -9,10 +9,11 @@ import pytest
 
 from volery.autopilots.px4 import DIALECT
 from volery.autopilots.px4.events import Checks, report
-from volery.autopilots.px4.flying import curve, interpolated
 from volery.autopilots.px4.joystick import Deflection, Joystick, deflection
 from volery.autopilots.px4.modes import custom_mode, main_and_sub
 from volery.autopilots.px4.offboard import Stream, Target, attitude_target
+from volery.autopilots.px4.piloted import curve
+from volery.autopilots.px4.ramps import interpolated
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import make_world
 from volery.autopilots.simulated.mavlink.habits import Texts
