@@ -12,13 +12,13 @@ import argparse
 from collections.abc import Callable
 from statistics import median
 from time import process_time
-from typing import Any, NamedTuple
+from typing import Any
 
 from volery import messages
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
 from volery.cost import catalogue
-from volery.graph import Graph
+from volery.graph import Graph, free
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -29,20 +29,10 @@ from volery.messages.cdr import copied_to_cdr
 POSE = "geometry_msgs/msg/PoseStamped"
 
 
-class Free(NamedTuple):
-    caller: int = 0
-    background: int = 0
-
-
 def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> Graph:
     tariff = catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
-    free = Free()
-
-    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        kernel.call_at(kernel.now(), deliver)
-
-    price = (lambda node, call, x: tariff(call, x)) if priced else (lambda node, call, x: free)
-    return Graph(kernel, price, carry, records=lambda topic: recorded)
+    price = (lambda node, call, x: tariff(call, x)) if priced else free
+    return Graph(kernel, price, records=lambda topic: recorded)
 
 
 def publishing(count: int, priced: bool, recorded: bool) -> float:

@@ -142,22 +142,10 @@ TALKERS: Mapping[str, Any] = {"rospy": rospy_talker, "rclpy": rclpy_talker}
 LISTENERS: Mapping[str, Any] = {"rospy": rospy_listener, "rclpy": rclpy_listener}
 
 
-class Free(NamedTuple):
-    caller: int = 0
-    background: int = 0
-
-
-FREE = Free()
-
-
 def embedded(library: str, recorded: bool, count: int) -> Taken:
     """Both as components of one run in virtual time, so that the talker's CPU time is that of both."""
     kernel = VirtualKernel()
-
-    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        kernel.call_at(kernel.now(), deliver)
-
-    graph = Graph(kernel, lambda node, call, x: FREE, carry, records=lambda topic: recorded)
+    graph = Graph(kernel, unrecorded=not recorded)
     face = importable(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
     kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
@@ -20,11 +20,6 @@ from volery.links.link import Frame
 STRING, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/SetBool"
 
 
-class Free(NamedTuple):
-    caller: int = 0
-    background: int = 0
-
-
 @pytest.fixture(params=[VirtualKernel, WallKernel])
 def kernel(request: pytest.FixtureRequest) -> Any:
     return request.param()
@@ -32,10 +27,7 @@ def kernel(request: pytest.FixtureRequest) -> Any:
 
 @pytest.fixture
 def graph(kernel: Any) -> Graph:
-    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        kernel.call_at(kernel.now(), deliver)
-
-    return Graph(kernel, lambda node, call, x: Free(), carry)
+    return Graph(kernel)
 
 
 def play(kernel: Any, *bodies: Callable[[], None]) -> None:

@@ -16,7 +16,7 @@ from volery.graph.node import (
     SENSOR_DATA,
     TRANSIENT_LOCAL,
     VOLATILE,
-    Carry,
+    Between,
     Client,
     Cost,
     Group,
@@ -33,7 +33,9 @@ from volery.graph.node import (
     Subscription,
     Timer,
     TopicState,
+    Way,
     Work,
+    free,
 )
 from volery.graph.services import ServiceError
 
@@ -47,7 +49,7 @@ __all__ = [
     "SENSOR_DATA",
     "TRANSIENT_LOCAL",
     "VOLATILE",
-    "Carry",
+    "Between",
     "Client",
     "Cost",
     "EmbeddedNode",
@@ -67,5 +69,7 @@ __all__ = [
     "Subscription",
     "Timer",
     "TopicState",
+    "Way",
     "Work",
+    "free",
 ]

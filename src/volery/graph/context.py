@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, US, Ns, S
-from volery.graph.node import Carry, NodeId, Price
+from volery.graph.node import Between, NodeId, Price
 from volery.graph.parameters import Parameters
-from volery.kernel.api import Kernel
+from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
 from volery.messages import Message, from_cdr, to_cdr
@@ -34,7 +34,7 @@ class Context:
 
     kernel: Kernel
     price: Price
-    carry: Carry
+    between: Between
     records: Records
     epoch: Ns
     changed: Signal
@@ -58,6 +58,14 @@ class Context:
         arriving: Message = from_cdr(message.__msgtype__, to_cdr(message))
         return arriving
 
+    def bring(self, sender: Member, receiver: Member, size: int, deliver: Action, lost: Action) -> None:
+        """Bring a request or an answer from node to node, reliably."""
+        way = self.between(sender.id, receiver.id)
+        if way is None:
+            deliver()
+        else:
+            way(size, True, deliver, lost)
+
     def stamp(self) -> Ns:
         """ROS time, without being an interaction point."""
         return self.epoch + self.kernel.now()
@@ -77,28 +85,27 @@ _KINDS = {call: f"ros:{call}" for call in _CALLS}
 class Member:
     """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
 
-    __slots__ = ("_awake", "_since", "_slept", "_waited", "closed", "context", "id", "place")
+    __slots__ = ("_awake", "_free", "_since", "_slept", "_waited", "closed", "context", "id", "name", "place")
 
     def __init__(self, context: Context, name: str, place: Place) -> None:
         processor = place.processor.name if place.processor else ""
         self.context = context
         self.id = NodeId(name, place.component, processor)
+        self.name = name
         self.place = place
+        self._free = context.unrecorded and place.processor is None  # nobody executes it, nobody sees it
         self.closed = False
         self._since = context.kernel.now()
         self._awake: Ns = -AWAKE
         self._slept = self._waited = 0.0
-
-    @property
-    def name(self) -> str:
-        """The node's full name."""
-        return self.id.name
 
     def pay(self, call: str, x: float = 0.0) -> None:
         """Price a call and have it executed: the caller's part before this returns, the rest beside it.
 
         House code cannot wait: there all of it goes to the background.
         """
+        if self._free:
+            return
         context = self.context
         kernel = context.kernel
         who = self.id

@@ -14,7 +14,7 @@ from volery.base.time import Ns
 from volery.graph.clock import Clock
 from volery.graph.context import Context, Records
 from volery.graph.embedded import EmbeddedNode
-from volery.graph.node import Carry, Price, RosGraph, ServiceState, TopicState
+from volery.graph.node import Between, Price, RosGraph, ServiceState, TopicState, at_once, free
 from volery.graph.parameters import Parameters
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
@@ -39,9 +39,10 @@ def _nothing(topic_name: str) -> bool:
 class Graph:
     """One ROS graph.
 
-    *records* says for which topics the content of messages is recorded. *epoch* is what ROS time is at the
-    kernel's zero: 0 in virtual time, the Unix time in ns on the wall clock. ``/clock`` ticks each 10 ms of
-    the kernel's time while somebody subscribes to it.
+    *price* says what a call takes, *between* how messages get from node to node. *records* says for which
+    topics the content of messages is recorded. *epoch* is what ROS time is at the kernel's zero: 0 in virtual
+    time, the Unix time in ns on the wall clock. ``/clock`` ticks each 10 ms of the kernel's time while
+    somebody subscribes to it.
 
     *unrecorded*: nothing of it is recorded at all; for a graph that is no part of a system, such as the wire
     to a simulated vehicle. *as_bytes*: messages make the trip through their bytes, so that they have the
@@ -51,8 +52,8 @@ class Graph:
     def __init__(
         self,
         kernel: Kernel,
-        price: Price,
-        carry: Carry,
+        price: Price = free,
+        between: Between = at_once,
         *,
         records: Records = everything,
         epoch: Ns = 0,
@@ -63,7 +64,7 @@ class Graph:
         self._context = Context(
             kernel,
             price,
-            carry,
+            between,
             _nothing if unrecorded else records,
             epoch,
             Signal(kernel, "the ROS graph"),

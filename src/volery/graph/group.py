@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 from volery.base.time import Ns
 from volery.graph.context import Member
@@ -22,8 +23,8 @@ class CallbackGroup:
     released when its message (request, timer) arrived. Polling (``within=0``) belongs to the activation that
     is under way. With *start* nothing waits: it is given the work at once, as house code.
 
-    An executor that waits for several groups at once sets ``on_ready``, which is called (as house code)
-    whenever something has become ready, and ``take``s it.
+    An executor that waits for several groups at once sets ``on_ready``, which is called whenever something
+    has become ready, and ``take``s it.
     """
 
     def __init__(self, member: Member, label: str, start: Callable[[Work], None] | None = None) -> None:
@@ -38,9 +39,13 @@ class CallbackGroup:
         return len(self._ready)
 
     def add(self, work: Work) -> None:
-        """A callback has become ready. House code."""
+        """A callback has become ready. Never blocks."""
         if self._start is not None:
-            self._start(work)
+            kernel = self._member.context.kernel
+            if kernel.current() is None:
+                self._start(work)
+            else:
+                kernel.call_at(kernel.now(), partial(self._start, work))
             return
         self._ready.append(work)
         self._filled.notify()

@@ -81,9 +81,33 @@ same where the node has sent or received something a moment ago), ``sleep`` (x =
 message arrives), ``connect`` (a subscription of it finds a publisher), ``accept`` (a publisher of it finds a
 subscription) and ``wait`` (x = microseconds in which it did not sleep)."""
 
-Carry = Callable[[NodeId, NodeId, int, bool, Callable[[], None], Callable[[], None]], None]
-"""``carry(sender, receiver, size, reliable, deliver, lost)``: bring *size* bytes from node to node, then call
-*deliver*, or *lost* where it did not arrive. Never blocks and calls nothing before it has returned."""
+
+class _NoCost(NamedTuple):
+    caller: Ns = 0
+    background: Ns = 0
+
+
+_NO_COST = _NoCost()
+
+
+def free(node: NodeId, call: str, x: float) -> Cost:
+    """A ``Price``: calls take nothing."""
+    return _NO_COST
+
+
+Way = Callable[[int, bool, Callable[[], None], Callable[[], None]], None]
+"""``way(size, reliable, deliver, lost)``: bring *size* bytes along it, then call *deliver*, or *lost* where
+they did not arrive. Never blocks and calls nothing before it has returned."""
+
+Between = Callable[[NodeId, NodeId], Way | None]
+"""``between(sender, receiver)``: the way from node to node, asked once; ``None`` where nothing is between
+them, so that what one sends is with the other at once."""
+
+
+def at_once(sender: NodeId, receiver: NodeId) -> Way | None:
+    """``Between``: nothing is."""
+    return None
+
 
 Callback = Callable[[Any], None]
 Handler = Callable[[Any], Any]
@@ -190,8 +214,8 @@ class Group(Protocol):
         """Run callbacks as they come until the node is closed."""
 
     on_ready: Callable[[], None] | None
-    """Called (as house code) whenever a callback has become ready: for who waits for several groups at once
-    and ``take``s what is there."""
+    """Called whenever a callback has become ready, for who waits for several groups at once and ``take``s
+    what is there. It must not block."""
 
     @property
     def oldest(self) -> Ns | None:

@@ -99,9 +99,8 @@ class EmbeddedService:
             self._send_back(exchange, exchange.succeed, content, cdr_size(content))
 
     def _send_back(self, exchange: Exchange, end: Any, content: Any, size: int) -> None:
-        context = self.member.context
         lost = partial(exchange.fail, "the answer was lost on the way")
-        context.carry(self.member.id, exchange.caller.id, size, True, partial(end, content), lost)
+        self.member.context.bring(self.member, exchange.caller, size, partial(end, content), lost)
 
     def close(self) -> None:
         """Answer no longer; who waits is told."""
@@ -130,11 +129,10 @@ class EmbeddedClient:
             start = kernel.now()
             server = self._server(request)
             exchange = Exchange(self._member, context.sent(request), self.name)
-            context.carry(
-                self._member.id,
-                server.member.id,
+            context.bring(
+                self._member,
+                server.member,
                 cdr_size(exchange.request),
-                True,
                 partial(server.arrive, exchange),
                 partial(exchange.fail, "the request was lost on the way"),
             )

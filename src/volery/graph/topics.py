@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections import deque
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.graph.context import Context, Member
 from volery.graph.group import CallbackGroup, Work
-from volery.graph.node import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE, Callback, QoS
+from volery.graph.node import (
+    BEST_AVAILABLE,
+    BEST_EFFORT,
+    RELIABLE,
+    TRANSIENT_LOCAL,
+    VOLATILE,
+    Callback,
+    QoS,
+    Way,
+)
 from volery.messages import Message as Value
 from volery.messages import cdr_size, message_class
 from volery.messages.cdr import copied_to_cdr
@@ -55,6 +64,16 @@ def incompatible(offered: QoS, wanted: QoS) -> str:
     return ""
 
 
+class Connection(NamedTuple):
+    """A publisher's connection to a subscription: the way there (``None``: they are in one place), and
+    whether what is lost on it is sent again.
+    """
+
+    to: EmbeddedSubscription
+    way: Way | None
+    reliable: bool
+
+
 class EmbeddedPublisher:
     """See ``volery.graph.node.Publisher``."""
 
@@ -64,10 +83,11 @@ class EmbeddedPublisher:
         self._context = member.context
         self._at = at
         self._class = message_class(at.type)
-        self._targets: list[EmbeddedSubscription] = []
+        self._targets: list[Connection] = []
         self._kept: deque[tuple[Any, Ns, int]] = deque(maxlen=qos.depth)
         self._keeps = qos.durability == TRANSIENT_LOCAL
         self._recorded = member.context.records(at.name)
+        self._weighed = not member.context.unrecorded  # whether somebody asks for the size of what is sent
         self._open = True
         at.publishers.append(self)
         for subscription in at.subscriptions:
@@ -80,18 +100,21 @@ class EmbeddedPublisher:
             text = f"{self.topic}: {subscription.member.name} does not hear {self.member.name}: {why}"
             self._context.record(Text(self._context.kernel.now(), self.member.name, WARNING, text))
             return
-        self._targets.append(subscription)
+        way = self._context.between(self.member.id, subscription.member.id)
+        reliable = BEST_EFFORT not in (self.qos.reliability, subscription.qos.reliability)
+        connection = Connection(subscription, way, reliable)
+        self._targets.append(connection)
+        self._weighed = self._weighed or way is not None
         if subscription.member is not self.member:
             self.member.bear("accept")
             subscription.member.bear("connect")
         if self._keeps and subscription.qos.durability in (TRANSIENT_LOCAL, BEST_AVAILABLE):
             for content, sent, size in self._kept:
-                self._send(subscription, content.copy(), sent, size)
+                self._send(connection, content.copy(), sent, size)
 
     def disconnect(self, subscription: EmbeddedSubscription) -> None:
         """Serve it no longer."""
-        if subscription in self._targets:
-            self._targets.remove(subscription)
+        self._targets = [one for one in self._targets if one.to is not subscription]
 
     def publish(self, message: Any) -> None:
         """Send a copy of *message* as it is when the call has been paid."""
@@ -113,23 +136,24 @@ class EmbeddedPublisher:
             if len(targets) == 1:
                 self._send(targets[0], content, sent, size)
             else:
-                for subscription in tuple(targets):
-                    self._send(subscription, content.copy(), sent, size)
+                for target in targets:
+                    self._send(target, content.copy(), sent, size)
 
     def _record(self, content: Value, sent: Ns) -> int:
         """Record what is sent, where that is wanted; returns its size in bytes."""
         if not self._recorded:
-            return cdr_size(content)
+            return cdr_size(content) if self._weighed else 0
         data = copied_to_cdr(content)
         self._context.record(Published(sent, self.topic, self.type, self.member.name, data))
         return len(data)
 
-    def _send(self, subscription: EmbeddedSubscription, content: Any, sent: Ns, size: int) -> None:
-        reliable = BEST_EFFORT not in (self.qos.reliability, subscription.qos.reliability)
+    def _send(self, target: Connection, content: Any, sent: Ns, size: int) -> None:
+        subscription, way, reliable = target
         name = self.member.name
-        self._context.carry(
-            self.member.id,
-            subscription.member.id,
+        if way is None:
+            subscription.arrive(content, sent, name, size)
+            return
+        way(
             size,
             reliable,
             partial(subscription.arrive, content, sent, name, size),
@@ -146,7 +170,7 @@ class EmbeddedPublisher:
         with self._context.kernel.guard:
             if self._open:
                 self._open = False
-                self._targets.clear()
+                self._targets = []
                 self._at.publishers.remove(self)
                 self._context.changed.notify()
 

@@ -136,7 +136,7 @@ class Builder:
         self._part = part
         self._truth = airfield.truth if airfield else part.truth if part else None
         self._models = part.instances if part else system.instances
-        self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.carry)
+        self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.between)
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._lands: dict[str, Lands] = {}
         self._instances: dict[str, Instance] = {}

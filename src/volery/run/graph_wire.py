@@ -10,17 +10,16 @@ recorded. With faults, messages travel as frames of a transport do: numbered, wi
 
 from __future__ import annotations
 
+from functools import partial
 from random import Random
 
 from volery.base.time import MS, Ns
-from volery.cost import Price
 from volery.graph import Graph
-from volery.graph.node import NodeId
+from volery.graph.node import NodeId, Way
 from volery.kernel.api import Action, Kernel
 from volery.links.wire import OVERTAKEN, WireFaults
 from volery.run.simulated import LINK_DELAY
 
-FREE = Price(0, 0)
 FRAME = 30
 """Bytes that a transport adds to a message."""
 GIVEN_UP: Ns = 500 * MS
@@ -43,10 +42,13 @@ class GraphWire:
         """From now on this happens to what passes, in both directions."""
         self._faults = faults
 
-    def carry(
-        self, sender: NodeId, receiver: NodeId, size: int, _sure: bool, deliver: Action, lost: Action
+    def between(self, sender: NodeId, receiver: NodeId) -> Way:
+        """See ``volery.graph.Between``. Messages of a pair keep their order, unless faults say so."""
+        return partial(self._carry, sender.name, receiver.name)
+
+    def _carry(
+        self, sender: str, receiver: str, size: int, _sure: bool, deliver: Action, lost: Action
     ) -> None:
-        """See ``volery.graph.Carry``. Messages of a pair of nodes keep their order, unless faults say so."""
         now = self._kernel.now()
         if self._faults is WHOLE and not self._latest:
             self._carry_whole(now, deliver)
@@ -56,7 +58,7 @@ class GraphWire:
             return
         faults, random = self._faults, self._random
         late = int(random.random() * faults.jitter) if faults.jitter else 0
-        way = sender.name, receiver.name
+        way = sender, receiver
         self._latest[way] = arrives = max(self._latest.get(way, 0), now + LINK_DELAY + late)
         if faults.reorder and random.random() < faults.reorder:
             arrives += OVERTAKEN
@@ -86,4 +88,4 @@ def _all(actions: list[Action]) -> None:
 
 def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Graph:
     """A graph whose messages go over *wire*: as values, or as what is left of them after their bytes."""
-    return Graph(kernel, lambda node, call, x: FREE, wire.carry, unrecorded=True, as_bytes=as_bytes)
+    return Graph(kernel, between=wire.between, unrecorded=True, as_bytes=as_bytes)

@@ -6,7 +6,7 @@ one allocation. Nodes and components that are allocated to no processor compute 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 from volery.base.errors import EstimateError, choices
@@ -16,7 +16,8 @@ from volery.components.instance import Seat
 from volery.components.ports import Travel
 from volery.components.pricing import FREE, Cost, Counted, Pricing, Stated
 from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
-from volery.graph.node import NodeId
+from volery.graph.node import NodeId, Way
+from volery.kernel.api import Action
 from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
 from volery.kernel.virtual import VirtualKernel
@@ -191,32 +192,28 @@ class Platform:
             if vehicle.processor is not None:
                 self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
 
-    def carry(
-        self,
-        sender: NodeId,
-        receiver: NodeId,
-        size: int,
-        reliable: bool,
-        deliver: Callable[[], None],
-        lost: Callable[[], None],
-    ) -> None:
-        """Bring a message from node to node."""
-        network = self._between(sender.processor, receiver.processor)
+    def between(self, sender: NodeId, receiver: NodeId) -> Way | None:
+        """How messages get from node to node: over the network between their processors, if there is one."""
+        network = self._network_between(sender.processor, receiver.processor)
         if network is None:
-            self._kernel.call_at(self._kernel.now(), deliver)
-        elif reliable:
-            network.send_reliable(size, deliver, f"{sender.name}>{receiver.name}")
-        else:
-            network.send(size, deliver, lost)
+            return None
+
+        def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
+            if reliable:
+                network.send_reliable(size, deliver, f"{sender.name}>{receiver.name}")
+            else:
+                network.send(size, deliver, lost)
+
+        return way
 
     def travel(self, one: str | None, other: str | None) -> Travel | None:
         """How the arguments of a call get from processor to processor; ``None`` where that takes no time."""
-        network = self._between(one or "", other or "")
+        network = self._network_between(one or "", other or "")
         if network is None:
             return None
         return lambda size: network.carry(size, self._kernel.now() + CALL_WITHIN)
 
-    def _between(self, one: str, other: str) -> Network | None:
+    def _network_between(self, one: str, other: str) -> Network | None:
         if one == other or not one or not other:
             return None
         model = self._system.network_between(one, other)

@@ -8,7 +8,7 @@ from random import Random
 from typing import Protocol
 
 from volery.base.seeds import stream
-from volery.graph.node import NodeId
+from volery.graph.node import NodeId, Way
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
@@ -107,15 +107,18 @@ class _HandOnNode(GraphWire):
         """All passes again."""
         self.hears = self.speaks = True
 
-    def carry(
-        self, sender: NodeId, receiver: NodeId, size: int, sure: bool, deliver: Action, lost: Action
-    ) -> None:
+    def between(self, sender: NodeId, receiver: NodeId) -> Way:
         """See ``GraphWire``; what the hand does not let pass is lost."""
-        unheard = receiver.name == self.held and not self.hears
-        if unheard or (sender.name == self.held and not self.speaks):
-            self._kernel.call_at(self._kernel.now() + GIVEN_UP, lost)
-        else:
-            super().carry(sender, receiver, size, sure, deliver, lost)
+        whole = super().between(sender, receiver)
+
+        def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
+            unheard = receiver.name == self.held and not self.hears
+            if unheard or (sender.name == self.held and not self.speaks):
+                self._kernel.call_at(self._kernel.now() + GIVEN_UP, lost)
+            else:
+                whole(size, reliable, deliver, lost)
+
+        return way
 
 
 class ByGraph(Access):

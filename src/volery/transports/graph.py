@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from time import time_ns
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.graph.clock import CLOCK_PERIOD
 from volery.graph.context import Context, Records
 from volery.graph.graph import everything
-from volery.graph.node import Cost, NodeId, RosGraph, ServiceState, TopicState
+from volery.graph.node import RosGraph, ServiceState, TopicState, at_once, free
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
@@ -31,20 +30,6 @@ if TYPE_CHECKING:
         return graph
 
 
-@dataclass(frozen=True)
-class _Free:
-    caller: Ns = 0
-    background: Ns = 0
-
-
-def _price(node: NodeId, call: str, x: float) -> Cost:
-    return _Free()
-
-
-def _carry(*what: object) -> NoReturn:
-    raise AssertionError("real ROS carries its messages itself")
-
-
 class TransportGraph:
     """The nodes of this process on a real ROS graph.
 
@@ -58,7 +43,7 @@ class TransportGraph:
         self._since = epoch
         if epoch is None:
             epoch = time_ns() - kernel.now()
-        self._context = Context(kernel, _price, _carry, records, epoch, Signal(kernel, "the ROS graph"))
+        self._context = Context(kernel, free, at_once, records, epoch, Signal(kernel, "the ROS graph"))
         self._library = library
         self._nodes: dict[str, TransportNode] = {}
         self._numbers = 0

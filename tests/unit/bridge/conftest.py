@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
@@ -9,17 +9,12 @@ from volery import messages
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
-from volery.graph import Graph
+from volery.graph import Cost, Graph, free
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.trace.events import Text
-
-
-class Free(NamedTuple):
-    caller: int = 0
-    background: int = 0
 
 
 class Aviary:
@@ -29,7 +24,7 @@ class Aviary:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
-        self.graph = Graph(self.kernel, self._price, self._carry)
+        self.graph = Graph(self.kernel, self._price)
         ours, self._theirs = in_process(self.kernel, MS, name="drone_1")
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
@@ -41,12 +36,9 @@ class Aviary:
         self.user = self.graph.node("user", place=Place("user"))
         self.got: dict[str, list[Any]] = {}
 
-    def _price(self, node: Any, call: str, x: float) -> Free:
+    def _price(self, node: Any, call: str, x: float) -> Cost:
         self.priced.append((node.name, call))
-        return Free()
-
-    def _carry(self, sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        self.kernel.call_at(self.kernel.now(), deliver)
+        return free(node, call, x)
 
     def _hear(self, frame: Frame) -> None:
         self.sent.append(frame)

@@ -19,12 +19,6 @@ from volery.links.pprzlink import PPRZLINK
 from volery.messages import new
 from volery.trace.events import Text
 
-
-class Free:
-    caller = 0
-    background = 0
-
-
 SETPOINT = Frame(
     "GUIDED_SETPOINT_NED", {"ac_id": 7, "flags": 0, "x": 1.5, "y": -2.0, "z": -10.0, "yaw": 0.25}, 0, 0
 )
@@ -41,12 +35,9 @@ class Aviary:
         self.told: list[Frame] = []
         self.aircraft.receive(self.told.append)
         self.heard: list[Any] = []
-        self.graph = Graph(self.kernel, lambda node, call, x: Free(), self._carry)
+        self.graph = Graph(self.kernel)
         serve_pprzros(self.graph, link, "craft_1", Place("pprzros"))
         self.kernel.spawn(self._control, "control", Place("control"))
-
-    def _carry(self, one: Any, other: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        self.kernel.call_at(self.kernel.now(), deliver)
 
     def _control(self) -> None:
         node = self.graph.node("control")

@@ -33,13 +33,6 @@ FRAME = LocalFrame(46.0825, -103.8995, 900.0)
 dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")
 
 
-class Free:
-    """A ROS call that costs nothing."""
-
-    caller = 0
-    background = 0
-
-
 def at(east: float, north: float, height: float = 10.0) -> Position:
     latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
     return Position(latitude, longitude, AboveHome(height))
@@ -89,10 +82,7 @@ class Field:
         return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
 
     def _over_mavros(self) -> Vehicle:
-        def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-            self.kernel.call_at(self.kernel.now(), deliver)
-
-        graph = Graph(self.kernel, lambda node, call, x: Free(), carry)
+        graph = Graph(self.kernel)
         serve_vehicle(graph, self._link, "craft_1", Place("vehicle node"))
         driver = open_mavros(self.kernel, graph.node("control"), "craft_1", {})
         return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
@@ -283,7 +273,7 @@ def test_a_vehicle_node_that_hears_its_autopilot_no_more() -> None:
 
 def test_a_vehicle_node_that_is_not_there() -> None:
     field = Field(mavros=True)
-    graph = Graph(field.kernel, lambda node, call, x: Free(), lambda *carried: None)
+    graph = Graph(field.kernel)
 
     def nobody(drone: Any) -> None:
         driver = open_mavros(field.kernel, graph.node("control"), "craft_2", {})

@@ -4,21 +4,16 @@ import builtins
 import textwrap
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
 from volery.base.time import S
 from volery.faces.importable import importable
 from volery.faces.launch import Launch
-from volery.graph import EmbeddedNode, Graph
+from volery.graph import Cost, EmbeddedNode, Graph, free
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-
-
-class Free(NamedTuple):
-    caller: int = 0
-    background: int = 0
 
 
 class Stage:
@@ -28,18 +23,15 @@ class Stage:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
-        self.graph = Graph(self.kernel, self._price, self._carry)
+        self.graph = Graph(self.kernel, self._price)
         self.launched: dict[str, Launch] = {}
         self.nodes: dict[str, EmbeddedNode] = {}
         self.modules = importable(self.graph, self.launched, self.nodes)
         self.out: list[Any] = []
 
-    def _price(self, node: Any, call: str, x: float) -> Free:
+    def _price(self, node: Any, call: str, x: float) -> Cost:
         self.priced.append((node.name, call))
-        return Free()
-
-    def _carry(self, sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        self.kernel.call_at(self.kernel.now(), deliver)
+        return free(node, call, x)
 
     def load(self, text: str) -> ModuleType:
         def find(

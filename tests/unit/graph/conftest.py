@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery.base.time import S
-from volery.graph import Graph, NodeId
+from volery.graph import Graph, NodeId, Way
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
@@ -32,18 +32,19 @@ class Rig:
         self.graph = self.new_graph()
 
     def new_graph(self, **options: Any) -> Graph:
-        return Graph(self.kernel, self.price, self.carry, **options)
+        return Graph(self.kernel, self.price, self.between, **options)
 
     def price(self, node: NodeId, call: str, x: float) -> Price:
         self.asked.append((node.name, call, x))
         return self.prices.get(call, Price(0, 0))
 
-    def carry(
-        self, sender: NodeId, receiver: NodeId, size: int, reliable: bool, deliver: Any, lost: Any
-    ) -> None:
-        self.carried.append((sender, receiver, size, reliable))
-        arrives = lost if self.loses and not reliable else deliver
-        self.kernel.call_at(self.kernel.now() + self.delay, arrives)
+    def between(self, sender: NodeId, receiver: NodeId) -> Way:
+        def way(size: int, reliable: bool, deliver: Any, lost: Any) -> None:
+            self.carried.append((sender, receiver, size, reliable))
+            arrives = lost if self.loses and not reliable else deliver
+            self.kernel.call_at(self.kernel.now() + self.delay, arrives)
+
+        return way
 
     def task(self, body: Callable[[], None], name: str = "component", on_processor: bool = False) -> None:
         place = Place(name, self.processor if on_processor else None)

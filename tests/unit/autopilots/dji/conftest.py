@@ -36,13 +36,6 @@ TYPES = {
 }
 
 
-class Free:
-    """A ROS call that costs nothing."""
-
-    caller = 0
-    background = 0
-
-
 class Apron:
     """One aircraft under /d/<package>, and a program whose flow of control is the test's."""
 
@@ -61,12 +54,7 @@ class Apron:
         self.autopilot = Autopilot(
             self.kernel, self.flight, DIALECT, warm=warm, name="d", parameters=parameters
         )
-        self.graph = Graph(
-            self.kernel,
-            lambda *call: Free,
-            lambda one, other, size, sure, deliver, lost: self.kernel.call_at(self.kernel.now(), deliver),
-            unrecorded=True,
-        )
+        self.graph = Graph(self.kernel, unrecorded=True)
         self.autopilot.join(self.graph, f"/d/{package}", Place("d"))
         self.node = self.graph.node("program", place=Place("program"))
         self.seen: dict[str, Any] = {}

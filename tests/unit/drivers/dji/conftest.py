@@ -20,13 +20,6 @@ HOME = (46.0, -103.0, 900.0)
 METRES = 111_195.0
 
 
-class Free:
-    """A ROS call that costs nothing."""
-
-    caller = 0
-    background = 0
-
-
 class FakeNode:
     """``dji_sdk`` 3.8 as a script. ``refuse``: names of services that say no; ``deaf``: that never answer."""
 
@@ -150,12 +143,7 @@ class Bench:
     def __init__(self, hardware: str = "A3", **options: str) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        self.graph = Graph(
-            self.kernel,
-            lambda *call: Free,
-            lambda one, other, size, sure, deliver, lost: self.kernel.call_at(self.kernel.now(), deliver),
-            unrecorded=True,
-        )
+        self.graph = Graph(self.kernel, unrecorded=True)
         self.node = FakeNode(self.graph, "/dji_sdk", hardware)
         commander = self.graph.node("commander", place=Place("commander"))
         self.driver = open_driver(self.kernel, commander, "d", {"namespace": "/dji_sdk", **options})

@@ -28,11 +28,6 @@ LATITUDE, LONGITUDE = 43.4622222, 1.2733333
 NEAR = Position(LATITUDE + 0.0003, LONGITUDE, AboveHome(12.0))
 
 
-class Free:
-    caller = 0
-    background = 0
-
-
 class OnGraph:
     """A scripted aircraft, the bridge's node, and a node that commands."""
 
@@ -41,12 +36,12 @@ class OnGraph:
         self.kernel = VirtualKernel(record=self.events.append)
         link, theirs = in_process(self.kernel, MS, "radio", PPRZLINK)
         self.aircraft = peer(self.kernel, theirs)
-        self.graph = Graph(self.kernel, lambda node, call, x: Free(), self._carry)
+        self.graph = Graph(self.kernel, between=self._between)
         if bridged:
             serve_pprzros(self.graph, link, "bee", Place("bridge"))
 
-    def _carry(self, one: Any, other: Any, size: int, sure: bool, deliver: Any, lost: Any) -> None:
-        self.kernel.call_at(self.kernel.now() + MS, deliver)
+    def _between(self, one: Any, other: Any) -> Any:
+        return lambda size, sure, deliver, lost: self.kernel.call_at(self.kernel.now() + MS, deliver)
 
     def fly(self, mission: Callable[[Any], Any], **options: str) -> Any:
         outcome: list[Any] = []

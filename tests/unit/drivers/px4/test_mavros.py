@@ -25,13 +25,6 @@ NEAR = Position(45.4675168, -73.7578362, AboveHome(12.0))
 SETPOINT, STICKS = "SET_POSITION_TARGET_LOCAL_NED", "MANUAL_CONTROL"
 
 
-class Free:
-    """A ROS call that costs nothing."""
-
-    caller = 0
-    background = 0
-
-
 def flown(at: Any, mission: Callable[[Any], Any]) -> Any:
     """What *mission* returns, flown over the graph."""
     kernel = at.kernel = VirtualKernel()
@@ -40,10 +33,7 @@ def flown(at: Any, mission: Callable[[Any], Any]) -> Any:
     at.craft = at.autopilot.craft
     outcome: list[Any] = []
 
-    def carry(sender: Any, receiver: Any, size: int, reliable: bool, deliver: Any, lost: Any) -> None:
-        kernel.call_at(kernel.now(), deliver)
-
-    graph = Graph(kernel, lambda node, call, x: Free(), carry)
+    graph = Graph(kernel)
     serve_vehicle(graph, link, "craft_1", Place("vehicle node"))
 
     def body() -> None:

@@ -1,0 +1,94 @@
+"""Nodes with nothing between them: what one sends is with the other at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery import messages
+from volery.base.time import S
+from volery.graph import Graph
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.trace.events import Charge, Message
+
+STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"
+
+
+def played(*bodies: Any, **options: Any) -> list[Any]:
+    """Each body as a component of one graph; what was recorded."""
+    events: list[Any] = []
+    kernel = VirtualKernel(events.append)
+    graph = Graph(kernel, **options)
+    for body in bodies:
+        kernel.spawn(lambda body=body: body(graph), body.__name__, Place(body.__name__))
+    kernel.run(100 * S)
+    return events
+
+
+def test_a_message_waits_for_its_callback_when_publish_returns() -> None:
+    heard: list[str] = []
+
+    def both(graph: Graph) -> None:
+        node = graph.node("both")
+        node.subscribe("chat", STRING, lambda message: heard.append(message.data))
+        node.advertise("chat", STRING).publish(messages.new(STRING, data="hello"))
+        assert heard == []
+        assert node.spin_once(0)
+
+    (message,) = (event for event in played(both) if isinstance(event, Message))
+    assert heard == ["hello"]
+    assert (message.sent, message.received, message.size) == (0, 0, 14)
+
+
+def test_work_that_is_started_at_once_is_not_the_publishers() -> None:
+    """It is begun as house code: what it takes is not paid by the task that published."""
+    begun: list[Any] = []
+
+    def both(graph: Graph) -> None:
+        node = graph.node("both")
+        group = node.group(lambda work: begun.append(graph.kernel.current()))
+        node.subscribe("chat", STRING, print, group=group)
+        node.advertise("chat", STRING).publish(messages.new(STRING))
+        node.sleep(1)
+
+    played(both)
+    assert begun == [None]
+
+
+def test_a_service_is_answered_in_no_time() -> None:
+    took: list[int] = []
+
+    kind = messages.service(TRIGGER)
+
+    def server(graph: Graph) -> None:
+        node = graph.node("server")
+        node.serve("go", TRIGGER, lambda request: kind.response(success=True))
+        node.spin_once()
+
+    def client(graph: Graph) -> None:
+        client = graph.node("client").client("go", TRIGGER)
+        client.wait()
+        started = graph.kernel.now()
+        assert client.call(kind.request()).success
+        took.append(graph.kernel.now() - started)
+
+    played(client, server)
+    assert took == [0]
+
+
+def test_an_unrecorded_graph_says_nothing_and_asks_for_no_price_of_what_nobody_executes() -> None:
+    asked: list[str] = []
+
+    def price(node: Any, call: str, x: float) -> Any:
+        asked.append(call)
+        raise AssertionError(call)
+
+    def both(graph: Graph) -> None:
+        node = graph.node("both")
+        node.subscribe("chat", STRING, lambda message: None)
+        node.advertise("chat", STRING).publish(messages.new(STRING))
+        node.spin_once()
+
+    events = played(both, price=price, unrecorded=True)
+    assert not [event for event in events if isinstance(event, Charge | Message)]
+    assert asked == []
