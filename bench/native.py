@@ -79,9 +79,7 @@ def wanted(given: int) -> Wanted:
 def costs_of(program: Program, folder: Path, run: Wanted) -> Costs:
     program.traced_object(folder / "traced.o")
     executable = build(program, run, folder / "traced.o", folder)
-    return traced_costs(program, [int(one) for one in trace(executable, run, folder, WINDOW)[:MOST_TRACED]])[
-        0
-    ]
+    return traced_costs(program, trace(executable, run, folder, WINDOW).until(MOST_TRACED))[0]
 
 
 def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:

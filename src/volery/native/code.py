@@ -13,11 +13,15 @@ from dataclasses import dataclass
 COUNTERS = "volery_counters"
 LENGTH = "volery_counters_length"
 TRACE = "volery_trace"
+SWITCH = "volery_switch"
 
 _DEFINE = re.compile(r'^define .*?@("[^"]+"|[-\w.$]+)\(')
 _LABEL = re.compile(r'^("[^"]+"|[-\w.$]+):')
 _TARGET_ATTRIBUTES = re.compile(r'\s*"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _FIRST = re.compile(r"^\s+(?:(?:%\S+|%\"[^\"]+\") = (?:phi|landingpad) |#dbg_|cleanup\b|catch |filter )")
+
+
+_SWITCH = re.compile(r"^\s+switch i(\d+) ([^,]+), label ")
 
 
 @dataclass(frozen=True)
@@ -60,9 +64,26 @@ def counted(text: str) -> str:
 
 
 def traced(text: str) -> str:
-    """The code with a call of ``volery_trace(number)`` at the beginning of each block."""
+    """The code with a call of ``volery_trace(number)`` at the beginning of each block, and one of
+    ``volery_switch(value)`` before each switch.
+    """
     traced = _instrumented(text, lambda number: f"  call void @{TRACE}(i32 {number})\n")
-    return traced + f"\ndeclare void @{TRACE}(i32)\n"
+    lines = "".join(
+        _told(number, line) + line for number, line in enumerate(traced.splitlines(keepends=True))
+    )
+    return lines + f"\ndeclare void @{TRACE}(i32)\ndeclare void @{SWITCH}(i32)\n"
+
+
+def _told(number: int, line: str) -> str:
+    """What tells the value that a switch is about to use, as a number of 32 bits."""
+    switch = _SWITCH.match(line)
+    if switch is None:
+        return ""
+    bits, value = int(switch[1]), switch[2]
+    if bits == 32:
+        return f"  call void @{SWITCH}(i32 {value})\n"
+    as_word, way = f"%volery.switch.{number}", "zext" if bits < 32 else "trunc"
+    return f"  {as_word} = {way} i{bits} {value} to i32\n  call void @{SWITCH}(i32 {as_word})\n"
 
 
 def _instrumented(text: str, inserted: Callable[[int], str]) -> str:

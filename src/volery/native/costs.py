@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +11,7 @@ from volery.native import core_model
 from volery.native.assembly import End
 from volery.native.encoding import Encoded, encode
 from volery.native.program import Program
+from volery.native.trace import Trace
 from volery.native.walk import Machine, Walked, walk
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -46,7 +46,7 @@ def static_costs(program: Program) -> Costs:
     return Costs(cycles, instructions, np.zeros(len(program.blocks), dtype=bool))
 
 
-def traced_costs(program: Program, trace: Sequence[int]) -> tuple[Costs, Walked]:
+def traced_costs(program: Program, trace: Trace) -> tuple[Costs, Walked]:
     """Costs from what ran: the mean of each block that was entered, the others from the code alone."""
     machine = Machine(program.blocks, program.pieces)
     encoded = encode(program.pieces, program.law, program.defined)
@@ -54,7 +54,7 @@ def traced_costs(program: Program, trace: Sequence[int]) -> tuple[Costs, Walked]
     took, _ = execute(encoded, np.array(walked.pieces, dtype=np.int64), np.array(walked.taken, dtype=np.int8))
     size = len(program.blocks)
     owners = np.array(walked.owners, dtype=np.int64)
-    entered = np.bincount(np.array(trace, dtype=np.int64), minlength=size)
+    entered = np.bincount(np.array(trace.blocks, dtype=np.int64), minlength=size)
     lengths = np.diff(encoded.first)[np.array(walked.pieces, dtype=np.int64)]
     cycles = np.bincount(owners, weights=took, minlength=size)
     instructions = np.bincount(owners, weights=lengths, minlength=size)

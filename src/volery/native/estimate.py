@@ -57,7 +57,7 @@ def estimate(program: Program, wanted: Wanted) -> Estimate:
         program.traced_object(tracing / "code.o")
         stride = WINDOW * max(1, -(-int(entered.sum()) // MOST_TRACED))
         run = trace(build(program, wanted, tracing / "code.o", tracing), wanted, tracing, stride)
-    costs, walked = traced_costs(program, [int(one) for one in run])
+    costs, walked = traced_costs(program, run)
     keep_costs(program, costs)
     calls = library_calls(program, entered)
     return Estimate(
@@ -67,7 +67,7 @@ def estimate(program: Program, wanted: Wanted) -> Estimate:
         costs,
         places(program, costs, entered),
         dict(calls),
-        _left_out(program, costs, entered, calls, walked.lost / max(len(run), 1)),
+        _left_out(program, costs, entered, calls, walked.lost / max(len(run.blocks), 1)),
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.native.program import Program
 from volery.native.toolchain import run_tool, toolchain
+from volery.native.trace import Trace, trace_of
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -115,15 +116,15 @@ def counts(executable: Path, wanted: Wanted, folder: Path) -> Array:
     return np.fromfile(out, dtype=np.uint64)
 
 
-def trace(executable: Path, wanted: Wanted, folder: Path, stride: int) -> Array:
-    """Blocks in the order in which they were entered: ``WINDOW`` of every ``stride`` of them."""
+def trace(executable: Path, wanted: Wanted, folder: Path, stride: int) -> Trace:
+    """What was entered: ``WINDOW`` of every ``stride`` blocks."""
     out = folder / "trace"
     _run(
         executable,
         wanted,
         {"VOLERY_TRACE": str(out), "VOLERY_WINDOW": str(WINDOW), "VOLERY_STRIDE": str(stride)},
     )
-    return np.fromfile(out, dtype=np.uint32)
+    return trace_of(np.fromfile(out, dtype=np.uint32))
 
 
 def _run(executable: Path, wanted: Wanted, told: dict[str, str]) -> None:

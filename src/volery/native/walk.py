@@ -2,7 +2,8 @@
 
 The trace says which blocks of the intermediate code were entered. The walk follows the machine code's own
 jumps and calls and chooses, where there is a choice, the way on which the next block of the trace comes
-first. So what the code generator merged, split, duplicated or moved is found where it went.
+first; where several lead there, the values that switches used decide. So what the code generator merged,
+split, duplicated or moved is found where it went.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from dataclasses import dataclass, field
 
 from volery.native.assembly import End, Piece
 from volery.native.code import Block
+from volery.native.switches import Switch
+from volery.native.trace import Trace
 
 _LOOK_AHEAD = 6
 """Records of the trace that a way may skip: blocks whose code was duplicated into the one before."""
@@ -93,9 +96,11 @@ class Machine:
 
 
 class _Walk:
-    def __init__(self, machine: Machine, trace: Sequence[int], limit: int) -> None:
+    def __init__(self, machine: Machine, trace: Trace, limit: int) -> None:
         self.machine = machine
-        self.trace = [one for one in trace if one in machine.piece_of_block]
+        followed = trace.only(machine.piece_of_block)
+        self.trace, self.values = followed.blocks, followed.switches
+        self.switch, self.switch_at = Switch(0), -1
         self.limit = limit
         self.at = 0
         self.out = Walked()
@@ -121,6 +126,7 @@ class _Walk:
         self.out.pieces.append(number)
         self.out.owners.append(self.owner)
         self.out.taken.append(0)
+        switched = self._switched(piece)
         if piece.end is End.CALL:
             return self._call(number, piece)
         if piece.end is End.RETURN:
@@ -135,16 +141,36 @@ class _Walk:
         best = min(ways, key=self._distance)
         if self._distance(best) >= _LOST:
             return self._lost()
+        if switched is not None and len(ways) > 1 and self._distance(ways[switched]) < _LOST:
+            best = ways[switched]
         self.out.taken[-1] = int(best != number + 1 or piece.end is End.JUMP)
         return self._enter_piece(best)
 
+    def _switched(self, piece: Piece) -> bool | None:
+        """Whether the branch of the piece is taken, where it is one of a switch that is under way."""
+        value = self.values.get(self.at)
+        if value is None:
+            return None
+        if self.switch_at != self.at:
+            self.switch, self.switch_at = Switch(value), self.at
+        return self.switch.taken(piece)
+
     def _call(self, number: int, piece: Piece) -> int | None:
-        entry = self.machine.entries.get(piece.target) if piece.target else self._next()
-        coming = self._next()
-        if coming is not None and entry == coming and self.machine.blocks[coming].entry:
+        blocks = self.machine.blocks
+        ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
+        skipped = next((place for place, block in enumerate(ahead) if blocks[block].entry), None)
+        if skipped is not None and self._calls(piece.target, blocks[ahead[skipped]].function, skipped):
+            self.at += skipped
             self.frames.append((number + 1, self.owner))
-            return self._enter(coming)
-        return number + 1 if number + 1 < len(self.machine.pieces) else self._return()
+            return self._enter(ahead[skipped])
+        return self._enter_piece(number + 1) if number + 1 < len(self.machine.pieces) else self._return()
+
+    def _calls(self, target: str, function: str, skipped: int) -> bool:
+        """Whether this call is of the next function that the trace enters, *skipped* records from here: those
+        of blocks whose code was merged into one that has run. Who is called by a computed call follows at
+        once.
+        """
+        return target == function if target else skipped == 0
 
     def _return(self) -> int | None:
         if not self.frames:
@@ -217,6 +243,6 @@ class _Walk:
         return min(_LOST, onward + (_FOREIGN if foreign else 1))
 
 
-def walk(machine: Machine, trace: Sequence[int], limit: int = 4_000_000) -> Walked:
-    """Follow a trace of block numbers through the machine code, for at most *limit* pieces."""
+def walk(machine: Machine, trace: Trace, limit: int = 4_000_000) -> Walked:
+    """Follow a trace through the machine code, for at most *limit* pieces."""
     return _Walk(machine, trace, limit).run()

@@ -59,3 +59,34 @@ def test_retargeted_code_leans_towards_no_processor():
     assert 'target datalayout = "e-m:e-i8:8:32"' in text
     assert "target-cpu" not in text
     assert "{ }" not in text  # a group of attributes may not be empty
+
+
+def test_a_trace_tells_the_value_of_each_switch():
+    text = """\
+define void @choose(i8 %small, i32 %word, i64 %"large one") {
+entry:
+  switch i8 %small, label %next [
+    i8 9, label %next
+  ]
+next:
+  switch i32 %word, label %last []
+last:
+  switch i64 %"large one", label %end []
+end:
+  ret void
+}
+"""
+    lines = traced(text).splitlines()
+    for switch, told in (
+        (
+            "  switch i8 %small, label %next [",
+            ["zext i8 %small to i32", "@volery_switch(i32 %volery.switch."],
+        ),
+        ("  switch i32 %word, label %last []", ["@volery_trace(i32 1)", "@volery_switch(i32 %word)"]),
+        (
+            '  switch i64 %"large one", label %end []',
+            ['trunc i64 %"large one" to i32', "@volery_switch(i32 %v"],
+        ),
+    ):
+        at = lines.index(switch)
+        assert [text in line for text, line in zip(told, lines[at - 2 : at], strict=True)] == [True, True]

@@ -1,5 +1,8 @@
+import pytest
+
 from volery.native.assembly import pieces
 from volery.native.code import Block
+from volery.native.trace import Trace
 from volery.native.walk import Machine, walk
 
 # a loop whose exit edge has a block of its own, and a callee
@@ -33,7 +36,7 @@ LEAF, ENTRY, BODY, EXIT = range(4)
 
 def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
     machine = Machine(BLOCKS, pieces(TEXT))
-    walked = walk(machine, [ENTRY, BODY, LEAF, BODY, LEAF, EXIT])
+    walked = walk(machine, Trace([ENTRY, BODY, LEAF, BODY, LEAF, EXIT]))
     names = [machine.pieces[number].instructions[0].mnemonic for number in walked.pieces]
     assert names == ["test", "call", "ret", "dec", "call", "ret", "dec", "xor", "ret"]
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, EXIT]
@@ -44,10 +47,90 @@ def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
 
 def test_what_the_code_generator_left_out_is_skipped():
     blocks = [*BLOCKS, Block("step", "merged")]
-    walked = walk(Machine(blocks, pieces(TEXT)), [ENTRY, 4, BODY, LEAF, EXIT])
+    walked = walk(Machine(blocks, pieces(TEXT)), Trace([ENTRY, 4, BODY, LEAF, EXIT]))
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, EXIT]
 
 
 def test_a_window_that_begins_in_the_middle_is_taken_up():
-    walked = walk(Machine(BLOCKS, pieces(TEXT)), [LEAF, BODY, LEAF, EXIT])
+    walked = walk(Machine(BLOCKS, pieces(TEXT)), Trace([LEAF, BODY, LEAF, EXIT]))
     assert walked.owners[:2] == [LEAF, BODY]
+
+
+# a caller whose block goes on after a call of a library, and a callee whose last two blocks are one piece
+AFTER_CALLS = """\
+callee:                                 # @callee
+# %bb.0:                                # %entry
+\ttest\tedi, edi
+\tje\t.LBB0_2
+# %bb.1:                                # %then
+\tjmp\tfree
+.LBB0_2:                                # %exit
+\tret
+.Lfunc_end0:
+caller:                                 # @caller
+# %bb.0:                                # %entry
+\tcall\tcallee
+\tcall\tcallee
+\ttest\teax, eax
+\tje\t.LBB1_2
+# %bb.1:                                # %then
+\tcall\tfree
+.LBB1_2:                                # %exit
+\tje\t.LBB1_4
+# %bb.3:                                # %rest
+\tjmp\tfree
+.LBB1_4:                                # %last
+\tret
+.Lfunc_end1:
+"""
+CALLEE = [Block("callee", "entry", True), Block("callee", "then"), Block("callee", "exit")]
+CALLER = [Block("caller", name, name == "entry") for name in ("entry", "then", "exit", "rest", "last")]
+
+
+def test_a_call_is_followed_though_blocks_of_the_callee_before_it_were_merged():
+    machine = Machine([*CALLEE, *CALLER], pieces(AFTER_CALLS))
+    walked = walk(machine, Trace([3, 0, 1, 2, 0, 2, 7]))
+    assert walked.owners == [3, 0, 1, 3, 0, 2, 3, 3, 7]
+
+
+def test_the_block_after_the_call_of_a_library_is_entered():
+    machine = Machine([*CALLEE, *CALLER], pieces(AFTER_CALLS))
+    walked = walk(machine, Trace([3, 0, 2, 0, 2, 4, 5, 7]))
+    assert walked.owners[-3:] == [4, 5, 7]
+    assert walked.lost == 0
+
+
+# several ways of one switch lead to the same block
+SWITCH = """\
+scan:                                   // @scan
+// %bb.0:                               // %entry
+\tcmp\tw8, #31
+\tb.gt\t.LBB0_3
+// %bb.1:                               // %entry
+\tsub\tw9, w8, #9
+\tcmp\tw9, #2
+\tb.hs\t.LBB0_5
+.LBB0_2:                                // %blank
+\tret
+.LBB0_3:                                // %entry
+\tcmp\tw8, #32
+\tb.eq\t.LBB0_2
+// %bb.4:                               // %entry
+\tcmp\tw8, #123
+\tb.eq\t.LBB0_2
+.LBB0_5:                                // %other
+\tret
+.Lfunc_end0:
+"""
+
+
+@pytest.mark.parametrize(
+    ("value", "to", "compared"),
+    [(9, 1, 2), (10, 1, 2), (11, 2, 2), (32, 1, 2), (65, 2, 3), (123, 1, 3)],
+)
+def test_the_value_of_a_switch_decides_where_blocks_do_not(value: int, to: int, compared: int):
+    machine = Machine(
+        [Block("scan", "entry", True), Block("scan", "blank"), Block("scan", "other")], pieces(SWITCH, 4)
+    )
+    walked = walk(machine, Trace([0, to], {1: value}))
+    assert walked.owners == [0] * compared + [to]

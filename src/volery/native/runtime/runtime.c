@@ -1,7 +1,8 @@
 /* Beside an instrumented program: writes what it counted, or which blocks it entered, when it ends.
  *
  * VOLERY_COUNTS=FILE   counters at the end, less those at the beginning (64 bits each)
- * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE
+ * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE,
+ *                      and between them the values that switches used (the greatest bit is set)
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -29,12 +30,20 @@ static void flush(void) {
     holds = 0;
 }
 
-void volery_trace(uint32_t block) {
-    if (!trace || entered++ % stride >= window)
-        return;
-    held[holds++] = block;
+static void hold(uint32_t told) {
+    held[holds++] = told;
     if (holds == HELD)
         flush();
+}
+
+void volery_trace(uint32_t block) {
+    if (trace && entered++ % stride < window)
+        hold(block);
+}
+
+void volery_switch(uint32_t value) {
+    if (trace && entered && (entered - 1) % stride < window)
+        hold(value | 1u << 31);
 }
 
 void volery_begin(void) {
