@@ -21,6 +21,7 @@ _TARGET_ATTRIBUTES = re.compile(r'\s*"(?:target-cpu|target-features|tune-cpu)"="
 _FIRST = re.compile(r"^\s+(?:(?:%\S+|%\"[^\"]+\") = (?:phi|landingpad) |#dbg_|cleanup\b|catch |filter )")
 
 
+_TARGET = re.compile(r'\blabel %("[^"]+"|[-\w.$]+)')
 _SWITCH = re.compile(r"^\s+switch i(\d+) ([^,]+), label ")
 
 
@@ -43,6 +44,26 @@ def retarget(text: str, triple: str, layout: str) -> str:
 def blocks(text: str) -> list[Block]:
     """All basic blocks, in the order of the text; a block's counter has its place in this list."""
     return [block for _, block in _lines(text) if block is not None]
+
+
+def edges(text: str) -> dict[int, int]:
+    """The blocks that stand on the way from one block to another (as LLVM's ``break-crit-edges`` makes and
+    names them), each with the one it comes from.
+    """
+    numbers: dict[tuple[str, str], int] = {}
+    heads: list[tuple[int, str, str]] = []
+    here, number = Block("", ""), -1
+    for line, block in _lines(text):
+        if block is not None:
+            here, number = block, number + 1
+            numbers[block.function, block.name] = number
+        elif "_crit_edge" in line:
+            heads += [
+                (number, here.function, name.strip('"'))
+                for name in _TARGET.findall(line)
+                if name.strip('"').endswith("_crit_edge")
+            ]
+    return {numbers[function, name]: number for number, function, name in heads}
 
 
 def counted(text: str) -> str:

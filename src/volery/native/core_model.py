@@ -114,14 +114,15 @@ def run(
     pieces: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
     slots: Array, library: Array, lengths: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Cycles from the end of the piece before to the end of each piece; 1 where its branch was mispredicted.
+    """Cycles from the end of the piece before to the end of each piece, and how many of them nothing entered
+    because the branch before had been mispredicted.
 
     *first* has each piece's first row in *table*, and one more entry; *slots* an instruction's slots;
     *library* the cycles of a call of a library, by the row.
     """
     count = len(pieces)
     cost = np.zeros(count)
-    wrong = np.zeros(count, dtype=np.int8)
+    stalled = np.zeros(count)
     ready = np.zeros(REGISTERS)
     version = np.zeros(REGISTERS, dtype=np.int64)
     used = np.full((len(capacity), SLOT_CYCLES, 2), -1.0)
@@ -131,9 +132,11 @@ def run(
     stored = np.zeros((PLACES, 2))
     predictor = fresh(len(lengths))
     targets = np.full(PLACES, -1, dtype=np.int64)
-    enters, retired, clock, number, changes = 0.0, 0.0, 0.0, 0, 0
+    enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
     for step in range(count):
         piece = pieces[step]
+        stalled[step] = max(0.0, resumes - clock)
+        enters = max(enters, resumes)
         for row in range(first[piece], first[piece + 1]):
             one = table[row]
             enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
@@ -202,11 +205,10 @@ def run(
                 right = targets[seen] == target
                 targets[seen] = target
             if not right:
-                wrong[step] = 1
-                enters = max(enters, done + core[REFILL])
+                resumes = done + core[REFILL]
             if one[KIND] != CONDITIONAL or taken[step] == 1:
                 remember(predictor, lengths, row, target)
         finished = max(retired, enters)
         cost[step] = finished - clock
         clock = finished
-    return cost, wrong
+    return cost, stalled

@@ -47,16 +47,23 @@ def static_costs(program: Program) -> Costs:
 
 
 def traced_costs(program: Program, trace: Trace) -> tuple[Costs, Walked]:
-    """Costs from what ran: the mean of each block that was entered, the others from the code alone."""
+    """Costs from what ran: the mean of each block that was entered, the others from the code alone.
+
+    What a wrong prediction costs belongs to the way that was taken then: the more often that is taken with
+    other data, the more there are.
+    """
     machine = Machine(program.blocks, program.pieces)
     encoded = encode(program.pieces, program.law, program.defined)
     walked = walk(machine, trace)
-    took, _ = execute(encoded, np.array(walked.pieces, dtype=np.int64), np.array(walked.taken, dtype=np.int8))
+    took, stalled = execute(
+        encoded, np.array(walked.pieces, dtype=np.int64), np.array(walked.taken, dtype=np.int8)
+    )
     size = len(program.blocks)
-    owners = np.array(walked.owners, dtype=np.int64)
+    owners, reached = np.array(walked.owners, dtype=np.int64), np.array(walked.reached, dtype=np.int64)
     entered = np.bincount(np.array(trace.blocks, dtype=np.int64), minlength=size)
     lengths = np.diff(encoded.first)[np.array(walked.pieces, dtype=np.int64)]
-    cycles = np.bincount(owners, weights=took, minlength=size)
+    cycles = np.bincount(owners, weights=took - stalled, minlength=size)
+    cycles += np.bincount(reached, weights=stalled, minlength=size)
     instructions = np.bincount(owners, weights=lengths, minlength=size)
     static = static_costs(program)
     seen = entered > 0
@@ -69,7 +76,9 @@ def traced_costs(program: Program, trace: Trace) -> tuple[Costs, Walked]:
 
 
 def execute(encoded: Encoded, pieces: Array, taken: Array) -> tuple[Array, Array]:
-    """Run pieces through the core model: cycles of each and where a branch was mispredicted."""
+    """Run pieces through the core model: cycles of each, and how many of them were lost to a wrong prediction
+    before it.
+    """
     return core_model.run(
         pieces, taken, encoded.first, encoded.table, encoded.operations, encoded.capacity, encoded.core,
         encoded.slots, encoded.library, encoded.lengths,

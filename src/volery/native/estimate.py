@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from volery.native.assembly import End
+from volery.native.code import edges
 from volery.native.costs import Costs, own_pieces, traced_costs
 from volery.native.program import Program
 from volery.native.running import WINDOW, Wanted, build, counts, trace
@@ -85,7 +86,9 @@ def library_calls(program: Program, entered: Array) -> Counter[str]:
 
 
 def places(program: Program, costs: Costs, entered: Array) -> tuple[Place, ...]:
-    """Lines of source by cost: a block's cycles spread evenly over its instructions."""
+    """Lines of source by cost: a block's cycles spread evenly over its instructions. What ways between blocks
+    take, wrong predictions mostly, is the line's that they come from.
+    """
     machine = Machine(program.blocks, program.pieces)
     cycles: Counter[str] = Counter()
     entries: Counter[str] = Counter()
@@ -99,8 +102,21 @@ def places(program: Program, costs: Costs, entered: Array) -> tuple[Place, ...]:
             cycles[line] += costs.cycles[block] * float(entered[block]) / len(lines)
         for line in set(lines):
             entries[line] += int(entered[block])
+    for edge, block in edges(program.text).items():
+        if edge not in machine.piece_of_block and entered[edge]:
+            line = _last_line(program, machine, block)
+            cycles[line] += costs.cycles[edge] * float(entered[edge])
     total = sum(cycles.values()) or 1.0
     return tuple(Place(line, spent / total, entries[line]) for line, spent in cycles.most_common() if line)
+
+
+def _last_line(program: Program, machine: Machine, block: int) -> str:
+    """The line of a block's last instruction; empty where the block has none of its own."""
+    first = machine.piece_of_block.get(block)
+    if first is None:
+        return ""
+    last = program.pieces[own_pieces(machine, first)[-1]].instructions
+    return last[-1].source if last else ""
 
 
 def _left_out(

@@ -26,10 +26,13 @@ _FOREIGN = 30
 
 @dataclass
 class Walked:
-    """What ran: pieces, the block each is charged to, whether its branch was taken; ``lost`` jumps."""
+    """What ran: pieces, the block each is charged to, the block that a wait before it is charged to (that of
+    the way by which it was reached), whether its branch was taken; ``lost`` jumps.
+    """
 
     pieces: list[int] = field(default_factory=list)
     owners: list[int] = field(default_factory=list)
+    reached: list[int] = field(default_factory=list)
     taken: list[int] = field(default_factory=list)
     lost: int = 0
 
@@ -99,10 +102,11 @@ class _Walk:
     def __init__(self, machine: Machine, trace: Trace, limit: int) -> None:
         self.machine = machine
         followed = trace.only(machine.piece_of_block)
-        self.trace, self.values = followed.blocks, followed.switches
+        self.trace, self.values, self.edges = followed.blocks, followed.switches, followed.edges
         self.switch, self.switch_at = Switch(0), -1
         self.limit = limit
-        self.at = 0
+        self.at = self.owner = 0
+        self.edge: int | None = None
         self.out = Walked()
         self.frames: list[tuple[int, int]] = []
         self._costs: dict[tuple[int, int, tuple[int, ...]], int] = {}
@@ -117,14 +121,22 @@ class _Walk:
         """Begin at the next record of the trace, wherever that is."""
         if self.at >= len(self.trace):
             return None
-        self.owner = self.trace[self.at]
-        self.at += 1
+        self._take(1)
         return self.machine.piece_of_block[self.owner]
+
+    def _take(self, count: int) -> None:
+        """The next *count* records: what runs now belongs to the last of them."""
+        passed = range(self.at, self.at + count)
+        self.edge = next((self.edges[place] for place in passed if place in self.edges), None)
+        self.at += count
+        self.owner = self.trace[self.at - 1]
 
     def _step(self, number: int) -> int | None:
         piece = self.machine.pieces[number]
         self.out.pieces.append(number)
         self.out.owners.append(self.owner)
+        self.out.reached.append(self.owner if self.edge is None else self.edge)
+        self.edge = None
         self.out.taken.append(0)
         switched = self._switched(piece)
         if piece.end is End.CALL:
@@ -134,7 +146,7 @@ class _Walk:
         ways = self.machine.successors(number)
         if not ways and piece.end is End.JUMP:  # a call in the place of a return
             entry = self.machine.entries.get(piece.target)
-            return self._enter(entry) if self._next() == entry and entry is not None else self._return()
+            return self._found_again() if self._next() == entry and entry is not None else self._return()
         if not ways:
             self.out.taken[-1] = 1
             return self._within(piece.function)
@@ -160,9 +172,9 @@ class _Walk:
         ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
         skipped = next((place for place, block in enumerate(ahead) if blocks[block].entry), None)
         if skipped is not None and self._calls(piece.target, blocks[ahead[skipped]].function, skipped):
-            self.at += skipped
             self.frames.append((number + 1, self.owner))
-            return self._enter(ahead[skipped])
+            self._take(skipped + 1)
+            return self.machine.piece_of_block[self.owner]
         return self._enter_piece(number + 1) if number + 1 < len(self.machine.pieces) else self._return()
 
     def _calls(self, target: str, function: str, skipped: int) -> bool:
@@ -197,18 +209,12 @@ class _Walk:
                 self.frames.pop()
         return self._found_again()
 
-    def _enter(self, block: int) -> int:
-        self.at += 1
-        self.owner = block
-        return self.machine.piece_of_block[block]
-
     def _enter_piece(self, number: int) -> int:
         block = self.machine.block_of_piece.get(number)
         if block is not None:
             ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
             if block in ahead:
-                self.at += ahead.index(block) + 1
-                self.owner = block
+                self._take(ahead.index(block) + 1)
         return number
 
     def _next(self) -> int | None:

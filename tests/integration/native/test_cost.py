@@ -54,6 +54,34 @@ def source(tmp_path):
     return file
 
 
+CHOICE = """
+static volatile int kept;
+static unsigned char data[4096];
+void fill(int percent) {
+    unsigned long long state = 12345;
+    for (auto &one : data) {
+        state = state * 6364136223846793005ull + 1442695040888963407ull;
+        one = (state >> 33) % 100 < (unsigned)percent;
+    }
+}
+void count() {
+    for (int i = 0; i < 4096; ++i)
+        if (data[i])
+            kept = i;
+}
+"""
+
+
+def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
+    """Costs of a run where a branch seldom goes the other way hold for one where it does so often."""
+    file = tmp_path / "choice.cpp"
+    file.write_text(CHOICE, encoding="utf-8")
+    program = compile_program([file], core_law("rpi4-cortex-a72"))
+    seldom, often = (estimate(program, Wanted("count", (f"fill({percent})",))) for percent in (5, 25))
+    assert seldom.costs.total(often.counts) == pytest.approx(often.cycles, rel=0.25)
+    assert often.cycles > 1.6 * seldom.cycles  # which a mean over both ways would miss
+
+
 def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
     program = compile_program([source], core_law("rpi4-cortex-a72"))
     once, twice = (estimate(program, Wanted(f"work({rounds})")) for rounds in (1000, 2000))

@@ -1,4 +1,4 @@
-from volery.native.code import Block, blocks, counted, retarget, traced
+from volery.native.code import Block, blocks, counted, edges, retarget, traced
 
 TEXT = """\
 target datalayout = "e-m:e"
@@ -90,3 +90,23 @@ end:
     ):
         at = lines.index(switch)
         assert [text in line for text, line in zip(told, lines[at - 2 : at], strict=True)] == [True, True]
+
+
+def test_ways_with_a_block_of_their_own_are_known_with_where_they_come_from():
+    text = """\
+define void @choose(i1 %one) {
+entry:
+  br i1 %one, label %entry.end_crit_edge, label %next
+entry.end_crit_edge:
+  br label %end
+next:
+  switch i32 1, label %"next x.end_crit_edge" [
+    i32 4, label %end
+  ]
+"next x.end_crit_edge":
+  br label %end
+end:
+  ret void
+}
+"""
+    assert edges(text) == {1: 0, 3: 2}

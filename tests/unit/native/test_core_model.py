@@ -28,8 +28,11 @@ def mispredicted(taken: list[int]) -> float:
     loop = [piece("test eax, eax", "jne .LBB0_1", end=End.BRANCH), piece("jmp .LBB0_1", end=End.JUMP)]
     ran = np.array([0, 1] * len(taken), dtype=np.int64)
     ways = np.array([way for one in taken for way in (one, 1)], dtype=np.int8)
-    took, wrong = execute(encode(loop, LAW, frozenset()), ran, ways)
-    assert took.sum() >= wrong.sum() * LAW.refill
+    took, stalled = execute(encode(loop, LAW, frozenset()), ran, ways)
+    assert np.all(stalled <= took)
+    wrong = stalled > 0.0
+    assert stalled.sum() >= wrong.sum() * (LAW.refill - 1)
+    assert not np.any(wrong[2::2])  # the wait is before what follows the branch
     return float(wrong.sum()) / len(taken)
 
 

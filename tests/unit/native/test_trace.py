@@ -10,4 +10,6 @@ def test_values_of_switches_stand_between_blocks_with_their_sign() -> None:
 
 
 def test_a_value_stays_before_the_next_block_that_is_followed() -> None:
-    assert Trace([4, 5, 6, 7], {1: 65, 2: 66, 3: 67}).only({4, 6, 7}) == Trace([4, 6, 7], {1: 65, 2: 67})
+    assert Trace([4, 5, 6, 7], {1: 65, 2: 66, 3: 67}).only({4, 6, 7}) == Trace(
+        [4, 6, 7], {1: 65, 2: 67}, {1: 5}
+    )

@@ -134,3 +134,11 @@ def test_the_value_of_a_switch_decides_where_blocks_do_not(value: int, to: int, 
     )
     walked = walk(machine, Trace([0, to], {1: value}))
     assert walked.owners == [0] * compared + [to]
+
+
+def test_a_wait_belongs_to_the_way_that_was_taken():
+    """Of the block that stands between the loop and its exit there is nothing in the machine code."""
+    blocks = [*BLOCKS, Block("step", "body.exit_crit_edge")]
+    walked = walk(Machine(blocks, pieces(TEXT)), Trace([ENTRY, BODY, LEAF, BODY, LEAF, 4, EXIT]))
+    assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, EXIT]
+    assert walked.reached == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, 4]
