@@ -26,8 +26,8 @@ int guess(int cell, int goal) {
 
 void prepare(int input) {
     Numbers numbers(input);
-    width = of(input, 64, 90, 76);
-    int percent = of(input, 35, 31, 28);
+    width = of(input, 64, 90, 76, 110);
+    int percent = of(input, 35, 31, 28, 33);
     blocked.assign(width * width, 0);
     for (int y = 0; y < width; ++y)
         for (int x = 0; x < width; ++x) {

@@ -54,8 +54,8 @@ void correct(double* x, Matrix p, int row, double measured, double noise) {
 
 void prepare(int input) {
     Numbers numbers(input);
-    readings.resize(of(input, 600, 900, 750));
-    int every = of(input, 10, 4, 6);  // GPS more often than when calibrating
+    readings.resize(of(input, 600, 900, 750, 1100));
+    int every = of(input, 10, 4, 6, 8);  // GPS more often than when calibrating
     int count = 0;
     for (Reading& reading : readings) {
         reading = {numbers.between(-1, 1), numbers.between(-0.5, 0.5), {}, count++ % every == 0};

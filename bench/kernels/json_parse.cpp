@@ -89,7 +89,7 @@ std::string document;
 void prepare(int input) {
     Numbers numbers(input);
     document = "[";
-    for (int i = 0; i < of(input, 50, 70, 60); ++i) {
+    for (int i = 0; i < of(input, 50, 70, 60, 40); ++i) {
         char line[400];
         std::snprintf(line, sizeof line,
                       "%s{\"id\": %d, \"mode\": \"%s\", \"position\": [%.6f, %.6f, %.2f], \"battery\": "
@@ -97,7 +97,7 @@ void prepare(int input) {
                       i ? ",\n" : "", i, numbers.below(2) ? "GUIDED" : "A_VERY_LONG_MODE_NAME", numbers.between(-90, 90),
                       numbers.between(-180, 180), numbers.between(0, 100), numbers.between(10, 13), numbers.below(100));
         document += line;
-        int ranges = of(input, 0, 12, 7);
+        int ranges = of(input, 0, 12, 7, 3);
         if (ranges > 0) {
             document += ", \"ranges\": [";
             for (int k = 0; k < ranges; ++k)

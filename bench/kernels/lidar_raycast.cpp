@@ -39,12 +39,12 @@ double range(double x, double y, double angle, double most) {
 
 void prepare(int input) {
     Numbers numbers(input);
-    width = of(input, 150, 200, 170);
-    rays = of(input, 180, 270, 360);
+    width = of(input, 150, 200, 170, 120);
+    rays = of(input, 180, 270, 360, 240);
     wall.assign(width * width, 0);
     for (int i = 0; i < width; ++i)
         wall[i] = wall[(width - 1) * width + i] = wall[i * width] = wall[i * width + width - 1] = 1;
-    for (int i = 0; i < of(input, 40, 60, 80); ++i) {
+    for (int i = 0; i < of(input, 40, 60, 80, 25); ++i) {
         int x = numbers.below(width - 6), y = numbers.below(width - 6), size = 1 + numbers.below(5);
         for (int k = 0; k < size * size; ++k)
             wall[(y + k / size) * width + x + k % size] = 1;

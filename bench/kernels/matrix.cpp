@@ -65,7 +65,7 @@ void prepare(int input) {
     Numbers numbers(input);
     inputs.clear();
     for (int i = 0; i < 16; ++i) {
-        Matrix m(of(input, 6 + i % 7, 9 + i % 8, 4 + i % 10));
+        Matrix m(of(input, 6 + i % 7, 9 + i % 8, 4 + i % 10, 5 + i % 9));
         for (double& value : m.a)
             value = numbers.between(-1.0, 1.0);
         for (int k = 0; k < m.n; ++k)

@@ -63,9 +63,9 @@ struct Parser {
 void prepare(int input) {
     Numbers numbers(input);
     stream.clear();
-    int frames = of(input, 500, 700, 600), least = of(input, 12, 4, 8), span = of(input, 30, 60, 90);
+    int frames = of(input, 500, 700, 600, 900), least = of(input, 12, 4, 8, 6), span = of(input, 30, 60, 90, 45);
     for (int i = 0; i < frames; ++i) {
-        for (int noise = numbers.below(of(input, 3, 6, 9)); noise > 0; --noise)
+        for (int noise = numbers.below(of(input, 3, 6, 9, 5)); noise > 0; --noise)
             stream.push_back(static_cast<std::uint8_t>(numbers.below(200)));
         int length = least + numbers.below(span);
         std::uint16_t crc = 0xFFFF;

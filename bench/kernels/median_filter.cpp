@@ -12,11 +12,11 @@ std::vector<std::uint16_t> image, out;
 
 void prepare(int input) {
     Numbers numbers(input);
-    width = of(input, 64, 96, 80);
-    height = of(input, 48, 72, 80);
+    width = of(input, 64, 96, 80, 72);
+    height = of(input, 48, 72, 80, 60);
     image.resize(width * height);
     out.resize(width * height);
-    int missing = of(input, 5, 15, 25);
+    int missing = of(input, 5, 15, 25, 10);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
             image[y * width + x] = numbers.below(100) < missing

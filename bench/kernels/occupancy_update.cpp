@@ -23,8 +23,8 @@ void prepare(int input) {
     Numbers numbers(input);
     grid.assign(WIDTH * WIDTH, 0);
     ends.clear();
-    int rays = of(input, 360, 540, 720);
-    double far = of(input, 40.0, 62.0, 30.0);
+    int rays = of(input, 360, 540, 720, 450);
+    double far = of(input, 40.0, 62.0, 30.0, 50.0);
     for (int ray = 0; ray < rays; ++ray) {
         double angle = ray * 2.0 * M_PI / rays, away = numbers.between(5.0, far);
         ends.push_back(WIDTH / 2 + static_cast<int>(away * std::cos(angle)));

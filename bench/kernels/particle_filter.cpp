@@ -21,10 +21,10 @@ void prepare(int input) {
     start.clear();
     landmarks.clear();
     ranges.clear();
-    rounds = of(input, 6, 4, 5);
-    for (int i = 0; i < of(input, 250, 400, 300); ++i)
+    rounds = of(input, 6, 4, 5, 7);
+    for (int i = 0; i < of(input, 250, 400, 300, 350); ++i)
         start.push_back({numbers.between(-5, 5), numbers.between(-5, 5), numbers.between(-M_PI, M_PI), 0.0});
-    for (int i = 0; i < of(input, 4, 6, 8); ++i) {
+    for (int i = 0; i < of(input, 4, 6, 8, 5); ++i) {
         landmarks.push_back(numbers.between(-10, 10));
         landmarks.push_back(numbers.between(-10, 10));
         ranges.push_back(numbers.between(2, 12));

@@ -30,12 +30,12 @@ void prepare(int input) {
     Numbers numbers(input);
     path = {{0.0, 0.0}};
     double heading = 0.0;
-    for (int i = 0; i < of(input, 40, 60, 50); ++i) {
+    for (int i = 0; i < of(input, 40, 60, 50, 80); ++i) {
         heading += numbers.between(-0.5, 0.5);
-        double length = numbers.between(1.0, of(input, 3.0, 5.0, 8.0));
+        double length = numbers.between(1.0, of(input, 3.0, 5.0, 8.0, 4.0));
         path.push_back({path.back().x + length * std::cos(heading), path.back().y + length * std::sin(heading)});
     }
-    steps = of(input, 600, 900, 700);
+    steps = of(input, 600, 900, 700, 1000);
 }
 
 double kernel() {

@@ -30,8 +30,8 @@ std::vector<Sample> samples;
 
 void prepare(int input) {
     Numbers numbers(input);
-    samples.resize(of(input, 2000, 3000, 2500));
-    double reach = of(input, 0.4, 0.9, 0.6);
+    samples.resize(of(input, 2000, 3000, 2500, 3500));
+    double reach = of(input, 0.4, 0.9, 0.6, 0.75);
     for (Sample& sample : samples) {
         for (int axis = 0; axis < 3; ++axis) {
             sample.wanted[axis] = numbers.between(-reach, reach);

@@ -40,7 +40,7 @@ Vector any(Numbers& numbers, double reach) {
 
 void prepare(int input) {
     Numbers numbers(input);
-    vectors_each = of(input, 5, 12, 8);
+    vectors_each = of(input, 5, 12, 8, 17);
     rates.clear();
     vectors.clear();
     for (int i = 0; i < 1500; ++i)

@@ -32,8 +32,8 @@ void prepare(int input) {
     Numbers numbers(input);
     map.clear();
     scan.clear();
-    int size = of(input, 180, 260, 220);
-    rounds = of(input, 3, 4, 5);
+    int size = of(input, 180, 260, 220, 300);
+    rounds = of(input, 3, 4, 5, 2);
     for (int i = 0; i < size; ++i) {
         double angle = i * 2.0 * M_PI / size, away = 4.0 + numbers.between(0.0, 2.0);
         map.push_back({static_cast<float>(away * std::cos(angle)), static_cast<float>(away * std::sin(angle))});

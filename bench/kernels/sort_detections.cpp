@@ -27,8 +27,8 @@ float overlap(const Box& a, const Box& b) {
 void prepare(int input) {
     Numbers numbers(input);
     detections.clear();
-    int field = of(input, 500, 900, 300);
-    for (int i = 0; i < of(input, 600, 900, 1200); ++i)
+    int field = of(input, 500, 900, 300, 700);
+    for (int i = 0; i < of(input, 600, 900, 1200, 800); ++i)
         detections.push_back({static_cast<float>(numbers.between(0, field)), static_cast<float>(numbers.between(0, field)),
                               static_cast<float>(numbers.between(20, 60)), static_cast<float>(numbers.between(20, 60)),
                               static_cast<float>(numbers.between(0, 1)), numbers.below(3)});
