@@ -9,7 +9,7 @@ from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import Machine
 from volery.calibrate.python.campaign import evaluate
 from volery.calibrate.python.nonnegative import explain
-from volery.calibrate.python.pieces import Rounds, measure, program, programs, snippets
+from volery.calibrate.python.pieces import Rounds, Timed, measure, program, programs, snippets
 from volery.components.operations import OPERATIONS
 from volery.cost import catalogue
 from volery.cost.interpreter import python_operations
@@ -77,3 +77,16 @@ def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):
     assert read.ns_per_step(1300.0) == pytest.approx(0.6)
     assert read.warnings() == ()
     assert "measured within" in read.how_good()
+
+
+def test_a_piece_that_takes_long_to_load_is_still_run_often_enough_to_be_timed():
+    loaded = []
+
+    def load(steps):
+        loaded.append(sum(range(400_000)))  # more than what is worth timing
+        return lambda times: [None for _ in range(times)]
+
+    piece = Timed("nothing much", "", load)
+    piece.warm_up()
+    assert len(loaded) == 1
+    assert piece.times > 1000
