@@ -79,7 +79,8 @@ def wanted(given: int) -> Wanted:
 def costs_of(program: Program, folder: Path, run: Wanted) -> Costs:
     program.traced_object(folder / "traced.o")
     executable = build(program, run, folder / "traced.o", folder)
-    return traced_costs(program, trace(executable, run, folder, WINDOW).until(MOST_TRACED))[0]
+    ran = trace(executable, run, folder, WINDOW, program.law.memory)
+    return traced_costs(program, ran.until(MOST_TRACED))[0]
 
 
 def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
@@ -92,7 +93,8 @@ def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
         place = folder / str(given)
         place.mkdir()
         run = wanted(given)
-        estimated[given] = costs.total(counts(build(program, run, folder / "counted.o", place), run, place))
+        entered = counts(build(program, run, folder / "counted.o", place), run, place)
+        estimated[given] = costs.total(entered) + costs.waiting(entered) * law.greatest_mhz / 1000.0
         timers["plain", given] = build_timing(program, run, folder / "plain.o", place).rename(place / "plain")
         timers["counted", given] = build_timing(program, run, folder / "counted.o", place).rename(
             place / "counted"

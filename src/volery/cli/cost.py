@@ -37,7 +37,7 @@ def cost(output: Output, wanted: Wanted) -> int:
     law, mhz = _core(wanted)
     program = compile_program(wanted.sources, law, wanted.flags)
     found = estimate(program, wanted.run)
-    seconds = found.cycles / (mhz * 1e6)
+    seconds = found.seconds(mhz)
     joules = _joules(law, mhz, seconds)
     output.show(_summary(law, mhz, found, joules), _lines(found.places[:TOP]))
     for remark in found.left_out:
@@ -51,6 +51,7 @@ def cost(output: Output, wanted: Wanted) -> int:
             "frequency_mhz": mhz,
             "time_s": seconds,
             "cycles": found.cycles,
+            "memory_s": found.memory_ns * 1e-9,
             "instructions": found.instructions,
             "energy_j": joules,
             "provenance": law.provenance,
@@ -92,8 +93,10 @@ def _joules(law: CoreLaw, mhz: float, seconds: float) -> float | None:
 def _summary(law: CoreLaw, mhz: float, found: Estimate, joules: float | None) -> Table:
     within = f", within {law.error:.0%}" if law.error else ""
     table = Table(title=f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", show_header=False)
-    table.add_row("time", _si(found.cycles / (mhz * 1e6), "s"))
+    table.add_row("time", _si(found.seconds(mhz), "s"))
     table.add_row("cycles", f"{found.cycles:,.0f}")
+    if law.memory is not None:
+        table.add_row("memory", f"{_si(found.memory_ns * 1e-9, 's')} of it, at any frequency")
     table.add_row("instructions", f"{found.instructions:,.0f}  (libraries' own not counted)")
     table.add_row("energy", "no figures of its power" if joules is None else f"{_si(joules, 'J')} above idle")
     return table

@@ -4,7 +4,8 @@ Law: ``volery.native.core_model`` executes what ran. Here stand the figures that
 operations how long it takes and how many a core starts per cycle, how wide the core is, how far it looks
 ahead, what a wrong prediction costs, and what calls of libraries cost.
 
-Validity: code whose data stay in the first cache. Cycles of the core do not depend on its frequency.
+Cycles of the core, its caches included, do not depend on its frequency; the time that memory behind them
+takes does not depend on it either.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from ruamel.yaml.error import YAMLError
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
 from volery.cost.figure import Stated
 
-__all__ = ["CoreLaw", "LibraryLaw", "Operation", "core_law", "cores", "read_cores"]
+__all__ = ["Cache", "CoreLaw", "LibraryLaw", "MemoryLaw", "Operation", "core_law", "cores", "read_cores"]
 
 
 class Operation(BaseModel):
@@ -39,6 +40,30 @@ class LibraryLaw(Stated):
     calls: dict[str, float] = Field(default_factory=dict)
 
 
+class Cache(BaseModel):
+    """A cache of lines of 64 bytes, the one that was not used for longest leaves first.
+
+    ``latency``: cycles from a load that it serves to its use; the first one's is that of the operations.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    bytes: int = Field(gt=0)
+    ways: int = Field(gt=0)
+    latency: float = Field(ge=0.0)
+
+
+class MemoryLaw(Stated):
+    """What lies behind the first cache, from there on: ``caches`` with the first, then memory.
+
+    ``latency_ns``: from a load that memory serves to its use; ``bytes_per_ns`` it gives to one core at most.
+    """
+
+    caches: tuple[Cache, ...] = Field(min_length=1, max_length=4)
+    latency_ns: float
+    bytes_per_ns: float = Field(gt=0.0)
+
+
 class CoreLaw(Stated):
     """A kind of core.
 
@@ -46,6 +71,7 @@ class CoreLaw(Stated):
     under way; ``refill``: cycles from the end of a mispredicted branch to the next instruction; ``forward``:
     from a store to a load of the same place; ``tables``, ``history``: of the prediction of branches, and how
     many taken ones it looks back on. ``error`` is the honest relative band, ``None`` where it is not known.
+    Without ``memory`` every access is taken to hit the first cache.
     """
 
     name: str = ""
@@ -62,6 +88,7 @@ class CoreLaw(Stated):
     error: float | None = None
     operations: dict[str, Operation]
     library: LibraryLaw
+    memory: MemoryLaw | None = None
 
     def how_good(self) -> str:
         """The honest band, in words."""

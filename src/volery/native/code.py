@@ -10,6 +10,8 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from volery.native import accesses
+
 COUNTERS = "volery_counters"
 LENGTH = "volery_counters_length"
 TRACE = "volery_trace"
@@ -66,6 +68,17 @@ def edges(text: str) -> dict[int, int]:
     return {numbers[function, name]: number for number, function, name in heads}
 
 
+def accesses_of(text: str) -> list[int]:
+    """How many accesses to memory each block has."""
+    found: list[int] = []
+    for line, block in _lines(text):
+        if block is not None:
+            found.append(0)
+        elif found and accesses.is_access(line):
+            found[-1] += 1
+    return found
+
+
 def counted(text: str) -> str:
     """The code with one counter of 64 bits per block, in an array that is exported as ``volery_counters``."""
     size = len(blocks(text))
@@ -85,14 +98,14 @@ def counted(text: str) -> str:
 
 
 def traced(text: str) -> str:
-    """The code with a call of ``volery_trace(number)`` at the beginning of each block, and one of
-    ``volery_switch(value)`` before each switch.
+    """The code with a call of ``volery_trace(number)`` at the beginning of each block, one of
+    ``volery_switch(value)`` before each switch, and those of ``accesses`` before each access to memory.
     """
-    traced = _instrumented(text, lambda number: f"  call void @{TRACE}(i32 {number})\n")
-    lines = "".join(
-        _told(number, line) + line for number, line in enumerate(traced.splitlines(keepends=True))
-    )
-    return lines + f"\ndeclare void @{TRACE}(i32)\ndeclare void @{SWITCH}(i32)\n"
+    entered = f"  call void @{TRACE}("
+    lines = _instrumented(text, lambda number: f"{entered}i32 {number})\n").splitlines(keepends=True)
+    switches = (one for number, line in enumerate(lines) for one in (_told(number, line), line))
+    whole = "".join(accesses.told(switches, lambda line: line.startswith(entered)))
+    return whole + f"\ndeclare void @{TRACE}(i32)\ndeclare void @{SWITCH}(i32)\n{accesses.DECLARED}"
 
 
 def _told(number: int, line: str) -> str:

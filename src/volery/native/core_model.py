@@ -7,7 +7,8 @@ stores until they have left. Branches are predicted by their history (``predicti
 last target with it; after a wrong prediction nothing enters until the branch is done and ``refill`` cycles
 have passed. A call of a library takes its time of the front end, and its result takes twice that.
 
-All accesses to memory hit the first cache: what misses costs is no part of it (see ``docs``).
+An access hits the first cache, or is served by the level that the trace says. Memory gives a line at a time:
+one that was fetched ahead is there as soon as memory can give it, any other after its latency as well.
 """
 
 from __future__ import annotations
@@ -42,6 +43,10 @@ PLAIN, CONDITIONAL, COMPUTED, LIBRARY, JUMP = range(5)
 LATENCY, KIND_OF, GROUP = range(3)
 # places in the vector of the core's own figures
 WIDTH, WINDOW, REFILL, FORWARD = range(4)
+# columns of the accesses that the first cache does not serve
+STEP, ROW, LEVEL, AHEAD = range(4)
+LINES_AHEAD = 4.0
+"""So many lines before they are asked for are they fetched."""
 
 
 @njit(cache=True)
@@ -112,13 +117,15 @@ def _forwarded(keys: Array, times: Array, key: np.int64, one: Array, start: floa
 @njit(cache=True)
 def run(
     pieces: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
-    slots: Array, library: Array, lengths: Array,
+    slots: Array, library: Array, lengths: Array, late: Array, levels: Array, line: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Cycles from the end of the piece before to the end of each piece, and how many of them nothing entered
     because the branch before had been mispredicted.
 
     *first* has each piece's first row in *table*, and one more entry; *slots* an instruction's slots;
-    *library* the cycles of a call of a library, by the row.
+    *library* the cycles of a call of a library, by the row. *late* has the accesses that the first cache does
+    not serve, in order; *levels* the latency of each level; *line* the cycles in which memory gives a line, 0
+    where it is a level like the others.
     """
     count = len(pieces)
     cost = np.zeros(count)
@@ -133,6 +140,7 @@ def run(
     predictor = fresh(len(lengths))
     targets = np.full(PLACES, -1, dtype=np.int64)
     enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
+    next_late, memory_free, memory = 0, 0.0, len(levels) - 1
     for step in range(count):
         piece = pieces[step]
         stalled[step] = max(0.0, resumes - clock)
@@ -166,6 +174,17 @@ def run(
                 for _ in range(one[LOADS]):
                     loaded = _issue(used, capacity, operations[one[LOAD]], at, 1.0)
                 loaded += operations[one[LOAD], LATENCY]
+                arrives = at
+                while next_late < len(late) and late[next_late, STEP] == step and late[next_late, ROW] == row:
+                    level, ahead = late[next_late, LEVEL], late[next_late, AHEAD]
+                    next_late += 1
+                    if level == memory and line > 0.0:
+                        begins = max(memory_free, at - LINES_AHEAD * line if ahead else at)
+                        memory_free = begins + line
+                        arrives = max(arrives, memory_free if ahead else begins + levels[level])
+                    elif not ahead:
+                        arrives = max(arrives, at + levels[level])
+                loaded = max(loaded, arrives)
                 if one[PLACE] != 0:
                     loaded = max(loaded, _forwarded(stored_key, stored, key, one, at, core[FORWARD]))
                 operand = max(operand, loaded)
@@ -174,6 +193,10 @@ def run(
                 operation = operations[one[OPERATION]]
                 done = _issue(used, capacity, operation, operand, float(one[TIMES]))
                 done += operation[LATENCY]
+            while next_late < len(late) and late[next_late, STEP] == step and late[next_late, ROW] == row:
+                if late[next_late, LEVEL] == memory and line > 0.0:  # nobody waits for a store
+                    memory_free = max(memory_free, at) + line
+                next_late += 1
             if one[STORE] >= 0:
                 sent = _issue(used, capacity, operations[one[STORE]], at, 1.0)
                 done = max(done, sent)

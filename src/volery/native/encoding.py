@@ -48,6 +48,8 @@ class Encoded:
     capacity: Array
     core: Array
     lengths: Array
+    levels: Array
+    """Latencies of the caches, from the first on."""
 
     def instructions(self, piece: int) -> int:
         """How many instructions a piece has."""
@@ -95,6 +97,7 @@ def encode(pieces: Sequence[Piece], law: CoreLaw, own: frozenset[str]) -> Encode
         capacity,
         core,
         lengths(law.tables, law.history),
+        np.array([one.latency for one in law.memory.caches] if law.memory else [0.0]),
     )
 
 

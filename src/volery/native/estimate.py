@@ -35,15 +35,22 @@ class Place:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What one run costs. ``left_out`` says, in sentences, what a reader must know to judge the figure."""
+    """What one run costs: cycles of the core, and nanoseconds of waiting for ``memory``, whatever the core's
+    frequency. ``left_out`` says, in sentences, what a reader must know to judge the figure.
+    """
 
     cycles: float
+    memory_ns: float
     instructions: float
     counts: Array
     costs: Costs
     places: tuple[Place, ...]
     library_calls: dict[str, int]
     left_out: tuple[str, ...]
+
+    def seconds(self, mhz: float) -> float:
+        """How long it takes at that frequency."""
+        return self.cycles / (mhz * 1e6) + self.memory_ns * 1e-9
 
 
 def estimate(program: Program, wanted: Wanted) -> Estimate:
@@ -57,12 +64,14 @@ def estimate(program: Program, wanted: Wanted) -> Estimate:
         entered = counts(build(program, wanted, counting / "code.o", counting), wanted, counting)
         program.traced_object(tracing / "code.o")
         stride = WINDOW * max(1, -(-int(entered.sum()) // MOST_TRACED))
-        run = trace(build(program, wanted, tracing / "code.o", tracing), wanted, tracing, stride)
+        traced = build(program, wanted, tracing / "code.o", tracing)
+        run = trace(traced, wanted, tracing, stride, program.law.memory)
     costs, walked = traced_costs(program, run)
     keep_costs(program, costs)
     calls = library_calls(program, entered)
     return Estimate(
         costs.total(entered),
+        costs.waiting(entered),
         float(costs.instructions @ entered),
         entered,
         costs,
@@ -122,7 +131,7 @@ def _last_line(program: Program, machine: Machine, block: int) -> str:
 def _left_out(
     program: Program, costs: Costs, entered: Array, calls: Counter[str], lost: float
 ) -> tuple[str, ...]:
-    said = ["every access to memory is taken to hit the first cache"]
+    said = [] if program.law.memory else ["every access to memory is taken to hit the first cache"]
     law = program.law.library
     unknown = {name: count for name, count in calls.items() if name not in law.calls}
     if unknown:

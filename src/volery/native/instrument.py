@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from volery.base.time import Ns
 from volery.cost.core import CoreLaw
 from volery.native.costs import Costs, static_costs
 from volery.native.program import compile_program
@@ -26,11 +25,6 @@ class Instrumented:
     law: CoreLaw
     functions: tuple[str, ...]
     estimated: str = ""
-
-    def time(self, cycles: float, frequency_mhz: float) -> Ns:
-        """The time of so many cycles of the core."""
-        self.law.check_frequency(frequency_mhz)
-        return round(cycles * 1000.0 / frequency_mhz)
 
 
 def instrument(sources: Sequence[Path], law: CoreLaw, out: Path, flags: Sequence[str] = ()) -> Instrumented:

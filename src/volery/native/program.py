@@ -41,7 +41,7 @@ is the same machine code, but how often the way was taken is counted.
 PROMOTE = "function(loop-mssa(licm))"
 """Counters of a loop live in registers while it runs; calls see them up to date."""
 
-METHOD = "2"
+METHOD = "3"
 """Another one whenever costs are found in another way: what was kept before counts no more."""
 
 C_SUFFIXES = {".c"}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from volery.base.errors import UsageError, choices, did_you_mean
+from volery.cost.core import MemoryLaw
 from volery.native.program import Program
 from volery.native.toolchain import run_tool, toolchain
 from volery.native.trace import Trace, trace_of
@@ -81,8 +82,9 @@ def build(program: Program, wanted: Wanted, instrumented: Path, folder: Path) ->
     source.write_text(driver(program, wanted), encoding="utf-8")
     out = folder / "program"
     clang = toolchain().clang
-    with as_file(files("volery.native").joinpath("runtime/runtime.c")) as runtime:
-        command = [clang, "-O2", "-x", "c", str(source), str(runtime), "-x", "none", str(instrumented)]
+    with as_file(files("volery.native").joinpath("runtime")) as runtime:
+        ours = [str(runtime / name) for name in ("runtime.c", "caches.c")]
+        command = [clang, "-O2", "-x", "c", str(source), *ours, "-x", "none", str(instrumented)]
         run_tool([*command, *_linked(program, wanted), "-o", str(out)])
     return out
 
@@ -116,13 +118,21 @@ def counts(executable: Path, wanted: Wanted, folder: Path) -> Array:
     return np.fromfile(out, dtype=np.uint64)
 
 
-def trace(executable: Path, wanted: Wanted, folder: Path, stride: int) -> Trace:
-    """What was entered: ``WINDOW`` of every ``stride`` blocks."""
+def trace(
+    executable: Path, wanted: Wanted, folder: Path, stride: int, memory: MemoryLaw | None = None
+) -> Trace:
+    """What was entered, ``WINDOW`` of every ``stride`` blocks, and what *memory*'s caches did not serve."""
     out = folder / "trace"
+    caches = ",".join(f"{one.bytes}/{one.ways}" for one in memory.caches) if memory else ""
     _run(
         executable,
         wanted,
-        {"VOLERY_TRACE": str(out), "VOLERY_WINDOW": str(WINDOW), "VOLERY_STRIDE": str(stride)},
+        {
+            "VOLERY_TRACE": str(out),
+            "VOLERY_WINDOW": str(WINDOW),
+            "VOLERY_STRIDE": str(stride),
+            "VOLERY_CACHES": caches,
+        },
     )
     return trace_of(np.fromfile(out, dtype=np.uint32))
 

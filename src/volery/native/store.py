@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ def kept_costs(program: Program) -> Costs | None:
     """The costs kept for this code on this core, if there are any."""
     try:
         with np.load(_file(program)) as kept:
-            return Costs(kept["cycles"], kept["instructions"], kept["seen"])
+            return Costs(kept["cycles"], kept["instructions"], kept["memory"], kept["seen"])
     except (OSError, KeyError, ValueError):
         return None
 
@@ -34,7 +35,7 @@ def keep_costs(program: Program, costs: Costs) -> None:
     new = file.with_suffix(f".{os.getpid()}.npz")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(new, cycles=costs.cycles, instructions=costs.instructions, seen=costs.seen)
+        np.savez(new, **asdict(costs))
         new.replace(file)
     except OSError:
         return

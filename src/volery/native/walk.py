@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from volery.native.assembly import End, Piece
 from volery.native.code import Block
 from volery.native.switches import Switch
-from volery.native.trace import Trace
+from volery.native.trace import Access, Trace
 
 _LOOK_AHEAD = 6
 """Records of the trace that a way may skip: blocks whose code was duplicated into the one before."""
@@ -27,14 +27,17 @@ _FOREIGN = 30
 @dataclass
 class Walked:
     """What ran: pieces, the block each is charged to, the block that a wait before it is charged to (that of
-    the way by which it was reached), whether its branch was taken; ``lost`` jumps.
+    the way by which it was reached), whether its branch was taken, the place of its block in the trace that
+    was followed; ``lost`` jumps, and ``accesses`` by the same place.
     """
 
     pieces: list[int] = field(default_factory=list)
     owners: list[int] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     taken: list[int] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
     lost: int = 0
+    accesses: dict[int, list[Access]] = field(default_factory=dict)
 
 
 class Machine:
@@ -105,10 +108,10 @@ class _Walk:
         self.trace, self.values, self.edges = followed.blocks, followed.switches, followed.edges
         self.switch, self.switch_at = Switch(0), -1
         self.limit = limit
-        self.at = self.owner = 0
+        self.at = self.owner = self.place = 0
         self.edge: int | None = None
-        self.out = Walked()
-        self.frames: list[tuple[int, int]] = []
+        self.out = Walked(accesses=followed.accesses)
+        self.frames: list[tuple[int, int, int]] = []
         self._costs: dict[tuple[int, int, tuple[int, ...]], int] = {}
 
     def run(self) -> Walked:
@@ -129,7 +132,8 @@ class _Walk:
         passed = range(self.at, self.at + count)
         self.edge = next((self.edges[place] for place in passed if place in self.edges), None)
         self.at += count
-        self.owner = self.trace[self.at - 1]
+        self.place = self.at - 1
+        self.owner = self.trace[self.place]
 
     def _step(self, number: int) -> int | None:
         piece = self.machine.pieces[number]
@@ -138,6 +142,7 @@ class _Walk:
         self.out.reached.append(self.owner if self.edge is None else self.edge)
         self.edge = None
         self.out.taken.append(0)
+        self.out.places.append(self.place)
         switched = self._switched(piece)
         if piece.end is End.CALL:
             return self._call(number, piece)
@@ -172,7 +177,7 @@ class _Walk:
         ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
         skipped = next((place for place, block in enumerate(ahead) if blocks[block].entry), None)
         if skipped is not None and self._calls(piece.target, blocks[ahead[skipped]].function, skipped):
-            self.frames.append((number + 1, self.owner))
+            self.frames.append((number + 1, self.owner, self.place))
             self._take(skipped + 1)
             return self.machine.piece_of_block[self.owner]
         return self._enter_piece(number + 1) if number + 1 < len(self.machine.pieces) else self._return()
@@ -187,7 +192,7 @@ class _Walk:
     def _return(self) -> int | None:
         if not self.frames:
             return self._found_again()
-        number, self.owner = self.frames.pop()
+        number, self.owner, self.place = self.frames.pop()
         return self._enter_piece(number)
 
     def _within(self, function: str) -> int | None:

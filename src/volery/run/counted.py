@@ -46,10 +46,10 @@ def ns_per_step(law: CoreLaw, frequency_mhz: float) -> float:
 
 
 class Counting:
-    """A ``Compile`` for a core. What is compiled is kept as the compiler's own objects are."""
+    """A ``Compile`` for a core at a frequency. What is compiled is kept as the compiler's own objects are."""
 
-    def __init__(self, law: CoreLaw) -> None:
-        self._law = law
+    def __init__(self, law: CoreLaw, frequency_mhz: float) -> None:
+        self._law, self._mhz = law, frequency_mhz
         self._cycles: Cycles | None = None
         self.estimated = ""
 
@@ -65,7 +65,7 @@ class Counting:
                 tools.tell(f"counting {tools.component} on {self._law.name}")
             self._make(sources, include, flags, made)
         with np.load(costs) as kept:
-            self._cycles = kept["cycles"]
+            self._cycles = kept["cycles"] + kept["memory"] * self._mhz / 1000.0
             self.estimated = str(kept["estimated"])
         return [made]
 
@@ -87,6 +87,7 @@ class Counting:
             made.with_suffix(".npz"),
             cycles=costs.cycles * theirs,
             instructions=costs.instructions * theirs,
+            memory=costs.memory * theirs,
             seen=costs.seen,
             estimated=found.estimated,
         )

@@ -53,18 +53,19 @@ def compile_all(
     if fidelity == "times" and not has_compiler():
         return {}
     return {
-        one.name: _ready(system, one.component, core_of(system, fidelity, one), tell)
+        one.name: _ready(system, one, core_of(system, fidelity, one), tell)
         for one in instances
         if is_cpp(one.component)
     }
 
 
-def _ready(system: System, component: Component, core: CoreLaw | None, tell: Tell | None) -> Ready:
+def _ready(system: System, instance: InstanceModel, core: CoreLaw | None, tell: Tell | None) -> Ready:
+    component = instance.component
     face = _ROSCPP if component.language == "roscpp" else Face()
     wanted = described(system, component)
-    if core is None:
+    if core is None or instance.processor is None:
         return Ready(compile_component(wanted, face, tell))
-    counting = Counting(core)
+    counting = Counting(core, system.processor(instance.processor).frequency_mhz)
     return Ready(compile_component(wanted, face, tell, counting), counting)
 
 

@@ -20,6 +20,8 @@ HERE = "127.0.0.1"
 WITHIN_S = 60.0
 """Longer than anything here takes on a busy machine; nothing waits so long unless it fails."""
 
+AGAIN_S = 6.0
+
 COMMAND = (sys.executable, "-c", "from volery.cli.main import main; main()")
 
 
@@ -159,10 +161,17 @@ class Station:
         return beat
 
     def command(self, number: int, *values: float) -> int:
-        """Send a COMMAND_LONG; the result it is acknowledged with."""
+        """Send a COMMAND_LONG; the result it is acknowledged with. As stations do, it is sent again where no
+        acknowledgement comes: UDP may lose either.
+        """
         padded = [*values, *(0.0,) * (7 - len(values))]
-        self.connection.mav.command_long_send(1, 1, number, 0, *padded)
-        return int(self.wait("COMMAND_ACK", lambda ack: ack.command == number).result)
+        for confirmation in range(round(WITHIN_S / AGAIN_S)):
+            self.connection.mav.command_long_send(1, 1, number, confirmation, *padded)
+            try:
+                return int(self.wait("COMMAND_ACK", lambda ack: ack.command == number, AGAIN_S).result)
+            except AssertionError as nothing:
+                missing = nothing
+        raise missing
 
     def mode(self, name: str) -> int:
         number = self.connection.mode_mapping()[name]

@@ -3,7 +3,7 @@ import pytest
 
 from volery.cost.core import core_law
 from volery.native.assembly import End, Instruction, Piece
-from volery.native.costs import execute
+from volery.native.costs import Ran, execute
 from volery.native.encoding import encode
 
 LAW = core_law("intel-i5-3470")
@@ -19,7 +19,7 @@ def piece(*lines: str, end: End = End.FALLS) -> Piece:
 def cycles(*lines: str) -> float:
     """Cycles of one pass through a piece that runs again and again."""
     ran = np.zeros(REPEATS, dtype=np.int64)
-    took, _ = execute(encode([piece(*lines)], LAW, frozenset()), ran, np.zeros(REPEATS, dtype=np.int8))
+    took, _ = execute(encode([piece(*lines)], LAW, frozenset()), Ran(ran, np.zeros(REPEATS, dtype=np.int8)))
     return float(took.sum()) / REPEATS
 
 
@@ -28,7 +28,7 @@ def mispredicted(taken: list[int]) -> float:
     loop = [piece("test eax, eax", "jne .LBB0_1", end=End.BRANCH), piece("jmp .LBB0_1", end=End.JUMP)]
     ran = np.array([0, 1] * len(taken), dtype=np.int64)
     ways = np.array([way for one in taken for way in (one, 1)], dtype=np.int8)
-    took, stalled = execute(encode(loop, LAW, frozenset()), ran, ways)
+    took, stalled = execute(encode(loop, LAW, frozenset()), Ran(ran, ways))
     assert np.all(stalled <= took)
     wrong = stalled > 0.0
     assert stalled.sum() >= wrong.sum() * (LAW.refill - 1)
@@ -63,3 +63,41 @@ def test_branches_that_repeat_are_foreseen_and_random_ones_are_not():
     assert mispredicted([number % 2 for number in range(4000)]) < 0.02
     assert mispredicted([int(number % 7 == 0) for number in range(4000)]) < 0.05
     assert 0.4 < mispredicted(random) < 0.6
+
+
+def late(*lines: str, level: int, ahead: int = 0, memory: tuple[float, float] | None = None) -> float:
+    """Cycles of one pass through a piece whose first instruction is always served by that level."""
+    ran = np.zeros(REPEATS, dtype=np.int64)
+    rows = np.array([(step, 0, level, ahead) for step in range(REPEATS)])
+    encoded = encode([piece(*lines)], LAW, frozenset())
+    took, _ = execute(encoded, Ran(ran, np.zeros(REPEATS, dtype=np.int8), rows), memory)
+    return float(took.sum()) / REPEATS
+
+
+CHAIN = "mov rax, qword ptr [rax]"
+MEMORY = (200.0, 16.0)
+"""Cycles of its latency, and of a line."""
+
+
+def test_a_load_that_another_needs_takes_the_latency_of_what_serves_it():
+    assert LAW.memory is not None
+    second, third = (one.latency for one in LAW.memory.caches[1:])
+    assert late(CHAIN, level=1) == pytest.approx(second, rel=0.02)
+    assert late(CHAIN, level=2) == pytest.approx(third, rel=0.02)
+    assert late(CHAIN, level=3) == pytest.approx(third, rel=0.02)  # where memory is a cache like the last
+    assert late(CHAIN, level=3, memory=MEMORY) == pytest.approx(MEMORY[0], rel=0.02)
+
+
+def test_loads_that_do_not_need_each_other_wait_for_memory_together():
+    assert late("mov rax, qword ptr [rbx]", level=3, memory=MEMORY) == pytest.approx(MEMORY[1], rel=0.1)
+
+
+def test_what_is_fetched_ahead_takes_what_a_line_takes():
+    assert late(CHAIN, level=3, ahead=1, memory=MEMORY) == pytest.approx(MEMORY[1], rel=0.1)
+    assert late(CHAIN, *["add rax, 1"] * 40, level=3, ahead=1, memory=MEMORY) == pytest.approx(
+        cycles(CHAIN, *["add rax, 1"] * 40), rel=0.05
+    )
+
+
+def test_nobody_waits_for_a_store():
+    assert late("mov qword ptr [rbx], rax", level=3, memory=MEMORY) == cycles("mov qword ptr [rbx], rax")

@@ -10,11 +10,28 @@ from ruamel.yaml import YAML
 
 from volery.calibrate.machine import Machine
 from volery.calibrate.processor.snippets import SNIPPETS
-from volery.calibrate.processor.timing import CHAIN, FORWARDED, FREE, LIBRARY, NEVER, RANDOM, WIDTH, Taken
-from volery.cost.core import CoreLaw, LibraryLaw, Operation, read_cores
+from volery.calibrate.processor.timing import (
+    BEHIND,
+    CHAIN,
+    FORWARDED,
+    FREE,
+    LIBRARY,
+    NEVER,
+    RANDOM,
+    ROW,
+    SECOND,
+    THIRD,
+    WIDTH,
+    Taken,
+    behind,
+    caches,
+)
+from volery.cost.core import Cache, CoreLaw, LibraryLaw, MemoryLaw, Operation, read_cores
 
 WINDOW, TABLES, HISTORY = 512, 12, 60
 """Not measured, as of a large core; the prediction's were chosen looking at the kernels' first two inputs."""
+
+LINE_BYTES = 64.0
 
 SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
@@ -44,7 +61,7 @@ def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
         cpu="x86-64" if isa == "x86_64" else "generic",
         provenance="measured",
         source=f"volery calibrate processor on {machine.description}",
-        validity="data in the first cache; the window and the prediction of branches are assumed",
+        validity="the window and the prediction of branches are assumed",
         least_mhz=mhz * 0.5,
         greatest_mhz=mhz,
         width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),
@@ -52,6 +69,7 @@ def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
         forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency)),
         operations=operations,
         library=_library(taken),
+        memory=_memory(taken, operations["load"].latency, mhz),
         window=WINDOW,
         tables=TABLES,
         history=HISTORY,
@@ -71,6 +89,26 @@ def _pipes(cycles: float) -> float:
     per_cycle = 1.0 / max(cycles, 1e-3)
     whole = per_cycle > 1.0 - PIPES_ARE_WHOLE
     return float(max(1, ceil(per_cycle - PIPES_ARE_WHOLE))) if whole else round(per_cycle, 3)
+
+
+def _memory(taken: Mapping[str, Taken], load: float, mhz: float) -> MemoryLaw:
+    """Caches as large as the system says; what lies behind them is memory."""
+    first, second, third = caches()
+    behind_ns = taken[BEHIND].cycles * 1000.0 / mhz
+    row_ns = taken[ROW].cycles * 1000.0 / mhz
+    known = [
+        Cache(bytes=first.bytes, ways=first.ways, latency=load),
+        Cache(bytes=second.bytes, ways=second.ways, latency=round(taken[SECOND].cycles)),
+    ]
+    if third != second:
+        known.append(Cache(bytes=third.bytes, ways=third.ways, latency=round(taken[THIRD].cycles)))
+    return MemoryLaw(
+        provenance="measured",
+        source=f"loads round a circle, and in a row, of {behind() >> 20} MiB; sizes by the system",
+        caches=tuple(known),
+        latency_ns=round(behind_ns, 1),
+        bytes_per_ns=round(LINE_BYTES / row_ns, 2),
+    )
 
 
 def _library(taken: Mapping[str, Taken]) -> LibraryLaw:

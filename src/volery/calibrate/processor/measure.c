@@ -1,7 +1,7 @@
 /* Times loops of snippets against a loop of single cycles, in turns: NAME REPETITIONS... -> a line per round.
  *
  * A line: the name, nanoseconds of one pass of the snippets, of one of the single cycles (both of process time).
- * The loops of snippets, tick among them, and the table of CASES are generated before this file.
+ * The loops of snippets, tick among them, the table of CASES and what memory is gone through are generated before this file.
  */
 #include <math.h>
 #include <stdint.h>
@@ -39,6 +39,62 @@ static void branches(long passes, uint64_t state, uint64_t mask) {
 static void branches_random(long passes) { branches(passes, 88172645463325252ull, ~0ull); }
 static void branches_never(long passes) { branches(passes, 88172645463325252ull, 0); }
 
+/* Sixty-four loads a pass, each of which needs the one before, round a circle of lines in random order. */
+enum { LINE = 64, EACH = LINE / sizeof(uint32_t) };
+
+static uint32_t *circle_of(uint32_t lines) {
+    uint32_t *order = malloc(lines * sizeof *order), *circle = aligned_alloc(LINE, (size_t)lines * LINE);
+    uint64_t state = 88172645463325252ull;
+    for (uint32_t i = 0; i < lines; ++i)
+        order[i] = i;
+    for (uint32_t i = lines - 1; i > 0; --i) {
+        state = mixed(state);
+        uint32_t other = state % (i + 1), moved = order[i];
+        order[i] = order[other];
+        order[other] = moved;
+    }
+    for (uint32_t i = 0; i < lines; ++i)
+        circle[(size_t)order[i] * EACH] = order[(i + 1) % lines];
+    free(order);
+    return circle;
+}
+
+static void go_round(long passes, size_t bytes) {
+    static uint32_t *circle, left;
+    if (!circle)
+        circle = circle_of(bytes / LINE);
+    uint32_t at = left;
+    for (long pass = 0; pass < passes; ++pass)
+        for (int i = 0; i < 64; ++i)
+            at = circle[(size_t)at * EACH];
+    left = at;
+}
+
+/* Sixty-four lines in a row. */
+static void in_a_row(long passes, size_t bytes) {
+    static double *numbers;
+    static size_t at;
+    static volatile double sink;
+    size_t length = bytes / sizeof *numbers;
+    if (!numbers) {
+        numbers = aligned_alloc(LINE, bytes);
+        for (size_t i = 0; i < length; ++i)
+            numbers[i] = i;
+    }
+    double sum = 0.0;
+    for (long pass = 0; pass < passes; ++pass) {
+        at = at + 2 * 64 * 8 > length ? 0 : at + 64 * 8;
+        for (const double *line = numbers + at; line < numbers + at + 64 * 8; line += 8)
+            sum += *line;
+    }
+    sink = sum;
+}
+
+static void memory_second(long passes) { go_round(passes, IN_SECOND); }
+static void memory_third(long passes) { go_round(passes, IN_THIRD); }
+static void memory_behind(long passes) { go_round(passes, BEHIND); }
+static void memory_row(long passes) { in_a_row(passes, BEHIND); }
+
 static double arguments[64], others[64];
 static char text[64][32], copied[256], source[256];
 static volatile double total;
@@ -61,7 +117,9 @@ typedef struct {
     void (*run)(long);
 } Case;
 
-static const Case cases[] = {CASES{"branches_random", branches_random}, {"branches_never", branches_never}};
+static const Case cases[] = {CASES{"branches_random", branches_random}, {"branches_never", branches_never},
+                             {"memory_second", memory_second}, {"memory_third", memory_third},
+                             {"memory_behind", memory_behind}, {"memory_row", memory_row}};
 
 static double timed(void (*run)(long), long passes) {
     double start = now();
@@ -81,6 +139,7 @@ int main(int count, char **words) {
             if (strcmp(cases[i].name, words[word]) != 0)
                 continue;
             long passes = 1;
+            cases[i].run(passes); /* what it sets up is not timed */
             while (timed(cases[i].run, passes) * passes < 50e3)
                 passes *= 2;
             for (int round = atoi(words[word + 1]); round > 0; --round) {

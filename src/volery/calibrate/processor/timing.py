@@ -6,20 +6,25 @@ import math
 import platform
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from statistics import median, quantiles
+from typing import NamedTuple
 
 from volery.base.errors import UsageError
 from volery.calibrate.processor.snippets import FORWARD, IF_ODD, NOTHING, PROLOGUE, SNIPPETS
 from volery.native.toolchain import run_tool, toolchain
 
-CHAIN, FREE, LIBRARY = "chain_", "free_", "library_"
+CHAIN, FREE, LIBRARY, MEMORY = "chain_", "free_", "library_", "memory_"
 RANDOM, NEVER, WIDTH, FORWARDED = "branches_random", "branches_never", "width", "forward"
+SECOND, THIRD, BEHIND, ROW = "memory_second", "memory_third", "memory_behind", "memory_row"
+LARGEST_THIRD = 32 << 20
+"""A third cache that is larger is shared by many, and counts as memory."""
 UNROLLED, PASSES = 48, 20
-BRANCHES = CALLS = 64
-"""How many branches and calls a pass of ``measure.c`` has."""
+BRANCHES = CALLS = LOADS = 64
+"""How many branches, calls and lines of memory a pass of ``measure.c`` has."""
 
 ROUNDS, MOST_ROUNDS = 15, 150
 TIGHT = 0.01
@@ -64,13 +69,14 @@ def build(folder: Path) -> Path:
 def names() -> tuple[str, ...]:
     """All that is timed."""
     library = tuple(LIBRARY + name for name in _calls())
-    return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *library)
+    memory = (SECOND, THIRD, BEHIND, ROW)
+    return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *memory, *library)
 
 
 def take(program: Path, name: str) -> Taken:
     """Time one snippet until its median is tight, or has been taken from ``MOST_ROUNDS`` rounds."""
     each = {RANDOM: BRANCHES, NEVER: BRANCHES}.get(name, UNROLLED * PASSES)
-    each = CALLS if name.startswith(LIBRARY) else each
+    each = CALLS if name.startswith((LIBRARY, MEMORY)) else each
     cycles: list[float] = []
     ticks: list[float] = []
     while True:
@@ -106,6 +112,43 @@ def _loops(machine: str) -> list[tuple[str, str, int]]:
     return loops
 
 
+class Found(NamedTuple):
+    """A cache of this machine."""
+
+    bytes: int
+    ways: int
+
+
+def caches() -> tuple[Found, Found, Found]:
+    """The caches for data of this machine, from the first on. One that the system says nothing of is taken to
+    be as usual; where there is no third one that counts, it is as the second.
+    """
+    found = dict(_found())
+    first, second = found.get(1, Found(32 << 10, 8)), found.get(2, Found(512 << 10, 8))
+    third = found.get(3, second)
+    return first, second, third if third.bytes <= LARGEST_THIRD else second
+
+
+def behind() -> int:
+    """So many bytes do not fit into the caches, and are not so many that finding their pages takes longer
+    than memory does.
+    """
+    _, second, third = caches()
+    return 2 * third.bytes if third != second else 8 * second.bytes
+
+
+def _found() -> Iterator[tuple[int, Found]]:
+    """What Linux says, by level."""
+    for one in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        with suppress(OSError, ValueError):
+            size, ways, level, kind = (
+                (one / name).read_text(encoding="ascii").strip()
+                for name in ("size", "ways_of_associativity", "level", "type")
+            )
+            if kind != "Instruction" and int(ways) > 0:
+                yield int(level), Found(int(size.removesuffix("K")) << 10, int(ways))
+
+
 def _library() -> str:
     return files("volery.calibrate.processor").joinpath("library.h").read_text(encoding="utf-8")
 
@@ -117,7 +160,11 @@ def _calls() -> list[str]:
 def _generated(machine: str) -> str:
     """What stands before ``measure.c``: the loops, and the table of cases."""
     begin, end, (numbers, passes), changed = PROLOGUE[machine]
+    first, second, third = caches()
     out = [
+        f"#define IN_SECOND {min(4 * first.bytes, second.bytes // 2)}\n",
+        f"#define IN_THIRD {third.bytes // 2}\n",
+        f"#define BEHIND {behind()}\n",
         "static double numbers[64] = {1.0000137, 1.3719};\n",
         f"#define BRANCH_IF_ODD(bits, taken) {IF_ODD[machine]}\n",
     ]

@@ -2,7 +2,8 @@
  *
  * VOLERY_COUNTS=FILE   counters at the end, less those at the beginning (64 bits each)
  * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE,
- *                      and between them the values that switches used (the greatest bit is set)
+ *                      and between them the values that switches used (the greatest bit is set) and the accesses to
+ *                      memory that the first cache did not serve (the second greatest is; see caches.c)
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -36,14 +37,23 @@ static void hold(uint32_t told) {
         flush();
 }
 
+static int is_seen(void) {
+    return trace && entered && (entered - 1) % stride < window;
+}
+
 void volery_trace(uint32_t block) {
     if (trace && entered++ % stride < window)
         hold(block);
 }
 
 void volery_switch(uint32_t value) {
-    if (trace && entered && (entered - 1) % stride < window)
+    if (is_seen())
         hold(value | 1u << 31);
+}
+
+void volery_tell_access(uint32_t what) {
+    if (is_seen())
+        hold(what | 1u << 30);
 }
 
 void volery_begin(void) {

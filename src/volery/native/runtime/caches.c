@@ -1,0 +1,119 @@
+/* Which cache serves each access of a traced program.
+ *
+ * VOLERY_CACHES=SIZE/WAYS,...   bytes and ways of each cache, from the first on; lines have 64 bytes
+ *
+ * A cache is sets of lines, of which the one that was not used for longest leaves. Pages are numbered in the order
+ * in which they are touched first, so that it does not matter where the system has put them. A line that comes
+ * after one of the last that were missed is fetched ahead: what a second cache has of it is there in time.
+ */
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { LINE = 6, PAGE = 12, MOST_CACHES = 4, STREAMS = 16, FETCHED_AHEAD = 8 };
+
+void volery_tell_access(uint32_t what);
+
+typedef struct {
+    uint64_t sets;
+    unsigned ways;
+    uint64_t *lines; /* of each set, the youngest first; 0: nothing yet */
+} Cache;
+
+static Cache caches[MOST_CACHES];
+static unsigned count;
+static uint64_t streams[STREAMS];
+static unsigned oldest_stream;
+
+static struct { uint64_t page, number; } *pages;
+static uint64_t room, known;
+
+static uint64_t place_of(uint64_t page) {
+    uint64_t at = (page * 0x9e3779b97f4a7c15ull >> 20) & (room - 1);
+    while (pages[at].number && pages[at].page != page)
+        at = (at + 1) & (room - 1);
+    return at;
+}
+
+static void grow(void) {
+    uint64_t before = room;
+    __typeof__(pages) old = pages;
+    room = before ? 2 * before : 1 << 12;
+    pages = calloc(room, sizeof *pages);
+    for (uint64_t i = 0; i < before; ++i)
+        if (old[i].number)
+            pages[place_of(old[i].page)] = old[i];
+    free(old);
+}
+
+static uint64_t line_of(uint64_t address) {
+    if (2 * known >= room)
+        grow();
+    uint64_t at = place_of(address >> PAGE);
+    if (!pages[at].number) {
+        pages[at].page = address >> PAGE;
+        pages[at].number = ++known;
+    }
+    return pages[at].number << (PAGE - LINE) | (address >> LINE & ((1u << (PAGE - LINE)) - 1));
+}
+
+/* Whether the line was there; it is the youngest of its set now. */
+static int touched(Cache *cache, uint64_t line) {
+    uint64_t *set = cache->lines + line % cache->sets * cache->ways, moved = line;
+    for (unsigned way = 0; way < cache->ways; ++way) {
+        uint64_t here = set[way];
+        set[way] = moved;
+        if (here == line)
+            return 1;
+        moved = here;
+    }
+    return 0;
+}
+
+static int streamed(uint64_t line) {
+    for (unsigned i = 0; i < STREAMS; ++i)
+        if (line == streams[i] + 1 || line + 1 == streams[i]) {
+            streams[i] = line;
+            return 1;
+        }
+    streams[oldest_stream++ % STREAMS] = line;
+    return 0;
+}
+
+__attribute__((constructor)) static void read_caches(void) {
+    const char *text = getenv("VOLERY_CACHES");
+    for (char *rest; text && *text && count < MOST_CACHES; text = *rest ? rest + 1 : rest) {
+        uint64_t size = strtoull(text, &rest, 10);
+        Cache *cache = &caches[count++];
+        cache->ways = strtoul(rest + 1, &rest, 10);
+        cache->sets = size / (cache->ways << LINE);
+        cache->lines = calloc(cache->sets * cache->ways, sizeof *cache->lines);
+    }
+}
+
+static unsigned level_of(uint64_t line) {
+    unsigned level = 0;
+    while (level < count && !touched(&caches[level], line))
+        ++level;
+    return level;
+}
+
+/* *what*: twice the number of the access within its block, and one more for a store. */
+void volery_access(const void *address, uint32_t what) {
+    if (!count)
+        return;
+    uint64_t line = line_of((uintptr_t)address);
+    unsigned level = level_of(line);
+    if (!level)
+        return;
+    unsigned ahead = streamed(line) ? FETCHED_AHEAD : 0;
+    if (!ahead || level == count)
+        volery_tell_access(what << 4 | ahead | level);
+}
+
+/* What is copied or filled as a whole: its lines are there afterwards. */
+void volery_range(const void *address, uint64_t length) {
+    uint64_t first = (uintptr_t)address >> LINE, last = ((uintptr_t)address + length - 1) >> LINE;
+    for (uint64_t line = first; count && length && line <= last; ++line)
+        level_of(line_of(line << LINE));
+}

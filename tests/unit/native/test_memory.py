@@ -1,0 +1,80 @@
+"""Accesses that the first cache did not serve: told by the code, found again in the machine code."""
+
+from __future__ import annotations
+
+from volery.cost.core import core_law
+from volery.native.accesses import is_access, told
+from volery.native.assembly import pieces
+from volery.native.code import Block, accesses_of
+from volery.native.encoding import encode
+from volery.native.memory import served_late
+from volery.native.trace import Access, Trace
+from volery.native.walk import Machine, walk
+
+TEXT = """\
+define void @mix(ptr %p, i64 %n) {
+entry:
+  %a = load i32, ptr %p, align 4, !tbaa !5
+  store i32 %a, ptr getelementptr inbounds (i8, ptr @buffer, i64 4), align 4
+  %b = load <4 x float>, ptr %"odd name", align 16
+  store volatile { ptr, i32 } zeroinitializer, ptr %q, align 8
+  call void @llvm.memcpy.p0.p0.i64(ptr nonnull align 8 %d, ptr dereferenceable(24) @src, i64 %n, i1 0)
+  call void @llvm.memset.p0.i64(ptr align 4 %d, i8 0, i64 64, i1 0)
+  br label %end
+end:
+  %c = load double, ptr %p, align 8
+  ret void
+}
+"""
+
+
+def test_every_access_is_told_before_it_is_made() -> None:
+    lines = TEXT.splitlines(keepends=True)
+    said = [
+        line.strip() for line in told(iter(lines), lambda line: line.startswith("end")) if line not in lines
+    ]
+    assert said == [
+        "call void @volery_access(ptr %p, i32 0)",
+        "call void @volery_access(ptr getelementptr inbounds (i8, ptr @buffer, i64 4), i32 3)",
+        'call void @volery_access(ptr %"odd name", i32 4)',
+        "call void @volery_access(ptr %q, i32 7)",
+        "call void @volery_range(ptr %d, i64 %n)",
+        "call void @volery_range(ptr @src, i64 %n)",
+        "call void @volery_range(ptr %d, i64 64)",
+        "call void @volery_access(ptr %p, i32 0)",
+    ]
+
+
+def test_what_counts_as_an_access() -> None:
+    assert accesses_of(TEXT) == [4, 1]
+    assert not is_access("  call void @store(ptr %p)")
+
+
+ASSEMBLY = """\
+f:                                      # @f
+# %bb.0:                                # %entry
+\tpush\trbx
+\tmov\teax, dword ptr [rdi]
+\tmov\tdword ptr [rsi], eax
+\tmov\tecx, dword ptr [rdi + 64]
+\tcall\tother
+\tmov\tdword ptr [rsi + 64], ecx
+\tret
+.Lfunc_end0:
+"""
+
+
+def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None:
+    made = pieces(ASSEMBLY)
+    machine = Machine([Block("f", "entry", True)], made)
+    encoded = encode(made, core_law("intel-i5-3470"), frozenset({"f"}))
+    told = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
+    late = served_late(walk(machine, Trace([0], accesses={0: told})), encoded, [4])
+    assert late.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
+
+
+def test_nothing_is_late_where_nothing_was_told() -> None:
+    made = pieces(ASSEMBLY)
+    machine = Machine([Block("f", "entry", True)], made)
+    encoded = encode(made, core_law("intel-i5-3470"), frozenset({"f"}))
+    assert served_late(walk(machine, Trace([0])), encoded, [4]).shape == (0, 4)
