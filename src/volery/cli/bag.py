@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
-from volery.cli.console import Output
+from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
 from volery.graph.playing import Playing, play
 from volery.graph.recording import Recorder
@@ -49,11 +48,12 @@ def info(output: Output, path: Path) -> int:
         }
     )
     lasts = to_seconds(bag.end - bag.start)
-    table = Table("topic", "type", "messages", "Hz", title=f"{path}: {bag.format}, {lasts:.1f} s")
+    title = f"{path}: {bag.format}, {lasts:.1f} s"
+    listed = table("topic", "type", figures("messages"), figures("Hz"), title=title)
     for topic in bag.topics:
         rate = f"{topic.messages / lasts:.3g}" if lasts else ""
-        table.add_row(topic.name, topic.type, str(topic.messages), rate)
-    output.show(table)
+        listed.add_row(topic.name, topic.type, str(topic.messages), rate)
+    output.show(listed)
     _remark(output, bag)
     return OK
 

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rich import box
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -27,7 +26,7 @@ from volery.calibrate.ros.entry import in_figures, law_of, write_entry
 from volery.calibrate.ros.fitting import Cost, costs
 from volery.calibrate.ros.plot import picture
 from volery.calibrate.ros.stage import check_client, stage
-from volery.cli.console import Output
+from volery.cli.console import Output, table
 from volery.cli.endings import FAILED, OK
 
 
@@ -113,11 +112,11 @@ def _shown(output: Output, client: str) -> Iterator[Show]:
 
 
 def _table(found: Mapping[str, Cost], title: str) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    shown = table(title=title)
     for heading in ("call", "process µs", "caller µs", "known to", "quartiles", "residual"):
-        table.add_column(heading, justify="left" if heading == "call" else "right", no_wrap=True)
+        shown.add_column(heading, justify="left" if heading == "call" else "right", no_wrap=True)
     for cost in found.values():
-        table.add_row(
+        shown.add_row(
             cost.call,
             in_figures(cost.whole, cost.call),
             in_figures(cost.caller, cost.call),
@@ -125,5 +124,5 @@ def _table(found: Mapping[str, Cost], title: str) -> Table:
             f"±{cost.spread / 2.0:.0%}",
             f"{cost.residual:.0%}" if len(cost.points) > 1 else "",
         )
-    table.caption = "n: subscribers; ms: slept or waited; µs of CPU time"
-    return table
+    shown.caption = "n: subscribers; ms: slept or waited; µs of CPU time"
+    return shown

@@ -12,7 +12,7 @@ from volery.calibrate.machine import this_machine
 from volery.calibrate.processor.campaign import loose, measure
 from volery.calibrate.processor.entry import law_of, write_entry
 from volery.calibrate.processor.timing import isa
-from volery.cli.console import Output
+from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.cost.core import CoreLaw
 
@@ -49,7 +49,14 @@ def processor(output: Output, wanted: Wanted) -> int:
 
 
 def _table(law: CoreLaw) -> Table:
-    table = Table("operation", "cycles", "starts per cycle", title=f"{law.name} at {law.greatest_mhz:g} MHz")
+    title = f"{law.name} at {law.greatest_mhz:g} MHz"
+    shown = table("operation", figures("cycles"), figures("starts per cycle"), title=title)
     for name, one in law.operations.items():
-        table.add_row(name, f"{one.latency:g}", f"{one.per_cycle:g}")
-    return table
+        shown.add_row(name, f"{one.latency:g}", f"{one.per_cycle:g}")
+    if law.memory is not None:
+        for level, cache in enumerate(law.memory.caches, 1):
+            shown.add_row(f"load from cache {level}, {cache.bytes >> 10} KiB", f"{cache.latency:g}", "")
+        shown.add_row(
+            "load from memory", f"{law.memory.latency_ns:g} ns", f"{law.memory.bytes_per_ns:g} GB/s"
+        )
+    return shown

@@ -17,7 +17,7 @@ from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import at_frequency, this_machine
 from volery.calibrate.python.campaign import Calibration, calibrate
 from volery.calibrate.python.pieces import Rounds, Tell
-from volery.cli.console import Output
+from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.components.operations import OPERATIONS
 from volery.cost.interpreter import OperationTable, python_operations
@@ -77,14 +77,11 @@ def _shown(output: Output) -> Iterator[Tell]:
 
 def _operations(found: Calibration) -> Table:
     shipped = python_operations().nanoseconds
-    table = Table(title="What CPython's operations take here", title_justify="left")
-    table.add_column("operation")
-    table.add_column("is")
-    table.add_column("ns", justify="right")
-    table.add_column("in volery's table", justify="right")
+    title = "What CPython's operations take here"
+    shown = table("operation", "is", figures("ns"), figures("in volery's table"), title=title)
     for name, what in OPERATIONS.items():
-        table.add_row(name, what, f"{found.costs[name]:.1f}", f"{shipped[name]:.1f}")
-    return table
+        shown.add_row(name, what, f"{found.costs[name]:.1f}", f"{shipped[name]:.1f}")
+    return shown
 
 
 def _in_words(found: Calibration) -> tuple[str, str, str]:

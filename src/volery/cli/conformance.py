@@ -8,12 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich import box
 from rich.status import Status
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
-from volery.cli.console import Output
+from volery.cli.console import Output, table
 from volery.cli.endings import FAILED, OK
 from volery.run.recording import make_folder
 from volery.testing.checks import Check
@@ -66,12 +65,10 @@ def check(output: Output, wanted: Wanted) -> int:
 def show_checks(output: Output, only: Sequence[str], kind: str) -> int:
     """Show which checks there are and what each demands; the exit status."""
     wanted = chosen(only, kind)
-    table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("group", "check", "flies", "demands"):
-        table.add_column(heading)
+    listed = table("group", "check", "flies", "demands")
     for one in wanted:
-        table.add_row(one.group, one.name, "yes" if one.flies else "", one.demands)
-    output.show(table)
+        listed.add_row(one.group, one.name, "yes" if one.flies else "", one.demands)
+    output.show(listed)
     output.give(
         [
             {"check": one.name, "group": one.group, "flies": one.flies, "demands": one.demands}
@@ -82,21 +79,22 @@ def show_checks(output: Output, only: Sequence[str], kind: str) -> int:
 
 
 def _tables(report: Report) -> list[Table | Text]:
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("group", style="dim")
-    table.add_column("check", no_wrap=True)
-    table.add_column("found", no_wrap=True)
-    table.add_column("noted", overflow="fold")
+    shown = table(
+        Column("group", style="dim"),
+        Column("check", no_wrap=True),
+        Column("found", no_wrap=True),
+        Column("noted", overflow="fold"),
+    )
     group = ""
     for one in report.results:
-        table.add_row(
+        shown.add_row(
             "" if one.group == group else one.group,
             one.check,
             Text(one.outcome.value, style=STYLES[one.outcome]),
             Text(one.detail),
         )
         group = one.group
-    return [table, Text(summary(report), style="bold green" if report.conforms else "bold red")]
+    return [shown, Text(summary(report), style="bold green" if report.conforms else "bold red")]
 
 
 def summary(report: Report) -> str:

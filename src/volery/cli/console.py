@@ -6,7 +6,27 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+from rich import box
 from rich.console import Console, RenderableType
+from rich.table import Column, Table
+
+
+def table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
+    """A table as all commands show theirs."""
+    return Table(
+        *headings,
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        show_header=show_header,
+        box=box.SIMPLE_HEAD if show_header else None,
+        pad_edge=False,
+    )
+
+
+def figures(heading: str) -> Column:
+    """A column of numbers."""
+    return Column(heading, justify="right")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from volery.base.errors import EstimateError, UsageError
-from volery.cli.console import Output
+from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
 from volery.cost.catalogue import catalogue
 from volery.cost.core import CoreLaw, core_law, read_cores
@@ -39,6 +39,8 @@ def cost(output: Output, wanted: Wanted) -> int:
     found = estimate(program, wanted.run)
     seconds = found.seconds(mhz)
     joules = _joules(law, mhz, seconds)
+    within = f", within {law.error:.0%}" if law.error else ""
+    output.show(Text(f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", style="bold"))
     output.show(_summary(law, mhz, found, joules), _lines(found.places[:TOP]))
     for remark in found.left_out:
         output.show(Text(f"note: {remark}", style="dim"))
@@ -91,25 +93,23 @@ def _joules(law: CoreLaw, mhz: float, seconds: float) -> float | None:
 
 
 def _summary(law: CoreLaw, mhz: float, found: Estimate, joules: float | None) -> Table:
-    within = f", within {law.error:.0%}" if law.error else ""
-    table = Table(title=f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", show_header=False)
-    table.add_row("time", _si(found.seconds(mhz), "s"))
-    table.add_row("cycles", f"{found.cycles:,.0f}")
+    shown = table(show_header=False)
+    shown.add_row("time", _si(found.seconds(mhz), "s"))
+    shown.add_row("cycles", f"{found.cycles:,.0f}")
     if law.memory is not None:
-        table.add_row("memory", f"{_si(found.memory_ns * 1e-9, 's')} of it, at any frequency")
-    table.add_row("instructions", f"{found.instructions:,.0f}  (libraries' own not counted)")
-    table.add_row("energy", "no figures of its power" if joules is None else f"{_si(joules, 'J')} above idle")
-    return table
+        waits = f"{_si(found.memory_ns * 1e-9, 's')} of it, at any frequency"
+        shown.add_row("memory", waits if found.memory_ns else "caches serve all of it")
+    shown.add_row("instructions", f"{found.instructions:,.0f}  (libraries' own not counted)")
+    shown.add_row("energy", "no figures of its power" if joules is None else f"{_si(joules, 'J')} above idle")
+    return shown
 
 
 def _lines(places: tuple[Place, ...]) -> Table:
-    table = Table(
-        "cycles", Column("line", overflow="fold"), Column("entries", justify="right"), title="where"
-    )
+    listed = table(figures("cycles"), Column("line", overflow="fold"), figures("entries"), title="where")
     for one in places:
         file, _, line = one.source.rpartition(":")
-        table.add_row(f"{one.share:.1%}", f"{Path(file).name}:{line}", f"{one.entries:,}")
-    return table
+        listed.add_row(f"{one.share:.1%}", f"{Path(file).name}:{line}", f"{one.entries:,}")
+    return listed
 
 
 def _listing(source: Path, places: tuple[Place, ...]) -> Text:

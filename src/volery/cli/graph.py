@@ -9,7 +9,7 @@ from rich.table import Column, Table
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds
-from volery.cli.console import Output
+from volery.cli.console import Output, table
 from volery.cli.endings import OK
 from volery.graph.portrait import Portrait, portrait
 from volery.report.graph_of_run import graph_of_run
@@ -53,13 +53,13 @@ def _look(wanted: Wanted) -> Portrait:
 
 
 def _tables(seen: Portrait) -> list[Table]:
-    nodes = Table(_folded("node"), "publishes", "subscribes", "serves", title="nodes")
+    nodes = table(_folded("node"), "publishes", "subscribes", "serves", title="nodes")
     for name in seen.nodes:
         published = sum(name in line.publishers for line in seen.topics)
         heard = sum(name in line.subscribers for line in seen.topics)
         served = sum(service.server == name for service in seen.services)
         nodes.add_row(name, *(str(count or "") for count in (published, heard, served)))
-    topics = Table(
+    topics = table(
         _folded("topic and type"), "Hz", _folded("publishers"), _folded("subscribers"), title="topics"
     )
     for line in seen.topics:

@@ -7,16 +7,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rich import box
 from rich.status import Status
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
 from volery.calibrate.measured.campaign import Show, compare, estimated, measured_runs, prepared
 from volery.calibrate.measured.comparison import Compared
-from volery.cli.console import Output
+from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.model.reader import load
 from volery.model.system import System
@@ -90,11 +89,11 @@ def tables(found: Sequence[Compared], system: System) -> Iterator[Table | Text]:
 
 
 def _table_iii(found: Sequence[Compared]) -> Table:
-    table = _table(
+    shown = _table(
         "node", "estimated ms", "of it ROS", "measured ms", "quartiles", "difference", "allowed", ""
     )
     for one in found:
-        table.add_row(
+        shown.add_row(
             one.node,
             _ms(one.estimate.whole_s),
             _ms(one.estimate.ros_s),
@@ -104,26 +103,22 @@ def _table_iii(found: Sequence[Compared]) -> Table:
             f"{one.allowed:.0%}",
             Text("holds", style="green") if one.holds else Text("too far", style="bold red"),
         )
-    return table
+    return shown
 
 
 def _table_iv(found: Sequence[Compared]) -> Table:
-    table = _table("node", "total ms", "ROS", "its error costs", "no estimate costs", "improvement")
+    shown = _table("node", "total ms", "ROS", "its error costs", "no estimate costs", "improvement")
     for one in found:
         better = f"{1.0 - one.impact / one.ros_share:.1%}" if one.ros_share else ""
-        table.add_row(
+        shown.add_row(
             one.node, _ms(one.measured_s), f"{one.ros_share:.1%}", f"{one.impact:.1%}",
             f"{one.ros_share:.1%}", better,
         )  # fmt: skip
-    return table
+    return shown
 
 
 def _table(first: str, *others: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column(first, no_wrap=True)
-    for heading in others:
-        table.add_column(heading, justify="right")
-    return table
+    return table(Column(first, no_wrap=True), *map(figures, others))
 
 
 def _ms(seconds: float) -> str:

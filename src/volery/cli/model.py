@@ -6,12 +6,11 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from volery.base.errors import choices
-from volery.cli.console import Output
+from volery.cli.console import Output, table
 from volery.cli.endings import OK
 from volery.model.diagram import diagram
 from volery.model.reader import check as check_model
@@ -56,22 +55,15 @@ def _summary(system: System) -> Text:
 
 
 def _instances(system: System) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in (
-        "instance",
-        "component",
-        "language",
-        f"runs on ({system.allocation or 'nowhere'})",
-        "connected to",
-    ):
-        table.add_column(title)
+    where_to = f"runs on ({system.allocation or 'nowhere'})"
+    listed = table("instance", "component", "language", where_to, "connected to")
     for one in system.instances:
         where = one.processor or "environment"
-        table.add_row(one.name, one.component.name, one.component.language, where, ", ".join(_targets(one)))
+        listed.add_row(one.name, one.component.name, one.component.language, where, ", ".join(_targets(one)))
     for vehicle in system.vehicles:
         node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
-        table.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
-    return table
+        listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
+    return listed
 
 
 def _targets(instance: Instance) -> Iterable[str]:
@@ -111,12 +103,10 @@ def print_schema(output: Output) -> int:
 
 def print_observables(output: Output) -> int:
     """The published list."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("observe", "unit", "what it is"):
-        table.add_column(title)
+    listed = table("observe", "unit", "what it is")
     for one in OBSERVABLES:
         subject = "application" if one.subject == "application" else f"<{one.subject}>"
-        table.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
-    output.show(table)
+        listed.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
+    output.show(listed)
     output.give([asdict(one) for one in OBSERVABLES])
     return OK
