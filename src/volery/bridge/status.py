@@ -12,6 +12,7 @@ from math import nan
 from volery.base.time import Ns
 from volery.bridge.modes import Firmware, mode_name
 from volery.bridge.offering import BODY, LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
+from volery.links.status_texts import Texts
 from volery.messages import new
 
 _UNKNOWN_U16 = 65535
@@ -50,6 +51,8 @@ class Status:
 
     def __init__(self, around: Surroundings) -> None:
         self._publish, self._wanted = around.publish, around.wanted
+        self._texts = Texts(self._say)
+        self._text_at: Ns = 0
 
     def translators(self) -> Mapping[str, Translate]:
         """By the name of the frame."""
@@ -120,9 +123,13 @@ class Status:
         )
 
     def _text(self, said: Fields, at: Ns) -> None:
-        message = new(
-            "mavros_msgs/msg/StatusText", header=stamped(at), severity=said["severity"], text=said["text"]
-        )
+        """A long one, which comes in pieces, is published whole."""
+        self._text_at = at
+        self._texts.hear(said)
+
+    def _say(self, severity: int, text: str) -> None:
+        header = stamped(self._text_at)
+        message = new("mavros_msgs/msg/StatusText", header=header, severity=severity, text=text)
         self._publish("statustext/recv", message)
 
     def _vfr_hud(self, said: Fields, at: Ns) -> None:

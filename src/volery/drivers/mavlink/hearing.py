@@ -12,10 +12,10 @@ from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.mavlink.kinds import kind_of
-from volery.drivers.mavlink.texts import Texts
 from volery.drivers.mavlink.vocabulary import ACTIVE, ARMED, FAILSAFE, ON_GROUND, UNDEFINED
 from volery.kernel.api import Kernel
 from volery.links.mavlink import constant, entry_name
+from volery.links.status_texts import Texts
 from volery.trace.events import Text
 from volery.vehicles.telemetry import Attitude, Battery, Said, Telemetry, Velocity
 

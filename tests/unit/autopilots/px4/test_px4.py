@@ -17,13 +17,14 @@ from volery.autopilots.px4.ramps import interpolated
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import make_world
 from volery.autopilots.simulated.mavlink.habits import Texts
-from volery.autopilots.simulated.mavlink.texts import TextLine, chunks
+from volery.autopilots.simulated.mavlink.texts import TextLine
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.parameter_values import as_bytes, from_bytes
+from volery.links.status_texts import chunks
 from volery.world.specs import Multirotor, Rover
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from volery.autopilots.simulated.mavlink.streams import Streams
 from volery.autopilots.simulated.mavlink.texts import TextLine
 from volery.base.time import Ns
 from volery.links.link import ByteLink, Frame, Link
+from volery.links.rates import Streams
 
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""

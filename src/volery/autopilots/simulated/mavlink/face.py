@@ -17,12 +17,13 @@ from volery.autopilots.simulated.mavlink.command_service import CommandService
 from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.mission_service import MissionService
 from volery.autopilots.simulated.mavlink.parameter_service import ParameterService
-from volery.autopilots.simulated.mavlink.streams import Streams
-from volery.autopilots.simulated.mavlink.texts import TextLine, chunks
+from volery.autopilots.simulated.mavlink.texts import TextLine
 from volery.autopilots.simulated.vehicle import Vehicle
 from volery.base.time import S
 from volery.kernel.api import Action, Handle
 from volery.links.link import Frame, Link
+from volery.links.rates import Streams
+from volery.links.status_texts import chunks
 from volery.trace.events import Text
 
 Handler = Callable[[Peer, dict[str, Any]], None]

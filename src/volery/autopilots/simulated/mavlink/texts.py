@@ -11,9 +11,6 @@ from volery.autopilots.simulated.sticks import NEVER
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 
-LENGTH = 50
-"""Characters that one message holds."""
-
 WAITING = 4
 """Texts that wait for a ground station; older ones are lost."""
 
@@ -24,14 +21,6 @@ GROUND_STATION = 6
 """MAV_TYPE_GCS."""
 
 Chunks = list[dict[str, Any]]
-
-
-def chunks(severity: int, text: str, number: int) -> Chunks:
-    """The fields of the messages that carry *text*."""
-    return [
-        {"severity": severity, "text": text[start : start + LENGTH], "id": number, "chunk_seq": place}
-        for place, start in enumerate(range(0, max(1, len(text)), LENGTH))
-    ]
 
 
 class TextLine:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from volery.autopilots.simulated.mavlink.streams import Streams
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.rates import Streams
 
 ORDER = ("A", "B", "C")
 

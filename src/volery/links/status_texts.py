@@ -1,4 +1,4 @@
-"""Status texts, which come in chunks of 50 characters when they are longer."""
+"""MAVLink's status texts, which go in chunks of 50 characters when they are longer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,14 @@ from typing import Any
 CHUNK = 50
 
 Say = Callable[[int, str], None]
+
+
+def chunks(severity: int, text: str, number: int) -> list[dict[str, Any]]:
+    """The fields of the STATUSTEXTs that carry *text*; *number* tells those of one text from others'."""
+    return [
+        {"severity": severity, "text": text[start : start + CHUNK], "id": number, "chunk_seq": place}
+        for place, start in enumerate(range(0, max(1, len(text)), CHUNK))
+    ]
 
 
 class Texts:
