@@ -1,10 +1,12 @@
 """The bridge: one vehicle on the graph, under MAVROS's names, roscopter's or pprzros's.
 
 Knows the graph, messages and links (frames as values); translates between them as those do, and
-no more: it waits for nothing to be done and repeats no command. It must not know worlds, simulated
-autopilots or drivers.
+no more: it waits for nothing to be done and repeats no command. Where an autopilot does not speak MAVLink,
+the interpreter stands between it and the names that do. It must not know worlds, simulated autopilots or any
+one driver.
 """
 
+from volery.bridge.interpreter import Interpreter
 from volery.bridge.mavros import MAVROS
 from volery.bridge.offering import Names
 from volery.bridge.pprzros import PprzrosNode, serve_pprzros
@@ -14,6 +16,7 @@ from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions, serve_ve
 __all__ = [
     "MAVROS",
     "ROSCOPTER",
+    "Interpreter",
     "Names",
     "PprzrosNode",
     "VehicleNode",

@@ -7,6 +7,7 @@ units of RAW_IMU open); HIGHRES_IMU, which PX4 sends, carries m/s^2, rad/s and g
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isnan
 from typing import Any, NamedTuple
 
 from volery.base import frames
@@ -83,10 +84,14 @@ class Inertial:
         }
 
     def _attitude(self, said: Fields, at: Ns) -> None:
-        """Its acceleration is that of the last measurement; without one it is marked unknown."""
+        """Its acceleration is that of the last measurement; without one it is marked unknown, as are rates
+        that are no numbers.
+        """
         message = new(IMU, header=stamped(at, BODY))
         message.orientation = orientation(said)
         message.angular_velocity = body_rates(said)
+        if isnan(said["rollspeed"]):
+            message.angular_velocity_covariance[0] = UNKNOWN
         name = source(self._wire)
         last = self._wire.last(name)
         if last is None:

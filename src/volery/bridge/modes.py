@@ -1,13 +1,17 @@
 """Names and numbers of flight modes, by MAVLink's autopilot and type of vehicle.
 
-Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``, PX4's ``px4_custom_mode.h``. A mode that is
-not listed goes by ``CMODE(number)``, as in MAVROS.
+Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``, PX4's ``px4_custom_mode.h``; for those that do
+not speak MAVLink the definitions of what they speak. A mode that is not listed goes by ``CMODE(number)``, as
+in MAVROS.
 """
 
 from __future__ import annotations
 
 import re
 from typing import NamedTuple
+
+from volery.links.pprzlink_definitions import message_type
+from volery.messages.dji import DisplayMode
 
 COPTER = {
     0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 7: "CIRCLE",
@@ -28,14 +32,17 @@ _PX4_MODES = (
 )  # fmt: skip
 PX4 = {sub << 24 | main << 16: name for main, sub, name in _PX4_MODES}
 """The same for all types of vehicle."""
+PAPARAZZI = dict(enumerate(message_type("ROTORCRAFT_STATUS").words("ap_mode")))
+DJI = {mode.value: mode.name for mode in DisplayMode}
 
-ARDUPILOT_ID, PX4_ID = 3, 12
-"""MAV_AUTOPILOT."""
-AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4"}
+GENERIC_ID, ARDUPILOT_ID, PAPARAZZI_ID, PX4_ID = 0, 3, 9, 12
+"""MAV_AUTOPILOT. It has no entry for DJI, for which the generic one stands."""
+AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", GENERIC_ID: "DJI"}
 
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""
-_NUMBERED = re.compile(r"(?:CMODE\()?(\d+)\)?\Z")
+_SAME_FOR_ALL = {PX4_ID: PX4, PAPARAZZI_ID: PAPARAZZI, GENERIC_ID: DJI}
+_NUMBERED = re.compile(r"(?:CMODE\(|MODE_)?(\d+)\)?\Z")
 
 
 class Firmware(NamedTuple):
@@ -46,9 +53,8 @@ class Firmware(NamedTuple):
 
 
 def _table(firmware: Firmware) -> dict[int, str]:
-    if firmware.autopilot == PX4_ID:
-        return PX4
-    return ROVER if firmware.kind in _ROVER_TYPES else COPTER
+    of_copters_or_rovers = ROVER if firmware.kind in _ROVER_TYPES else COPTER
+    return _SAME_FOR_ALL.get(firmware.autopilot, of_copters_or_rovers)
 
 
 def mode_name(firmware: Firmware, number: int) -> str:

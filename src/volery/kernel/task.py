@@ -131,10 +131,16 @@ class Scope:
     cancelled: str = ""  # why; empty while it lives
 
     def child(self, name: str) -> Scope:
-        """A scope that ends when this one does, or earlier."""
+        """A scope that ends when this one does, or earlier. Those that have ended before are forgotten."""
+        self.children = [one for one in self.children if not (one.cancelled and one.is_empty)]
         scope = Scope(name, self, cancelled=self.cancelled)
         self.children.append(scope)
         return scope
+
+    @property
+    def is_empty(self) -> bool:
+        """No task is left in it or below."""
+        return next(self.all_tasks(), None) is None
 
     def all_tasks(self) -> Iterator[Task]:
         """Every task in this scope and below."""

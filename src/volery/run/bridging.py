@@ -2,24 +2,29 @@
 stopped.
 
 A vehicle that is out there lives in real time; a simulated one in a world of its own, whose time passes
-*speed* times as fast.
+*speed* times as fast. Where an autopilot does not speak the protocol of the names, its driver hears and flies
+it, and an interpreter speaks for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import TypeVar
 
 from volery.base.errors import CapabilityError, UsageError, choices, did_you_mean
 from volery.base.geoid import BY_NAME, geoid_of
 from volery.base.time import Ns
-from volery.bridge import MAVROS, ROSCOPTER, Names, PprzrosNode, VehicleNode, VehicleNodeOptions
+from volery.bridge import MAVROS, ROSCOPTER, Interpreter, Names, PprzrosNode, VehicleNode, VehicleNodeOptions
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
-from volery.run.graphs import GRAPHS, open_graph
+from volery.run.graphs import GRAPHS
+from volery.run.opening import EMBEDDED, Graphs, for_driver
+from volery.run.serving import open_simulated
 from volery.run.simulated import link_to, simulated
 from volery.trace.events import Record, ignore
 from volery.vehicles.address import Address, parse
@@ -28,10 +33,14 @@ from volery.vehicles.driver import drivers
 
 MAVLINK_NAMES: Mapping[str, Names] = {"mavros": MAVROS, "roscopter": ROSCOPTER}
 NAMES: Mapping[str, tuple[str, ...]] = {"MAVLink": tuple(MAVLINK_NAMES), "pprzlink": ("pprzros",)}
-"""By the protocol that the autopilot speaks; the first is usual."""
+"""By the protocol that they are made for; the first is usual. Those of MAVLink serve every autopilot."""
+KNOWN = tuple(name for names in NAMES.values() for name in names)
+ON_A_GRAPH = (*GRAPHS, EMBEDDED)
 
 NAMESPACES: Mapping[str, str] = {"mavros": "/mavros", "roscopter": "/", "pprzros": "/"}
 """Where a node of these names is on a real vehicle."""
+
+T = TypeVar("T")
 
 FASTEST_HZ = 1000
 MOST_IDS = 255
@@ -71,35 +80,58 @@ class Bridge:
         self.names = _names(address, wanted.names)
         self.namespace = wanted.namespace or NAMESPACES[self.names]
         self.kernel: VirtualKernel | WallKernel
-        if address.carrier == "sim":
-            self.kernel = VirtualKernel(record, pace=wanted.speed)
-            self._link = _simulated_link(self.kernel, address, wanted.seed)
-        else:
-            address.only("baud", "system", SENDS_FROM, ANSWERS_TO)
-            self.kernel = WallKernel(record)
-            self._link = open_link(self.kernel, address, drivers.load(address.driver).codec)
-        try:
-            self._graph = open_graph(self.kernel, wanted.graph)
-        except BaseException:
-            self._link.close()
-            raise
-        self._node = self._made(address, wanted)
+        in_simulation = address.carrier == "sim"
+        self.kernel = VirtualKernel(record, pace=wanted.speed) if in_simulation else WallKernel(record)
+        self._graphs = Graphs(self.kernel)
+        self._interpreted = self.names not in _own_names(address)
+        way = self._interpreter if self._interpreted else self._way
+        with ExitStack() as undo:
+            undo.callback(self._graphs.close)
+            self._link = way(address, wanted)
+            undo.callback(self._link.close)
+            self._node = self._made(address, wanted)
+            undo.pop_all()
         self._node.start(Place("bridge"), self.kernel.root)
 
+    def _way(self, address: Address, wanted: Bridging) -> Link:
+        """To an autopilot that speaks the protocol of the names."""
+        if address.carrier == "sim":
+            return _in_the_air(self.kernel, address, wanted.seed, link_to)
+        address.only("baud", "system", SENDS_FROM, ANSWERS_TO)
+        return open_link(self.kernel, address, drivers.load(address.driver).codec)
+
+    def _interpreter(self, address: Address, wanted: Bridging) -> Link:
+        """To one that does not."""
+        name, factory = address.driver, drivers.load(address.driver)
+        if address.carrier == "sim":
+            driver = _in_the_air(self.kernel, address, wanted.seed, open_simulated)
+        elif address.carrier in GRAPHS:
+            driver = self._graphs.driver(name, address)
+        else:
+            assert factory.on_link is not None, "seen when the names were chosen"
+            link = open_link(self.kernel, address, factory.codec)
+            try:
+                driver = factory.on_link(self.kernel, link, name, for_driver(address))
+            except UsageError:
+                link.close()
+                raise
+        return Interpreter(self.kernel, driver, Place("bridge"))
+
     def _made(self, address: Address, wanted: Bridging) -> VehicleNode | PprzrosNode:
+        graph = self._graphs.graph(wanted.graph)
         if self.names not in MAVLINK_NAMES:
-            return PprzrosNode(self._graph, self._link, self.namespace)
+            return PprzrosNode(graph, self._link, self.namespace)
         names = MAVLINK_NAMES[self.names]
         options = VehicleNodeOptions(
             names=names,
             period=None,
             streams=dict.fromkeys(names.streams, wanted.rate) if wanted.rate else {},
             system=wanted.system,
-            vehicle=int(address.number("system", 0)),
+            vehicle=0 if self._interpreted else int(address.number("system", 0)),
             geoid=geoid_of(wanted.geoid),
             control=wanted.control,
         )
-        return VehicleNode(self._graph, self._link, self.namespace, options)
+        return VehicleNode(graph, self._link, self.namespace, options)
 
     @property
     def status(self) -> str:
@@ -115,8 +147,8 @@ class Bridge:
         try:
             self.kernel.run(FOREVER)
         finally:
-            self._graph.close()
             self._link.close()
+            self._graphs.close()
             self.kernel.close("the bridge was stopped")
 
 
@@ -135,33 +167,53 @@ def _check(wanted: Bridging) -> None:
     geoid_of(wanted.geoid)
 
 
+def _own_names(address: Address) -> tuple[str, ...]:
+    """The names that are made for the protocol in which the autopilot is reached there."""
+    factory = drivers.load(address.driver)
+    if factory.on_link is None or address.carrier in ON_A_GRAPH:
+        return ()
+    return NAMES.get(factory.codec.name, ())
+
+
 def _names(address: Address, wanted: str) -> str:
     """Which set of names it is."""
-    factory = drivers.load(address.driver)
-    if factory.on_link is None:
-        raise CapabilityError(
-            f"{address}: {address.driver} is reached over a graph already, under names of its own; "
-            f"a simulated one is put there by `volery vehicle {address.driver} --graph ros1`"
-        )
-    if address.carrier in (*GRAPHS, "graph"):
-        raise CapabilityError(f"{address}: that vehicle is on a graph already; there is nothing to bridge")
-    valid = NAMES[factory.codec.name]
+    _check_where(address, wanted)
+    own = _own_names(address)
+    valid = (*own, *(name for name in MAVLINK_NAMES if name not in own))
     if not wanted:
         return valid[0]
-    known = [name for names in NAMES.values() for name in names]
-    if wanted not in known:
-        raise UsageError(f"no names {wanted!r}{did_you_mean(wanted, known)}; there is {choices(known)}")
+    if wanted not in KNOWN:
+        raise UsageError(f"no names {wanted!r}{did_you_mean(wanted, KNOWN)}; there is {choices(KNOWN)}")
     if wanted not in valid:
+        made_for = next(protocol for protocol, names in NAMES.items() if wanted in names)
         raise CapabilityError(
-            f"{address}: {wanted}'s names are those of vehicles that speak "
-            f"{next(protocol for protocol, names in NAMES.items() if wanted in names)}; "
-            f"{address.driver} speaks {factory.codec.name}, which goes by {choices(valid)}"
+            f"{address}: {wanted}'s names are those of vehicles that speak {made_for}; "
+            f"this one goes by {choices(valid)}"
         )
     return wanted
 
 
-def _simulated_link(kernel: Kernel, address: Address, seed: int) -> Link:
+def _check_where(address: Address, wanted: str) -> None:
+    """A vehicle that is on a graph under names of its own gets others if they are asked for."""
+    factory = drivers.load(address.driver)
+    if factory.on_link is not None and address.carrier not in ON_A_GRAPH:
+        return
+    own = factory.graph_names
+    if own in MAVLINK_NAMES or address.carrier == EMBEDDED:
+        raise CapabilityError(
+            f"{address}: that vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
+        )
+    if wanted in ("", own):
+        served = f"`volery vehicle {address.driver} --graph ros1`"
+        raise CapabilityError(
+            f"{address}: {address.driver} is on a graph by itself, under {own}'s names "
+            f"(a simulated one: {served}); for others say --names {choices(MAVLINK_NAMES)}"
+        )
+
+
+def _in_the_air(kernel: Kernel, address: Address, seed: int, reach: Callable[..., T]) -> T:
+    """What *reach* makes of a simulated vehicle in a world of its own."""
     from volery.run.airfield import airfield_of
 
     wanted = simulated(address, address.driver)
-    return link_to(kernel, airfield_of(kernel, [wanted], seed), wanted, seed)
+    return reach(kernel, airfield_of(kernel, [wanted], seed), wanted, seed)

@@ -123,7 +123,7 @@ def _open_real(
     kernel = WallKernel()
     by_graph = {name: one for name, one in addresses.items() if one.carrier in GRAPHS}
     ways = _Ways(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
-    graphs = _Graphs(kernel)
+    graphs = Graphs(kernel)
     try:
         vehicles = []
         for name, address in addresses.items():
@@ -136,21 +136,25 @@ def _open_real(
     return Opened(kernel, tuple(vehicles), leave=graphs.close)
 
 
-class _Graphs:
+class Graphs:
     """Real ROS graphs, each opened once, with a node of ours for each vehicle."""
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
         self._open: dict[str, RosGraph] = {}
 
+    def graph(self, name: str) -> RosGraph:
+        """The graph called *name*. Raises what ``open_graph`` raises."""
+        if name not in self._open:
+            self._open[name] = open_graph(self._kernel, name)
+        return self._open[name]
+
     def driver(self, name: str, address: Address) -> Driver:
         """The driver of the vehicle called *name*; the address's path is where its names are."""
         open_driver = drivers.load(address.driver).on_graph
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
-        if address.carrier not in self._open:
-            self._open[address.carrier] = open_graph(self._kernel, address.carrier)
-        node = self._open[address.carrier].node(f"volery_{name}", anonymous=True, place=Place(name))
+        node = self.graph(address.carrier).node(f"volery_{name}", anonymous=True, place=Place(name))
         namespace = address.path.rstrip("/")
         stated = {"namespace": namespace} if namespace else {}
         return open_driver(self._kernel, node, name, {**stated, **address.options})
@@ -203,7 +207,7 @@ class _Ways:
         """The driver of the vehicle called *name*."""
         open_driver = self._factory(address).on_link
         assert open_driver is not None, "seen when the ways were made"
-        return open_driver(self._kernel, self.to(name), name, _for_driver(address))
+        return open_driver(self._kernel, self.to(name), name, for_driver(address))
 
     def to(self, name: str) -> Link:
         """The link for the driver of the vehicle called *name*."""
@@ -228,6 +232,6 @@ def _way(address: Address) -> tuple[object, ...]:
     return address.carrier, address.host, address.port, address.path
 
 
-def _for_driver(address: Address) -> dict[str, str]:
+def for_driver(address: Address) -> dict[str, str]:
     """Options of the address that are not for the carrier."""
     return {key: value for key, value in address.options.items() if key != "baud"}

@@ -203,13 +203,14 @@ class DriverFactory:
     either. ``None``: not on that.
 
     ``namespace`` is where on the graph its topics are if the address does not say; ``{name}`` is the
-    vehicle's.
+    vehicle's. ``graph_names`` says whose names they are.
     """
 
     on_link: Opener | None = None
     codec: Codec = MAVLINK
     on_graph: Opener | None = None
     namespace: str = "/{name}"
+    graph_names: str = "mavros"
 
 
 drivers: Registry[DriverFactory] = Registry("volery.drivers", "driver")

@@ -18,7 +18,11 @@ def bridge(
         str, typer.Option(metavar="ros1|ros2", help="The graph to put the vehicle on.")
     ] = "ros1",
     names: Annotated[
-        str, typer.Option(metavar="mavros|roscopter|pprzros", help="Whose names; else the usual ones.")
+        str,
+        typer.Option(
+            metavar="mavros|roscopter|pprzros",
+            help="Whose names: pprzros for Paparazzi, the others for all; else the usual ones.",
+        ),
     ] = "",
     namespace: Annotated[str, typer.Option(metavar="/NAME", help="Where they begin, such as /mavros.")] = "",
     rate: Annotated[int, typer.Option(help="What the autopilot is asked for, Hz; 0: nothing.")] = 10,

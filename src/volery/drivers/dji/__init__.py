@@ -41,5 +41,5 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
     return Dji(kernel, name, carrier)
 
 
-DRIVER = DriverFactory(on_graph=open_driver, namespace=f"/{{name}}/{OLD_NAMES}")
+DRIVER = DriverFactory(on_graph=open_driver, namespace=f"/{{name}}/{OLD_NAMES}", graph_names=OLD_NAMES)
 """Over a graph only: bytes to a DJI aircraft are encrypted, and its own library speaks them."""

@@ -65,5 +65,5 @@ def _blocks(options: Mapping[str, str]) -> Blocks:
     )
 
 
-DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK, on_graph=open_pprzros)
+DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK, on_graph=open_pprzros, graph_names="pprzros")
 """Paparazzi on a pprzlink; on a graph it goes by pprzros's names."""
