@@ -1,5 +1,5 @@
-"""``volery bridge`` on a real roscore: the session of a thesis with Debian's tools, and flights behind
-MAVROS's names.
+"""``volery bridge`` on a real roscore: the session of a thesis with Debian's tools, flights behind MAVROS's
+names, and autopilots that go by these without speaking MAVLink.
 
 The simulated vehicles live four times as fast as real time.
 """
@@ -48,8 +48,9 @@ def bridged(start: Start, *options: str) -> Any:
 
 @pytest.fixture
 def types(tmp_path: Path) -> str:
-    """Lets Debian's tools know roscopter's types: stands before their names."""
-    write_package("roscopter", tmp_path)
+    """Lets Debian's tools know roscopter's and MAVROS's types: stands before their names."""
+    for package in ("roscopter", "mavros_msgs", "geographic_msgs"):
+        write_package(package, tmp_path)
     return f"PYTHONPATH={tmp_path}"
 
 
@@ -123,6 +124,35 @@ def test_a_vehicle_behind_mavros(
         assert drone.altitude.metres == pytest.approx(3.0, abs=0.5)
         drone.land()
         assert not drone.armed
+
+
+def armed_by_tools(debian: Run, namespace: str) -> str:
+    """The state after it was armed by Debian's tools."""
+    said = debian("rosservice", "call", f"{namespace}/cmd/arming", "value: true")
+    assert "success: True" in said, said
+    return str(
+        until(
+            lambda: re.search(
+                r"armed: True(?s:.*)mode: .*", debian("rostopic", "echo", "-n1", f"{namespace}/state")
+            ),
+            "to be armed",
+        )[0]
+    )
+
+
+def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start) -> None:
+    bridged(start, "sim:paparazzi?start=warm", "--names", "mavros", "--namespace", "/paparazzi")
+    before = debian("rostopic", "echo", "-n1", "/paparazzi/state")
+    assert "connected: True" in before
+    assert "armed: False" in before
+    assert 'mode: "NAV"' in armed_by_tools(debian, "/paparazzi")
+
+
+def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) -> None:
+    served = start(*COMMAND, "vehicle", "dji", "--graph", "ros1", "--speed", "4")
+    assert "serving dji on ros1" in served.stdout.readline()
+    bridged(start, "dji+ros1:///dji_sdk", "--names", "mavros", "--namespace", "/dji")
+    assert 'mode: "P_GPS"' in armed_by_tools(debian, "/dji")
 
 
 def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) -> None:
