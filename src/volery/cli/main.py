@@ -48,7 +48,7 @@ GROUPS: tuple[tuple[str, str, tuple[Callable[..., None], ...]], ...] = (
     (
         "calibrate",
         "Measure what computing takes on this machine.",
-        (costs.ros, costs.python, costs.processor),
+        (costs.ros, costs.python, costs.processor, costs.components),
     ),
 )
 

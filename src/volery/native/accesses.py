@@ -13,6 +13,10 @@ _STORE = re.compile(r"^\s+store ")
 _BLOCK = re.compile(r"^\s+(?:tail |musttail |notail )?call void @llvm\.mem(?:cpy|move|set)\.[^(]*\((.*)\)")
 
 
+_EXPRESSION = re.compile(r"(?:getelementptr|inttoptr) .*\)")
+_NAME = re.compile(r'[%@](?:"[^"]*"|[-\w.$]+)|\bnull\b|\bpoison\b|\bundef\b')
+
+
 def is_access(line: str) -> bool:
     """Whether it loads or stores."""
     return _LOAD.match(line) is not None or _STORE.match(line) is not None
@@ -36,7 +40,7 @@ def told(lines: Iterator[str], begins: Callable[[str], bool]) -> Iterator[str]:
 def _address(line: str) -> str:
     """What the access points to: the last operand that is a pointer, before its alignment."""
     operands = [one for one in _operands(line.strip()) if one.startswith("ptr ")]
-    return operands[-1].removeprefix("ptr ")
+    return _value(operands[-1].removeprefix("ptr "))
 
 
 def _ranges(arguments: str) -> Iterator[str]:
@@ -47,13 +51,13 @@ def _ranges(arguments: str) -> Iterator[str]:
         return
     for one in given[:2]:
         if one.startswith("ptr "):
-            yield f"  call void @{RANGE}(ptr {_last_word(one)}, i64 {length[1]})\n"
+            yield f"  call void @{RANGE}(ptr {_value(one)}, i64 {length[1]})\n"
 
 
-def _last_word(argument: str) -> str:
-    """The value of an argument, behind its type and attributes: a name, or a whole expression."""
-    expression = re.search(r"(?:getelementptr|inttoptr|select) .*$", argument)
-    return expression[0] if expression else re.findall(r'[%@](?:"[^"]*"|\S+)|null|poison|undef', argument)[-1]
+def _value(operand: str) -> str:
+    """A name, or a whole expression, among attributes and orderings."""
+    expression = _EXPRESSION.search(operand)
+    return expression[0] if expression else _NAME.findall(operand)[-1]
 
 
 def _operands(text: str) -> Iterator[str]:

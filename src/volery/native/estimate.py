@@ -67,7 +67,7 @@ def estimate(program: Program, wanted: Wanted) -> Estimate:
         traced = build(program, wanted, tracing / "code.o", tracing)
         run = trace(traced, wanted, tracing, stride, program.law.memory)
     costs, walked = traced_costs(program, run)
-    keep_costs(program, costs)
+    keep_costs(program.key, costs)
     calls = library_calls(program, entered)
     return Estimate(
         costs.total(entered),

@@ -18,13 +18,16 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.cost.core import MemoryLaw
 from volery.native.program import Program
 from volery.native.toolchain import run_tool, toolchain
-from volery.native.trace import Trace, trace_of
+from volery.native.trace import Trace, read_trace
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LIMIT_S = 120.0
 WINDOW = 4096
 """Blocks that are traced in a row; windows are spread over a program that enters more than are wanted."""
+
+RUNTIME = ("runtime.c", "caches.c")
+"""What is linked with an instrumented program."""
 
 _CALL = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:\((.*)\))?\s*$")
 _DEFINE = re.compile(r"^define [^@]*?([\w*]+|ptr) @([\w.$]+)\(([^)]*)\)", re.MULTILINE)
@@ -83,10 +86,19 @@ def build(program: Program, wanted: Wanted, instrumented: Path, folder: Path) ->
     out = folder / "program"
     clang = toolchain().clang
     with as_file(files("volery.native").joinpath("runtime")) as runtime:
-        ours = [str(runtime / name) for name in ("runtime.c", "caches.c")]
+        ours = [str(runtime / name) for name in RUNTIME]
         command = [clang, "-O2", "-x", "c", str(source), *ours, "-x", "none", str(instrumented)]
         run_tool([*command, *_linked(program, wanted), "-o", str(out)])
     return out
+
+
+def runtime_objects(folder: Path) -> list[Path]:
+    """The runtime compiled in *folder*, for code that is loaded by another program."""
+    with as_file(files("volery.native").joinpath("runtime")) as runtime:
+        for name in RUNTIME:
+            compiled = ["-x", "c", "-c", str(runtime / name), "-o", str(folder / f"{name}.o")]
+            run_tool([toolchain().clang, "-O2", "-fPIC", *compiled])
+    return [folder / f"{name}.o" for name in RUNTIME]
 
 
 def _linked(program: Program, wanted: Wanted) -> tuple[str, ...]:
@@ -123,7 +135,6 @@ def trace(
 ) -> Trace:
     """What was entered, ``WINDOW`` of every ``stride`` blocks, and what *memory*'s caches did not serve."""
     out = folder / "trace"
-    caches = ",".join(f"{one.bytes}/{one.ways}" for one in memory.caches) if memory else ""
     _run(
         executable,
         wanted,
@@ -131,10 +142,15 @@ def trace(
             "VOLERY_TRACE": str(out),
             "VOLERY_WINDOW": str(WINDOW),
             "VOLERY_STRIDE": str(stride),
-            "VOLERY_CACHES": caches,
+            "VOLERY_CACHES": in_words(memory),
         },
     )
-    return trace_of(np.fromfile(out, dtype=np.uint32))
+    return read_trace(out)
+
+
+def in_words(memory: MemoryLaw | None) -> str:
+    """The caches as ``caches.c`` reads them."""
+    return ",".join(f"{one.bytes}/{one.ways}" for one in memory.caches) if memory else ""
 
 
 def _run(executable: Path, wanted: Wanted, told: dict[str, str]) -> None:

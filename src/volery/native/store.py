@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from volery.native.costs import Costs
-from volery.native.program import Program
 
 
 def folder() -> Path:
@@ -20,18 +19,18 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "volery"
 
 
-def kept_costs(program: Program) -> Costs | None:
-    """The costs kept for this code on this core, if there are any."""
+def kept_costs(key: str) -> Costs | None:
+    """The costs kept for the code and core of that ``Program.key``, if there are any."""
     try:
-        with np.load(_file(program)) as kept:
+        with np.load(_file(key)) as kept:
             return Costs(kept["cycles"], kept["instructions"], kept["memory"], kept["seen"])
     except (OSError, KeyError, ValueError):
         return None
 
 
-def keep_costs(program: Program, costs: Costs) -> None:
+def keep_costs(key: str, costs: Costs) -> None:
     """Keep costs; without a place to write, nothing is kept."""
-    file = _file(program)
+    file = _file(key)
     new = file.with_suffix(f".{os.getpid()}.npz")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -41,5 +40,5 @@ def keep_costs(program: Program, costs: Costs) -> None:
         return
 
 
-def _file(program: Program) -> Path:
-    return folder() / "native" / f"{program.key}.npz"
+def _file(key: str) -> Path:
+    return folder() / "native" / f"{key}.npz"

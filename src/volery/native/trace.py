@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +39,15 @@ class Trace:
     edges: dict[int, int] = field(default_factory=dict)
     accesses: dict[int, list[Access]] = field(default_factory=dict)
 
+    def then(self, other: Trace) -> Trace:
+        """Both, one after the other."""
+        first = len(self.blocks)
+        return Trace(
+            self.blocks + other.blocks,
+            self.switches | {first + place: value for place, value in other.switches.items()},
+            accesses=self.accesses | {first + place: told for place, told in other.accesses.items()},
+        )
+
     def until(self, length: int) -> Trace:
         """The first *length* blocks."""
         return replace(self, blocks=self.blocks[:length])
@@ -60,6 +70,11 @@ class Trace:
             if place in self.accesses and kept:
                 accesses.setdefault(len(kept) - 1, []).extend(self.accesses[place])
         return Trace(kept, switches, edges, accesses)
+
+
+def read_trace(file: Path) -> Trace:
+    """A trace that the runtime has written."""
+    return trace_of(np.fromfile(file, dtype=np.uint32))
 
 
 def _access(word: int) -> Access:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volery.base.position import Position
@@ -71,12 +72,15 @@ class Connected:
 
 @dataclass(frozen=True)
 class Built:
-    """Components that are ready to start. ``start`` starts them in the order of the model."""
+    """Components that are ready to start. ``start`` starts them in the order of the model; ``finish`` is for
+    when all have ended.
+    """
 
     starters: tuple[Callable[[], object], ...]
     loader: Loader
     instances: Mapping[str, Instance]
     doubts: tuple[str, ...] = ()
+    finish: Callable[[], None] = lambda: None
 
     def start(self) -> None:
         """Every check comes first: nothing has started when something is missing."""
@@ -141,20 +145,21 @@ class Builder:
         self._lands: dict[str, Lands] = {}
         self._instances: dict[str, Instance] = {}
 
-    def build(self, fidelity: str, seed: int) -> Built:
+    def build(self, fidelity: str, seed: int, traces: Path | None = None) -> Built:
         """Load every file, make every instance, connect every port."""
         steps = Steps() if fidelity == "code" else None
         for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component))
         launches = self._launches()
-        ready = compile_all(self._system, self._models, fidelity)
-        self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes)
+        ready = compile_all(self._system, self._models, fidelity, traced=traces is not None)
+        self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes, traces)
         modules = importable(self._graph, launches, self._nodes, self._ending.farewell)
         loader = Loader({**stand_ins(self._kernel, seed), **modules}, steps)
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
-        return Built(starters, loader, self._instances, tuple(self._cpp.warnings(self._models)))
+        doubts = tuple(self._cpp.warnings(self._models))
+        return Built(starters, loader, self._instances, doubts, self._cpp.finish)
 
     def _launches(self) -> dict[str, Launch]:
         return {

@@ -15,6 +15,9 @@ from volery.components.cpp.meter import Counters, Worth
 from volery.components.cpp.toolchain import Toolchain, cache_folder
 from volery.cost.core import CoreLaw, cores
 from volery.model.system import CPP_LANGUAGES, Instance, System
+from volery.native import instrument
+from volery.native.program import METHOD
+from volery.native.store import kept_costs
 
 Cycles = np.ndarray[Any, np.dtype[Any]]
 """Of each block."""
@@ -45,6 +48,11 @@ def ns_per_step(law: CoreLaw, frequency_mhz: float) -> float:
     return 1000.0 / frequency_mhz / PER_CYCLE
 
 
+def options(include: Sequence[Path], flags: Sequence[str]) -> list[str]:
+    """What the compiler of counted and traced code is told."""
+    return ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path))), *flags]
+
+
 class Counting:
     """A ``Compile`` for a core at a frequency. What is compiled is kept as the compiler's own objects are."""
 
@@ -64,31 +72,37 @@ class Counting:
             if tools.tell is not None:
                 tools.tell(f"counting {tools.component} on {self._law.name}")
             self._make(sources, include, flags, made)
-        with np.load(costs) as kept:
-            self._cycles = kept["cycles"] + kept["memory"] * self._mhz / 1000.0
-            self.estimated = str(kept["estimated"])
+        self._price(costs)
         return [made]
+
+    def _price(self, costs: Path) -> None:
+        """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
+        with np.load(costs) as found:
+            learnt = kept_costs(str(found["key"]))
+            cycles, memory = (found["cycles"], found["memory"])
+            self.estimated = str(found["estimated"])
+            if learnt is not None:
+                cycles, memory, self.estimated = learnt.cycles, learnt.memory, ""
+            self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
 
     def _digest(self, plain: Sequence[Path]) -> str:
         contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
-        return sha256(" ".join((self._law.model_dump_json(), *contents)).encode()).hexdigest()[:32]
+        told = " ".join((METHOD, self._law.model_dump_json(), *contents))
+        return sha256(told.encode()).hexdigest()[:32]
 
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
     ) -> None:
-        from volery.native import instrument
-
-        options = ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path)))]
         new = made.with_suffix(".new.o")
-        found = instrument(sources, self._law, new, [*options, *flags])
+        found = instrument(sources, self._law, new, options(include, flags))
         costs = found.costs
         theirs = np.array([not _OURS.match(name) for name in found.functions])
         np.savez(
             made.with_suffix(".npz"),
-            cycles=costs.cycles * theirs,
-            instructions=costs.instructions * theirs,
-            memory=costs.memory * theirs,
-            seen=costs.seen,
+            cycles=costs.cycles,
+            memory=costs.memory,
+            theirs=theirs,
+            key=found.key,
             estimated=found.estimated,
         )
         new.replace(made)

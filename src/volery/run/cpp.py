@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 from volery.base.errors import ModelError
 from volery.components.cpp.build import Compiled, CppComponent, Face, compile_component
 from volery.components.cpp.interfaces import DRONE, Required, operations
+from volery.components.cpp.library import Library
 from volery.components.cpp.meter import Meter
 from volery.components.cpp.program import CppProgram
 from volery.components.cpp.sources import find_sources
@@ -20,6 +23,7 @@ from volery.kernel.api import Kernel
 from volery.model.system import ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component, System
 from volery.model.system import Instance as InstanceModel
 from volery.run.counted import Counting, core_of
+from volery.run.traced import Tracing
 
 LANGUAGES = ("c++", "roscpp")
 _ROSCPP = Face((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
@@ -36,16 +40,23 @@ def has_cpp(system: System) -> bool:
 
 
 class Ready(NamedTuple):
-    """What an instance is to run, and how its code counts itself (``None``: it does not)."""
+    """What an instance is to run; how its code counts itself, or tells what it executes, if it does."""
 
     compiled: Compiled
     counting: Counting | None = None
+    tracing: Tracing | None = None
 
 
 def compile_all(
-    system: System, instances: Iterable[InstanceModel], fidelity: str, tell: Tell | None = None
+    system: System,
+    instances: Iterable[InstanceModel],
+    fidelity: str,
+    tell: Tell | None = None,
+    *,
+    traced: bool = False,
 ) -> dict[str, Ready]:
-    """What the C++ components among *instances* are to run, by their names, compiled if it is not yet.
+    """What the C++ components among *instances* are to run, by their names, compiled if it is not yet. Those
+    whose code would be counted tell what they execute where it is to be *traced*.
 
     ``ModelError`` with the compiler's words for one that does not compile; ``UsageError`` if there is no
     compiler, but nothing at fidelity ``times``, where components without code take their stated times.
@@ -53,19 +64,24 @@ def compile_all(
     if fidelity == "times" and not has_compiler():
         return {}
     return {
-        one.name: _ready(system, one, core_of(system, fidelity, one), tell)
+        one.name: _ready(system, one, None if traced else tell, Tracing(core) if traced and core else core)
         for one in instances
         if is_cpp(one.component)
+        for core in (core_of(system, fidelity, one),)
     }
 
 
-def _ready(system: System, instance: InstanceModel, core: CoreLaw | None, tell: Tell | None) -> Ready:
+def _ready(
+    system: System, instance: InstanceModel, tell: Tell | None, how: CoreLaw | Tracing | None
+) -> Ready:
     component = instance.component
     face = _ROSCPP if component.language == "roscpp" else Face()
     wanted = described(system, component)
-    if core is None or instance.processor is None:
+    if how is None or instance.processor is None:
         return Ready(compile_component(wanted, face, tell))
-    counting = Counting(core, system.processor(instance.processor).frequency_mhz)
+    if isinstance(how, Tracing):
+        return Ready(compile_component(wanted, face, tell, how), tracing=how)
+    counting = Counting(how, system.processor(instance.processor).frequency_mhz)
     return Ready(compile_component(wanted, face, tell, counting), counting)
 
 
@@ -115,8 +131,11 @@ class CppPrograms:
         ready: Mapping[str, Ready],
         launches: Mapping[str, Launch],
         nodes: Mapping[str, Node],
+        traces: Path | None = None,
     ) -> None:
         self._kernel = kernel
+        self._traces = traces
+        self._told: list[Library] = []
         self._graph = graph
         self._ready = ready
         self._launches = launches
@@ -137,7 +156,7 @@ class CppPrograms:
 
     def program(self, model: InstanceModel) -> CppProgram:
         """What the instance is to run."""
-        compiled, counting = self._ready[model.name]
+        compiled, counting, tracing = self._ready[model.name]
         if model.component.language == "roscpp":
             launch = self._launches.get(model.name, Launch())
             session = roscpp.Session(self._graph, model.name, launch, self._nodes)
@@ -146,4 +165,15 @@ class CppPrograms:
             made = CppProgram(self._kernel, model.name, compiled)
         if counting is not None:
             made.count(self.meters[model.name], counting.worth())
+        if tracing is not None and self._traces is not None:
+            made.when_loaded(partial(self._trace, tracing, self._traces / model.name))
         return made
+
+    def _trace(self, tracing: Tracing, file: Path, library: Library) -> None:
+        tracing.begin(library, file)
+        self._told.append(library)
+
+    def finish(self) -> None:
+        """What they have to tell of themselves is told."""
+        for library in self._told:
+            library.function("volery_end")()

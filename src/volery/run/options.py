@@ -14,6 +14,7 @@ class Options:
 
     ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once. ``graph``
     (``ros1``, ``ros2``): with the components as processes on that graph, at a pace of 1 unless one is given.
+    ``traces``: a folder in which C++ components tell what they execute, instead of being charged for it.
     """
 
     fidelity: str = "times"
@@ -23,6 +24,7 @@ class Options:
     show: Show | None = None
     tell: Tell | None = None
     graph: str = ""
+    traces: Path | None = None
 
 
 AS_USUAL = Options()

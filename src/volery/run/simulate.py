@@ -85,7 +85,8 @@ def _simulated(system: System, options: Options) -> Run:
 
 def _supervised(system: System, options: Options) -> Run:
     """In a process of its own: C++ components may end it."""
-    ready = compile_all(system, system.instances, options.fidelity, options.tell)
+    traced = options.traces is not None
+    ready = compile_all(system, system.instances, options.fidelity, options.tell, traced=traced)
     if not ready:
         return _simulated(system, options)
     libraries = {name: one.compiled.library for name, one in ready.items()}
@@ -125,7 +126,7 @@ class _Simulation:
 
     def _build(self, platform: Platform) -> Built:
         builder = Builder(self._system, self._kernel, platform, self._airfield, self._ending)
-        return builder.build(self._options.fidelity, self._options.seed)
+        return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
     def prepare(self) -> None:
         """Make what the run is made of. Raises what is wrong with the model."""
@@ -179,6 +180,7 @@ class _Simulation:
 
     def _close(self, left: Sequence[str]) -> Run:
         now, ending = self._kernel.now(), self._ending
+        self._built.finish()
         self._airfield.record_states()
         for warning in self._built.warnings():
             self._recording.stream(Text(now, WHO, WARNING, warning))

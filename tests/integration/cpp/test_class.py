@@ -6,6 +6,11 @@ import shutil
 
 import pytest
 
+from volery.base.errors import UsageError
+from volery.model.reader import load
+from volery.run.learning import learn
+from volery.run.options import Options
+from volery.run.vocabulary import vocabulary
 from volery.trace.events import Charge, Milestone, Text
 
 pytestmark = pytest.mark.integration
@@ -123,3 +128,36 @@ def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
     assert 0 < counted["other"] < counted["one"] < 100_000, "one of them does a few rounds more"
     [doubt] = [one.text for one in outcome.of(Text) if one.source == "volery"]
     assert "comes from its code alone" in doubt
+
+
+@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+def test_what_it_costs_is_learnt_from_a_run(run_model, tmp_path, monkeypatch):
+    """From then on the costs are those of what ran; the rest is charged as before."""
+    monkeypatch.setenv("VOLERY_CACHE", str(tmp_path / "cache"))
+    guessed = run_model(MODEL, "adder.cpp", fidelity="code", out="guessed", lister=LISTER, caller=CALLER)
+    (tmp_path / "model.yaml").write_text(MODEL, encoding="utf-8")
+    system = load(tmp_path / "model.yaml", vocabulary())
+    (kind,), run = learn(system, Options())
+    assert run.completed
+    assert (kind.component, kind.instances, kind.core) == ("Adder", ("one", "other"), "intel-i5-3470")
+    assert 10 < kind.met < kind.blocks
+    assert kind.followed > 0.9
+    learnt = run_model(MODEL, "adder.cpp", fidelity="code", out="learnt", lister=LISTER, caller=CALLER)
+    assert [one.text for one in learnt.of(Text) if one.source == "volery"] == []
+    before, after = (_counted(outcome, "one") for outcome in (guessed, learnt))
+    assert before != after
+    assert after == pytest.approx(before, rel=4.0)
+    assert _counted(guessed, "caller") == _counted(learnt, "caller")
+
+
+def _counted(outcome, component):
+    charged = [one for one in outcome.of(Charge) if one.kind == "code" and one.component == component]
+    return sum(one.caller for one in charged)
+
+
+def test_there_is_nothing_to_learn_of_python(tmp_path):
+    for name in ("adder.cpp", "lister.py", "caller.py"):
+        (tmp_path / name).touch()
+    (tmp_path / "model.yaml").write_text(MODEL.replace("language: c++", "language: python"), encoding="utf-8")
+    with pytest.raises(UsageError, match="adders: no component of it is C\\+\\+"):
+        learn(load(tmp_path / "model.yaml", vocabulary()), Options())

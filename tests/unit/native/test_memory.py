@@ -22,7 +22,7 @@ entry:
   call void @llvm.memset.p0.i64(ptr align 4 %d, i8 0, i64 64, i1 0)
   br label %end
 end:
-  %c = load double, ptr %p, align 8
+  %c = load atomic i32, ptr %"odd name" syncscope("singlethread") acquire, align 8
   ret void
 }
 """
@@ -41,7 +41,7 @@ def test_every_access_is_told_before_it_is_made() -> None:
         "call void @volery_range(ptr %d, i64 %n)",
         "call void @volery_range(ptr @src, i64 %n)",
         "call void @volery_range(ptr %d, i64 64)",
-        "call void @volery_access(ptr %p, i32 0)",
+        'call void @volery_access(ptr %"odd name", i32 0)',
     ]
 
 

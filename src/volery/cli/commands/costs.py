@@ -9,7 +9,7 @@ import typer
 
 from volery.cli.console import Output
 from volery.cli.endings import run_command
-from volery.cli.options import Allocation, Debug, Fidelity, Json, Model, Overrides, Quiet, Scenario
+from volery.cli.options import Allocation, Debug, Fidelity, Json, Model, Overrides, Quiet, Scenario, Seed
 
 
 def cost(
@@ -177,3 +177,26 @@ def processor(
 
     output = Output(quiet, as_json, debug)
     run_command(output, lambda: command.processor(output, command.Wanted(out, name)))
+
+
+def components(
+    model: Model,
+    seed: Seed = 1,
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Learn what a model's C++ components cost on the cores that they are allocated to.
+
+    The model runs once while the components tell which blocks of their code they enter; that goes through
+    the model of the core. What comes out is kept with the code: later runs at fidelity `code` are charged by
+    it, until the code changes. Needs LLVM (Debian: clang-19 and llvm-19).
+    """
+    from volery.cli import calibrate_components as command
+
+    output = Output(quiet, as_json, debug)
+    wanted = command.Wanted(model, allocation, scenario, seed, tuple(overrides or ()))
+    run_command(output, lambda: command.components(output, wanted))

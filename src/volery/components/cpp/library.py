@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from volery.base.errors import ComponentError
@@ -32,6 +33,11 @@ class Library:
         entry = self._loaded.volery_component_dispatch
         self.dispatch: int = ctypes.cast(entry, ctypes.c_void_p).value or 0
         self.counters = self._counters()
+
+    def function(self, name: str) -> Callable[..., object]:
+        """A function of its own runtime, by its C name."""
+        found: Callable[..., object] = getattr(self._loaded, name)
+        return found
 
     def _counters(self) -> ctypes.Array[ctypes.c_uint64]:
         try:

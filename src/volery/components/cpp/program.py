@@ -67,10 +67,15 @@ class CppProgram:
         self._more = more or {}
         self._on_end = on_end
         self._meter: tuple[Meter, Worth] | None = None
+        self._on_load: Callable[[Library], None] = lambda library: None
 
     def count(self, meter: Meter, worth: Worth) -> None:
         """Have *meter* read what the code counts, as *worth* says."""
         self._meter = (meter, worth)
+
+    def when_loaded(self, told: Callable[[Library], None]) -> None:
+        """*told* is given the library before any of its code has run."""
+        self._on_load = told
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
         """See ``Program``. What a class must have is the compiler's to say."""
@@ -92,6 +97,7 @@ class CppProgram:
         known = answers(self._kernel, self._name, parameters, self._connected(given))
         runtime = house(self._compiled.house)
         library = Library(self._compiled.library, self._name)
+        self._on_load(library)
         if self._meter is not None:
             meter, worth = self._meter
             meter.read_from(library.counters, worth)

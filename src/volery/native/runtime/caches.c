@@ -80,8 +80,7 @@ static int streamed(uint64_t line) {
     return 0;
 }
 
-__attribute__((constructor)) static void read_caches(void) {
-    const char *text = getenv("VOLERY_CACHES");
+void volery_model_caches(const char *text) {
     for (char *rest; text && *text && count < MOST_CACHES; text = *rest ? rest + 1 : rest) {
         uint64_t size = strtoull(text, &rest, 10);
         Cache *cache = &caches[count++];
@@ -90,6 +89,8 @@ __attribute__((constructor)) static void read_caches(void) {
         cache->lines = calloc(cache->sets * cache->ways, sizeof *cache->lines);
     }
 }
+
+__attribute__((constructor)) static void read_caches(void) { volery_model_caches(getenv("VOLERY_CACHES")); }
 
 static unsigned level_of(uint64_t line) {
     unsigned level = 0;

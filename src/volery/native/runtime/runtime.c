@@ -56,17 +56,21 @@ void volery_tell_access(uint32_t what) {
         hold(what | 1u << 30);
 }
 
+/* The same for code that is loaded by another program. */
+void volery_trace_into(const char *name, uint64_t of_each, uint64_t so_many) {
+    window = of_each;
+    stride = so_many;
+    trace = fopen(name, "wb");
+}
+
 void volery_begin(void) {
     if (getenv("VOLERY_COUNTS") && &volery_counters_length) {
         before = malloc(volery_counters_length * sizeof *before);
         memcpy(before, volery_counters, volery_counters_length * sizeof *before);
     }
     const char *name = getenv("VOLERY_TRACE");
-    if (name) {
-        window = number("VOLERY_WINDOW", 1);
-        stride = number("VOLERY_STRIDE", 1);
-        trace = fopen(name, "wb");
-    }
+    if (name)
+        volery_trace_into(name, number("VOLERY_WINDOW", 1), number("VOLERY_STRIDE", 1));
 }
 
 void volery_end(void) {
