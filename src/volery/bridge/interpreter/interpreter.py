@@ -37,6 +37,8 @@ SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, GET_HOME_POSITION, DO_SET_MODE = (
     constant(f"MAV_CMD_{name}")
     for name in ("SET_MESSAGE_INTERVAL", "REQUEST_MESSAGE", "GET_HOME_POSITION", "DO_SET_MODE")
 )
+FASTEST: Ns = MS
+"""No message is said more often."""
 NEWS_PERIOD: Ns = 100 * MS
 """How soon texts are passed on, and a change of what a heartbeat says."""
 
@@ -70,7 +72,7 @@ class Interpreter:
         self._passed: Said | None = None  # the last of the vehicle's own texts that was passed on
         self._state: tuple[object, ...] = ()
         self._handlers = self._all()
-        self._streams = Streams(kernel, tuple(self._telling.messages), self._burst)
+        self._streams = Streams(kernel, tuple(self._telling.messages), self._burst, least=FASTEST)
         self._streams.set(REGULAR, S)
         self._streams.start()
         self._news = kernel.every(NEWS_PERIOD, self._tell_news)

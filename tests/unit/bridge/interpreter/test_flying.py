@@ -300,3 +300,25 @@ def test_nonsense_ends_in_words(flown: Any, name: str, fields: dict[str, Any]) -
     made.tap()
     made.run(2.0)
     assert made.said("HEARTBEAT")  # it lives
+
+
+def test_a_pilot_who_takes_it_is_shown_and_not_fought(flown: Any) -> None:
+    made = flown("sim:dji?start=warm")
+    made.hear("state", "mavros_msgs/State")
+    made.run(5.0)
+    made.take_off(4.0)
+    made.airfield.autopilots["d"].vehicle.sticks.transmitter[4] = 1500  # the mode switch
+    made.run(2.0)
+    assert (made.last("state").mode, made.last("state").guided) == ("ATTITUDE", False)
+    assert made.command("cmd/land", "CommandTOL") == (False, 2)
+    assert "which this program did not command" in made.texts[-1]
+    assert made.driver.telemetry.flying
+
+
+def test_it_is_closed_with_a_command_under_way(flown: Any) -> None:
+    made = flown("sim:paparazzi?start=warm")
+    made.run(30.0)
+    made.send("COMMAND_LONG", command=22, param7=20.0)
+    made.run(6.0)
+    made.interpreter.close()
+    assert made.kernel.close() == []
