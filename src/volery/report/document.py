@@ -199,8 +199,8 @@ def _outcome(record: RunRecord) -> Fact:
 
 
 def _facts(record: RunRecord) -> list[Fact]:
-    facts = [Fact("simulated", moment(record.sim_s)[:-4], "h:mm:ss")]
-    if record.wall_s is not None:
+    facts = [Fact("lasted" if record.is_real else "simulated", moment(record.sim_s)[:-4], "h:mm:ss")]
+    if record.wall_s is not None and not record.is_real:
         speed = number(record.real_time_factor, 0, "× real time")
         facts.append(Fact("it took", number(record.wall_s, 1, "s"), speed))
     if record.parcels:

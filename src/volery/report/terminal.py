@@ -69,8 +69,8 @@ def headline(record: RunRecord) -> Text:
     line.append(f"  {record.outcome.status}", style="green" if good else "bold red")
     if record.outcome.reason:
         line.append(f" ({record.outcome.reason})")
-    line.append(f"  {record.sim_s:.1f} s simulated", style="dim")
-    if record.wall_s is not None and record.real_time_factor is not None:
+    line.append(f"  {record.sim_s:.1f} s{'' if record.is_real else ' simulated'}", style="dim")
+    if not record.is_real and record.wall_s is not None and record.real_time_factor is not None:
         line.append(f" in {record.wall_s:.1f} s, {record.real_time_factor:.0f}× real time", style="dim")
     return line
 

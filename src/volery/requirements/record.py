@@ -215,6 +215,11 @@ class RunRecord(_Part):
     wall_s: float | None
     real_time_factor: float | None
 
+    @property
+    def is_real(self) -> bool:
+        """Whether it was flown out there, in real time."""
+        return self.fidelity == "hardware"
+
 
 def write_record(record: RunRecord, folder: Path) -> Path:
     """Write ``run.json`` into *folder*; ``UsageError`` if that cannot be done."""

@@ -26,6 +26,7 @@ from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.setup import setup_of_flight
 from volery.run.simulated import HOME
+from volery.run.watched import Watched
 from volery.trace.events import Failure
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import parse
@@ -109,10 +110,10 @@ class _Flight:
         if options.tell is not None:
             self._recording.stream.tap(Teller(options.tell))
         airfield = self._opened.airfield
-        if airfield is not None:
-            airfield.sample()
-            if options.show is not None:
-                self._recording.stream.tap(Reporter(kernel, airfield, 0, options.show))
+        self._states = airfield or Watched(kernel, self._opened.vehicles)
+        self._states.sample()
+        if airfield is not None and options.show is not None:
+            self._recording.stream.tap(Reporter(kernel, airfield, 0, options.show))
         self._under_way = len(self._opened.vehicles)
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
@@ -141,8 +142,7 @@ class _Flight:
             for vehicle in self._opened.vehicles:
                 vehicle.close()
             self._opened.leave()
-            if self._opened.airfield is not None:
-                self._opened.airfield.record_states()
+            self._states.record_states()
             record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
         return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
 

@@ -102,7 +102,8 @@ class VehicleState(NamedTuple):
     """A vehicle as it is (truth, ENU metres about the world's origin) and as its autopilot believes.
 
     Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates
-    are NaN while the autopilot has none, and truth is NaN where nobody knows it, as with a real vehicle.
+    are NaN while the autopilot has none. Of a real vehicle nobody knows the truth: its position is NaN, its
+    attitude and velocity are as the autopilot believes.
     """
 
     at: Ns

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from volery.cli.folders import example
+from volery.requirements.record import read_record
 
 pytestmark = pytest.mark.integration
 
@@ -154,10 +155,24 @@ def test_a_served_vehicle_can_be_flown_over_a_socket(starter):
             "fly", example("starter") / "mission.py", "--on", url, "--out", "out", cwd=starter.parent
         )
         assert done.returncode == 0, done.stderr
+        assert "simulated" not in done.stdout  # it was flown in real time, whatever flew there
+        _is_told_by_its_autopilot(read_record(starter.parent / "out"))
         server.send_signal(signal.SIGINT)
         assert server.wait(timeout=WITHIN_S) == 0
     finally:
         server.kill()
+
+
+def _is_told_by_its_autopilot(record):
+    """Of a vehicle out there the report has what it says of itself, and no truth."""
+    (drone,) = record.vehicles.values()
+    assert record.is_real
+    assert drone.landed
+    assert drone.distance_m > 10.0
+    assert drone.airborne_s > 1.0
+    assert 0.0 < drone.battery < 1.0
+    assert drone.energy_j > 0.0
+    assert drone.error_by_truth_m.horizontal is None
 
 
 def test_a_folder_that_cannot_be_written(starter):
