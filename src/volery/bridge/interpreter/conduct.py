@@ -216,10 +216,10 @@ class Conduct:
         """Hold them so; ``None`` lets go of them. They take effect in modes that are flown by hand."""
         if self._driver.telemetry.kind != Drone.kind:
             return  # it would have to be waited for
-        self._sticks_at = None if sticks is None else self._kernel.now()
         if sticks is None:
-            self._driver.sticks(None)
+            self._let_go()
             return
+        self._sticks_at = self._kernel.now()
         try:
             self.drone.manual_control(*sticks)
         except VoleryError as error:
@@ -230,9 +230,14 @@ class Conduct:
     def _look_at_sticks(self) -> None:
         if self._sticks_at is None or self._kernel.now() - self._sticks_at < STICKS_LAST:
             return
-        self._sticks_at = None
         if not self._by_hand:
-            self._driver.sticks(None)
+            self._let_go()
             return
+        self._sticks_at = None  # what holds it lets go of them
         self._say(f"{self._driver.name}: no sticks for {STICKS_LAST // S} s: it is told to hold")
         self.command(Order("hold", self.drone.hold), lambda result: None)
+
+    def _let_go(self) -> None:
+        if self._sticks_at is not None:
+            self._sticks_at = None
+            self._driver.sticks(None)
