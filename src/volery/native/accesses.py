@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
+from volery.native.operands import operands
+
 ACCESS, RANGE = "volery_access", "volery_range"
 DECLARED = f"declare void @{ACCESS}(ptr, i32)\ndeclare void @{RANGE}(ptr, i64)\n"
 
 _LOAD = re.compile(r"^\s+%.+? = load ")
 _STORE = re.compile(r"^\s+store ")
 _BLOCK = re.compile(r"^\s+(?:tail |musttail |notail )?call void @llvm\.mem(?:cpy|move|set)\.[^(]*\((.*)\)")
-
-
 _EXPRESSION = re.compile(r"(?:getelementptr|inttoptr) .*\)")
 _NAME = re.compile(r'[%@](?:"[^"]*"|[-\w.$]+)|\bnull\b|\bpoison\b|\bundef\b')
 
@@ -39,13 +39,13 @@ def told(lines: Iterator[str], begins: Callable[[str], bool]) -> Iterator[str]:
 
 def _address(line: str) -> str:
     """What the access points to: the last operand that is a pointer, before its alignment."""
-    operands = [one for one in _operands(line.strip()) if one.startswith("ptr ")]
-    return _value(operands[-1].removeprefix("ptr "))
+    pointers = [one for one in operands(line.strip()) if one.startswith("ptr ")]
+    return _value(pointers[-1].removeprefix("ptr "))
 
 
 def _ranges(arguments: str) -> Iterator[str]:
     """Of a copy the two, of a filling the one range that it touches."""
-    given = list(_operands(arguments))
+    given = list(operands(arguments))
     length = given[2].split(" ", 1)
     if length[0] != "i64":
         return
@@ -58,17 +58,3 @@ def _value(operand: str) -> str:
     """A name, or a whole expression, among attributes and orderings."""
     expression = _EXPRESSION.search(operand)
     return expression[0] if expression else _NAME.findall(operand)[-1]
-
-
-def _operands(text: str) -> Iterator[str]:
-    """What stands between commas that are in no brackets."""
-    depth, start = 0, 0
-    for at, sign in enumerate(text):
-        if sign in "([{<":
-            depth += 1
-        elif sign in ")]}>":
-            depth -= 1
-        elif sign == "," and depth == 0:
-            yield text[start:at].strip()
-            start = at + 1
-    yield text[start:].strip()

@@ -7,9 +7,10 @@ code generator made blocks of its own, split edges for instance, there is no suc
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+
+from volery.native.operands import operands
 
 _FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
 _LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
@@ -116,21 +117,7 @@ def _instruction(line: str, source: str) -> Instruction:
     prefix, _, after = mnemonic.partition(" ")
     if prefix in ("lock", "rep", "notrack", "data16"):
         mnemonic = after
-    return Instruction(mnemonic.strip(), tuple(_split(rest)), source)
-
-
-def _split(operands: str) -> Iterator[str]:
-    depth, start = 0, 0
-    for at, sign in enumerate(operands):
-        if sign in "[{":
-            depth += 1
-        elif sign in "]}":
-            depth -= 1
-        elif sign == "," and depth == 0:
-            yield operands[start:at].strip()
-            start = at + 1
-    if operands[start:].strip():
-        yield operands[start:].strip()
+    return Instruction(mnemonic.strip(), tuple(operands(rest)), source)
 
 
 def _ending(one: Instruction) -> tuple[End, str]:
