@@ -12,7 +12,7 @@ from volery.autopilots.simulated.flight import Flight, make_world
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
-from volery.base.time import MS, Ns
+from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.links.codec import Codec
 from volery.links.in_process import in_process
@@ -20,15 +20,13 @@ from volery.links.link import Link
 from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
+from volery.run.options import SAMPLING_PERIOD
 from volery.run.simulated import LINK_DELAY, Simulated
 from volery.world.specs import Battery, BodySpec, Multirotor, Rover
 from volery.world.wind import Wind
 from volery.world.world import World
 
 CELL_NOMINAL_VOLTS = 3.7
-
-SAMPLING_PERIOD: Ns = 200 * MS
-"""How often the state of every vehicle is recorded."""
 
 
 class Airfield:

@@ -15,9 +15,6 @@ from volery.components.cpp.meter import Counters, Worth
 from volery.components.cpp.toolchain import Toolchain, cache_folder
 from volery.cost.core import CoreLaw, cores
 from volery.model.system import CPP_LANGUAGES, Instance, System
-from volery.native import instrument
-from volery.native.program import METHOD
-from volery.native.store import kept_costs
 
 Cycles = np.ndarray[Any, np.dtype[Any]]
 """Of each block."""
@@ -77,6 +74,8 @@ class Counting:
 
     def _price(self, costs: Path) -> None:
         """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
+        from volery.native.store import kept_costs
+
         with np.load(costs) as found:
             learnt = kept_costs(str(found["key"]))
             cycles, memory = (found["cycles"], found["memory"])
@@ -86,6 +85,8 @@ class Counting:
             self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
 
     def _digest(self, plain: Sequence[Path]) -> str:
+        from volery.native.program import METHOD
+
         contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
         told = " ".join((METHOD, self._law.model_dump_json(), *contents))
         return sha256(told.encode()).hexdigest()[:32]
@@ -93,6 +94,8 @@ class Counting:
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
     ) -> None:
+        from volery.native import instrument
+
         new = made.with_suffix(".new.o")
         found = instrument(sources, self._law, new, options(include, flags))
         costs = found.costs

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from volery.base.time import MS, Ns
 from volery.run.progress import Show, Tell
+
+SAMPLING_PERIOD: Ns = 200 * MS
+"""How often the state of every vehicle is recorded."""
 
 
 @dataclass(frozen=True)

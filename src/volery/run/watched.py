@@ -9,7 +9,7 @@ from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, eule
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.run.airfield import SAMPLING_PERIOD
+from volery.run.options import SAMPLING_PERIOD
 from volery.trace.events import VehicleState
 from volery.vehicles import Vehicle
 from volery.vehicles.telemetry import Attitude
