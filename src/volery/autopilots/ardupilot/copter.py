@@ -19,19 +19,16 @@ from volery.autopilots.ardupilot.arming import (
     not_armable,
 )
 from volery.autopilots.ardupilot.failsafes import CopterFailsafes
+from volery.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
 from volery.autopilots.ardupilot.honoured import COPTER as HONOURED
-from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, set_mode, switch
+from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, switch
 from volery.autopilots.ardupilot.status import ACTIVE, CRITICAL, STANDBY, XY_CONTROL, Z_CONTROL, Health
-from volery.autopilots.ardupilot.tables import BUILDERS, ORDER, streams
+from volery.autopilots.ardupilot.tables import streams
 from volery.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
-from volery.autopilots.simulated.dialect import Dialect
-from volery.autopilots.simulated.flight import Flight
 from volery.autopilots.simulated.manoeuvres.guided import Guided
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission, copter_leg
 from volery.autopilots.simulated.manoeuvres.pilot import AltitudeHold, ByPilot, Loiter, Stabilize
 from volery.autopilots.simulated.manoeuvres.points import Brake, Land, Return
-from volery.autopilots.simulated.mavlink.command_service import DENIED, FAILED
-from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.face import MavlinkFace
 from volery.autopilots.simulated.mode import Mode
 from volery.autopilots.simulated.parameters import Parameter, load
@@ -159,9 +156,7 @@ def warm(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire, touch-down, disarming by itself."""
-    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(COPTER.transmitter):
-        radio.fail(vehicle)
-    radio.expire(vehicle)
+    radio.on_step(vehicle)
     if not vehicle.armed:
         return
     if not vehicle.landed:
@@ -213,14 +208,8 @@ def system_status(vehicle: Vehicle) -> int:
 def greet(vehicle: Vehicle) -> None:
     """Said to whoever lists the parameters."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
-    vehicle.say(INFO, "ArduCopter V4.5.6 (7ce11b41)")
-    vehicle.say(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+    introduce(vehicle, "ArduCopter")
     vehicle.say(INFO, f"Frame: QUAD/{shape}")
-
-
-def board(vehicle: Vehicle) -> str:
-    """The board's own number, different for each system id."""
-    return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
 
 
 @cache
@@ -229,68 +218,37 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.autopilots.ardupilot", "data/copter.parameters")
 
 
-def own_parameters(system: int, flight: Flight) -> dict[str, float]:
-    """What follows from the vehicle."""
-    return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.spec.battery.capacity_ah * 1000.0}
-
-
 def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
     """A copter does not store stream rates."""
 
 
-def refuse_interval(vehicle: Vehicle, number: int) -> int:
-    """SET_MESSAGE_INTERVAL of a message that the firmware does not know."""
-    vehicle.say(INFO, f"No ap_message for mavlink id ({number})")
-    return DENIED
-
-
 _FAILSAFES = CopterFailsafes(switch, ARMED_WORDS[1])
 
-_MAVLINK = MavlinkDialect(
+_MAVLINK = mavlink(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
     ),
     heartbeat_first=(round(1.05 * S),),
     heartbeat_from=round(2.037 * S),
-    deaf_until=100 * MS,
     messages={
-        **BUILDERS,
-        "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
-            vehicle, CAPABILITIES, board(vehicle).encode()
-        ),
+        **builders(QUADROTOR, CAPABILITIES, HEALTH, system_status),
         "ESC_TELEMETRY_1_TO_4": status.esc_telemetry,
-        "HEARTBEAT": lambda vehicle: status.heartbeat(vehicle, QUADROTOR, system_status(vehicle)),
-        "SYS_STATUS": partial(status.sys_status, health=HEALTH),
         "TERRAIN_REPORT": status.terrain_report,
         "WIND": status.wind,
     },
-    message_order=ORDER,
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
     on_stream_request=_ignored,
-    refuse_interval=refuse_interval,
-    unknown_message=FAILED,
     commands=commands.copter(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
     handlers={
-        "HEARTBEAT": radio.on_heartbeat,
-        "MANUAL_CONTROL": radio.on_manual_control,
-        "RC_CHANNELS_OVERRIDE": radio.on_override,
+        **HEARD,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,
     },
-    set_mode=set_mode,
-    set_mode_ack=11,
     on_parameter_list=greet,
-    mission_runs=missions.runs,
-    stored_item=missions.stored_item,
-    home_item=missions.home_item,
-    go_to_item=commands.go_to_item,
-    mission_grew=missions.mission_grew,
-    timesync_every=10 * S,
 )
 
-COPTER = Dialect(
-    name="ardupilot",
+COPTER = ardupilot(
     kind="multirotor",
     face=partial(MavlinkFace, _MAVLINK),
     boot_mode=MODES[0],
@@ -314,11 +272,7 @@ COPTER = Dialect(
     watches=_FAILSAFES.watches(),
     on_step=on_step,
     on_disarmed=on_disarmed,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
     mission_ended=missions.copter_ended,
-    mission_action=missions.act,
     parameters=parameters,
-    own_parameters=own_parameters,
     honoured=HONOURED,
 )

@@ -84,6 +84,13 @@ def _moved(vehicle: Vehicle) -> None:
         vehicle.act()
 
 
+def on_step(vehicle: Vehicle) -> None:
+    """At each tick: a transmitter that fails or comes back, overrides that expire."""
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(vehicle.dialect.transmitter):
+        fail(vehicle)
+    expire(vehicle)
+
+
 def expire(vehicle: Vehicle) -> None:
     """Overrides fall back to the transmitter after RC_OVERRIDE_TIME; a negative time means never."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]

@@ -6,7 +6,6 @@ from functools import cache, partial
 
 from volery.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
 from volery.autopilots.ardupilot.arming import (
-    INFO,
     WARNING,
     Check,
     between,
@@ -16,10 +15,10 @@ from volery.autopilots.ardupilot.arming import (
     no_mission,
     not_armable,
 )
-from volery.autopilots.ardupilot.copter import board, own_parameters, refuse_interval
 from volery.autopilots.ardupilot.failsafes import RoverFailsafes
+from volery.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
 from volery.autopilots.ardupilot.honoured import ROVER as HONOURED
-from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, set_mode, switch
+from volery.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, switch
 from volery.autopilots.ardupilot.motion import nav_controller
 from volery.autopilots.ardupilot.status import (
     ACTIVE,
@@ -32,13 +31,10 @@ from volery.autopilots.ardupilot.status import (
     YAW_CONTROL,
     Health,
 )
-from volery.autopilots.ardupilot.tables import ALL, BUILDERS, ORDER, streams
+from volery.autopilots.ardupilot.tables import ALL, streams
 from volery.autopilots.ardupilot.targets import rover_global, rover_local
-from volery.autopilots.simulated.dialect import Dialect
 from volery.autopilots.simulated.manoeuvres.mission import FlyMission
 from volery.autopilots.simulated.manoeuvres.rover import GuidedRover, Manual, ReturnRover, Stand, rover_leg
-from volery.autopilots.simulated.mavlink.command_service import FAILED
-from volery.autopilots.simulated.mavlink.dialect import MavlinkDialect
 from volery.autopilots.simulated.mavlink.face import MavlinkFace
 from volery.autopilots.simulated.mavlink.telemetry import Fields
 from volery.autopilots.simulated.mode import Mode
@@ -132,9 +128,7 @@ def warm(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire."""
-    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(ROVER.transmitter):
-        radio.fail(vehicle)
-    radio.expire(vehicle)
+    radio.on_step(vehicle)
     if vehicle.armed:
         vehicle.flight_time += ROVER.tick
 
@@ -160,8 +154,7 @@ def system_status(vehicle: Vehicle) -> int:
 
 def greet(vehicle: Vehicle) -> None:
     """Said to whoever lists the parameters."""
-    vehicle.say(INFO, "ArduRover V4.5.6 (7ce11b41)")
-    vehicle.say(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+    introduce(vehicle, "ArduRover")
 
 
 def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
@@ -184,50 +177,30 @@ def parameters() -> tuple[Parameter, ...]:
 
 _FAILSAFES = RoverFailsafes(switch, ARMED_WORDS[1])
 
-_MAVLINK = MavlinkDialect(
+_MAVLINK = mavlink(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
     ),
     heartbeat_first=(round(1.025 * S),),
     heartbeat_from=round(3.04 * S),
-    deaf_until=100 * MS,
     least_period=25 * MS,
     messages={
-        **BUILDERS,
-        "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
-            vehicle, CAPABILITIES, board(vehicle).encode()
-        ),
-        "HEARTBEAT": lambda vehicle: status.heartbeat(vehicle, GROUND_ROVER, system_status(vehicle)),
+        **builders(GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
         "NAV_CONTROLLER_OUTPUT": navigation,
         "RC_CHANNELS_SCALED": status.rc_channels_scaled,
-        "SYS_STATUS": partial(status.sys_status, health=HEALTH),
     },
-    message_order=ORDER,
     streams=streams(("RC_CHANNELS_SCALED",), ()),
     on_stream_request=on_stream_request,
-    refuse_interval=refuse_interval,
-    unknown_message=FAILED,
     commands=commands.rover(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
     handlers={
-        "HEARTBEAT": radio.on_heartbeat,
-        "MANUAL_CONTROL": radio.on_manual_control,
-        "RC_CHANNELS_OVERRIDE": radio.on_override,
+        **HEARD,
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
         "SET_POSITION_TARGET_LOCAL_NED": rover_local,
     },
-    set_mode=set_mode,
-    set_mode_ack=11,
     on_parameter_list=greet,
-    mission_runs=missions.runs,
-    stored_item=missions.stored_item,
-    home_item=missions.home_item,
-    go_to_item=commands.go_to_item,
-    mission_grew=missions.mission_grew,
-    timesync_every=10 * S,
 )
 
-ROVER = Dialect(
-    name="ardupilot",
+ROVER = ardupilot(
     kind="rover",
     face=partial(MavlinkFace, _MAVLINK),
     boot_mode=INITIALISING,
@@ -250,11 +223,7 @@ ROVER = Dialect(
     on_disarmed=lambda _vehicle: None,
     guided_arrived=guided_arrived,
     guided_stale=guided_stale,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
     mission_ended=missions.rover_ended,
-    mission_action=missions.act,
     parameters=parameters,
-    own_parameters=own_parameters,
     honoured=HONOURED,
 )
