@@ -27,7 +27,8 @@ from volery.calibrate.machine import this_machine
 from volery.calibrate.processor.campaign import measure
 from volery.calibrate.processor.entry import law_of
 from volery.calibrate.processor.timing import isa
-from volery.cost.core import CoreLaw, core_law
+from volery.cost import catalogue
+from volery.cost.core import CoreLaw
 from volery.native.costs import Costs, traced_costs
 from volery.native.program import Program, compile_program
 from volery.native.running import WINDOW, Wanted, build, build_timing, counts, timed, trace
@@ -171,7 +172,7 @@ def executed(program: Program, given: int, folder: Path) -> int:
 
 
 def on_a72(paths: list[Path]) -> None:
-    law = core_law(A72)
+    law = catalogue().processor(A72).core_law()
     print("instructions on a Cortex-A72, judging input: estimated, executed by qemu-aarch64")
     errors = []
     for path in paths:
@@ -189,7 +190,7 @@ def on_a72(paths: list[Path]) -> None:
 
 
 def anchors() -> None:
-    law = core_law(A72)
+    law = catalogue().processor(A72).core_law()
     with TemporaryDirectory() as made:
         folder = Path(made)
         source = folder / "primes.cpp"

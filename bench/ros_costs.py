@@ -92,7 +92,7 @@ class Campaign:
         under = Circumstances(self.client, machine.description, mhz)
         write_entry(self.catalogue, machine, law_of(self.costs(), under))
         code = catalogue().processor("generic-host").code["python"]  # a thousandth of what the nodes take
-        put_law(self.catalogue, machine, "code", "python", code, (mhz, mhz))
+        put_law(self.catalogue, machine, ("code", "python"), code, (mhz, mhz))
         host = f"{{is: {machine.name}, frequency: {mhz:g} MHz}}"
         system = self.system(f"platform.catalogues={self.catalogue}", f"platform.processors.host={host}")
         return system, compare(system, estimated(system), self.runs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ from volery.cost.figure import Stated
 
 
 def put_law(
-    file: Path, machine: Machine, section: str, name: str, law: Stated, reach_mhz: tuple[float, float]
+    file: Path, machine: Machine, where: Sequence[str], law: Stated, reach_mhz: tuple[float, float]
 ) -> None:
-    """Make *law* the entry ``<machine>.<section>.<name>`` of the catalogue at *file*, made if need be.
+    """Make *law* what stands at *where* (``("code", "python")``) in the machine's entry of the catalogue at
+    *file*, made if need be.
 
     The entry's range of frequencies grows to contain *reach_mhz*; everything else in the file stays. Raises
     ``ModelError`` if the file is there and no catalogue, ``UsageError`` if it cannot be written.
@@ -29,7 +31,11 @@ def put_law(
     entry = data.setdefault("processors", {}).setdefault(machine.name, _new_entry(machine))
     entry["least_mhz"] = min(entry["least_mhz"], reach_mhz[0])
     entry["greatest_mhz"] = max(entry["greatest_mhz"], reach_mhz[1])
-    entry.setdefault(section, {})[name] = law.model_dump(exclude_defaults=True)
+    *sections, last = where
+    place = entry
+    for section in sections:
+        place = place.setdefault(section, {})
+    place[last] = law.model_dump(exclude_defaults=True)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with file.open("w", encoding="utf-8") as out:

@@ -8,9 +8,10 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
+from volery.calibrate.catalogue_file import put_law
 from volery.calibrate.machine import this_machine
 from volery.calibrate.processor.campaign import loose, measure
-from volery.calibrate.processor.entry import law_of, write_entry
+from volery.calibrate.processor.entry import law_of
 from volery.calibrate.processor.timing import isa
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
@@ -37,11 +38,17 @@ def processor(output: Output, wanted: Wanted) -> int:
             notes, lambda name, done, whole: bar.update(line, description=name, completed=done, total=whole)
         )
     law = law_of(machine, here, taken)
-    write_entry(wanted.out, law)
+    put_law(
+        wanted.out,
+        machine,
+        ("core_model",),
+        law.model_copy(update={"name": ""}),
+        (law.least_mhz, law.greatest_mhz),
+    )
     notes.unlink(missing_ok=True)
     output.show(_table(law))
     output.give(law.model_dump())
-    output.note(f"{law.name} in {wanted.out}: volery cost FILE --on {law.name} --cores {wanted.out}")
+    output.note(f"{law.name} in {wanted.out}: volery cost FILE --on {law.name} --catalogue {wanted.out}")
     noisy = loose(taken)
     if noisy:
         output.note(f"not tight, the machine was busy: {', '.join(noisy)}")

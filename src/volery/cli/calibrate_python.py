@@ -43,7 +43,7 @@ def python(output: Output, wanted: Wanted) -> int:
     with at_frequency(machine, wanted.frequency) as mhz, _shown(output) as tell:
         found = calibrate(wanted.rounds, tell)
     law = found.law(machine.description, mhz)
-    put_law(wanted.out, machine, "code", "python", law, (mhz, mhz))
+    put_law(wanted.out, machine, ("code", "python"), law, (mhz, mhz))
     if wanted.reference is not None:
         _write_reference(wanted.reference, found.table(machine.description))
     output.show(_operations(found), *_in_words(found))

@@ -11,8 +11,8 @@ from rich.text import Text
 from volery.base.errors import EstimateError, UsageError
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
-from volery.cost.catalogue import catalogue
-from volery.cost.core import CoreLaw, core_law, read_cores
+from volery.cost.catalogue import Catalogue, catalogue
+from volery.cost.core import CoreLaw
 from volery.native.estimate import Estimate, Place, estimate
 from volery.native.program import compile_program
 from volery.native.running import Wanted as Run
@@ -22,13 +22,13 @@ TOP = 8
 
 @dataclass(frozen=True)
 class Wanted:
-    """What was asked for: *on* is ``KIND`` or ``KIND@600MHz``; ``cores`` a file that calibrating wrote."""
+    """What was asked for. ``on``: ``KIND`` or ``KIND@600MHz``; ``catalogue``: what calibrating wrote."""
 
     sources: tuple[Path, ...]
     on: str
     run: Run
     flags: tuple[str, ...] = ()
-    cores: Path | None = None
+    catalogue: Path | None = None
     listing: bool = False
 
 
@@ -38,7 +38,7 @@ def cost(output: Output, wanted: Wanted) -> int:
     program = compile_program(wanted.sources, law, wanted.flags)
     found = estimate(program, wanted.run)
     seconds = found.seconds(mhz)
-    joules = _joules(law, mhz, seconds)
+    joules = _joules(wanted, law, mhz, seconds)
     within = f", within {law.error:.0%}" if law.error else ""
     output.show(Text(f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", style="bold"))
     output.show(_summary(law, mhz, found, joules), _lines(found.places[:TOP]))
@@ -68,13 +68,7 @@ def cost(output: Output, wanted: Wanted) -> int:
 
 def _core(wanted: Wanted) -> tuple[CoreLaw, float]:
     kind, _, frequency = wanted.on.partition("@")
-    more = {}
-    if wanted.cores is not None:
-        try:
-            more = read_cores(wanted.cores.read_text(encoding="utf-8"), str(wanted.cores))
-        except OSError as error:
-            raise UsageError(f"{wanted.cores} cannot be read: {error.strerror or error}") from error
-    law = core_law(kind, more)
+    law = _known(wanted).processor(kind).core_law()
     text = frequency.lower().removesuffix("mhz")
     try:
         mhz = float(text) if frequency else law.greatest_mhz
@@ -84,10 +78,14 @@ def _core(wanted: Wanted) -> tuple[CoreLaw, float]:
     return law, mhz
 
 
-def _joules(law: CoreLaw, mhz: float, seconds: float) -> float | None:
+def _known(wanted: Wanted) -> Catalogue:
+    return catalogue(*([wanted.catalogue] if wanted.catalogue else []))
+
+
+def _joules(wanted: Wanted, law: CoreLaw, mhz: float, seconds: float) -> float | None:
     """What the busy core draws on top of idle, where the catalogue knows its power."""
     try:
-        return catalogue().processor(law.name).power_law().core_w(mhz) * seconds
+        return _known(wanted).processor(law.name).power_law().core_w(mhz) * seconds
     except EstimateError:
         return None
 

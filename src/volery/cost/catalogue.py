@@ -12,6 +12,7 @@ from ruamel.yaml.error import YAMLError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
 from volery.cost.code import CodeLaw
+from volery.cost.core import CoreLaw
 from volery.cost.energy import PowerLaw
 from volery.cost.figure import Figure, Stated
 from volery.cost.ros import RosLaw
@@ -53,6 +54,7 @@ class ProcessorEntry(BaseModel):
     power: PowerLaw | None = None
     ros: dict[str, RosLaw] = {}
     code: dict[str, CodeLaw] = {}
+    core_model: CoreLaw | None = None
 
     def check_frequency(self, frequency_mhz: float) -> None:
         """``EstimateError`` for a frequency outside the range that the laws of this processor hold for."""
@@ -97,6 +99,15 @@ class ProcessorEntry(BaseModel):
                 f" (there is one for {choices(self.code)}); state times and run with fidelity 'times'"
             )
         return law.model_copy(update={"processor": self.name})
+
+    def core_law(self) -> CoreLaw:
+        """The law of compiled code; ``EstimateError`` if there are no figures."""
+        if self.core_model is None:
+            raise EstimateError(
+                f"{self.name}: the catalogue has no figures of compiled code for it; "
+                "volery calibrate processor measures them there"
+            )
+        return self.core_model.model_copy(update={"name": self.name})
 
 
 class Catalogue(BaseModel):
@@ -166,6 +177,7 @@ def _joined(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
             **reach,
             "power": new.power or known.power,
             "settings": new.settings or known.settings,
+            "core_model": new.core_model or known.core_model,
         }
     )
 

@@ -10,18 +10,12 @@ takes does not depend on it either.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
-from importlib.resources import files
+from pydantic import BaseModel, ConfigDict, Field
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
-from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
+from volery.base.errors import EstimateError
 from volery.cost.figure import Stated
 
-__all__ = ["Cache", "CoreLaw", "LibraryLaw", "MemoryLaw", "Operation", "core_law", "cores", "read_cores"]
+__all__ = ["Cache", "CoreLaw", "LibraryLaw", "MemoryLaw", "Operation"]
 
 
 class Operation(BaseModel):
@@ -101,38 +95,3 @@ class CoreLaw(Stated):
                 f"{self.name}: {frequency_mhz:g} MHz is outside the range of its laws, "
                 f"{self.least_mhz:g} to {self.greatest_mhz:g} MHz"
             )
-
-
-def read_cores(text: str, name: str) -> dict[str, CoreLaw]:
-    """Cores from YAML text, by the kind of processor. ``ModelError`` names the place of what is wrong."""
-    try:
-        data = YAML(typ="safe").load(text)
-    except YAMLError as error:
-        raise ModelError(f"not YAML: {error}", name) from error
-    entries = data.get("cores") if isinstance(data, dict) else None
-    if not isinstance(entries, dict):
-        raise ModelError("no 'cores' in it", name)
-    try:
-        return {kind: CoreLaw.model_validate({"name": kind, **entry}) for kind, entry in entries.items()}
-    except ValidationError as error:
-        said = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3])
-        raise ModelError(said, name) from error
-
-
-@cache
-def cores() -> Mapping[str, CoreLaw]:
-    """The cores that come with volery."""
-    text = files("volery.cost").joinpath("cores.yaml").read_text(encoding="utf-8")
-    return read_cores(text, "cores.yaml")
-
-
-def core_law(kind: str, more: Mapping[str, CoreLaw] | None = None) -> CoreLaw:
-    """The core of a kind of processor, *more* before what comes with volery. ``EstimateError`` if unknown."""
-    known = {**cores(), **(more or {})}
-    law = known.get(kind)
-    if law is None:
-        raise EstimateError(
-            f"no figures of compiled code for processor {kind!r}{did_you_mean(kind, known)}; "
-            f"there are some for {choices(known)}; `volery calibrate processor` adds this machine"
-        )
-    return law

@@ -13,7 +13,8 @@ import numpy as np
 from volery.components.cpp.build import one_by_one
 from volery.components.cpp.meter import Counters, Worth
 from volery.components.cpp.toolchain import Toolchain, cache_folder
-from volery.cost.core import CoreLaw, cores
+from volery.cost import catalogue
+from volery.cost.core import CoreLaw
 from volery.model.system import CPP_LANGUAGES, Instance, System
 
 Cycles = np.ndarray[Any, np.dtype[Any]]
@@ -36,7 +37,8 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
     counts = fidelity == "code" and component.path and component.language in CPP_LANGUAGES
     if not counts or instance.processor is None:
         return None
-    return cores().get(system.processor(instance.processor).kind)
+    known = catalogue(*system.catalogues).processors.get(system.processor(instance.processor).kind)
+    return None if known is None or known.core_model is None else known.core_law()
 
 
 def ns_per_step(law: CoreLaw, frequency_mhz: float) -> float:

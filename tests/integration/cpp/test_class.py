@@ -7,6 +7,9 @@ import shutil
 import pytest
 
 from volery.base.errors import UsageError
+from volery.calibrate.catalogue_file import put_law
+from volery.calibrate.machine import Machine
+from volery.cost import catalogue
 from volery.model.reader import load
 from volery.run.learning import learn
 from volery.run.options import Options
@@ -161,3 +164,23 @@ def test_there_is_nothing_to_learn_of_python(tmp_path):
     (tmp_path / "model.yaml").write_text(MODEL.replace("language: c++", "language: python"), encoding="utf-8")
     with pytest.raises(UsageError, match="adders: no component of it is C\\+\\+"):
         learn(load(tmp_path / "model.yaml", vocabulary()), Options())
+
+
+@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+def test_a_core_that_the_model_brings_along_is_counted_for(run_model, tmp_path):
+    law = catalogue().processor("intel-i5-3470").core_law().model_copy(update={"name": ""})
+    machine = Machine("mine", "a computer", 2, 3000.0)
+    put_law(tmp_path / "mine.yaml", machine, ("core_model",), law, (1600.0, 3000.0))
+    put_law(tmp_path / "mine.yaml", machine, ("code", "python"), python_law(), (1600.0, 3000.0))
+    model = MODEL.replace(
+        "platform: {processors: {pc: {is: intel-i5-3470,", "platform: {processors: {pc: {is: mine,"
+    )
+    model = model.replace("platform: {", "platform: {catalogues: [mine.yaml], ")
+    there = run_model(model, "adder.cpp", fidelity="code", out="there", lister=LISTER, caller=CALLER)
+    assert there.run.completed, there.run.record.outcome
+    known = run_model(MODEL, "adder.cpp", fidelity="code", out="known", lister=LISTER, caller=CALLER)
+    assert _counted(there, "one") == _counted(known, "one") > 0
+
+
+def python_law():
+    return catalogue().processor("intel-i5-3470").code_law().model_copy(update={"processor": ""})

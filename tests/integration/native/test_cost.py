@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
 from volery.cli.main import app
-from volery.cost.core import core_law
+from volery.cost import catalogue
 from volery.native import CompilerError, compile_program, instrument
 from volery.native.estimate import estimate
 from volery.native.running import Wanted
@@ -76,14 +76,14 @@ def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
     """Costs of a run where a branch seldom goes the other way hold for one where it does so often."""
     file = tmp_path / "choice.cpp"
     file.write_text(CHOICE, encoding="utf-8")
-    program = compile_program([file], core_law("rpi4-cortex-a72"))
+    program = compile_program([file], catalogue().processor("rpi4-cortex-a72").core_law())
     seldom, often = (estimate(program, Wanted("count", (f"fill({percent})",))) for percent in (5, 25))
     assert seldom.costs.total(often.counts) == pytest.approx(often.cycles, rel=0.25)
     assert often.cycles > 1.6 * seldom.cycles  # which a mean over both ways would miss
 
 
 def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
-    program = compile_program([source], core_law("rpi4-cortex-a72"))
+    program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
     once, twice = (estimate(program, Wanted(f"work({rounds})")) for rounds in (1000, 2000))
     assert once.library_calls == {"sin": 1000}
     assert twice.cycles == pytest.approx(2 * once.cycles, rel=0.03)
@@ -92,14 +92,14 @@ def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
 
 
 def test_the_same_run_costs_the_same_each_time(source):
-    program = compile_program([source], core_law("intel-i5-3470"))
+    program = compile_program([source], catalogue().processor("intel-i5-3470").core_law())
     first, second = (estimate(program, Wanted("work(500)")) for _ in range(2))
     assert (first.cycles, first.instructions) == (second.cycles, second.instructions)
     assert (first.counts == second.counts).all()
 
 
 def test_components_get_an_object_that_counts(source, tmp_path):
-    law = core_law("rpi4-cortex-a72")
+    law = catalogue().processor("rpi4-cortex-a72").core_law()
     made = instrument([source], law, tmp_path / "work.o")
     library = tmp_path / "libwork.so"
     subprocess.run([toolchain().clang, "-shared", made.object_file, "-lm", "-o", library], check=True)
@@ -114,7 +114,7 @@ def test_components_get_an_object_that_counts(source, tmp_path):
 
 
 def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
-    law = core_law("rpi4-cortex-a72")
+    law = catalogue().processor("rpi4-cortex-a72").core_law()
     estimate(compile_program([source], law), Wanted("work(50)"))
     assert instrument([source], law, tmp_path / "work.o").estimated == ""
 
@@ -132,7 +132,7 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
     wrong = tmp_path / "wrong.cpp"
     wrong.write_text("int main() { return nobody; }", encoding="utf-8")
     with pytest.raises(CompilerError, match=r"wrong.cpp:1:21: error: use of undeclared identifier 'nobody'"):
-        compile_program([wrong], core_law("rpi4-cortex-a72"))
+        compile_program([wrong], catalogue().processor("rpi4-cortex-a72").core_law())
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
     ],
 )
 def test_a_wrong_entry_is_told(source, entry, said):
-    program = compile_program([source], core_law("rpi4-cortex-a72"))
+    program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
     with pytest.raises(UsageError, match=said):
         estimate(program, Wanted(entry))
 
@@ -153,7 +153,7 @@ def test_a_crash_is_told(tmp_path):
     crashing = tmp_path / "crash.cpp"
     crashing.write_text("int main() { volatile int *p = nullptr; return *p; }", encoding="utf-8")
     with pytest.raises(UsageError, match=r"SIGSEGV|SIGILL|SIGTRAP"):
-        estimate(compile_program([crashing], core_law("rpi4-cortex-a72")), Wanted())
+        estimate(compile_program([crashing], catalogue().processor("rpi4-cortex-a72").core_law()), Wanted())
 
 
 def test_without_llvm_the_error_names_the_packages(monkeypatch):
@@ -190,7 +190,7 @@ def test_caches_cost_cycles_and_memory_costs_time(tmp_path):
     """A circle of loads that each need the one before, in the first cache, the second one, and memory."""
     file = tmp_path / "memory.cpp"
     file.write_text(MEMORY, encoding="utf-8")
-    law = core_law("rpi4-cortex-a72")
+    law = catalogue().processor("rpi4-cortex-a72").core_law()
     program = compile_program([file], law)
     first, second, behind = (
         estimate(program, Wanted("chase(20000)", (f"fill({kib})",))) for kib in (16, 512, 8192)

@@ -72,7 +72,7 @@ def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):
         one.nanoseconds += [3.0 * one.counted_ns(python_operations().nanoseconds)] * 4
     law = evaluate(statements, whole, Rounds(4, 4)).law("A Processor", 2600.0)
     file = tmp_path / "catalogue.yaml"
-    put_law(file, HERE, "code", "python", law, (2600.0, 2600.0))
+    put_law(file, HERE, ("code", "python"), law, (2600.0, 2600.0))
     read = catalogue(file).processor("bench").code_law()
     assert read.ns_per_step(1300.0) == pytest.approx(0.6)
     assert read.warnings() == ()

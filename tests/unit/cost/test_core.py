@@ -1,22 +1,47 @@
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.cost.core import core_law, read_cores
+from volery.calibrate.catalogue_file import put_law
+from volery.calibrate.machine import Machine
+from volery.cost import catalogue
+from volery.cost.catalogue import read
+
+MINE = """
+processors:
+  mine:
+    description: a computer
+    source: nobody
+    cores: 1
+    least_mhz: 100
+    greatest_mhz: 200
+"""
 
 
 def test_an_unknown_core_names_those_there_are():
     with pytest.raises(EstimateError, match=r"did you mean 'rpi4-cortex-a72'.*intel-i5-3470"):
-        core_law("rpi4-cortex-a73")
+        catalogue().processor("rpi4-cortex-a73")
 
 
 def test_a_core_runs_at_its_frequencies_only():
-    with pytest.raises(EstimateError, match="outside the range of its laws, 600 to 1500 MHz"):
-        core_law("rpi4-cortex-a72").check_frequency(2000.0)
+    with pytest.raises(EstimateError, match="a72: 2000 MHz is outside the range of its laws, 600 to"):
+        catalogue().processor("rpi4-cortex-a72").core_law().check_frequency(2000.0)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"), [("cores: [", "not YAML"), ("processors: {}", "no 'cores'"), ("cores: {a: {}}", "isa")]
-)
-def test_a_wrong_file_is_told(text, said):
-    with pytest.raises(ModelError, match=said):
-        read_cores(text, "mine.yaml")
+def test_a_processor_may_have_no_figures_of_compiled_code():
+    with pytest.raises(EstimateError, match="mine: the catalogue has no figures of compiled code for it"):
+        read(MINE).processor("mine").core_law()
+
+
+def test_a_wrong_figure_is_told():
+    with pytest.raises(ModelError, match=r"mine\.core_model\.isa: Field required"):
+        read(MINE + "    core_model: {cpu: x86-64}\n", "mine.yaml")
+
+
+def test_a_model_of_a_core_joins_the_entry_that_is_there(tmp_path):
+    shipped = catalogue().processor("intel-i5-3470")
+    law = shipped.core_law().model_copy(update={"name": "", "width": 2.0})
+    file = tmp_path / "more.yaml"
+    put_law(file, Machine("intel-i5-3470", "mine", 4, 3000.0), ("core_model",), law, (1600.0, 3000.0))
+    joined = catalogue(file).processor("intel-i5-3470")
+    assert joined.core_law().width == 2.0
+    assert joined.ros == shipped.ros

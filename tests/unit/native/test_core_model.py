@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from volery.cost.core import core_law
+from volery.cost import catalogue
 from volery.native.assembly import End, Instruction, Piece
 from volery.native.costs import Ran, execute
 from volery.native.encoding import encode
 
-LAW = core_law("intel-i5-3470")
+LAW = catalogue().processor("intel-i5-3470").core_law()
 REPEATS = 400
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.cost.core import core_law
+from volery.cost import catalogue
 from volery.native.accesses import is_access, told
 from volery.native.assembly import pieces
 from volery.native.code import Block, accesses_of
@@ -67,7 +67,7 @@ f:                                      # @f
 def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None:
     made = pieces(ASSEMBLY)
     machine = Machine([Block("f", "entry", True)], made)
-    encoded = encode(made, core_law("intel-i5-3470"), frozenset({"f"}))
+    encoded = encode(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
     told = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
     late = served_late(walk(machine, Trace([0], accesses={0: told})), encoded, [4])
     assert late.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
@@ -76,5 +76,5 @@ def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None
 def test_nothing_is_late_where_nothing_was_told() -> None:
     made = pieces(ASSEMBLY)
     machine = Machine([Block("f", "entry", True)], made)
-    encoded = encode(made, core_law("intel-i5-3470"), frozenset({"f"}))
+    encoded = encode(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
     assert served_late(walk(machine, Trace([0])), encoded, [4]).shape == (0, 4)

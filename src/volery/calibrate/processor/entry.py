@@ -1,12 +1,9 @@
-"""From the times of snippets to the figures of a core, and to a file that ``volery cost --cores`` reads."""
+"""From the times of snippets to the figures of a core."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from math import ceil
-from pathlib import Path
-
-from ruamel.yaml import YAML
 
 from volery.calibrate.machine import Machine
 from volery.calibrate.processor.snippets import SNIPPETS
@@ -26,7 +23,7 @@ from volery.calibrate.processor.timing import (
     behind,
     caches,
 )
-from volery.cost.core import Cache, CoreLaw, LibraryLaw, MemoryLaw, Operation, read_cores
+from volery.cost.core import Cache, CoreLaw, LibraryLaw, MemoryLaw, Operation
 
 WINDOW, TABLES, HISTORY = 512, 12, 60
 """Not measured, as of a large core; the prediction's were chosen looking at the kernels' first two inputs."""
@@ -74,15 +71,6 @@ def law_of(machine: Machine, isa: str, taken: Mapping[str, Taken]) -> CoreLaw:
         tables=TABLES,
         history=HISTORY,
     )
-
-
-def write_entry(file: Path, law: CoreLaw) -> None:
-    """Write the core into *file*, in the place of an earlier one of its name."""
-    known = read_cores(file.read_text(encoding="utf-8"), str(file)) if file.exists() else {}
-    known[law.name] = law
-    entries = {name: one.model_dump(exclude={"name"}, exclude_none=True) for name, one in known.items()}
-    with file.open("w", encoding="utf-8") as out:
-        YAML(typ="safe").dump({"cores": entries}, out)
 
 
 def _pipes(cycles: float) -> float:

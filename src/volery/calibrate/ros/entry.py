@@ -136,7 +136,7 @@ def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
     known = read_file(file).processors.get(machine.name) if file.exists() else None
     before = known.ros.get(law.client) if known is not None else None
     made = joined(before, law) if before is not None else law
-    put_law(file, machine, "ros", law.client, made, (made.least_mhz, made.greatest_mhz))
+    put_law(file, machine, ("ros", law.client), made, (made.least_mhz, made.greatest_mhz))
     return made
 
 

@@ -32,8 +32,8 @@ def cost(
     link: Annotated[
         list[str] | None, typer.Option(help="For the linker, such as -lpthread; may be repeated.")
     ] = None,
-    cores: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Cores that `volery calibrate processor` wrote.")
+    catalogue: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="What `volery calibrate processor` wrote.")
     ] = None,
     listing: Annotated[
         bool, typer.Option("--listing", help="Show the sources with each line's share of the cycles.")
@@ -53,7 +53,7 @@ def cost(
 
     output = Output(quiet, as_json, debug)
     run = Run(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
-    wanted = command.Wanted(tuple(files), on, run, tuple(flag or ()), cores, listing)
+    wanted = command.Wanted(tuple(files), on, run, tuple(flag or ()), catalogue, listing)
     run_command(output, lambda: command.cost(output, wanted))
 
 
@@ -161,14 +161,17 @@ def python(
 
 def processor(
     out: Annotated[
-        Path, typer.Option(metavar="FILE", help="The file of cores to write the entry into; made if need be.")
-    ] = Path("cores.yaml"),
+        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
+    ] = Path("catalogue.yaml"),
     name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Measure what operations and library calls take on this machine, for `volery cost`.
+    """Measure what compiled code costs on this machine, and write it as an entry of a catalogue.
+
+    What operations, library calls, wrong predictions, caches and memory take: for `volery cost` and for
+    C++ components that are allocated to this machine.
 
     Each is timed until its median is known to 1 %, or said to be noisy. Ctrl-C keeps what was measured; the
     same command goes on from there. Exit status: 0 if every figure is tight, 2 for bad input, 1 otherwise.
