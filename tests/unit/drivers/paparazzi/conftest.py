@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from rigs.bench import Bench
 from volery.base.frames import geodetic_to_ecef
 from volery.base.time import MS, S
 from volery.drivers.paparazzi import open_driver
@@ -272,11 +273,12 @@ def place(north: float, east: float) -> tuple[float, float]:
     return latitude, longitude
 
 
-@pytest.fixture
-def bench(bench: Any) -> Any:
-    class PaparazziBench(bench):  # type: ignore[misc]  # the fixture of the folder above
-        peer = FakePaparazzi
-        opener = staticmethod(open_driver)
-        codec = PPRZLINK
+class PaparazziBench(Bench):
+    peer = FakePaparazzi
+    opener = staticmethod(open_driver)
+    codec = PPRZLINK
 
+
+@pytest.fixture
+def bench() -> Callable[..., Bench]:
     return PaparazziBench

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import carried_out
 from volery.base.errors import LinkSilent, UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS, S
@@ -44,23 +45,12 @@ class OnGraph:
         return lambda size, sure, deliver, lost: self.kernel.call_at(self.kernel.now() + MS, deliver)
 
     def fly(self, mission: Callable[[Any], Any], **options: str) -> Any:
-        outcome: list[Any] = []
+        def body() -> Any:
+            node = self.graph.node("control")
+            driver = open_pprzros(self.kernel, node, "bee", {"namespace": "/bee", **options})
+            return mission(Drone(self.kernel, "bee", driver))
 
-        def body() -> None:
-            try:
-                node = self.graph.node("control")
-                driver = open_pprzros(self.kernel, node, "bee", {"namespace": "/bee", **options})
-                outcome.append(mission(Drone(self.kernel, "bee", driver)))
-            except Exception as error:
-                outcome.append(error)
-
-        self.kernel.spawn(body, "mission", Place("mission"))
-        while not outcome:
-            self.kernel.run(self.kernel.now() + S)
-        (found,) = outcome
-        if isinstance(found, Exception):
-            raise found
-        return found
+        return carried_out(self.kernel, body)
 
 
 @pytest.fixture

@@ -11,84 +11,64 @@ from typing import Any
 
 import pytest
 
+from rigs import scripted
+from rigs.bench import Bench
+from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
 from volery.base.time import MS, S
 from volery.drivers.px4 import open_driver
 from volery.drivers.px4.events import event_id
 from volery.drivers.px4.modes import BY_STICKS, HOLD, LAND, MODES, OFFBOARD, RTL, TAKEOFF
-from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame, Link
-from volery.links.mavlink import message_type
+from volery.links.link import Frame
 
 HOME = (454671168, -737578362, 32_575)  # degE7, degE7, mm AMSL
-ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
-SET_MODE, ARM, CLIMB, SPEED, GO, INTERVAL, ASK, GET_HOME = 176, 400, 22, 178, 192, 511, 512, 410
+REJECTED, UNSUPPORTED = 1, 3
+SET_MODE, ARM, CLIMB, SPEED, GO = 176, 400, 22, 178, 192
 HEALTHY, UNHEALTHY = 840990783, 572555327
 LOST_AFTER = S  # COM_OF_LOSS_T
-NORTH_M, EAST_M = 1.1113e-2, 0.7812e-2  # metres in 1e-7 degrees here
 NAMES = {mode.number: name for name, mode in MODES.items()}
 
 
 @dataclass
-class Craft:
-    """What the autopilot believes."""
+class Craft(scripted.Craft):
+    """What PX4 believes besides."""
 
     mode: str = HOLD
-    armed: bool = False
-    status: int = 3
-    landed_state: int = 1
-    north: float = 0.0
-    east: float = 0.0
-    up: float = 0.0
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    heading: float = 0.0
     healthy: bool = True
     flags: int = 831
-    placed: bool = True
 
 
 @dataclass
-class FakePx4:
+class FakePx4(Scripted):
     """``on_loss`` is the mode that it enters when it misses OFFBOARD's stream. ``short`` is by how much
     take-offs end short.
     """
 
-    kernel: VirtualKernel
-    link: Link
-    kind: int = 2
     craft: Craft = field(default_factory=Craft)
-    refuse: dict[int, list[str]] = field(default_factory=dict)
-    ignore: set[int] = field(default_factory=set)
-    heard: list[Frame] = field(default_factory=list)
     times: list[int] = field(default_factory=list)
-    streams: set[str] = field(default_factory=set)
-    deaf: bool = False
-    mute: bool = False
     on_loss: str = "POSCTL"
     short: float = 1.03
     climb_s: float = 10.0
     system: int = 3
     firmware: int = 12
     version: int = 17694975
-    parameters: dict[str, float] = field(default_factory=dict)
     intended: str = HOLD
 
+    home = HOME
+    metres = (1.1113e-2, 0.7812e-2)
+    streamed = (*STREAMED, "ESTIMATOR_STATUS", "LOCAL_POSITION_NED")
+    refusal = REJECTED
+    item_requests = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
+
     def __post_init__(self) -> None:
-        self.mission: dict[int, dict[str, Any]] = {}
         self.setpoint: dict[str, Any] | None = None
         self.streamed_at = self.sticks_at = -10 * S
-        self.link.receive(self._receive)
-        self.kernel.every(S, self._heartbeat)
         self.kernel.every(50 * MS, self._live)
-        self.kernel.every(100 * MS, self._stream)
+        super().__post_init__()
 
     # -- speaking
 
-    def say(self, name: str, **fields: Any) -> None:
-        if not self.mute:
-            self.link.send(Frame(name, fields, self.system, 1))
-
     def text(self, words: str, severity: int = 6) -> None:
-        self.say("STATUSTEXT", severity=severity, text=words + "\t")
+        super().text(words + "\t", severity)
 
     def event(self, name: str, level: int, arguments: bytes = b"") -> None:
         padded = tuple(arguments.ljust(40, b"\0"))
@@ -101,37 +81,8 @@ class FakePx4:
             self.event(name, level, modes.to_bytes(4, "little"))
         self.event("commander_health_summary", 8)
 
-    def _heartbeat(self) -> None:
-        craft = self.craft
-        self.say(
-            "HEARTBEAT",
-            type=self.kind,
-            autopilot=self.firmware,
-            base_mode=29 + 128 * craft.armed,
-            custom_mode=MODES[craft.mode].number,
-            system_status=craft.status,
-            mavlink_version=3,
-        )
-
-    def _stream(self) -> None:
-        for name in sorted(self.streams):
-            getattr(self, "_" + name.lower())()
-
-    def _global_position_int(self) -> None:
-        craft = self.craft
-        north, east, up = craft.velocity
-        if craft.placed:
-            self.say(
-                "GLOBAL_POSITION_INT",
-                lat=HOME[0] + round(craft.north / NORTH_M),
-                lon=HOME[1] + round(craft.east / EAST_M),
-                alt=HOME[2] + round(craft.up * 1000),
-                relative_alt=round(craft.up * 1000),
-                vx=round(north * 100),
-                vy=round(east * 100),
-                vz=round(-up * 100),
-                hdg=round(craft.heading * 100),
-            )
+    def mode_words(self) -> tuple[int, int]:
+        return 29, MODES[self.craft.mode].number
 
     def _sys_status(self) -> None:
         can_arm = self.craft.healthy and (
@@ -148,16 +99,6 @@ class FakePx4:
 
     def _estimator_status(self) -> None:
         self.say("ESTIMATOR_STATUS", flags=self.craft.flags)
-
-    def _extended_sys_state(self) -> None:
-        self.say("EXTENDED_SYS_STATE", landed_state=self.craft.landed_state)
-
-    def _home_position(self) -> None:
-        if self.craft.placed:
-            self.say("HOME_POSITION", latitude=HOME[0], longitude=HOME[1], altitude=HOME[2])
-
-    def _gps_raw_int(self) -> None:
-        self.say("GPS_RAW_INT", fix_type=3, satellites_visible=10)
 
     def _local_position_ned(self) -> None:
         north, east, up = self.craft.velocity
@@ -196,28 +137,18 @@ class FakePx4:
     # -- listening
 
     def _receive(self, frame: Frame) -> None:
-        if self.deaf:
-            return
-        self.heard.append(frame)
-        self.times.append(self.kernel.now())
-        fields = frame.fields
-        if frame.name in {"COMMAND_LONG", "COMMAND_INT"}:
-            self._command(fields["command"], fields)
-        elif frame.name == "SET_POSITION_TARGET_LOCAL_NED" and fields["coordinate_frame"] == 1:
+        if not self.deaf:
+            self.times.append(self.kernel.now())
+        super()._receive(frame)
+
+    def take(self, name: str, fields: dict[str, Any]) -> None:
+        if name == "SET_POSITION_TARGET_LOCAL_NED" and fields["coordinate_frame"] == 1:
             self.setpoint, self.streamed_at = fields, self.kernel.now()
-        elif frame.name == "MANUAL_CONTROL":
+        elif name == "MANUAL_CONTROL":
             self._take_sticks(fields)
-        elif frame.name == "SET_MODE":
+        elif name == "SET_MODE":
             number = fields["custom_mode"]
             self._command(SET_MODE, {"param2": number >> 16 & 0xFF, "param3": number >> 24})
-        elif frame.name == "PARAM_REQUEST_READ" and fields["param_id"] in self.parameters:
-            self._tell_parameter(fields["param_id"])
-        elif frame.name in {"MISSION_COUNT", "MISSION_ITEM_INT"}:
-            self._take_mission(frame)
-
-    def _tell_parameter(self, name: str) -> None:
-        value = self.parameters[name]
-        self.say("PARAM_VALUE", param_id=name, param_value=value, param_type=9)
 
     def _take_sticks(self, fields: dict[str, Any]) -> None:
         self.sticks_at = self.kernel.now()
@@ -226,33 +157,7 @@ class FakePx4:
             self.enter("POSCTL")
             self.event("failsafe_rc_override", 6)
 
-    def _take_mission(self, frame: Frame) -> None:
-        if frame.name == "MISSION_COUNT":
-            self.mission = {-1: frame.fields}
-        else:
-            self.mission[frame.fields["seq"]] = frame.fields
-        had = len(self.mission) - 1
-        to = {"target_system": 255, "target_component": 190}
-        if had < self.mission[-1]["count"]:
-            self.say("MISSION_REQUEST" if had == 0 else "MISSION_REQUEST_INT", seq=had, **to)
-        else:
-            self.say("MISSION_ACK", type=ACCEPTED, **to)
-
-    def _command(self, command: int, fields: dict[str, Any]) -> None:
-        if command in self.ignore:
-            return
-        if command in self.refuse:
-            self._acknowledge(command, REJECTED)
-            for words in self.refuse[command]:
-                self.text(words, 2)
-            return
-        result = self._obey(command, fields)
-        self._acknowledge(command, result)
-
-    def _acknowledge(self, command: int, result: int) -> None:
-        self.say("COMMAND_ACK", command=command, result=result, target_system=255, target_component=190)
-
-    def _obey(self, command: int, fields: dict[str, Any]) -> int:
+    def obey(self, command: int, fields: dict[str, Any]) -> None:
         obeying: dict[int, Callable[[dict[str, Any]], int]] = {
             INTERVAL: self._interval,
             ASK: self._version,
@@ -264,12 +169,10 @@ class FakePx4:
             GET_HOME: self._tell_home,
         }
         obey = obeying.get(command)
-        return UNSUPPORTED if obey is None else obey(fields)
+        self.acknowledge(command, UNSUPPORTED if obey is None else obey(fields))
 
     def _interval(self, fields: dict[str, Any]) -> int:
-        known = ("GLOBAL_POSITION_INT", "SYS_STATUS", "ESTIMATOR_STATUS", "EXTENDED_SYS_STATE")
-        known = (*known, "HOME_POSITION", "GPS_RAW_INT", "MISSION_CURRENT", "LOCAL_POSITION_NED")
-        self.streams.update(name for name in known if message_type(name).id == int(fields["param1"]))
+        self.begin_to_stream(int(fields["param1"]))
         return ACCEPTED
 
     def _tell_home(self, _: dict[str, Any]) -> int:
@@ -277,7 +180,7 @@ class FakePx4:
         return ACCEPTED
 
     def _version(self, _: dict[str, Any]) -> int:
-        self.say("AUTOPILOT_VERSION", flight_sw_version=self.version)
+        self.tell_version()
         return ACCEPTED
 
     def _set_mode(self, fields: dict[str, Any]) -> int:
@@ -332,8 +235,8 @@ class FakePx4:
 
     def _there(self, latitude: int, longitude: int, amsl: float) -> None:
         if self.craft.mode == HOLD:
-            self.craft.north = (latitude - HOME[0]) * NORTH_M
-            self.craft.east = (longitude - HOME[1]) * EAST_M
+            self.craft.north = (latitude - HOME[0]) * self.metres[0]
+            self.craft.east = (longitude - HOME[1]) * self.metres[1]
             if self.kind == 2:
                 self.craft.up = amsl - HOME[2] / 1000.0
 
@@ -342,32 +245,20 @@ class FakePx4:
         self.intended = self.craft.mode = mode
         self.craft.velocity = (0.0, 0.0, 0.0)
         if mode in {LAND, RTL} and self.kind == 2:
-            self.kernel.call_at(self.kernel.now() + 15 * S, self._down)
-
-    def _down(self) -> None:
-        if self.craft.mode in {LAND, RTL}:
-            self.craft.up, self.craft.landed_state, self.craft.status, self.craft.armed = 0.0, 1, 3, False
-
-    def sent(self, name: str) -> list[dict[str, Any]]:
-        """The fields of all frames of this name that it heard."""
-        return [frame.fields for frame in self.heard if frame.name == name]
+            self.kernel.call_at(self.kernel.now() + 15 * S, lambda: self.down(LAND, RTL))
 
     def since(self, name: str, when: int) -> list[dict[str, Any]]:
         """Those that it heard after *when*."""
         both = zip(self.times, self.heard, strict=True)
         return [frame.fields for at, frame in both if frame.name == name and at > when]
 
-    def commands(self) -> list[int]:
-        """The commands that it heard, requests for messages left out."""
-        heard = [frame.fields["command"] for frame in self.heard if frame.name.startswith("COMMAND_")]
-        return [command for command in heard if command not in {INTERVAL, ASK, GET_HOME}]
+
+class Px4Bench(Bench):
+    peer = FakePx4
+    opener = staticmethod(open_driver)
+    standing = HOLD
 
 
 @pytest.fixture
-def bench(bench: Any) -> Any:
-    class Px4Bench(bench):  # type: ignore[misc]  # the fixture of the folder above
-        peer = FakePx4
-        opener = staticmethod(open_driver)
-        standing = HOLD
-
+def bench() -> Callable[..., Bench]:
     return Px4Bench

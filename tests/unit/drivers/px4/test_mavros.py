@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import carried_out
 from volery.base.errors import Overridden, UsageError
 from volery.base.position import AboveHome, Position
-from volery.base.time import HOUR, MS, S
+from volery.base.time import MS
 from volery.bridge import serve_vehicle
 from volery.drivers.mavros import MAVROS
 from volery.drivers.px4.modes import HOLD
@@ -31,27 +32,16 @@ def flown(at: Any, mission: Callable[[Any], Any]) -> Any:
     link, theirs = in_process(kernel, name="radio")
     at.autopilot = type(at.autopilot)(kernel, theirs)
     at.craft = at.autopilot.craft
-    outcome: list[Any] = []
-
     graph = Graph(kernel)
     serve_vehicle(graph, link, "craft_1", Place("vehicle node"))
 
-    def body() -> None:
-        try:
-            open_driver = MAVROS.on_graph
-            assert open_driver is not None
-            driver = open_driver(kernel, graph.node("control"), "craft_1", {"autopilot": "px4"})
-            outcome.append(mission(Drone(kernel, "craft_1", driver)))
-        except Exception as error:
-            outcome.append(error)
+    def body() -> Any:
+        open_driver = MAVROS.on_graph
+        assert open_driver is not None
+        driver = open_driver(kernel, graph.node("control"), "craft_1", {"autopilot": "px4"})
+        return mission(Drone(kernel, "craft_1", driver))
 
-    kernel.spawn(body, "mission", Place("mission"))
-    while not outcome and kernel.now() < HOUR:
-        kernel.run(kernel.now() + S)
-    (found,) = outcome
-    if isinstance(found, Exception):
-        raise found
-    return found
+    return carried_out(kernel, body)
 
 
 def test_a_flight(bench: Make) -> None:

@@ -1,0 +1,1 @@
+"""What suites of several folders stand on: scripted and simulated vehicles, and ways to run a flight."""
