@@ -120,10 +120,18 @@ _IN_SHORT: tuple[tuple[str, Take], ...] = (
 """For 80 columns."""
 
 
+def _on_computers(records: Sequence[RunRecord]) -> list[str]:
+    """The components that a run has on a computer: the others take none of its time in any of them."""
+    names = _names(record.components for record in records)
+    everywhere = [(name, record.components.get(name)) for name in names for record in records]
+    placed = {name for name, one in everywhere if one is not None and one.processor}
+    return [name for name in names if name in placed]
+
+
 def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
     """Each component: where it ran and what it cost there, run beside run."""
     rows = []
-    for name in _names(record.components for record in records):
+    for name in _on_computers(records):
         found = [record.components.get(name) for record in records]
         places = [Cell(one.processor or "none", status="quiet") if one else Cell(NOTHING) for one in found]
         rows.append((Cell(name), Cell("processor", status="quiet"), *places))
@@ -138,7 +146,7 @@ def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid
 def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
     """The same in short: one row per component, the runs beside each other for each question."""
     rows = []
-    for name in _names(record.components for record in records):
+    for name in _on_computers(records):
         cells = [Cell(name)]
         for _, take in _IN_SHORT:
             found = [record.components.get(name) for record in records]
