@@ -1,49 +1,14 @@
-"""What the driver makes of telemetry as ArduPilot 4.5.6 sent it: extracts of recorded flights.
-
-The extracts hold, of the messages that the driver listens to, those that brought a change, with the time in
-milliseconds since the recording began.
-"""
+"""What the driver makes of telemetry as ArduPilot 4.5.6 sent it: extracts of recorded flights."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import pytest
 
-from volery.base.time import MS
+from rigs.recorded import Recorded
 from volery.drivers.ardupilot.hearing import Hearing
-from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
-from volery.links.mavlink import quantised
-from volery.vehicles.telemetry import Telemetry
 
-EXTRACTS = Path(__file__).parents[2] / "golden" / "ardupilot_telemetry"
-
-
-def replayed(name: str) -> Iterator[tuple[float, Telemetry]]:
-    """The telemetry after each message of an extract, with its time in seconds."""
-    kernel = VirtualKernel()
-    seen = Telemetry(kernel, "recorded")
-    hearing = Hearing(kernel, seen)
-    for ms, message, fields in json.loads((EXTRACTS / f"{name}.json").read_text()):
-        kernel.call_at(ms * MS, lambda: None)
-        kernel.run(ms * MS)
-        frame = quantised(Frame(message, fields, 1, 1))
-        assert hearing.hear(frame.name, frame.fields)
-        yield ms / 1000.0, seen
-
-
-def changes(name: str, *facts: str) -> list[Any]:
-    """The values of these facts in the order in which they changed."""
-    found: list[Any] = []
-    for _, seen in replayed(name):
-        now = tuple(getattr(seen, fact) for fact in facts)
-        if not found or found[-1] != now:
-            found.append(now)
-    return found
+RECORDED = Recorded("ardupilot_telemetry", Hearing)
+replayed, changes = RECORDED.replayed, RECORDED.changes
 
 
 def test_a_guided_flight() -> None:

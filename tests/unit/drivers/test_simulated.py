@@ -7,117 +7,48 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
+from rigs.airstrip import FRAME, Airstrip, at
+from rigs.missions import carried_out
 from volery.base.errors import Failsafe, LinkLost, LinkSilent, NotArrived, Overridden, Refused
 from volery.base.frames import LocalFrame
-from volery.base.position import AMSL, AboveHome, Position
-from volery.base.registry import Registry
-from volery.base.seeds import stream
 from volery.base.time import HOUR, MS, S
 from volery.bridge import serve_vehicle
 from volery.drivers.ardupilot import open_driver, open_mavros
 from volery.graph import Graph
 from volery.kernel.task import Place
-from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.in_process import in_process
-from volery.links.link import Frame, Link
-from volery.links.wire import WireFaults, wire
-from volery.trace.events import LinkState, Operation, Text
+from volery.links.wire import WireFaults
+from volery.trace.events import LinkState, Text
 from volery.vehicles import Drone, Land, Rover, TakeOff, Vehicle, Waypoint
-from volery.world.specs import Multirotor
-from volery.world.specs import Rover as RoverBody
-
-FRAME = LocalFrame(46.0825, -103.8995, 900.0)
-dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")
 
 
-def at(east: float, north: float, height: float = 10.0) -> Position:
-    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
-    return Position(latitude, longitude, AboveHome(height))
+class Field(Airstrip):
+    """A simulated ArduPilot, over its link or over MAVROS's names."""
 
+    dialect = "ardupilot"
+    opener = staticmethod(open_driver)
 
-class Field:
-    """One simulated vehicle, its driver, and a second station that plays the pilot."""
+    def __init__(self, kind: type[Vehicle] = Drone, *, mavros: bool = False, **stated: Any) -> None:
+        self._mavros = mavros
+        super().__init__(kind, **stated)
 
-    def __init__(
-        self,
-        kind: type[Vehicle] = Drone,
-        *,
-        warm: bool = True,
-        faults: WireFaults | None = None,
-        mavros: bool = False,
-        parameters: dict[str, float] | None = None,
-    ) -> None:
-        self.events: list[Any] = []
-        self.kernel = VirtualKernel(record=self.events.append)
-        body = Multirotor() if kind is Drone else RoverBody()
-        _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
-        self.autopilot = Autopilot(
-            self.kernel,
-            self.flight,
-            dialects.load("ardupilot"),
-            warm=warm,
-            name="craft_1",
-            parameters=parameters,
-        )
-        self._link = self._connect(faults)
-        self._pilot, theirs = in_process(self.kernel, name="pilot")
-        self.autopilot.connect(theirs)
-        self._kind, self._mavros = kind, mavros
-        self.vehicle: Any = None if mavros else self._vehicle(self._link)
-
-    def _connect(self, faults: WireFaults | None) -> Link:
-        if faults is None:
-            ours, theirs = in_process(self.kernel, 2 * MS)
-            self.autopilot.connect(theirs)
-            return ours
-        end, other = wire(self.kernel, "radio", faults, stream(7, "radio"))
-        self.autopilot.connect(other)
-        return end
-
-    def _vehicle(self, link: Link) -> Vehicle:
-        driver = open_driver(self.kernel, link, "craft_1", {"texts": "unrecorded"})
-        return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
+    def open(self) -> Vehicle | None:
+        return None if self._mavros else super().open()
 
     def _over_mavros(self) -> Vehicle:
         graph = Graph(self.kernel)
-        serve_vehicle(graph, self._link, "craft_1", Place("vehicle node"))
-        driver = open_mavros(self.kernel, graph.node("control"), "craft_1", {})
-        return self._kind(self.kernel, "craft_1", driver, truth=self.truth)
-
-    def truth(self) -> Position:
-        latitude, longitude, amsl = FRAME.from_enu(self.flight.truth().position)
-        return Position(latitude, longitude, AMSL(amsl))
+        serve_vehicle(graph, self.link, "craft_1", Place("vehicle node"))
+        return self.commanded_by(open_mavros(self.kernel, graph.node("control"), "craft_1", {}))
 
     def fly(self, mission: Callable[[Any], Any]) -> Any:
-        outcome: list[Any] = []
+        def body() -> Any:
+            self.vehicle = self.vehicle or self._over_mavros()
+            return mission(self.vehicle)
 
-        def body() -> None:
-            try:
-                self.vehicle = self.vehicle or self._over_mavros()
-                outcome.append(mission(self.vehicle))
-            except Exception as error:
-                outcome.append(error)
-
-        self.kernel.spawn(body, "mission", Place("mission"))
-        while not outcome and self.kernel.now() < HOUR:
-            self.kernel.run(self.kernel.now() + S)
-        (found,) = outcome
-        if isinstance(found, Exception):
-            raise found
-        return found
+        return carried_out(self.kernel, body)
 
     def pilot_chooses(self, number: int, after_s: float) -> None:
         self.station_sends("COMMAND_LONG", after_s, command=176, param1=1.0, param2=number)
-
-    def station_sends(self, name: str, after_s: float, **stated: float) -> None:
-        frame = Frame(name, {"target_system": 1, "target_component": 1, **stated}, 254, 190)
-        self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
-
-    def operations(self) -> list[Operation]:
-        return [event for event in self.events if isinstance(event, Operation)]
 
     def told(self, kind: type) -> Iterator[Any]:
         return (event for event in self.events if isinstance(event, kind))

@@ -1,61 +1,32 @@
-"""What the driver makes of telemetry as PX4 1.14 sent it: extracts of recorded flights.
-
-The extracts hold what the driver listens to and brought a change, in milliseconds since their beginning.
-"""
+"""What the driver makes of telemetry as PX4 1.14 sent it: extracts of recorded flights."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
-from typing import Any
-
 import pytest
 
-from volery.base.time import MS
+from rigs.recorded import Recorded, extract
 from volery.drivers.px4.events import SAID, event_id, words_of
 from volery.drivers.px4.hearing import Hearing
-from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
-from volery.links.mavlink import encode, quantised
+from volery.links.mavlink import encode
 from volery.links.parser import Parser
-from volery.vehicles.telemetry import Telemetry
 
-EXTRACTS = Path(__file__).parents[3] / "golden" / "px4_telemetry"
 ARM, REJECTED = 400, 1
+FOLDER = "px4_telemetry"
 
 
-@cache
-def extract(name: str) -> list[Any]:
-    return list(json.loads((EXTRACTS / f"{name}.json").read_text()))
+class RecordedPx4(Recorded):
+    """An answer that refuses to arm has the checks that fail said; other answers are not telemetry."""
+
+    def hear(self, hearing: Hearing, frame: Frame) -> None:
+        if frame.name != "COMMAND_ACK":
+            super().hear(hearing, frame)
+        elif frame.fields["command"] == ARM and frame.fields["result"] == REJECTED:
+            hearing.say_failing_checks()
 
 
-def replayed(name: str) -> Iterator[tuple[float, Telemetry]]:
-    """The telemetry after each message of an extract, with its time in seconds."""
-    kernel = VirtualKernel()
-    seen = Telemetry(kernel, "recorded")
-    hearing = Hearing(kernel, seen)
-    for ms, message, fields in extract(name):
-        kernel.call_at(ms * MS, lambda: None)
-        kernel.run(ms * MS)
-        frame = quantised(Frame(message, fields, 1, 1))
-        if message == "COMMAND_ACK":
-            if frame.fields["command"] == ARM and frame.fields["result"] == REJECTED:
-                hearing.say_failing_checks()
-        else:
-            assert hearing.hear(frame.name, frame.fields)
-        yield ms / 1000.0, seen
-
-
-def changes(name: str, *facts: str) -> list[Any]:
-    """The values of these facts in the order in which they changed."""
-    found: list[Any] = []
-    for _, seen in replayed(name):
-        now = tuple(getattr(seen, fact) for fact in facts)
-        if not found or found[-1] != now:
-            found.append(now)
-    return found
+RECORDED = RecordedPx4(FOLDER, Hearing)
+replayed, changes = RECORDED.replayed, RECORDED.changes
 
 
 def texts(name: str) -> list[str]:
@@ -132,7 +103,7 @@ def test_numbers_of_events_are_made_of_their_names() -> None:
     recorded = {
         fields["id"]
         for name in ("auto-gcs", "manual-gcs", "offboard-api")
-        for _, kind, fields in extract(name)
+        for _, kind, fields in extract(FOLDER, name)
         if kind == "EVENT"
     }
     known = {number for number in recorded if not words_of(number).startswith("event")}

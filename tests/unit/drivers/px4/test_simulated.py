@@ -2,107 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import hypot, nan
-from typing import Any
 
 import pytest
 
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
+from rigs.airstrip import FRAME, Airstrip, at
 from volery.base.errors import Failsafe, LinkLost, Overridden, Refused
-from volery.base.frames import LocalFrame
-from volery.base.position import AMSL, AboveHome, Position
-from volery.base.registry import Registry
-from volery.base.seeds import stream
-from volery.base.time import HOUR, MS, S
+from volery.base.time import MS, S
 from volery.drivers.px4 import open_driver
 from volery.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD
-from volery.kernel.task import Place
-from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.in_process import in_process
-from volery.links.link import Frame, Link
-from volery.links.wire import WireFaults, wire
+from volery.links.wire import WireFaults
 from volery.trace.events import Operation, Text
 from volery.vehicles import ChangeSpeed, Drone, Land, ReturnHome, TakeOff, Waypoint
-from volery.world.specs import Multirotor
-
-FRAME = LocalFrame(46.0825, -103.8995, 900.0)
-dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")
 
 
-def at(east: float, north: float, height: float = 10.0) -> Position:
-    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
-    return Position(latitude, longitude, AboveHome(height))
+class Field(Airstrip):
+    """A simulated PX4, its driver, and a pilot."""
 
-
-class Field:
-    """One simulated PX4, its driver, and a second station that plays the pilot."""
-
-    def __init__(
-        self,
-        *,
-        warm: bool = True,
-        faults: WireFaults | None = None,
-        parameters: dict[str, float] | None = None,
-    ) -> None:
-        self.events: list[Any] = []
-        self.kernel = VirtualKernel(record=self.events.append)
-        _, (self.flight,) = make_world(self.kernel.now, [Multirotor()], seed=7, frame=FRAME)
-        dialect = dialects.load("px4")
-        self.autopilot = Autopilot(
-            self.kernel, self.flight, dialect, warm=warm, name="craft_1", parameters=parameters
-        )
-        self._pilot, theirs = in_process(self.kernel, name="pilot")
-        self.autopilot.connect(theirs)
-        self.driver = open_driver(self.kernel, self._connect(faults), "craft_1", {"texts": "unrecorded"})
-        self.vehicle = Drone(self.kernel, "craft_1", self.driver, truth=self.truth)
-
-    def _connect(self, faults: WireFaults | None) -> Link:
-        if faults is None:
-            ours, theirs = in_process(self.kernel, 2 * MS)
-        else:
-            ours, theirs = wire(self.kernel, "radio", faults, stream(7, "radio"))
-        self.autopilot.connect(theirs)
-        return ours
-
-    def truth(self) -> Position:
-        latitude, longitude, amsl = FRAME.from_enu(self.flight.truth().position)
-        return Position(latitude, longitude, AMSL(amsl))
-
-    def fly(self, mission: Callable[[Drone], Any]) -> Any:
-        outcome: list[Any] = []
-
-        def body() -> None:
-            try:
-                outcome.append(mission(self.vehicle))
-            except Exception as error:
-                outcome.append(error)
-
-        self.kernel.spawn(body, "mission", Place("mission"))
-        while not outcome and self.kernel.now() < HOUR:
-            self.kernel.run(self.kernel.now() + S)
-        (found,) = outcome
-        if isinstance(found, Exception):
-            raise found
-        return found
+    dialect = "px4"
+    opener = staticmethod(open_driver)
 
     def pilot_chooses(self, mode: str, after_s: float = 0.0) -> None:
         number = MODES[mode]
         stated = {"param1": 1.0, "param2": float(number.main), "param3": float(number.sub)}
-        self._pilot_says(after_s, command=176, **stated)
+        self.station_sends("COMMAND_LONG", after_s, command=176, **stated)
 
     def station_pauses(self, after_s: float) -> None:
         here = {"param5": nan, "param6": nan, "param7": nan}
-        self._pilot_says(after_s, command=192, param1=-1.0, param2=1.0, param4=nan, **here)
-
-    def _pilot_says(self, after_s: float, **stated: float) -> None:
-        frame = Frame("COMMAND_LONG", {"target_system": 1, "target_component": 1, **stated}, 254, 190)
-        self.kernel.call_at(self.kernel.now() + round(after_s * S), lambda: self._pilot.send(frame))
-
-    def operations(self) -> list[Operation]:
-        return [event for event in self.events if isinstance(event, Operation)]
+        self.station_sends("COMMAND_LONG", after_s, command=192, param1=-1.0, param2=1.0, param4=nan, **here)
 
 
 def test_a_square() -> None:
@@ -343,7 +271,7 @@ def test_a_bad_wire() -> None:
 def test_what_it_will_do_if_its_commander_falls_silent() -> None:
     field = Field(parameters={"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 4.0})
     field.kernel.run(5 * S)
-    assert field.driver.if_silent() == (
+    assert field.vehicle.if_silent == (
         "10 s after the last heartbeat it returns home; a velocity ends after 1 s in AUTO.LAND; "
         "0.5 s after the last sticks it returns home"
     )
