@@ -2,10 +2,10 @@
 
 The trace-event format (*Trace Event Format*, Google, 2016) as its JSON array, which by its definition may
 lack the closing bracket: a file whose writer was killed opens as far as it goes. A process of the timeline is
-a processor of the run and a thread one of its cores; who preempted whom is marked there. Activations (with
-the names that ros2_tracing has for their begin and end), calls, vehicle operations and what the application
-follows have tracks of their own. The format's time is microseconds; three decimals keep the
-nanoseconds.
+a processor of the run and a thread one of its cores; who preempted whom is marked there. Tracks of their own
+have activations and messages that took time on their way (both with the names that ros2_tracing has for their
+begin and end), calls, vehicle operations and what the application follows. The format's time is microseconds;
+three decimals keep the nanoseconds.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from volery.trace.events import (
     Event,
     Failure,
     LinkState,
+    Message,
     Milestone,
     Operation,
     Preemption,
@@ -34,8 +35,10 @@ from volery.trace.output import Output
 _quote = json.JSONEncoder(ensure_ascii=False).encode
 
 _CALLBACK = '"begin": "callback_start", "end": "callback_end"'
+_MESSAGE = '"begin": "rclcpp_publish", "end": "rclcpp_take"'
 _ACTIVATIONS = "activations"
 _CALLS = "calls"
+_MESSAGES = "messages"
 _OPERATIONS = "vehicle operations"
 _FOLLOWED = "followed"
 _RUN = "the run"
@@ -66,6 +69,7 @@ class TimelineWriter:
             Preemption: self._preemption,
             Activation: self._activation,
             Call: self._call,
+            Message: self._message,
             Operation: self._operation,
             Milestone: self._milestone,
             LinkState: self._link_state,
@@ -134,6 +138,13 @@ class TimelineWriter:
     def _activation(self, event: Activation) -> None:
         details = f'{{"deadline": {event.deadline}, {_CALLBACK}}}'
         self._span(_ACTIVATIONS, _quote(event.component), event.released, event.finished, details)
+
+    def _message(self, event: Message) -> None:
+        """One that was lost, or that was there at once, took no time on its way."""
+        if event.received > event.sent:
+            ends = f'"from": {_quote(event.publisher)}, "to": {_quote(event.subscriber)}'
+            details = f'{{{ends}, "bytes": {event.size}, {_MESSAGE}}}'
+            self._span(_MESSAGES, _quote(event.topic), event.sent, event.received, details)
 
     def _call(self, event: Call) -> None:
         name = f"{event.callee}.{event.operation}"

@@ -9,7 +9,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.testing.sample_run import sample_events
-from volery.trace.events import Activation, Call, Event, Failure, Milestone, Slice, Text
+from volery.trace.events import NONE, Activation, Call, Event, Failure, Message, Milestone, Slice, Text
 from volery.trace.timeline import TimelineWriter
 
 
@@ -114,3 +114,17 @@ def test_a_full_disk_is_a_problem_not_an_exception(tmp_path: Path) -> None:
         writer(event)
     writer.close()
     assert "No space left" in writer.problem
+
+
+def test_a_message_that_took_time_has_the_names_of_its_ends(tmp_path: Path) -> None:
+    found = timeline(
+        tmp_path / "t",
+        Message(1000, 4500, "/pose", "/talker", "/listener", 60),
+        Message(2000, 2000, "/pose", "/talker", "/beside", 60),
+        Message(3000, NONE, "/pose", "/talker", "/gone", 60),
+    )
+    begin, end = (event for event in found if event["ph"] in "be")
+    assert (begin["name"], begin["ts"], end["ts"], begin["id"]) == ("/pose", 1.0, 4.5, end["id"])
+    assert begin["args"] == {
+        "from": "/talker", "to": "/listener", "bytes": 60, "begin": "rclcpp_publish", "end": "rclcpp_take",
+    }  # fmt: skip
