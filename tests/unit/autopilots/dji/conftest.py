@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import carried_out
 from volery.autopilots.dji import DIALECT
 from volery.autopilots.simulated.autopilot import Autopilot
 from volery.autopilots.simulated.flight import make_world
@@ -141,23 +142,10 @@ class Apron:
 
     def run(self, body: Callable[[], None]) -> None:
         """As the program; what it raises comes out here."""
-        problems: list[BaseException] = []
-
-        def flow() -> None:
-            try:
-                body()
-            except Exception as problem:
-                problems.append(problem)
-            finally:
-                ended.append(True)
-
-        ended: list[bool] = []
-        self.kernel.spawn(flow, "program", Place("program"))
-        while not ended:
-            self.kernel.run(self.kernel.now() + 500 * MS)
-        self.kernel.close()
-        if problems:
-            raise problems[0]
+        try:
+            carried_out(self.kernel, body, step=500 * MS)
+        finally:
+            self.kernel.close()
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import carried_out
 from volery.base.time import MS, S
 from volery.drivers.dji import open_driver
 from volery.graph import Graph
@@ -151,24 +152,11 @@ class Bench:
 
     def run(self, body: Callable[[], None]) -> None:
         """As a task; what it raises comes out here."""
-        problems: list[BaseException] = []
-        ended: list[bool] = []
-
-        def flow() -> None:
-            try:
-                body()
-            except Exception as problem:
-                problems.append(problem)
-            finally:
-                ended.append(True)
-
-        self.kernel.spawn(flow, "test", Place("test"))
-        while not ended:
-            self.kernel.run(self.kernel.now() + 500 * MS)
-        self.drone.close()
-        assert self.kernel.close() == []
-        if problems:
-            raise problems[0]
+        try:
+            carried_out(self.kernel, body, step=500 * MS)
+        finally:
+            self.drone.close()
+            assert self.kernel.close() == []
 
     def wait(self, seconds: float) -> None:
         self.kernel.sleep_until(self.kernel.now() + round(seconds * S))

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import carried_out
 from volery.base.errors import Failsafe, NotArrived, Overridden
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
@@ -39,25 +40,16 @@ class Flown:
 
     def fly(self, mission: Callable[[Drone], None]) -> list[Operation]:
         """Carry it out; what it raises comes out here."""
-        problems: list[BaseException] = []
-        ended: list[bool] = []
 
         def flow() -> None:
-            try:
-                self.drone.wait_heard()
-                mission(self.drone)
-            except Exception as problem:
-                problems.append(problem)
-            finally:
-                ended.append(True)
+            self.drone.wait_heard()
+            mission(self.drone)
 
-        self.kernel.spawn(flow, "mission", Place("mission"))
-        while not ended:
-            self.kernel.run(self.kernel.now() + 500 * MS)
-        self.drone.close()
-        self.kernel.close()
-        if problems:
-            raise problems[0]
+        try:
+            carried_out(self.kernel, flow, step=500 * MS)
+        finally:
+            self.drone.close()
+            self.kernel.close()
         return [event for event in self.events if isinstance(event, Operation)]
 
     def wait(self, seconds: float) -> None:

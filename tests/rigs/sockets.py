@@ -1,0 +1,61 @@
+"""A simulated drone behind a real socket or line, in a thread with a clock of its own; and a flight to it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from rigs.airstrip import FRAME, at, dialects
+from volery.autopilots.simulated.autopilot import Autopilot
+from volery.autopilots.simulated.flight import make_world
+from volery.base.time import HOUR
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.wall import WallKernel
+from volery.links.coded import CodedLink
+from volery.vehicles import Drone, drivers
+from volery.world.specs import Multirotor
+
+HERE = "127.0.0.1"
+PACE = 20.0
+"""Times faster than the wall clock, on both sides."""
+
+
+@contextmanager
+def served(listen: Callable[[VirtualKernel], CodedLink], autopilot: str) -> Iterator[Any]:
+    """The link of a simulated drone, made by *listen*."""
+    kernel = VirtualKernel(pace=PACE)
+    _, (flight,) = make_world(kernel.now, [Multirotor()], seed=7, frame=FRAME)
+    served_one = Autopilot(kernel, flight, dialects.load(autopilot), warm=True)
+    link = listen(kernel)
+    served_one.connect(link)
+    thread = threading.Thread(target=kernel.run, args=(HOUR,), daemon=True)
+    thread.start()
+    try:
+        yield link
+    finally:
+        kernel.post(lambda: kernel.cancel(kernel.root, "end"))
+        thread.join(10)
+        link.close()
+        assert not thread.is_alive()
+
+
+def flown(kernel: WallKernel, link: CodedLink, autopilot: str) -> None:
+    """There and back."""
+    open_driver = drivers.load(autopilot).on_link
+    assert open_driver is not None
+    drone = Drone(kernel, "drone_1", open_driver(kernel, link, "drone_1", {}))
+    kernel.start()
+    try:
+        with kernel.adopt("script"):
+            drone.takeoff(5)
+            drone.goto(at(0.0, 15.0, 5.0))
+            assert drone.altitude.metres == pytest.approx(5.0, abs=0.6)
+            drone.land()
+            assert not drone.armed
+    finally:
+        drone.close()
+        assert kernel.close() == []
