@@ -21,6 +21,7 @@ from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.options import SAMPLING_PERIOD
+from volery.run.progress import VehicleProgress
 from volery.run.simulated import LINK_DELAY, Simulated
 from volery.world.specs import Battery, BodySpec, Multirotor, Rover
 from volery.world.wind import Wind
@@ -106,6 +107,14 @@ class Airfield:
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
         """Record the state of every vehicle now and then each *period*."""
         self._kernel.every(period, self.record_states)
+
+    def progress(self) -> tuple[VehicleProgress, ...]:
+        """What they do now."""
+        return tuple(self._progress(name) for name in self.flights)
+
+    def _progress(self, name: str) -> VehicleProgress:
+        vehicle, truth = self.autopilots[name].vehicle, self.flights[name].truth()
+        return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)
 
     def record_states(self) -> None:
         """Record the state of every vehicle now."""

@@ -109,11 +109,10 @@ class _Flight:
         kernel.record = self._recording.stream
         if options.tell is not None:
             self._recording.stream.tap(Teller(options.tell))
-        airfield = self._opened.airfield
-        self._states = airfield or Watched(kernel, self._opened.vehicles)
+        self._states = self._opened.airfield or Watched(kernel, self._opened.vehicles)
         self._states.sample()
-        if airfield is not None and options.show is not None:
-            self._recording.stream.tap(Reporter(kernel, airfield, 0, options.show))
+        if options.show is not None:
+            self._recording.stream.tap(Reporter(kernel, 0, self._states.progress, options.show))
         self._under_way = len(self._opened.vehicles)
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:

@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.trace.events import Event, Milestone, Text
 from volery.vehicles.heard import IF_SILENT
 
-if TYPE_CHECKING:
-    from volery.run.airfield import Airfield
-
 PERIOD: Ns = S
 
 
 @dataclass(frozen=True)
 class VehicleProgress:
-    """A vehicle as it is now: the autopilot's mode, whether it is armed, metres above the ground."""
+    """A vehicle as it is now: the autopilot's mode, whether it is armed, metres above the ground (of a real
+    one, above home).
+    """
 
     name: str
     mode: str
@@ -37,6 +35,9 @@ class Progress:
     vehicles: tuple[VehicleProgress, ...]
     parcels: dict[str, int]
 
+
+Look = Callable[[], tuple[VehicleProgress, ...]]
+"""What vehicles do now."""
 
 Show = Callable[[Progress], None]
 """Called about once a simulated second. It must not block and changes nothing."""
@@ -59,12 +60,12 @@ class Teller:
 
 
 class Reporter:
-    """Tells *show* how a run goes. A tap of its stream."""
+    """Tells *show* how a run goes; *look* says what its vehicles do. A tap of its stream."""
 
-    def __init__(self, kernel: Kernel, airfield: Airfield, limit: Ns, show: Show) -> None:
+    def __init__(self, kernel: Kernel, limit: Ns, look: Look, show: Show) -> None:
         self._kernel = kernel
-        self._airfield = airfield
         self._limit = limit
+        self._look = look
         self._show = show
         self._parcels: dict[str, str] = {}
         kernel.every(PERIOD, self._tell)
@@ -75,10 +76,5 @@ class Reporter:
             self._parcels[event.subject] = event.state
 
     def _tell(self) -> None:
-        vehicles = tuple(self._vehicle(name) for name in self._airfield.flights)
-        self._show(Progress(self._kernel.now(), self._limit, vehicles, dict(Counter(self._parcels.values()))))
-
-    def _vehicle(self, name: str) -> VehicleProgress:
-        vehicle = self._airfield.autopilots[name].vehicle
-        truth = self._airfield.flights[name].truth()
-        return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)
+        parcels = dict(Counter(self._parcels.values()))
+        self._show(Progress(self._kernel.now(), self._limit, self._look(), parcels))

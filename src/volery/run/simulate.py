@@ -147,7 +147,7 @@ class _Simulation:
             self._recording.stream.tap(self._goal)
             kernel.every(GOAL_PERIOD, self._look_at_goal)
         if options.show is not None:
-            reporter = Reporter(kernel, self._airfield, system.limits.duration_ns, options.show)
+            reporter = Reporter(kernel, system.limits.duration_ns, self._airfield.progress, options.show)
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._airfield)
         self._airfield.sample()

@@ -10,6 +10,7 @@ from volery.base.position import Position
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.run.options import SAMPLING_PERIOD
+from volery.run.progress import VehicleProgress
 from volery.trace.events import VehicleState
 from volery.vehicles import Vehicle
 from volery.vehicles.telemetry import Attitude
@@ -28,6 +29,11 @@ class Watched:
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
         """Record the state of every vehicle now and then each *period*."""
         self._kernel.every(period, self.record_states)
+
+    def progress(self) -> tuple[VehicleProgress, ...]:
+        """What those that have been heard do now."""
+        heard = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.heard >= 0]
+        return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in heard)
 
     def record_states(self) -> None:
         """Record the state of every vehicle that has been heard."""
