@@ -36,12 +36,14 @@ PAPARAZZI = dict(enumerate(message_type("ROTORCRAFT_STATUS").words("ap_mode")))
 DJI = {mode.value: mode.name for mode in DisplayMode}
 
 GENERIC_ID, ARDUPILOT_ID, PAPARAZZI_ID, PX4_ID = 0, 3, 9, 12
-"""MAV_AUTOPILOT. It has no entry for DJI, for which the generic one stands."""
-AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", GENERIC_ID: "DJI"}
+"""MAV_AUTOPILOT."""
+DJI_ID = 255
+"""MAVLink has no number for it, and does not use this one. It is said inside this process only."""
+AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", DJI_ID: "DJI"}
 
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""
-_SAME_FOR_ALL = {PX4_ID: PX4, PAPARAZZI_ID: PAPARAZZI, GENERIC_ID: DJI}
+_SAME_FOR_ALL = {PX4_ID: PX4, PAPARAZZI_ID: PAPARAZZI, DJI_ID: DJI}
 _NUMBERED = re.compile(r"(?:CMODE\(|MODE_)?(\d+)\)?\Z")
 
 

@@ -12,7 +12,7 @@ from volery.base.position import AMSL
 from volery.bridge.interpreter.aims import ALTITUDES, Place, on_globe
 from volery.bridge.interpreter.conduct import Order
 from volery.bridge.interpreter.telling import CUSTOM_MODE_ENABLED
-from volery.bridge.modes import GENERIC_ID, PAPARAZZI_ID, Firmware, mode_name
+from volery.bridge.modes import DJI_ID, PAPARAZZI_ID, Firmware, mode_name
 from volery.links.mavlink import constant, entry_name
 from volery.vehicles.drone import Drone
 
@@ -34,7 +34,7 @@ MODES: Mapping[int, Mapping[str, Operation]] = {
         "ATTITUDE_DIRECT": Drone.stabilize,
         "ATTITUDE_RC_CLIMB": Drone.altitude_hold,
     },
-    GENERIC_ID: {
+    DJI_ID: {
         "P_GPS": Drone.hold,
         "ATTITUDE": Drone.altitude_hold,
         "MANUAL_CTRL": Drone.stabilize,

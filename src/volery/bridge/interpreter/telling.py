@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from volery.base.frames import LocalFrame, wrap
 from volery.base.position import Position
 from volery.base.time import MS, US
-from volery.bridge.modes import GENERIC_ID, PAPARAZZI_ID, Firmware, mode_number
+from volery.bridge.modes import DJI_ID, GENERIC_ID, PAPARAZZI_ID, Firmware, mode_number
 from volery.kernel.api import Kernel
 from volery.links.mavlink import constant
 from volery.messages.dji import HEALTHY_GPS
@@ -21,8 +21,8 @@ from volery.vehicles.driver import Driver
 
 Fields = dict[str, Any]
 
-AUTOPILOTS: Mapping[str, int] = {"Paparazzi": PAPARAZZI_ID}
-"""MAV_AUTOPILOT by the driver's word."""
+AUTOPILOTS: Mapping[str, int] = {"Paparazzi": PAPARAZZI_ID, "DJI": DJI_ID}
+"""MAV_AUTOPILOT by the first of the driver's words."""
 KINDS: Mapping[str, int] = {"drone": constant("MAV_TYPE_QUADROTOR")}
 """MAV_TYPE by the driver's word. How many rotors a drone has is not known: it stands for a multirotor."""
 
@@ -121,7 +121,8 @@ class Telling:
     def firmware(self) -> Firmware:
         """Whose modes they are."""
         seen = self._seen
-        return Firmware(AUTOPILOTS.get(seen.autopilot, GENERIC_ID), KINDS.get(seen.kind, 0))
+        maker = seen.autopilot.partition(" ")[0]
+        return Firmware(AUTOPILOTS.get(maker, GENERIC_ID), KINDS.get(seen.kind, 0))
 
     @property
     def mode(self) -> int | None:

@@ -99,9 +99,10 @@ def test_only_what_was_heard_anew_is_said_again(bird: Bird, seen: Telemetry) -> 
         ({"mode": "NAV"}, 9, 13, 1, 3),
         ({"mode": "GUIDED", "armed": True, "flying": True}, 9, 19, 1 | 8 | 128, 4),
         ({"mode": "FAILSAFE", "armed": True, "failsafe": True}, 9, 1, 1 | 128, 5),
-        ({"mode": "P_GPS", "autopilot": "DJI M600"}, 0, 6, 1, 3),
-        ({"mode": "P_GPS by RC", "autopilot": "DJI M600"}, 0, 6, 1, 3),
-        ({"mode": "MODE_35", "autopilot": "DJI M600"}, 0, 35, 1, 3),
+        ({"mode": "P_GPS", "autopilot": "DJI M600"}, 255, 6, 1, 3),
+        ({"mode": "P_GPS by RC", "autopilot": "DJI M600"}, 255, 6, 1, 3),
+        ({"mode": "MODE_35", "autopilot": "DJI M600"}, 255, 35, 1, 3),
+        ({"mode": "LAND", "autopilot": "somebody's"}, 0, 9, 1, 3),
     ],
 )
 def test_a_heartbeat_says_whose_mode_it_is(
