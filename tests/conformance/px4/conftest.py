@@ -2,109 +2,36 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from math import nan
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
+from rigs.station import TARGET, Station, facts_of
 from volery.autopilots.px4 import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
 from volery.base.frames import LocalFrame
-from volery.base.time import MS, S, from_seconds, to_seconds
+from volery.base.time import S
 from volery.kernel.api import Handle
-from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
-from volery.links.link import Frame
-from volery.world.specs import Multirotor, Rover
-
-FACTS = Path(__file__).parents[2] / "golden" / "px4" / "facts.json"
-HOME = LocalFrame(45.4671160, -73.7578370, 32.34)
-STATION, STATION_COMPONENT = 255, 190
 
 
-class Heard(NamedTuple):
-    """A frame from the autopilot, and when it came, in seconds."""
-
-    at: float
-    name: str
-    fields: dict[str, Any]
-
-
-class Bench:
+class Bench(Station):
     """One vehicle, one ground station on one link, whose heartbeat it hears."""
 
-    def __init__(
-        self, kind: str = "copter", *, warm: bool = True, use: str = "", beats: bool = True, **options: Any
-    ) -> None:
-        self.kernel = VirtualKernel()
-        spec = Multirotor(sensors="rtk") if kind == "copter" else Rover(sensors="rtk")
-        self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=3, frame=HOME)
-        self.autopilot = Autopilot(self.kernel, self.flight, DIALECT, warm=warm, **options)
-        self.vehicle = self.autopilot.vehicle
-        self.heard: list[Heard] = []
-        self.latest: dict[str, dict[str, Any]] = {}
+    dialect = DIALECT
+    home = LocalFrame(45.4671160, -73.7578370, 32.34)
+    looks_per_second = 50
+
+    def __init__(self, kind: str = "copter", *, beats: bool = True, **options: Any) -> None:
+        super().__init__(kind, **options)
         self._streams: list[Handle] = []
-        self.link, theirs = in_process(self.kernel, MS, "station")
-        self.autopilot.connect(theirs, use=use)
-        self.link.receive(self._hear)
         if beats:
             self.beat()
 
-    def _hear(self, frame: Frame) -> None:
-        self.heard.append(Heard(self.now, frame.name, frame.fields))
-        self.latest[frame.name] = frame.fields
-
-    @property
-    def now(self) -> float:
-        return to_seconds(self.kernel.now())
-
-    def send(self, name: str, *, system: int = STATION, **fields: Any) -> None:
-        self.link.send(Frame(name, fields, system, STATION_COMPONENT))
-
-    def run(self, seconds: float) -> None:
-        self.kernel.run(self.kernel.now() + from_seconds(seconds))
-
-    def run_until(self, done: Callable[[], bool], within: float = 120.0) -> float:
-        """Seconds until *done*."""
-        start = self.now
-        while not done():
-            assert self.now - start < within, (
-                f"not within {within} s: mode {self.vehicle.mode.name}, {self.texts()[-3:]}"
-            )
-            self.kernel.run(self.kernel.now() + S // 50)
-        return self.now - start
-
-    def command(self, number: int, *params: float, **options: Any) -> int | None:
-        """Send a COMMAND_LONG and return its MAV_RESULT, ``None`` if nothing answers."""
-        values = {f"param{place}": float(value) for place, value in enumerate(params, start=1)}
-        fields = {"target_system": 1, "target_component": 1, "command": number, **values, **options}
-        for place in range(1, 8):
-            fields.setdefault(f"param{place}", 0.0)
-        return self._answered("COMMAND_LONG", number, fields)
-
     def command_int(self, number: int, **fields: Any) -> int | None:
-        whole = {"target_system": 1, "target_component": 1, "command": number, "frame": 5, **fields}
-        for place in range(1, 5):
-            whole.setdefault(f"param{place}", 0.0)
-        return self._answered("COMMAND_INT", number, whole)
-
-    def _answered(self, name: str, number: int, fields: dict[str, Any]) -> int | None:
-        count = len(self.heard)
-        self.send(name, **fields)
-        self.run(0.05)
-        answers = [one.fields for one in self.heard[count:] if one.name == "COMMAND_ACK"]
-        return next((int(answer["result"]) for answer in answers if answer["command"] == number), None)
+        return super().command_int(number, **{"frame": 5, **fields})
 
     def mode(self, main: int, sub: int = 0) -> int | None:
         return self.command(176, 1, main, sub)
-
-    def beat(self) -> None:
-        """Heartbeats of the ground station from now on."""
-        self.kernel.every(S, lambda: self.send("HEARTBEAT", type=6, autopilot=8))
 
     # -- streams
 
@@ -150,9 +77,6 @@ class Bench:
     def events(self, since: float = 0.0) -> list[int]:
         return [one.fields["id"] for one in self.of("EVENT") if one.at >= since]
 
-    def of(self, name: str) -> list[Heard]:
-        return [one for one in self.heard if one.name == name]
-
     def modes(self, since: float = 0.0) -> list[tuple[float, int]]:
         """Changes of the heartbeat's mode: when, and to what."""
         found: list[tuple[float, int]] = []
@@ -161,10 +85,6 @@ class Bench:
             if one.at >= since and (not found or found[-1][1] != number):
                 found.append((one.at, number))
         return found
-
-    @property
-    def height(self) -> float:
-        return self.vehicle.height
 
     @property
     def ned(self) -> tuple[float, float, float]:
@@ -191,8 +111,7 @@ class Bench:
 
 POSITION_ONLY = {
     "time_boot_ms": 0,
-    "target_system": 1,
-    "target_component": 1,
+    **TARGET,
     "coordinate_frame": 1,
     "type_mask": 0b0000_1101_1111_1000,
     "x": 0.0,
@@ -212,8 +131,7 @@ POSITION_ONLY = {
 @pytest.fixture(scope="session")
 def facts() -> dict[str, Any]:
     """What ``extract.py`` found in the recordings."""
-    found: dict[str, Any] = json.loads(FACTS.read_text(encoding="utf-8"))
-    return found
+    return facts_of("px4")
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,6 @@
 """Extract the facts that the conformance tests check from recordings of the real firmware.
 
-    python tests/golden/ardupilot/extract.py FOLDER
+    PYTHONPATH=tests python tests/golden/ardupilot/extract.py FOLDER
 
 FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
 ``facts.json`` beside this file. Times are seconds after the boot, worked out from the messages that
@@ -10,86 +10,19 @@ carry it.
 from __future__ import annotations
 
 import json
-import struct
 import sys
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega
+from rigs.recordings import STATION, Row, changes, first, healthy_at, of, read
 
-STATION = 255
 UNLISTED = 65535
 ARMED = 128
 
 
-class Row(NamedTuple):
-    """One frame: seconds after boot, who sent it, what it says."""
-
-    at: float
-    system: int
-    name: str
-    fields: dict[str, Any]
-
-
-def frames(path: Path) -> Iterator[tuple[float, Any]]:
-    data, place, decoder = path.read_bytes(), 0, ardupilotmega.MAVLink(None)
-    while place + 20 <= len(data):
-        (stamp,) = struct.unpack_from(">Q", data, place)
-        length = 12 + data[place + 9] + (13 if data[place + 10] & 1 else 0)
-        yield stamp / 1e6, decoder.decode(bytearray(data[place + 8 : place + 8 + length]))
-        place += 8 + length
-
-
-def read(path: Path) -> list[Row]:
-    """All frames; simulated time drifts against the stamps, so each takes the offset last seen before it."""
-    stamped = list(frames(path))
-    start = stamped[0][0]
-    offset = next(filter(None, (_offset(stamp - start, message) for stamp, message in stamped)))
-    rows = []
-    for stamp, message in stamped:
-        offset = _offset(stamp - start, message) or offset
-        fields = message.to_dict()
-        fields.pop("mavpackettype")
-        rows.append(
-            Row(round(stamp - start + offset, 3), message.get_srcSystem(), message.get_type(), fields)
-        )
-    return rows
-
-
-def _offset(seconds: float, message: Any) -> float:
-    """Boot clock less stamp; 0 where the message does not say."""
-    if message.get_srcSystem() != 1 or not getattr(message, "time_boot_ms", 0):
-        return 0.0
-    return message.time_boot_ms / 1000.0 - seconds
-
-
-def of(rows: list[Row], name: str) -> list[Row]:
-    return [row for row in rows if row.name == name and row.system == 1]
-
-
-def changes(rows: list[Row], *names: str) -> list[list[Any]]:
-    found: list[list[Any]] = []
-    for row in rows:
-        values = [row.fields[name] for name in names]
-        if not found or found[-1][1:] != values:
-            found.append([row.at, *values])
-    return found
-
-
-def first(rows: list[Row], name: str) -> float | None:
-    found = of(rows, name)
-    return found[0].at if found else None
-
-
-PREARM = 1 << 28
-
-
 def boot(rows: list[Row]) -> dict[str, Any]:
-    healthy = [
-        row.at for row in of(rows, "SYS_STATUS") if row.fields["onboard_control_sensors_health"] & PREARM
-    ]
+    healthy = healthy_at(rows)
     unlisted = [
         row for row in of(rows, "PARAM_VALUE") if row.fields["param_index"] == UNLISTED and row.at < 42.5
     ]

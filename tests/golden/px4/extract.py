@@ -1,6 +1,6 @@
 """Extract the facts that the conformance tests check from recordings of the real firmware.
 
-    python tests/golden/px4/extract.py FOLDER
+    PYTHONPATH=tests python tests/golden/px4/extract.py FOLDER
 
 FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
 ``facts.json`` beside this file. Times are seconds after the boot, worked out from the messages that
@@ -10,82 +10,22 @@ carry it.
 from __future__ import annotations
 
 import json
-import struct
 import sys
-from collections.abc import Iterator
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from volery.links.parser import Parser
+from rigs.recordings import Row, changes, first, healthy_at, of, read
 
-STATION = 255
 ARMED = 128
 UNLISTED = 65535
-PREARM = 1 << 28
 OFFBOARD = 0x00060000
-
-
-class Row(NamedTuple):
-    """One frame: seconds after boot, whether the vehicle sent it, what it says."""
-
-    at: float
-    ours: bool
-    name: str
-    fields: dict[str, Any]
-
-
-def frames(path: Path) -> Iterator[tuple[float, int, str, dict[str, Any]]]:
-    data, place = path.read_bytes(), 0
-    while place + 20 <= len(data):
-        (stamp,) = struct.unpack_from(">Q", data, place)
-        length = 12 + data[place + 9] + (13 if data[place + 10] & 1 else 0)
-        for frame in Parser().feed(data[place + 8 : place + 8 + length]):
-            yield stamp / 1e6, frame.system, frame.name, frame.fields
-        place += 8 + length
-
-
-def read(path: Path) -> list[Row]:
-    """All frames; simulated time drifts against the stamps, so each takes the offset last seen before it."""
-    stamped = list(frames(path))
-    start = stamped[0][0]
-    offset = next(filter(None, (_offset(one, start) for one in stamped)))
-    rows = []
-    for one in stamped:
-        offset = _offset(one, start) or offset
-        rows.append(Row(round(one[0] - start + offset, 3), one[1] == STATION, one[2], one[3]))
-    return rows
-
-
-def _offset(one: tuple[float, int, str, dict[str, Any]], start: float) -> float:
-    """Boot clock less stamp; 0 where the message does not say, or says it of something older."""
-    stamp, system, name, fields = one
-    if system == STATION or name not in ("LOCAL_POSITION_NED", "ATTITUDE"):
-        return 0.0
-    return float(fields["time_boot_ms"] / 1000.0 - (stamp - start))
-
-
-def of(rows: list[Row], name: str) -> list[Row]:
-    return [row for row in rows if row.name == name and not row.ours]
+CLOCKS = ("LOCAL_POSITION_NED", "ATTITUDE")  # others say the time of something older
 
 
 def sent(rows: list[Row], name: str) -> list[Row]:
     return [row for row in rows if row.name == name and row.ours]
-
-
-def first(rows: list[Row], name: str) -> float | None:
-    found = of(rows, name)
-    return found[0].at if found else None
-
-
-def changes(rows: list[Row], *names: str) -> list[list[Any]]:
-    found: list[list[Any]] = []
-    for row in rows:
-        values = [row.fields[name] for name in names]
-        if not found or found[-1][1:] != values:
-            found.append([row.at, *values])
-    return found
 
 
 def texts(rows: list[Row], start: float = 0.0) -> list[list[Any]]:
@@ -133,9 +73,7 @@ def streams(rows: list[Row]) -> dict[str, float]:
 
 
 def boot(rows: list[Row]) -> dict[str, Any]:
-    healthy = [
-        row.at for row in of(rows, "SYS_STATUS") if row.fields["onboard_control_sensors_health"] & PREARM
-    ]
+    healthy = healthy_at(rows)
     return {
         "first_heartbeat": first(rows, "HEARTBEAT"),
         "first": {
@@ -342,7 +280,7 @@ def parameters(rows: list[Row]) -> dict[str, Any]:
 
 def main(folder: Path) -> None:
     logs = {
-        name: read(folder / f"px4-1.14-{name}.tlog")
+        name: read(folder / f"px4-1.14-{name}.tlog", CLOCKS)
         for name in ("ground-api", "basic-api", "offboard-api", "auto-gcs", "manual-gcs")
     }
     ground, basic, offboard = logs["ground-api"], logs["basic-api"], logs["offboard-api"]

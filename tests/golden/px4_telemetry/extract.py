@@ -9,14 +9,12 @@ FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink 
 from __future__ import annotations
 
 import json
-import struct
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from volery.links.link import Frame
-from volery.links.parser import Parser
+from volery.links.tlog import read_tlog
 
 STATION = 255
 THINNED_MS = {"GLOBAL_POSITION_INT": 1000, "ATTITUDE": 10_000, "SYS_STATUS": 1000}
@@ -43,21 +41,13 @@ NAMES = ("auto-gcs", "manual-gcs", "offboard-api")
 UNTIL_MS = {"offboard-api": 150_000}
 
 
-def frames(path: Path) -> Iterator[tuple[int, Frame]]:
-    data, place, parser = path.read_bytes(), 0, Parser()
-    (start,) = struct.unpack_from(">Q", data, 0)
-    while place + 20 <= len(data):
-        (stamp,) = struct.unpack_from(">Q", data, place)
-        length = 12 + data[place + 9] + (13 if data[place + 10] & 1 else 0)
-        for frame in parser.feed(data[place + 8 : place + 8 + length]):
-            yield (stamp - start) // 1000, frame
-        place += 8 + length
-
-
 def extract(path: Path, until: int) -> Iterator[list[Any]]:
     last: dict[str, Any] = {}
     told: dict[str, int] = {}
-    for ms, frame in frames(path):
+    start: int | None = None
+    for at_us, frame in read_tlog(path):
+        start = at_us if start is None else start
+        ms = (at_us - start) // 1000
         if frame.system == STATION or frame.name not in KEPT or ms > until:
             continue
         fields = {name: frame.fields[name] for name in KEPT[frame.name]}
