@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns, S
-from volery.drivers.arrival import DRONE_KIND, distance
+from volery.drivers.arrival import DRONE_KIND, at, distance
 from volery.drivers.eviction import Eviction
+from volery.kernel.api import Action
+from volery.vehicles.driver import Step
 from volery.vehicles.telemetry import Telemetry
 
 SAME_M = 0.5
@@ -45,6 +47,25 @@ class Aim:
         if not self._confirmed:
             self._confirmed = self._goal is not None and self._shows(self._goal)
         return self._confirmed
+
+    def reach(self, goal: Position, send: Action, mode: str, within: Ns, *, rover: bool = False) -> Step:
+        """By *send*, which sends it there, again until it has shown that it goes there; in *mode*."""
+
+        def say() -> None:
+            if not self.confirmed:
+                self.set(goal)
+                send()
+
+        return Step(
+            ask=f"reach {goal}",
+            send=say,
+            done=at(goal, rover),
+            within=within,
+            again=S,
+            mode=mode,
+            armed=True,
+            lost=self.lost,
+        )
 
     def lost(self) -> str:
         """How somebody has changed it, who has the vehicle then; empty if nobody has."""

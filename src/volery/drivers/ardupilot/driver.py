@@ -18,9 +18,9 @@ from volery.drivers.aim import Aim
 from volery.drivers.ardupilot.commands import Commands
 from volery.drivers.ardupilot.items import items_of
 from volery.drivers.ardupilot.modes import GUIDED
-from volery.drivers.ardupilot.setpoints import VELOCITY_PERIOD, Setpoints
+from volery.drivers.ardupilot.setpoints import Setpoints
 from volery.drivers.ardupilot.silence import if_silent
-from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, STANDING_M_S, at, standing
+from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, STANDING_M_S, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.sequences import Sequences
@@ -35,7 +35,7 @@ from volery.drivers.steps import (
     nothing,
 )
 from volery.kernel.api import Kernel
-from volery.vehicles.driver import Repeat, Step, Sticks
+from volery.vehicles.driver import Step, Sticks
 from volery.vehicles.mission import MissionItem, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
 
@@ -88,24 +88,12 @@ class ArduPilot(Sequences):
         """GUIDED, then a target, until it shows that it goes there; a rover is armed on the way."""
         rover = self.telemetry.kind != DRONE_KIND
         start = self._armed_in_guided() if rover else self._guided()
-        aim = Aim(self.telemetry, self._eviction)
 
         def send() -> None:
-            if not aim.confirmed:
-                aim.set(goal)
-                self._commands.target(goal)
-                self._commands.watch_target()
+            self._commands.target(goal)
+            self._commands.watch_target()
 
-        target = Step(
-            ask=f"reach {goal}",
-            send=send,
-            done=at(goal, rover),
-            within=within,
-            again=S,
-            mode=GUIDED,
-            armed=True,
-            lost=aim.lost,
-        )
+        target = Aim(self.telemetry, self._eviction).reach(goal, send, GUIDED, within, rover=rover)
         return (*start, *(self._at_speed(speed, GUIDED) if speed is not None else ()), target)
 
     def hold(self) -> Sequence[Step]:
@@ -113,16 +101,7 @@ class ArduPilot(Sequences):
         if self.telemetry.kind != DRONE_KIND:
             stand = Step(ask="stand", send=nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
             return (*self._change("HOLD"), stand)
-        brake = Step(
-            ask="stop",
-            send=self._setpoints.stand_still,
-            done=standing,
-            within=STOPPED_WITHIN,
-            keep=Repeat(VELOCITY_PERIOD, self._setpoints.stand_still),
-            mode=GUIDED,
-            armed=True,
-        )
-        return (*self._guided(), brake, at_once("stay", self._stay))
+        return (*self._guided(), self._setpoints.braking(), at_once("stay", self._stay))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """GUIDED, then repeated until it has lasted long enough; then it stops."""
@@ -179,15 +158,11 @@ class ArduPilot(Sequences):
 
     def sticks(self, sticks: Sticks | None) -> None:
         """Keep sending them, as long as the mode is ours."""
-        if sticks is None:
-            self._setpoints.release()
-        else:
-            self._setpoints.hold(sticks)
+        self._setpoints.take(sticks)
 
     def stop(self) -> None:
         """No set-point and no stick is repeated any more."""
-        self._setpoints.unfollow()
-        self._setpoints.release()
+        self._setpoints.end()
 
     # -- missions
 

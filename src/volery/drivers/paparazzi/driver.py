@@ -9,23 +9,22 @@ a change of mode is told at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import radians
 
 from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.drivers.aim import Aim
-from volery.drivers.arrival import DRONE_KIND, at, standing
+from volery.drivers.arrival import DRONE_KIND
 from volery.drivers.eviction import Eviction
 from volery.drivers.paparazzi.ground import LIFTED_M, Blocks, Ground
 from volery.drivers.paparazzi.if_silent import if_silent
 from volery.drivers.paparazzi.modes import BY_ATTITUDE, BY_HEIGHT, FAILSAFE, GUIDED
 from volery.drivers.paparazzi.pieces import Pieces
-from volery.drivers.paparazzi.setpoints import VELOCITY_PERIOD
 from volery.drivers.paparazzi.uplink import Uplink
 from volery.drivers.steps import (
     READY_WITHIN,
-    STOPPED_WITHIN,
     TURNED_WITHIN,
     at_once,
     check_not_idle,
@@ -33,7 +32,7 @@ from volery.drivers.steps import (
     until_ready,
 )
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, Repeat, Step, Sticks
+from volery.vehicles.driver import Capability, Step, Sticks
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
@@ -130,40 +129,15 @@ class Paparazzi:
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
         """GUIDED, then a set-point, with the heading as it is."""
         del speed  # there is no such capability
-        return (*self._pieces.guided(), self._reach(goal, f"reach {goal}", within))
+        return (*self._pieces.guided(), self._reach(goal, within))
 
-    def _reach(self, goal: Position, ask: str, within: Ns) -> Step:
-        """Said until it shows that it goes there."""
+    def _reach(self, goal: Position, within: Ns) -> Step:
         aim = Aim(self.telemetry, self._eviction)
-
-        def send() -> None:
-            if not aim.confirmed:
-                aim.set(goal)
-                self._uplink.setpoint(self._pieces.at(goal))
-
-        return Step(
-            ask=ask,
-            send=send,
-            done=at(goal, False),
-            within=within,
-            again=S,
-            mode=GUIDED,
-            armed=True,
-            lost=aim.lost,
-        )
+        return aim.reach(goal, lambda: self._uplink.setpoint(self._pieces.at(goal)), GUIDED, within)
 
     def hold(self) -> Sequence[Step]:
         """In GUIDED, first without velocity, then where it has stopped."""
-        brake = Step(
-            ask="stop",
-            send=self._setpoints.stand_still,
-            done=standing,
-            within=STOPPED_WITHIN,
-            keep=Repeat(VELOCITY_PERIOD, self._setpoints.stand_still),
-            mode=GUIDED,
-            armed=True,
-        )
-        return (*self._pieces.guided(), brake, at_once("stay", self._pieces.stay))
+        return (*self._pieces.guided(), self._setpoints.braking(), at_once("stay", self._pieces.stay))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """GUIDED, then repeated until it has lasted long enough; then it stops."""
@@ -200,7 +174,7 @@ class Paparazzi:
             raise Refused(self.name, "return home", "it has not told where its home is")
         above = AboveHome(max(self.telemetry.above_home, LIFTED_M))
         over = Position(home.latitude, home.longitude, above)
-        reach = self._reach(over, "be over home", within)
+        reach = replace(self._reach(over, within), ask="be over home")
         return (*self._pieces.guided(), reach, *self._ground.land_by_plan(within))
 
     def land(self, within: Ns) -> Sequence[Step]:
@@ -226,15 +200,11 @@ class Paparazzi:
 
     def sticks(self, sticks: Sticks | None) -> None:
         """Keep sending them, as long as the mode is ours."""
-        if sticks is None:
-            self._setpoints.release()
-        else:
-            self._setpoints.hold(sticks)
+        self._setpoints.take(sticks)
 
     def stop(self) -> None:
         """No set-point and no stick is repeated any more."""
-        self._setpoints.unfollow()
-        self._setpoints.release()
+        self._setpoints.end()
 
     # -- missions
 
