@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.faces.launch import AtEnd, Launch, never
+from volery.faces.launch import AtEnd, Launch, Launched, never
 from volery.faces.rclpy.errors import NameValidationException, NotInitializedException
 from volery.graph import Node, RosGraph
 from volery.kernel.waiting import Signal, current_task
@@ -132,32 +132,22 @@ class Context:
             kernel.record(Text(kernel.now(), self._component, severity, text))
 
 
-class Contexts:
+@dataclass(eq=False)
+class Contexts(Launched):
     """All components of one run that import rclpy."""
 
-    def __init__(
-        self,
-        graph: RosGraph,
-        launched: Mapping[str, Launch] | None = None,
-        nodes: Mapping[str, Node] | None = None,
-        at_end: AtEnd = never,
-    ) -> None:
-        self.graph = graph
-        self.kernel = graph.kernel
-        self._launched = {} if launched is None else launched
-        self._nodes = {} if nodes is None else nodes
-        self.levels: dict[str, int] = {}  # of loggers, by name
-        self._at_end = at_end
-        self._contexts: dict[str, Context] = {}
+    levels: dict[str, int] = field(default_factory=dict, init=False)
+    """Of loggers, by name."""
+    _contexts: dict[str, Context] = field(default_factory=dict, init=False)
 
     def here(self) -> Context:
         """That of the component that the current task computes for."""
-        component = current_task(self.kernel).place.component
+        component = self.component
         found = self._contexts.get(component)
         if found is None:
-            launch, node = self._launched.get(component), self._nodes.get(component)
+            launch, node = self.launch_of(component), self.node_of(component)
             found = self._contexts[component] = Context(self.graph, component, launch, node)
-            found.at_end = self._at_end
+            found.at_end = self.at_end
         return found
 
     def now(self) -> Ns:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.base.time import Ns
-from volery.faces.launch import AtEnd, Launch, never
+from volery.faces.launch import AtEnd, Launch, Launched
 from volery.faces.rosout import Rosout
 from volery.faces.rospy.errors import ROSInitException, ROSInterruptException
 from volery.graph import LATCHED, Group, Node, RosGraph, Work
@@ -117,48 +117,33 @@ def _in_words(error: Exception) -> str:
     return f"{type(error).__name__}: {error}{where}"
 
 
-class Sessions:
+@dataclass(eq=False)
+class Sessions(Launched):
     """All components of one run that are nodes."""
 
-    def __init__(
-        self,
-        graph: RosGraph,
-        launched: Mapping[str, Launch] | None = None,
-        nodes: Mapping[str, Node] | None = None,
-        at_end: AtEnd = never,
-    ) -> None:
-        self.graph = graph
-        self.kernel = graph.kernel
-        self._launched = {} if launched is None else launched
-        self._nodes = {} if nodes is None else nodes
-        self._at_end = at_end
-        self._open: dict[str, Session] = {}
-
-    def _component(self) -> str:
-        return current_task(self.kernel).place.component
+    _open: dict[str, Session] = field(default_factory=dict, init=False)
 
     def join(self, name: str, anonymous: bool) -> None:
         """``init_node``: a second call of the same component changes nothing."""
-        session = self._open.get(self._component()) or self._joined(name, anonymous)
+        session = self._open.get(self.component) or self._joined(name, anonymous)
         session.initialised = True
 
     def _joined(self, name: str, anonymous: bool) -> Session:
-        component = self._component()
+        component = self.component
         task = current_task(self.kernel)
-        launch = self._launched.get(component, Launch())
-        label = re.sub(r"\W", "_", component if component in self._launched else name)
-        node = self._nodes.get(component) or self.graph.node(
-            label,
-            launch.namespace,
-            remaps=launch.remaps,
-            anonymous=anonymous and component not in self._launched,
+        launch = self.launch_of(component)
+        label = re.sub(r"\W", "_", name if launch is None else component)
+        anonymous = anonymous and launch is None
+        launch = launch or Launch()
+        node = self.node_of(component) or self.graph.node(
+            label, launch.namespace, remaps=launch.remaps, anonymous=anonymous
         )
         for key, value in launch.parameters.items():
             node.set_parameter(f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
         rosout = Rosout(self.graph, node, "rosgraph_msgs/msg/Log", LATCHED)
         made = self._open[component] = Session(
-            self.graph, node, task.scope, self.kernel, ended, rosout, self._at_end
+            self.graph, node, task.scope, self.kernel, ended, rosout, self.at_end
         )
         return made
 
@@ -166,16 +151,16 @@ class Sessions:
         """The session of the component that the current task computes for."""
         session = self.find()
         if session is None or not session.initialised:
-            raise ROSInitException(f"{self._component()}: call rospy.init_node() first")
+            raise ROSInitException(f"{self.component}: call rospy.init_node() first")
         return session
 
     def early(self) -> Session:
         """``here``, for what rospy does before ``init_node`` as well: the component joins the graph now."""
-        return self.find() or self._joined(self._component(), anonymous=False)
+        return self.find() or self._joined(self.component, anonymous=False)
 
     def find(self) -> Session | None:
         """``here``, or ``None`` before the component has joined the graph."""
-        return self._open.get(self._component())
+        return self._open.get(self.component)
 
     def now(self) -> Ns:
         """ROS time; an interaction point."""
