@@ -1,4 +1,4 @@
-"""All that a file written for ROS may import in a run: the faces of rospy and rclpy, tf2, and interfaces."""
+"""All that a file written for ROS may import in a run: faces of client libraries, and what goes with them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import NoReturn
 
-from volery.faces import rclpy, rospy, tf2
+from volery.faces import message_filters, rclpy, rospy, tf2
 from volery.faces.launch import AtEnd, Launch, never
 from volery.graph import Node, RosGraph
 
@@ -15,7 +15,6 @@ _ABSENT = {
     "dynamic_reconfigure": "ask rospy.get_param each time, as a parameter may be set while it runs",
     "dynamic_reconfigure.client": "use rospy.set_param",
     "dynamic_reconfigure.server": "ask rospy.get_param each time, as a parameter may be set while it runs",
-    "message_filters": "subscribe to each topic and compare the stamps",
 }
 """Libraries beside the client libraries that are not there, and what to do instead."""
 
@@ -30,7 +29,13 @@ def importable(
     given = launched, nodes, at_end
     found = {**rospy.modules(graph, *given), **rclpy.modules(graph, *given)}
     transforms = tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"])
-    return {**found, **transforms, **{name: _absent(name, instead) for name, instead in _ABSENT.items()}}
+    filters = message_filters.modules(found["rospy"], found["rclpy.time"])
+    return {
+        **found,
+        **transforms,
+        **filters,
+        **{name: _absent(name, instead) for name, instead in _ABSENT.items()},
+    }
 
 
 def _absent(name: str, instead: str) -> ModuleType:

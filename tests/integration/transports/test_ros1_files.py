@@ -30,6 +30,10 @@ CASES = {
         {"/sums": ("std_msgs/msg/Int64", 4), "/people": ("tutorial_msgs/msg/Person", 1)},
     ),
     "parameters": Case({"parameters": {"rate": 10, "listeners": 0}}, {"/told": (STRING, 15)}),
+    "filters": Case(
+        {"pairs": {"listeners": 0}, "cameras": {"pairs": 1}},
+        {"/pairs": (STRING, 20)},
+    ),
     "controller": Case(
         {"controller": {"gains": GAINS, "listeners": 0}, "plant": {"steps": 250, "listeners": 1}},
         {
