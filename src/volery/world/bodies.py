@@ -202,11 +202,11 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
     if flying:
         if row[S_RESTING] == 0.0:
             _normalise(row)
-        rotation_matrix(row, 0)
+        rotation_matrix(row, S_ATTITUDE, W_ROTATION)
         _settle_flyer(row)
     else:
         _settle_rover(row, height_before)
-        rotation_matrix(row, 0)
+        rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     _felt(row)
     _power(row, flying)
     k = bodies.reached[body] + 1
@@ -219,7 +219,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
 @njit(cache=False)
 def wake_body(bodies: Bodies, body: int, row: Array) -> None:
     """What the instruments show at the first grid step, before anything moved."""
-    rotation_matrix(row, 0)
+    rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     for axis in range(3):
         row[S_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
     _power(row, row[P_KIND] == MULTIROTOR)

@@ -87,19 +87,18 @@ def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
 
 
 @njit(cache=False)
-def rotation_matrix(row: Array, at: int) -> None:
-    """The attitude of the state from column *at* as a matrix: body axes to east, north, up."""
-    w, x = row[at + S_ATTITUDE], row[at + S_ATTITUDE + 1]
-    y, z = row[at + S_ATTITUDE + 2], row[at + S_ATTITUDE + 3]
-    row[W_ROTATION] = 1.0 - 2.0 * (y * y + z * z)
-    row[W_ROTATION + 1] = 2.0 * (x * y - w * z)
-    row[W_ROTATION + 2] = 2.0 * (x * z + w * y)
-    row[W_ROTATION + 3] = 2.0 * (x * y + w * z)
-    row[W_ROTATION + 4] = 1.0 - 2.0 * (x * x + z * z)
-    row[W_ROTATION + 5] = 2.0 * (y * z - w * x)
-    row[W_ROTATION + 6] = 2.0 * (x * z - w * y)
-    row[W_ROTATION + 7] = 2.0 * (y * z + w * x)
-    row[W_ROTATION + 8] = 1.0 - 2.0 * (x * x + y * y)
+def rotation_matrix(row: Array, at: int, to: int) -> None:
+    """The quaternion from column *at* as a matrix, from column *to*: body axes to the axes of the world."""
+    w, x, y, z = row[at], row[at + 1], row[at + 2], row[at + 3]
+    row[to] = 1.0 - 2.0 * (y * y + z * z)
+    row[to + 1] = 2.0 * (x * y - w * z)
+    row[to + 2] = 2.0 * (x * z + w * y)
+    row[to + 3] = 2.0 * (x * y + w * z)
+    row[to + 4] = 1.0 - 2.0 * (x * x + z * z)
+    row[to + 5] = 2.0 * (y * z - w * x)
+    row[to + 6] = 2.0 * (x * z - w * y)
+    row[to + 7] = 2.0 * (y * z + w * x)
+    row[to + 8] = 1.0 - 2.0 * (x * x + y * y)
 
 
 @njit(cache=False)
@@ -215,7 +214,7 @@ def multirotor_slope(row: Array, resting: bool) -> None:
         for i in range(S_ROTORS):
             row[W_SLOPE + i] = 0.0
         return
-    rotation_matrix(row, W_Y)
+    rotation_matrix(row, W_Y + S_ATTITUDE, W_ROTATION)
     _loads(row)
     reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
     if row[W_Y + S_POSITION + 2] - row[W_GROUND] < reach:

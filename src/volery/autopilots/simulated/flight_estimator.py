@@ -69,6 +69,7 @@ from volery.world.columns import (
     W_TURN,
     Array,
 )
+from volery.world.multirotor import rotation_matrix
 from volery.world.sensors import RTK_FIX
 
 FUSE_EVERY = 25  # steps: 20 Hz, where the barometer's, the compass' and the receiver's samples fall
@@ -92,21 +93,6 @@ def _euler(row: Array) -> None:
     row[K_EULER] = arc_tangent2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     row[K_EULER + 1] = arc_tangent2(sine, sqrt(1.0 - sine * sine))
     row[K_EULER + 2] = arc_tangent2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
-@njit(cache=False)
-def _matrix(row: Array) -> None:
-    """The estimated attitude as a matrix that takes forward, right, down to north, east, down."""
-    w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
-    row[W_BELIEF] = 1.0 - 2.0 * (y * y + z * z)
-    row[W_BELIEF + 1] = 2.0 * (x * y - w * z)
-    row[W_BELIEF + 2] = 2.0 * (x * z + w * y)
-    row[W_BELIEF + 3] = 2.0 * (x * y + w * z)
-    row[W_BELIEF + 4] = 1.0 - 2.0 * (x * x + z * z)
-    row[W_BELIEF + 5] = 2.0 * (y * z - w * x)
-    row[W_BELIEF + 6] = 2.0 * (x * z - w * y)
-    row[W_BELIEF + 7] = 2.0 * (y * z + w * x)
-    row[W_BELIEF + 8] = 1.0 - 2.0 * (x * x + y * y)
 
 
 @njit(cache=False)
@@ -164,7 +150,7 @@ def _predict(row: Array) -> None:
     for axis in range(3):
         row[K_RATES + axis] = row[M_GYRO + axis] - row[K_GYRO_BIAS + axis]
     _turn_body(row, row[K_RATES] * STEP_S, row[K_RATES + 1] * STEP_S, row[K_RATES + 2] * STEP_S)
-    _matrix(row)
+    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     aided = row[K_AIDED] > 0.5
     for axis in range(3):
@@ -368,7 +354,7 @@ def _align(row: Array) -> None:
     row[K_ATTITUDE + 1] = sr * cp
     row[K_ATTITUDE + 2] = cr * sp
     row[K_ATTITUDE + 3] = -sr * sp
-    _matrix(row)
+    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
     north = row[W_BELIEF] * mx + row[W_BELIEF + 1] * my + row[W_BELIEF + 2] * mz
     east = row[W_BELIEF + 3] * mx + row[W_BELIEF + 4] * my + row[W_BELIEF + 5] * mz
