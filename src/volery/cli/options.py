@@ -36,3 +36,12 @@ Topics = Annotated[
 ]
 Recording = Annotated[Path, typer.Argument(help="A .bag or .mcap file, or the folder of a rosbag 2.")]
 Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a model.yaml.")]
+IntoCatalogue = Annotated[
+    Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
+]
+CATALOGUE = Path("catalogue.yaml")
+"""Where `volery calibrate` writes by default."""
+EntryName = Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")]
+Frequency = Annotated[
+    float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
+]

@@ -9,7 +9,21 @@ import typer
 
 from volery.cli.console import Output
 from volery.cli.endings import run_command
-from volery.cli.options import Allocation, Debug, Fidelity, Json, Model, Overrides, Quiet, Scenario, Seed
+from volery.cli.options import (
+    CATALOGUE,
+    Allocation,
+    Debug,
+    EntryName,
+    Fidelity,
+    Frequency,
+    IntoCatalogue,
+    Json,
+    Model,
+    Overrides,
+    Quiet,
+    Scenario,
+    Seed,
+)
 
 
 def cost(
@@ -87,13 +101,9 @@ def measure(
 
 def ros(
     client: Annotated[str, typer.Option(metavar="roscpp|rospy|rclpy", help="The client library.")],
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
-    ] = Path("catalogue.yaml"),
-    frequency: Annotated[
-        float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
-    ] = None,
-    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    out: IntoCatalogue = CATALOGUE,
+    frequency: Frequency = None,
+    name: EntryName = "",
     python: Annotated[
         str, typer.Option(metavar="PATH", help="The Python that has rospy or rclpy; by default this one.")
     ] = "",
@@ -124,13 +134,9 @@ def ros(
 
 
 def python(
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
-    ] = Path("catalogue.yaml"),
-    frequency: Annotated[
-        float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
-    ] = None,
-    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    out: IntoCatalogue = CATALOGUE,
+    frequency: Frequency = None,
+    name: EntryName = "",
     rounds: Annotated[
         tuple[int, int], typer.Option(metavar="LEAST MOST", help="How often each piece of code is timed.")
     ] = (9, 31),
@@ -160,10 +166,8 @@ def python(
 
 
 def processor(
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
-    ] = Path("catalogue.yaml"),
-    name: Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")] = "",
+    out: IntoCatalogue = CATALOGUE,
+    name: EntryName = "",
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
