@@ -57,3 +57,13 @@ def distance(here: Position | None, there: Position) -> float:
         here.latitude, here.longitude, 0.0
     )
     return hypot(east, north)
+
+
+def risen(height: float) -> Callable[[Telemetry], bool]:
+    """In the air, *height* metres above home, and no longer going up or down."""
+
+    def up(seen: Telemetry) -> bool:
+        near = abs(seen.above_home - height) <= NEAR_UP_M
+        return seen.flying and near and abs(seen.velocity.up) <= STANDING_M_S
+
+    return up

@@ -20,7 +20,7 @@ from volery.drivers.ardupilot.items import items_of
 from volery.drivers.ardupilot.modes import GUIDED
 from volery.drivers.ardupilot.setpoints import Setpoints
 from volery.drivers.ardupilot.silence import if_silent
-from volery.drivers.arrival import DRONE_KIND, NEAR_UP_M, STANDING_M_S, standing
+from volery.drivers.arrival import DRONE_KIND, risen, standing
 from volery.drivers.mavlink import commands as key
 from volery.drivers.mavlink.commands import Item
 from volery.drivers.mavlink.sequences import Sequences
@@ -37,7 +37,7 @@ from volery.drivers.steps import (
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Step, Sticks
 from volery.vehicles.mission import MissionItem, Waypoint
-from volery.vehicles.telemetry import Telemetry, Velocity
+from volery.vehicles.telemetry import Velocity
 
 
 class ArduPilot(Sequences):
@@ -60,15 +60,10 @@ class ArduPilot(Sequences):
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Ready, GUIDED, armed, up: within 10 s of each other, or it disarms itself."""
-
-        def up(seen: Telemetry) -> bool:
-            near = abs(seen.above_home - height) <= NEAR_UP_M
-            return seen.flying and near and abs(seen.velocity.up) <= STANDING_M_S
-
         climb = Step(
             ask=f"climb to {height:g} m",
             send=lambda: self._commands.takeoff(height),
-            done=up,
+            done=risen(height),
             within=within,
             answer=key.TAKEOFF,
             again=2 * S,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from volery.base.time import Ns, S
-from volery.drivers.arrival import NEAR_UP_M, STANDING_M_S, distance
+from volery.drivers.arrival import distance, risen
 from volery.drivers.paparazzi.modes import FAILSAFE, GUIDED, KILL, LAND_BLOCK, NAV, START_BLOCK, TAKEOFF_BLOCK
 from volery.drivers.paparazzi.pieces import ARMING, Pieces
 from volery.drivers.paparazzi.uplink import COME_DOWN, VELOCITY_Z, Setpoint
@@ -68,14 +68,10 @@ class Ground:
                 spot.append(pieces.spot())
             self._uplink.setpoint(Setpoint(*spot[0], -height, pieces.heading()))
 
-        def up(seen: Telemetry) -> bool:
-            near = abs(seen.above_home - height) <= NEAR_UP_M
-            return seen.flying and near and abs(seen.velocity.up) <= STANDING_M_S
-
         straight_up = Step(
             ask=f"climb to {height:g} m",
             send=send,
-            done=up,
+            done=risen(height),
             within=within,
             again=S,
             mode=GUIDED,
