@@ -107,8 +107,15 @@ def require() -> Callable[[str, str], None]:
     return installed
 
 
+STREAMED_S = 0.02
+
+
 class Station:
-    """A ground station of pymavlink's ``mavutil`` alone; ``heard`` keeps the texts."""
+    """A ground station of pymavlink's ``mavutil`` alone; ``texts`` keeps what was said. ``streams`` is sent
+    fifty times a second, whatever it waits for.
+    """
+
+    streams: Callable[[], None] | None = None
 
     def __init__(self, url: str, system: int = 255) -> None:
         os.environ["MAVLINK20"] = "1"
@@ -117,7 +124,7 @@ class Station:
         self.mavlink = mavutil.mavlink
         self.connection = mavutil.mavlink_connection(url, source_system=system, source_component=190)
         self.texts: list[str] = []
-        self._beaten = -1.0
+        self._beaten = self._streamed = -1.0
 
     def close(self) -> None:
         self.connection.close()
@@ -133,7 +140,7 @@ class Station:
         end = monotonic() + within
         while monotonic() < end:
             self._beat()
-            message = self.connection.recv_match(blocking=True, timeout=0.2)
+            message = self.connection.recv_match(blocking=True, timeout=STREAMED_S if self.streams else 0.2)
             if message is None:
                 continue
             if message.get_type() == "STATUSTEXT":
@@ -148,6 +155,9 @@ class Station:
             self.wait("STATUSTEXT", lambda message: message.text.startswith(start))
 
     def _beat(self) -> None:
+        if self.streams is not None and monotonic() - self._streamed > STREAMED_S:
+            self._streamed = monotonic()
+            self.streams()
         if monotonic() - self._beaten > 0.2:
             self._beaten = monotonic()
             self.connection.mav.heartbeat_send(self.mavlink.MAV_TYPE_GCS, 8, 0, 0, 0)

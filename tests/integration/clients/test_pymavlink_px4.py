@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import nan
-from time import monotonic, sleep
 from typing import Any
 
 import pytest
@@ -25,14 +24,10 @@ def reached(request: Any, serve: Callable[..., Any], station: Callable[..., Any]
     return station(f"tcp:{where}" if request.param == "tcp" else f"udpin:{where}")
 
 
-def streamed(station: Any, seconds: float, north: float, down: float) -> None:
-    """Set-points, fifty a second."""
-    end = monotonic() + seconds
-    while monotonic() < end:
-        station.connection.mav.set_position_target_local_ned_send(
-            0, 1, 1, 1, POSITION_ONLY, north, 0, down, 0, 0, 0, 0, 0, 0, 0, 0
-        )
-        sleep(0.02)
+def to(station: Any, north: float, down: float) -> Callable[[], None]:
+    """Sends that set-point."""
+    point = (0, 1, 1, 1, POSITION_ONLY, north, 0, down, 0, 0, 0, 0, 0, 0, 0, 0)
+    return lambda: station.connection.mav.set_position_target_local_ned_send(*point)
 
 
 def shown(station: Any, number: int) -> Any:
@@ -53,10 +48,11 @@ def test_from_boot_to_the_ground_again(reached: Any) -> None:
     reached.wait("EXTENDED_SYS_STATE", lambda state: state.landed_state == 2)
     assert reached.command(176, 1, 6) == TEMPORARILY_REJECTED
     reached.wait_text("Switching to OFFBOARD is currently not available")
-    streamed(reached, 0.5, 8.0, -6.0)
-    assert reached.command(176, 1, 6) == 0
-    streamed(reached, 3.0, 8.0, -6.0)
+    reached.streams = to(reached, 8.0, -6.0)
+    while reached.command(176, 1, 6) == TEMPORARILY_REJECTED:
+        reached.wait("LOCAL_POSITION_NED")  # it wants to have seen the stream for a while
     assert reached.wait("LOCAL_POSITION_NED", lambda place: place.x > 6.0).x < 12.0
+    reached.streams = None
     assert reached.command(176, 1, 4, 6) == 0
     shown(reached, LAND_MODE)
     reached.wait_armed(False)
