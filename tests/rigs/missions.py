@@ -32,3 +32,10 @@ def carried_out(
     if isinstance(found, Exception):
         raise found
     return found
+
+
+def stabilize_by_idle_throttle(drone: Any) -> None:
+    """In the air it would fall."""
+    drone.takeoff(10)
+    drone.manual_control(0, 0, 0, 0)
+    drone.stabilize()

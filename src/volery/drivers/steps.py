@@ -40,6 +40,13 @@ def until_ready(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
     )
 
 
+def until_disarmed(ask: str, mode: str, within: Ns, leads_to: tuple[str, ...] = ()) -> Step:
+    """In *mode* it comes down by itself and stops its motors."""
+    return Step(
+        ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode, leads_to=leads_to
+    )
+
+
 def heads(degrees: float) -> Callable[[Telemetry], bool]:
     """It looks *degrees* clockwise from north."""
 

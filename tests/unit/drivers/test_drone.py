@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import stabilize_by_idle_throttle
 from volery.base.errors import (
     CapabilityError,
     Failsafe,
@@ -545,13 +546,8 @@ def test_sticks_are_let_go_when_a_pilot_takes_over(bench: Make) -> None:
 def test_stabilize_with_an_idle_throttle_in_the_air_is_refused(bench: Make) -> None:
     at = bench()
 
-    def mission(drone: Any) -> None:
-        drone.takeoff(10)
-        drone.manual_control(0, 0, 0, 0)
-        drone.stabilize()
-
     with pytest.raises(UsageError, match="the motors would idle and it would fall"):
-        at.fly(mission)
+        at.fly(stabilize_by_idle_throttle)
     assert at.craft.mode == "GUIDED"
 
 

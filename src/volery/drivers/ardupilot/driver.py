@@ -33,6 +33,7 @@ from volery.drivers.steps import (
     check_not_idle,
     heads,
     nothing,
+    until_disarmed,
 )
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Step, Sticks
@@ -201,8 +202,11 @@ class ArduPilot(Sequences):
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
-        return (*self._change(mode), at_once("let go of the sticks", self._setpoints.release), down)
+        return (
+            *self._change(mode),
+            at_once("let go of the sticks", self._setpoints.release),
+            until_disarmed(ask, mode, within),
+        )
 
     def _stay(self) -> None:
         here = self.telemetry.position

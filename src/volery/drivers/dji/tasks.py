@@ -11,7 +11,7 @@ from volery.drivers.dji import carrier as key
 from volery.drivers.dji.hearing import TAKES_OFF
 from volery.drivers.dji.names import GO_HOME, LAND, TAKE_OFF
 from volery.drivers.dji.pieces import ASK_AGAIN, SDK, STARTS, WAITS, Pieces
-from volery.drivers.steps import ANSWERED_WITHIN, ARMED_WITHIN, nothing
+from volery.drivers.steps import ANSWERED_WITHIN, ARMED_WITHIN, until_disarmed
 from volery.messages.dji import DisplayMode
 from volery.vehicles.driver import Step
 from volery.vehicles.telemetry import Telemetry
@@ -111,5 +111,4 @@ class Tasks:
             enters=mode.name,
             leads_to=(WAITS, SDK),
         )
-        down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode.name)
-        return (self._pieces.quiet(), begin, down)
+        return (self._pieces.quiet(), begin, until_disarmed(ask, mode.name, within))

@@ -14,7 +14,7 @@ from volery.drivers.arrival import distance, risen
 from volery.drivers.paparazzi.modes import FAILSAFE, GUIDED, KILL, LAND_BLOCK, NAV, START_BLOCK, TAKEOFF_BLOCK
 from volery.drivers.paparazzi.pieces import ARMING, Pieces
 from volery.drivers.paparazzi.uplink import COME_DOWN, VELOCITY_Z, Setpoint
-from volery.drivers.steps import nothing
+from volery.drivers.steps import until_disarmed
 from volery.vehicles.driver import Step
 from volery.vehicles.telemetry import Telemetry
 
@@ -177,11 +177,4 @@ class Ground:
         self._uplink.emergency(COME_DOWN)
 
     def _down(self, mode: str, within: Ns) -> Step:
-        return Step(
-            ask="land",
-            send=nothing,
-            done=lambda seen: not seen.armed,
-            within=within,
-            mode=mode,
-            leads_to=(KILL,),
-        )
+        return until_disarmed("land", mode, within, (KILL,))

@@ -48,6 +48,7 @@ from volery.drivers.steps import (
     check_not_idle,
     heads,
     nothing,
+    until_disarmed,
 )
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import Repeat, Step, Sticks
@@ -316,10 +317,6 @@ class PX4(Sequences):
         self._offboard.stop()
         self._sticks.stop()
 
-    def close(self) -> None:
-        """Stop talking and let go of the link."""
-        super().close()
-
     # -- missions
 
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
@@ -360,5 +357,4 @@ class PX4(Sequences):
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        down = Step(ask=ask, send=nothing, done=lambda seen: not seen.armed, within=within, mode=mode)
-        return (*self._let_go(), *self._change(mode), down)
+        return (*self._let_go(), *self._change(mode), until_disarmed(ask, mode, within))

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import stabilize_by_idle_throttle
 from volery.base.errors import (
     CapabilityError,
     Failsafe,
@@ -241,13 +242,8 @@ def test_from_the_ground_it_is_armed_and_flown_by_hand_without_gps(bench: Make) 
 def test_an_idle_throttle_in_the_air_is_refused(bench: Make) -> None:
     at = bench()
 
-    def mission(drone: Any) -> None:
-        drone.takeoff(10)
-        drone.manual_control(0.0, 0.0, 0.0, 0.0)
-        drone.stabilize()
-
     with pytest.raises(UsageError, match="the motors would idle and it would fall"):
-        at.fly(mission)
+        at.fly(stabilize_by_idle_throttle)
 
 
 # -- what goes wrong

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.missions import stabilize_by_idle_throttle
 from volery.base.errors import (
     CapabilityError,
     Failsafe,
@@ -432,13 +433,8 @@ def test_sticks_of_somebody_else_end_ours(bench: Make) -> None:
 def test_stabilized_with_an_idle_throttle_in_the_air_is_refused(bench: Make) -> None:
     at = bench()
 
-    def mission(drone: Any) -> None:
-        drone.takeoff(10)
-        drone.manual_control(0, 0, 0, 0)
-        drone.stabilize()
-
     with pytest.raises(UsageError, match="it would fall"):
-        at.fly(mission)
+        at.fly(stabilize_by_idle_throttle)
 
 
 # -- missions
