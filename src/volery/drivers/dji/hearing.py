@@ -94,6 +94,8 @@ class Hearing:
 
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True
+        if message.data == M100Status.FINISHED_LANDING != self._status and self.aircraft == M100:
+            self._motors = False  # when it begins to say so; it goes on for a while, whatever is started then
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
             self._seen.heard = self._kernel.now()
@@ -219,8 +221,6 @@ class Hearing:
     def _judge_m100(self) -> int:
         """It has no display mode: what it does follows from its status and from what was asked of it."""
         seen, status = self._seen, self._status
-        if status == M100Status.FINISHED_LANDING:
-            self._motors = False
         moving = (M100Status.TAKING_OFF, M100Status.IN_AIR, M100Status.LANDING)
         seen.armed = self._motors or status in moving
         seen.flying = status in (M100Status.IN_AIR, M100Status.LANDING)

@@ -97,6 +97,21 @@ def test_a_tour_arrives_by_the_aircrafts_own_estimate(options: str) -> None:
     assert not flown.drone.armed
 
 
+@pytest.mark.parametrize("options", ["", "&parameters=AIRCRAFT:2"], ids=["3.8", "M100"])
+def test_motors_start_again_just_after_a_landing(options: str) -> None:
+    flown = Flown(options)
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(5.0)
+        drone.land()
+        assert not drone.armed
+        drone.arm()
+        assert drone.armed
+        drone.disarm()
+
+    assert [one.outcome for one in flown.fly(mission)] == ["ok"] * 4
+
+
 def test_the_same_seed_is_the_same_flight() -> None:
     bad = "&wire=bytes&drop=0.05&jitter=0.02"
     first, again, other = (Flown(bad, seed) for seed in (3, 3, 4))
