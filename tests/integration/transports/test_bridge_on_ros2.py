@@ -64,3 +64,13 @@ def test_a_vehicle_behind_mavros(beside: Beside) -> None:
     assert found["home"] == pytest.approx(900.0, abs=2.0)
     assert found["went"] == pytest.approx(0.00008, abs=1e-5)
     assert not found["armed"]
+
+
+def test_the_graph_is_shown_to_whoever_has_just_come(beside: Beside) -> None:
+    """All of it: who joins knows nobody at first."""
+    found = beside("ros2_shown.py", "/mavros/state")
+    assert found["nodes"] == ["/mavros/mavros"]
+    topics = {topic["name"]: topic for topic in found["topics"]}
+    assert topics["/mavros/state"]["publishers"] == ["/mavros/mavros"]
+    assert len(topics) > 40
+    assert "/mavros/cmd/arming" in {service["name"] for service in found["services"]}

@@ -180,7 +180,6 @@ class Ros2:
     def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Wire:
         """Make a node."""
         full = names.node_name(name, namespace)
-        self._wait_for_discovery()
         if self._is_taken(full):
             raise UsageError(
                 f"a node named {full} is there already; choose another name or namespace for this one"
@@ -210,17 +209,20 @@ class Ros2:
             node.destroy_node()
 
     def _wait_for_discovery(self) -> None:
+        """Whoever has just joined knows nobody yet."""
         left = self._began + DISCOVERY_S - time.monotonic()
         if left > 0:
             time.sleep(left)
 
     def node_names(self) -> list[str]:
         """Whom it has discovered."""
+        self._wait_for_discovery()
         known = self._own.get_node_names_and_namespaces()
         return sorted({names.join(space, name) for name, space in known if not name.startswith(HIDDEN)})
 
     def topics(self) -> list[TopicState]:
         """What it has discovered."""
+        self._wait_for_discovery()
         found = []
         for name, kinds in sorted(self._own.get_topic_names_and_types()):
             publishers = _users(self._own.get_publishers_info_by_topic(name))
@@ -231,6 +233,7 @@ class Ros2:
 
     def services(self) -> list[ServiceState]:
         """What it has discovered."""
+        self._wait_for_discovery()
         servers: dict[str, tuple[str, str]] = {}
         for name, space in self._own.get_node_names_and_namespaces():
             with suppress(Exception):  # a node that has just left
