@@ -1,6 +1,5 @@
 """The report in a real browser: it draws, it plays, the slider moves the vehicles, a phone can read it."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigs.requirements import lacking
 from volery.report.comparison import write_comparison
 from volery.report.document import write_report
 from volery.requirements.accounts import Accounts
@@ -21,20 +21,14 @@ pytestmark = pytest.mark.integration
 _CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-def _miss(what: str) -> None:
-    if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
-        pytest.fail(f"{what}, and VOLERY_REQUIRE_ALL=1 asks for it")
-    pytest.skip(what)
-
-
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     if _CHROMIUM is None:
-        _miss("no Chromium is installed (Debian: apt install chromium)")
+        lacking("no Chromium is installed (Debian: apt install chromium)")
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        _miss("playwright is not installed (pip install playwright)")
+        lacking("playwright is not installed (pip install playwright)")
     with sync_playwright() as playwright:
         running = playwright.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"])
         yield running

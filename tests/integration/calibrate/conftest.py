@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
+from rigs.requirements import lacking
 from volery.base.errors import UsageError
 from volery.calibrate.ros.stage import check_client
 
@@ -16,6 +15,4 @@ def ros() -> None:
         check_client("rospy")
         check_client("roscpp")
     except UsageError as error:
-        if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
-            pytest.fail(f"{error}, and VOLERY_REQUIRE_ALL=1 asks for it")
-        pytest.skip(str(error))
+        lacking(str(error))

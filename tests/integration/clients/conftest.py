@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from rigs.requirements import lacking
+
 HERE = "127.0.0.1"
 WITHIN_S = 60.0
 """Longer than anything here takes on a busy machine; nothing waits so long unless it fails."""
@@ -97,12 +99,8 @@ def require() -> Callable[[str, str], None]:
     """Skip for want of a client package; where everything is required, fail."""
 
     def installed(module: str, package: str) -> None:
-        if find_spec(module) is not None:
-            return
-        reason = f"{package} is not installed (pip install {package})"
-        if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
-            pytest.fail(f"{reason}, and VOLERY_REQUIRE_ALL=1 asks for it")
-        pytest.skip(reason)
+        if find_spec(module) is None:
+            lacking(f"{package} is not installed (pip install {package})")
 
     return installed
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from rigs.requirements import lacking
 from volery.run.options import Options
 from volery.run.result import Run
 from volery.run.simulate import simulate
@@ -23,10 +23,15 @@ FILES = Path(__file__).parent / "files"
 def compiler(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler is needed; what it makes is kept beside pytest's own cache."""
     if shutil.which("g++") is None:
-        if os.environ.get("VOLERY_REQUIRE_ALL"):
-            pytest.fail("there is no g++, and VOLERY_REQUIRE_ALL=1 asks for it")
-        pytest.skip("there is no g++")
+        lacking("there is no g++ (scripts/debian-packages g++)")
     monkeypatch.setenv("XDG_CACHE_HOME", str(request.config.cache.mkdir("cpp")))
+
+
+@pytest.fixture
+def llvm() -> None:
+    """What counts blocks is needed as well."""
+    if shutil.which("opt-19") is None:
+        lacking("there is no LLVM (scripts/debian-packages native)")
 
 
 class Outcome:

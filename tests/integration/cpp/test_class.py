@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 
 from volery.base.errors import UsageError
@@ -120,7 +118,7 @@ def test_the_same_seed_gives_the_same_trace(run_model, tmp_path):
     assert first == second
 
 
-@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+@pytest.mark.usefixtures("llvm")
 def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
     outcome = run_model(MODEL, "adder.cpp", fidelity="code", lister=LISTER, caller=CALLER)
     assert outcome.run.completed, outcome.run.record.outcome
@@ -133,7 +131,7 @@ def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
     assert "comes from its code alone" in doubt
 
 
-@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+@pytest.mark.usefixtures("llvm")
 def test_what_it_costs_is_learnt_from_a_run(run_model, tmp_path, monkeypatch):
     """From then on the costs are those of what ran; the rest is charged as before."""
     monkeypatch.setenv("VOLERY_CACHE", str(tmp_path / "cache"))
@@ -166,7 +164,7 @@ def test_there_is_nothing_to_learn_of_python(tmp_path):
         learn(load(tmp_path / "model.yaml", vocabulary()), Options())
 
 
-@pytest.mark.skipif(shutil.which("opt-19") is None, reason="there is no LLVM: scripts/debian-packages native")
+@pytest.mark.usefixtures("llvm")
 def test_a_core_that_the_model_brings_along_is_counted_for(run_model, tmp_path):
     law = catalogue().processor("intel-i5-3470").core_law().model_copy(update={"name": ""})
     machine = Machine("mine", "a computer", 2, 3000.0)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rigs.requirements import lacking
 from volery.components.cpp.build import INCLUDE
 from volery.faces import roscpp
 from volery.messages import from_cdr
@@ -84,7 +85,7 @@ def test_it_compiles_without_boost(tmp_path):
 
 def test_it_compiles_with_the_real_roscpp():
     if shutil.which("pkg-config") is None or subprocess.run(["pkg-config", "roscpp"], check=False).returncode:
-        pytest.skip("there is no roscpp: scripts/debian-packages roscpp")
+        lacking("there is no roscpp (scripts/debian-packages roscpp)")
     flags = subprocess.run(["pkg-config", "--cflags", "roscpp"], capture_output=True, text=True, check=True)
     _check("pose_keeper.cpp", *flags.stdout.split())
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from rigs.requirements import lacking
 from volery.base.time import MS, S
 from volery.graph import Node
 from volery.kernel.task import Place
@@ -26,12 +27,6 @@ from volery.transports.ros1.roscore import environment
 
 HERE = Path(__file__).parent
 LIMIT_S = 30
-
-
-def lacking(what: str) -> None:
-    if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
-        pytest.fail(f"{what}, and VOLERY_REQUIRE_ALL=1 asks for it")
-    pytest.skip(what)
 
 
 def python_of(distribution: str) -> str:
