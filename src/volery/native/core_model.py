@@ -115,6 +115,98 @@ def _forwarded(keys: Array, times: Array, key: np.int64, one: Array, start: floa
 
 
 @njit(cache=True)
+def _loaded(used: Array, capacity: Array, operation: Array, at: float, times: int) -> float:
+    """When the last of so many loads has what the first cache serves."""
+    started = at
+    for _ in range(times):
+        started = _issue(used, capacity, operation, at, 1.0)
+    return float(started + operation[LATENCY])
+
+
+@njit(cache=True)
+def _there(registers: Array, ready: Array, start: float) -> float:
+    """When the last of these registers has its value."""
+    at = start
+    for register in registers:
+        if register >= 0:
+            at = max(at, ready[register])
+    return at
+
+
+@njit(cache=True)
+def _place(one: Array, version: Array) -> np.int64:
+    """The name of a place in memory: the text of its address and the versions of the registers in it."""
+    key = np.int64(one[PLACE]) * 1000003
+    for register in one[FIRST_ADDRESS : FIRST_ADDRESS + ADDRESSES]:
+        if register >= 0:
+            key = (key ^ version[register]) * 16777619 + register
+    return key
+
+
+@njit(cache=True)
+def _written(registers: Array, ready: Array, version: Array, done: float, changes: int) -> int:
+    """These registers have a new value at *done*; returns how many changes there have been."""
+    for register in registers:
+        if register >= 0:
+            ready[register] = done
+            changes += 1
+            version[register] = changes
+    return changes
+
+
+@njit(cache=True)
+def _fetched(
+    late: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
+) -> tuple[float, float]:
+    """When the last of a load's late accesses arrives, and from when on memory is free again."""
+    arrives = at
+    for i in range(first, last):
+        level, ahead = late[i, LEVEL], late[i, AHEAD]
+        if level == len(levels) - 1 and line > 0.0:
+            begins = max(free, at - LINES_AHEAD * line if ahead else at)
+            free = begins + line
+            arrives = max(arrives, free if ahead else begins + levels[level])
+        elif not ahead:
+            arrives = max(arrives, at + levels[level])
+    return arrives, free
+
+
+@njit(cache=True)
+def _sent(late: Array, first: int, last: int, levels: Array, line: float, at: float, free: float) -> float:
+    """From when on memory is free again after a store's late accesses, for which nobody waits."""
+    for i in range(first, last):
+        if late[i, LEVEL] == len(levels) - 1 and line > 0.0:
+            free = max(free, at) + line
+    return free
+
+
+@njit(cache=True)
+def _of_this(late: Array, first: int, step: int, row: int) -> int:
+    """Where the late accesses end that belong to this instruction."""
+    last = first
+    while last < len(late) and late[last, STEP] == step and late[last, ROW] == row:
+        last += 1
+    return last
+
+
+@njit(cache=True)
+def _foreseen(
+    predictor: Any, lengths: Array, targets: Array, kind: int, row: int, taken: bool, target: int
+) -> bool:
+    """Whether the core enters the right piece after a branch; it learns from what was right."""
+    right = True
+    if kind == CONDITIONAL:
+        right = foresees(predictor, lengths, row, taken)
+    elif kind == COMPUTED:
+        seen = (row ^ predictor[3][len(lengths) // 2, 0]) % PLACES
+        right = targets[seen] == target
+        targets[seen] = target
+    if kind != CONDITIONAL or taken:
+        remember(predictor, lengths, row, target)
+    return right
+
+
+@njit(cache=True)
 def run(
     pieces: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
     slots: Array, library: Array, lengths: Array, late: Array, levels: Array, line: float,
@@ -140,7 +232,7 @@ def run(
     predictor = fresh(len(lengths))
     targets = np.full(PLACES, -1, dtype=np.int64)
     enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
-    next_late, memory_free, memory = 0, 0.0, len(levels) - 1
+    next_late, free = 0, 0.0
     for step in range(count):
         piece = pieces[step]
         stalled[step] = max(0.0, resumes - clock)
@@ -148,89 +240,41 @@ def run(
         for row in range(first[piece], first[piece + 1]):
             one = table[row]
             enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
-            start = enters
             if one[KIND] == LIBRARY:
-                enters = start + library[row]
-                done = max(start, ready[0], ready[1]) + 2.0 * library[row]
+                done = max(enters, ready[0], ready[1]) + 2.0 * library[row]
+                enters += library[row]
                 ready[0] = ready[1] = done
-                retired = max(retired, done)
-                leaves[number % window] = retired
-                number += 1
-                continue
-            at = start
-            key = np.int64(one[PLACE]) * 1000003
-            for i in range(ADDRESSES):
-                register = one[FIRST_ADDRESS + i]
-                if register >= 0:
-                    at = max(at, ready[register])
-                    key = (key ^ version[register]) * 16777619 + register
-            operand = start
-            for i in range(READS):
-                register = one[FIRST_READ + i]
-                if register >= 0:
-                    operand = max(operand, ready[register])
-            if one[LOAD] >= 0:
-                loaded = at
-                for _ in range(one[LOADS]):
-                    loaded = _issue(used, capacity, operations[one[LOAD]], at, 1.0)
-                loaded += operations[one[LOAD], LATENCY]
-                arrives = at
-                while next_late < len(late) and late[next_late, STEP] == step and late[next_late, ROW] == row:
-                    level, ahead = late[next_late, LEVEL], late[next_late, AHEAD]
-                    next_late += 1
-                    if level == memory and line > 0.0:
-                        begins = max(memory_free, at - LINES_AHEAD * line if ahead else at)
-                        memory_free = begins + line
-                        arrives = max(arrives, memory_free if ahead else begins + levels[level])
-                    elif not ahead:
-                        arrives = max(arrives, at + levels[level])
-                loaded = max(loaded, arrives)
-                if one[PLACE] != 0:
-                    loaded = max(loaded, _forwarded(stored_key, stored, key, one, at, core[FORWARD]))
-                operand = max(operand, loaded)
-            done = operand
-            if one[OPERATION] >= 0:
-                operation = operations[one[OPERATION]]
-                done = _issue(used, capacity, operation, operand, float(one[TIMES]))
-                done += operation[LATENCY]
-            while next_late < len(late) and late[next_late, STEP] == step and late[next_late, ROW] == row:
-                if late[next_late, LEVEL] == memory and line > 0.0:  # nobody waits for a store
-                    memory_free = max(memory_free, at) + line
-                next_late += 1
-            if one[STORE] >= 0:
-                sent = _issue(used, capacity, operations[one[STORE]], at, 1.0)
-                done = max(done, sent)
-                if one[PLACE] != 0:
-                    _remembered(stored_key, stored, key, one, number, done, max(done, retired))
-            for i in range(WRITES):
-                register = one[FIRST_WRITE + i]
-                if register >= 0:
-                    ready[register] = done
-                    changes += 1
-                    version[register] = changes
-            for i in range(BUMPS):
-                register = one[FIRST_BUMP + i]
-                if register >= 0:
-                    ready[register] = at + 1.0
-                    changes += 1
-                    version[register] = changes
+            else:
+                at = _there(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
+                done = _there(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
+                place = _place(one, version) if one[PLACE] != 0 else np.int64(0)
+                last_late = _of_this(late, next_late, step, row)
+                if one[LOAD] >= 0:
+                    loaded = _loaded(used, capacity, operations[one[LOAD]], at, one[LOADS])
+                    arrives, free = _fetched(late, next_late, last_late, levels, line, at, free)
+                    done = max(done, loaded, arrives)
+                    if one[PLACE] != 0:
+                        done = max(done, _forwarded(stored_key, stored, place, one, at, core[FORWARD]))
+                else:
+                    free = _sent(late, next_late, last_late, levels, line, at, free)
+                next_late = last_late
+                if one[OPERATION] >= 0:
+                    operation = operations[one[OPERATION]]
+                    done = _issue(used, capacity, operation, done, float(one[TIMES])) + operation[LATENCY]
+                if one[STORE] >= 0:
+                    done = max(done, _issue(used, capacity, operations[one[STORE]], at, 1.0))
+                    if one[PLACE] != 0:
+                        _remembered(stored_key, stored, place, one, number, done, max(done, retired))
+                changes = _written(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
+                changes = _written(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
             retired = max(retired, done)
             leaves[number % window] = retired
             number += 1
-            if one[KIND] == PLAIN or step + 1 == count:
+            if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
                 continue
             target = pieces[step + 1]
-            right = True
-            if one[KIND] == CONDITIONAL:
-                right = foresees(predictor, lengths, row, taken[step] == 1)
-            elif one[KIND] == COMPUTED:
-                seen = (row ^ predictor[3][len(lengths) // 2, 0]) % PLACES
-                right = targets[seen] == target
-                targets[seen] = target
-            if not right:
+            if not _foreseen(predictor, lengths, targets, one[KIND], row, taken[step] == 1, target):
                 resumes = done + core[REFILL]
-            if one[KIND] != CONDITIONAL or taken[step] == 1:
-                remember(predictor, lengths, row, target)
         finished = max(retired, enters)
         cost[step] = finished - clock
         clock = finished
