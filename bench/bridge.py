@@ -24,9 +24,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from volery.transports.ros1 import Roscore
-from volery.transports.ros1.packages import write_package
-from volery.transports.ros1.roscore import environment
+from volery.ros.transports.ros1 import Roscore
+from volery.ros.transports.ros1.packages import write_package
+from volery.ros.transports.ros1.roscore import environment
 
 RATES_HZ = (10, 50)
 SETTLE_S = 2.0

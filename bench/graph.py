@@ -14,17 +14,17 @@ from statistics import median
 from time import process_time
 from typing import Any
 
-from volery import messages
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
 from volery.cost import catalogue
-from volery.graph import Graph, free
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
-from volery.messages.cdr import copied_to_cdr
+from volery.ros import messages
+from volery.ros.graph import Graph, free
+from volery.ros.messages.cdr import copied_to_cdr
 
 POSE = "geometry_msgs/msg/PoseStamped"
 

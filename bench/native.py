@@ -23,16 +23,16 @@ from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
 
-from volery.calibrate.machine import this_machine
-from volery.calibrate.processor.campaign import measure
-from volery.calibrate.processor.entry import law_of
-from volery.calibrate.processor.timing import isa
+from volery.calibration.machine import this_machine
+from volery.calibration.processor.campaign import measure
+from volery.calibration.processor.entry import law_of
+from volery.calibration.processor.timing import isa
 from volery.cost import catalogue
 from volery.cost.core import CoreLaw
-from volery.native.costs import Costs, traced_costs
-from volery.native.program import Program, compile_program
-from volery.native.running import WINDOW, Wanted, build, build_timing, counts, timed, trace
-from volery.native.toolchain import run_tool
+from volery.cost.native.costs import Costs, traced_costs
+from volery.cost.native.program import Program, compile_program
+from volery.cost.native.running import WINDOW, Wanted, build, build_timing, counts, timed, trace
+from volery.cost.native.toolchain import run_tool
 
 KERNELS = Path(__file__).parent / "kernels"
 CALIBRATING, JUDGING = 0, 3

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from statistics import median
 from time import perf_counter
 
-from volery.autopilots.simulated.flight import Control, Flight, Setpoint, make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.world.columns import U_THROTTLE
-from volery.world.specs import Multirotor
-from volery.world.world import STEP, World
+from volery.simulation.autopilots.simulated.flight import Control, Flight, Setpoint, make_world
+from volery.simulation.world.columns import U_THROTTLE
+from volery.simulation.world.specs import Multirotor
+from volery.simulation.world.world import STEP, World
 
 HERE = LocalFrame(47.3977, 8.5456, 488.0)
 ROUNDS = 5

@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 from statistics import mean
 
-from volery.calibrate.python.campaign import calibrate
-from volery.calibrate.python.pieces import Rounds, Timed, program
+from volery.calibration.python.campaign import calibrate
+from volery.calibration.python.pieces import Rounds, Timed, program
 from volery.components.counting import Steps
 from volery.cost.interpreter import python_operations
 

@@ -25,16 +25,16 @@ from typing import TypeVar
 from rich.console import Console
 
 from volery.base.errors import UsageError
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import this_machine
-from volery.calibrate.measured.campaign import compare, estimated, prepared
-from volery.calibrate.measured.comparison import Compared
-from volery.calibrate.measured.runs import Run, running
-from volery.calibrate.ros.campaign import Circumstances, Plan
-from volery.calibrate.ros.entry import in_figures, law_of, write_entry
-from volery.calibrate.ros.fitting import Cost, costs
-from volery.calibrate.ros.samples import Round
-from volery.calibrate.ros.stage import Pace, check_client, own_master, stage
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import this_machine
+from volery.calibration.measured.campaign import compare, estimated, prepared
+from volery.calibration.measured.comparison import Compared
+from volery.calibration.measured.runs import Run, running
+from volery.calibration.ros.campaign import Circumstances, Plan
+from volery.calibration.ros.entry import in_figures, law_of, write_entry
+from volery.calibration.ros.fitting import Cost, costs
+from volery.calibration.ros.samples import Round
+from volery.calibration.ros.stage import Pace, check_client, own_master, stage
 from volery.cli.measure import tables
 from volery.cost import catalogue
 from volery.model.reader import load

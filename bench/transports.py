@@ -28,12 +28,12 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.faces.importable import importable
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.messages import message_class
-from volery.transports.ros1 import Roscore, available
+from volery.ros.client_libraries.importable import importable
+from volery.ros.graph import Graph
+from volery.ros.messages import message_class
+from volery.ros.transports.ros1 import Roscore, available
 
 SPACING_S = 0.005
 TIMEOUT_S = 120

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
-from volery.graph import Graph, QoS
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
+from volery.ros import messages
+from volery.ros.graph import Graph, QoS
 
 STRING, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/SetBool"
 

@@ -7,19 +7,23 @@ from math import isfinite
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autopilots.ardupilot import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
-from volery.autopilots.simulated.manoeuvres.points import root_speed, stopping_distance, stopping_point
-from volery.autopilots.simulated.parameters import INT8, INT16, INT32, REAL32, quantised
-from volery.autopilots.simulated.sticks import Travel
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame, Link
 from volery.links.mavlink import message_type
-from volery.world.specs import Multirotor
+from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.autopilots.simulated.manoeuvres.points import (
+    root_speed,
+    stopping_distance,
+    stopping_point,
+)
+from volery.simulation.autopilots.simulated.parameters import INT8, INT16, INT32, REAL32, quantised
+from volery.simulation.autopilots.simulated.sticks import Travel
+from volery.simulation.world.specs import Multirotor
 
 speeds = st.floats(0.0, 50.0)
 accels = st.floats(0.1, 10.0)

@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery import messages
 from volery.base.errors import UsageError
-from volery.messages.stamp import TimeValue
+from volery.ros import messages
+from volery.ros.messages.stamp import TimeValue
 
 FLOATS = st.floats(allow_nan=False, width=64)
 TEXTS = st.text(st.characters(exclude_characters="\x00", exclude_categories=["Cs"]), max_size=40)

@@ -8,10 +8,6 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autopilots.paparazzi import DIALECT
-from volery.autopilots.paparazzi.datalink import HANDLERS
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
@@ -19,7 +15,11 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprzlink import PPRZLINK
 from volery.links.pprzlink_definitions import message_type
-from volery.world.specs import Multirotor
+from volery.simulation.autopilots.paparazzi import DIALECT
+from volery.simulation.autopilots.paparazzi.datalink import HANDLERS
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Multirotor
 
 AIRCRAFT = 1
 FULL_SETTINGS = range(4)

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
-from volery.graph import names
+from volery.ros.graph import names
 
 TOKENS = st.from_regex(r"[A-Za-z][A-Za-z0-9]{0,8}", fullmatch=True)
 RELATIVE = st.lists(TOKENS, min_size=1, max_size=4).map("/".join)

@@ -5,11 +5,11 @@ from math import isfinite
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autopilots.simulated.flight import Control, Setpoint, make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.world.specs import Multirotor, Rover
-from volery.world.wind import Wind
+from volery.simulation.autopilots.simulated.flight import Control, Setpoint, make_world
+from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.world.wind import Wind
 
 HERE = LocalFrame(47.4, 8.5, 400.0)
 LENGTH = 4000  # milliseconds

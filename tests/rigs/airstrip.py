@@ -6,8 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from rigs.missions import carried_out
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.registry import Registry
@@ -17,9 +15,11 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame, Link
 from volery.links.wire import WireFaults, wire
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Multirotor, Rover
 from volery.trace.events import Operation
 from volery.vehicles import Drone, Vehicle
-from volery.world.specs import Multirotor, Rover
 
 FRAME = LocalFrame(46.0825, -103.8995, 900.0)
 dialects: Registry[Any] = Registry("volery.autopilots", "autopilot")

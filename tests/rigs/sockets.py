@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from rigs.airstrip import FRAME, at, dialects
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
 from volery.base.time import HOUR
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.coded import CodedLink
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Multirotor
 from volery.vehicles import Drone, drivers
-from volery.world.specs import Multirotor
 
 HERE = "127.0.0.1"
 PACE = 20.0

@@ -15,7 +15,7 @@ from volery.bridge.modes import mode_names, mode_number
 from volery.bridge.offering import Service, Surroundings
 from volery.bridge.streams import request_stream
 from volery.kernel.waiting import Lock
-from volery.messages import service
+from volery.ros.messages import service
 
 ACK_WITHIN: Ns = 5 * S
 ACCEPTED, FAILED, IN_PROGRESS = 0, 4, 5

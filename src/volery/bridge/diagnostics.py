@@ -13,7 +13,7 @@ from volery.base.time import Ns
 from volery.bridge.modes import mode_name
 from volery.bridge.offering import Fields, Surroundings, Topic, Translate, stamped
 from volery.links.mavlink import entry_name
-from volery.messages import message_class, new
+from volery.ros.messages import message_class, new
 
 DIAGNOSTICS = "/diagnostics"
 _ARRAY = "diagnostic_msgs/msg/DiagnosticArray"

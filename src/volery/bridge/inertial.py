@@ -14,7 +14,7 @@ from volery.base import frames
 from volery.base.time import Ns
 from volery.bridge.offering import BODY, Fields, Surroundings, Topic, Translate, stamped
 from volery.bridge.wire import Wire
-from volery.messages import message_class, new
+from volery.ros.messages import message_class, new
 
 G = 9.80665
 TESLA = 1e-4

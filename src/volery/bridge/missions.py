@@ -13,7 +13,7 @@ from volery.base.time import MS, Ns
 from volery.bridge.offering import LATCHED_STATE, Fields, Service, Surroundings, Topic, Translate, stamped
 from volery.bridge.wire import Ear
 from volery.links.link import Frame
-from volery.messages import new, service
+from volery.ros.messages import new, service
 
 ANSWER_WITHIN: Ns = 1500 * MS
 TRIES = 3

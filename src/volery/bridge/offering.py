@@ -12,8 +12,8 @@ from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import Ns, S
 from volery.bridge.wire import Wire
-from volery.graph import DEFAULT, TRANSIENT_LOCAL, Handler, Node, QoS
-from volery.messages import message_class
+from volery.ros.graph import DEFAULT, TRANSIENT_LOCAL, Handler, Node, QoS
+from volery.ros.messages import message_class
 
 BODY = "base_link"
 """The frame of the vehicle's body: forward, left, up."""

@@ -17,7 +17,7 @@ from volery.bridge.modes import PX4_ID
 from volery.bridge.offering import Fields, Service, Surroundings, Topic, Translate, stamped
 from volery.links.link import Frame
 from volery.links.parameter_values import as_bytes, from_bytes
-from volery.messages import new, service
+from volery.ros.messages import new, service
 
 ANSWER_WITHIN: Ns = 1000 * MS
 TRIES = 3

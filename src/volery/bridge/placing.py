@@ -15,7 +15,7 @@ from volery.base import frames
 from volery.base.time import Ns
 from volery.bridge.inertial import body_rates, orientation
 from volery.bridge.offering import BODY, LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
-from volery.messages import message_class, new
+from volery.ros.messages import message_class, new
 
 MAP = "map"
 _UNKNOWN_U8, _UNKNOWN_U16 = 255, 65535

@@ -16,10 +16,10 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.bridge.vehicle_node import WARNING
-from volery.graph import Node, RosGraph
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Frame, Link
 from volery.links.pprz_message import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
+from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
 
 PERIOD: Ns = 100 * MS

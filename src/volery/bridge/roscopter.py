@@ -31,7 +31,7 @@ from volery.bridge.offering import (
 )
 from volery.bridge.streams import ALL
 from volery.links.mavlink import entry_name
-from volery.messages import new, service
+from volery.ros.messages import new, service
 
 CHANNELS = 8
 MILLI = 1000.0

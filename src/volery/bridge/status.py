@@ -13,7 +13,7 @@ from volery.base.time import Ns
 from volery.bridge.modes import Firmware, mode_name
 from volery.bridge.offering import BODY, LATCHED_STATE, Fields, Surroundings, Topic, Translate, stamped
 from volery.links.status_texts import Texts
-from volery.messages import new
+from volery.ros.messages import new
 
 _UNKNOWN_U16 = 65535
 _SERVOS = 16

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from volery.base import frames
 from volery.base.time import Ns
 from volery.bridge.offering import Fields, Surroundings, Topic, Translate, stamped
-from volery.messages import message_class, new
+from volery.ros.messages import message_class, new
 
 _LOCAL, _GLOBAL = "mavros_msgs/msg/PositionTarget", "mavros_msgs/msg/GlobalPositionTarget"
 _ATTITUDE = "mavros_msgs/msg/AttitudeTarget"

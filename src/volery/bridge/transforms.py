@@ -25,8 +25,8 @@ from volery.base.time import Ns
 from volery.bridge.inertial import orientation
 from volery.bridge.offering import BODY, Fields, Surroundings, Topic, Translate, stamped
 from volery.bridge.placing import MAP
-from volery.graph import LATCHED, QoS
-from volery.messages import message_class, new
+from volery.ros.graph import LATCHED, QoS
+from volery.ros.messages import message_class, new
 
 TF, TF_STATIC = "/tf", "/tf_static"
 _TF_MESSAGE = "tf2_msgs/msg/TFMessage"

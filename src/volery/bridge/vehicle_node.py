@@ -26,10 +26,10 @@ from volery.bridge.modes import AUTOPILOTS, mode_name
 from volery.bridge.offering import Names, Offering, Service, Subscription, Surroundings
 from volery.bridge.streams import Streams
 from volery.bridge.wire import Heard, Wire
-from volery.graph import Node, Publisher, RosGraph
-from volery.graph.group import Work
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Link
+from volery.ros.graph import Node, Publisher, RosGraph
+from volery.ros.graph.group import Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4

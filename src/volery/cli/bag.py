@@ -13,10 +13,10 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
-from volery.graph.playing import Playing, play
-from volery.graph.recording import Recorder
-from volery.messages.bag_writing import create_bag
-from volery.messages.bags import Bag, open_bag
+from volery.ros.graph.playing import Playing, play
+from volery.ros.graph.recording import Recorder
+from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bags import Bag, open_bag
 from volery.run.graphs import on_graph
 
 _TICK: Ns = from_seconds(0.5)

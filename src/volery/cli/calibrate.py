@@ -11,8 +11,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from volery.base.errors import UsageError
-from volery.calibrate.machine import at_frequency, this_machine
-from volery.calibrate.ros.campaign import (
+from volery.calibration.machine import at_frequency, this_machine
+from volery.calibration.ros.campaign import (
     LEAST_ROUNDS,
     Circumstances,
     Notebook,
@@ -21,11 +21,11 @@ from volery.calibrate.ros.campaign import (
     loose_figures,
     pursue,
 )
-from volery.calibrate.ros.campaign import Progress as Rounds
-from volery.calibrate.ros.entry import in_figures, law_of, write_entry
-from volery.calibrate.ros.fitting import Cost, costs
-from volery.calibrate.ros.plot import picture
-from volery.calibrate.ros.stage import check_client, stage
+from volery.calibration.ros.campaign import Progress as Rounds
+from volery.calibration.ros.entry import in_figures, law_of, write_entry
+from volery.calibration.ros.fitting import Cost, costs
+from volery.calibration.ros.plot import picture
+from volery.calibration.ros.stage import check_client, stage
 from volery.cli.console import Output, table
 from volery.cli.endings import FAILED, OK
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import this_machine
-from volery.calibrate.processor.campaign import loose, measure
-from volery.calibrate.processor.entry import law_of
-from volery.calibrate.processor.timing import isa
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import this_machine
+from volery.calibration.processor.campaign import loose, measure
+from volery.calibration.processor.entry import law_of
+from volery.calibration.processor.timing import isa
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.cost.core import CoreLaw

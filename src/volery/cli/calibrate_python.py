@@ -13,10 +13,10 @@ from rich.table import Table
 from ruamel.yaml import YAML
 
 from volery.base.errors import UsageError
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import at_frequency, this_machine
-from volery.calibrate.python.campaign import Calibration, calibrate
-from volery.calibrate.python.pieces import Rounds, Tell
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import at_frequency, this_machine
+from volery.calibration.python.campaign import Calibration, calibrate
+from volery.calibration.python.pieces import Rounds, Tell
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.components.operations import OPERATIONS

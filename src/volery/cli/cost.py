@@ -13,9 +13,9 @@ from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
 from volery.cost.catalogue import Catalogue, catalogue
 from volery.cost.core import CoreLaw
-from volery.native.estimate import Estimate, Place, estimate
-from volery.native.program import compile_program
-from volery.native.running import Wanted as Run
+from volery.cost.native.estimate import Estimate, Place, estimate
+from volery.cost.native.program import compile_program
+from volery.cost.native.running import Wanted as Run
 
 TOP = 8
 

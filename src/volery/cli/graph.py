@@ -11,9 +11,9 @@ from volery.base.errors import UsageError
 from volery.base.time import from_seconds
 from volery.cli.console import Output, table
 from volery.cli.endings import OK
-from volery.graph.portrait import Portrait, portrait
 from volery.report.graph_of_run import graph_of_run
 from volery.report.graph_picture import picture
+from volery.ros.graph.portrait import Portrait, portrait
 from volery.run.graphs import GRAPHS, on_graph
 
 

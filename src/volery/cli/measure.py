@@ -13,8 +13,8 @@ from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
-from volery.calibrate.measured.campaign import Show, compare, estimated, measured_runs, prepared
-from volery.calibrate.measured.comparison import Compared
+from volery.calibration.measured.campaign import Show, compare, estimated, measured_runs, prepared
+from volery.calibration.measured.comparison import Compared
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.model.reader import load

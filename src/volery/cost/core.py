@@ -1,6 +1,6 @@
 """What compiled code costs on a core: the figures of a model of its pipeline.
 
-Law: ``volery.native.core_model`` executes what ran. Here stand the figures that it needs: for each class of
+Law: ``volery.cost.native.core_model`` executes what ran. Here stand the figures that it needs: for each class of
 operations how long it takes and how many a core starts per cycle, how wide the core is, how far it looks
 ahead, what a wrong prediction costs, and what calls of libraries cost.
 

@@ -13,7 +13,7 @@ from volery.base.time import Ns, S
 from volery.links.link import Frame
 from volery.links.pprzlink import HEADER, encode
 from volery.links.pprzlink_definitions import DATALINK, TELEMETRY, message_type
-from volery.messages import message_class, new
+from volery.ros.messages import message_class, new
 
 TYPE = "pprzros_msgs/msg/PprzrosMsg"
 TO_ROS, FROM_ROS = "pprzros/to_ros", "pprzros/from_ros"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.base.time import to_seconds
-from volery.graph.node import ServiceState
-from volery.graph.portrait import Portrait, TopicLine
 from volery.report.document import TRACE_FILE
+from volery.ros.graph.node import ServiceState
+from volery.ros.graph.portrait import Portrait, TopicLine
 from volery.trace.events import Call, Message, Published
 from volery.trace.reader import Reading
 

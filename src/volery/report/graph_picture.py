@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from volery.graph.portrait import Portrait, TopicLine
+from volery.ros.graph.portrait import Portrait, TopicLine
 
 ROW, PAD, TOP = 34, 20, 46
 RATE = 70

@@ -6,9 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import cos, pi, radians, sin
 
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.dialect import Family, dialects
-from volery.autopilots.simulated.flight import Flight, make_world
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
@@ -23,9 +20,12 @@ from volery.model.environment import Wind as WindModel
 from volery.run.options import SAMPLING_PERIOD
 from volery.run.progress import VehicleProgress
 from volery.run.simulated import LINK_DELAY, Simulated
-from volery.world.specs import Battery, BodySpec, Multirotor, Rover
-from volery.world.wind import Wind
-from volery.world.world import World
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.dialect import Family, dialects
+from volery.simulation.autopilots.simulated.flight import Flight, make_world
+from volery.simulation.world.specs import Battery, BodySpec, Multirotor, Rover
+from volery.simulation.world.wind import Wind
+from volery.simulation.world.world import World
 
 CELL_NOMINAL_VOLTS = 3.7
 

@@ -17,14 +17,14 @@ from volery.components.ports import Port, PortList
 from volery.components.python import Program, ScriptProgram, load_program, script_or_class, start
 from volery.components.stand_ins import stand_ins
 from volery.components.stub import StubProgram
-from volery.faces.importable import importable
-from volery.faces.launch import Launch
-from volery.graph import Graph, Node, RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
-from volery.messages import define_imported
 from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
+from volery.ros.client_libraries.importable import importable
+from volery.ros.client_libraries.launch import Launch
+from volery.ros.graph import Graph, Node, RosGraph
+from volery.ros.messages import define_imported
 from volery.run.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.ending import Ending, Lands
 from volery.run.fences import fence_of

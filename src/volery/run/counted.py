@@ -76,7 +76,7 @@ class Counting:
 
     def _price(self, costs: Path) -> None:
         """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
-        from volery.native.store import kept_costs
+        from volery.cost.native.store import kept_costs
 
         with np.load(costs) as found:
             learnt = kept_costs(str(found["key"]))
@@ -87,7 +87,7 @@ class Counting:
             self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
 
     def _digest(self, plain: Sequence[Path]) -> str:
-        from volery.native.program import METHOD
+        from volery.cost.native.program import METHOD
 
         contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
         told = " ".join((METHOD, self._law.model_dump_json(), *contents))
@@ -96,7 +96,7 @@ class Counting:
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
     ) -> None:
-        from volery.native import instrument
+        from volery.cost.native import instrument
 
         new = made.with_suffix(".new.o")
         found = instrument(sources, self._law, new, options(include, flags))

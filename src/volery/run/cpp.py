@@ -16,12 +16,12 @@ from volery.components.cpp.program import CppProgram
 from volery.components.cpp.sources import find_sources
 from volery.components.cpp.toolchain import GET_ONE, Tell, has_compiler
 from volery.cost.core import CoreLaw
-from volery.faces import roscpp
-from volery.faces.launch import Launch
-from volery.graph import Node, RosGraph
 from volery.kernel.api import Kernel
 from volery.model.system import ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component, System
 from volery.model.system import Instance as InstanceModel
+from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries.launch import Launch
+from volery.ros.graph import Node, RosGraph
 from volery.run.counted import Counting, core_of
 from volery.run.traced import Tracing
 

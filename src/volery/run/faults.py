@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from volery.autopilots.simulated.flight import Flight
 from volery.kernel.api import Kernel
 from volery.model.environment import Fault
 from volery.run.airfield import Airfield
+from volery.simulation.autopilots.simulated.flight import Flight
 from volery.trace.events import Text
 
 Break = Callable[[Flight, bool], None]

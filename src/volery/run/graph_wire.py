@@ -14,10 +14,10 @@ from functools import partial
 from random import Random
 
 from volery.base.time import MS, Ns
-from volery.graph import Graph
-from volery.graph.node import NodeId, Way
 from volery.kernel.api import Action, Kernel
 from volery.links.wire import OVERTAKEN, WireFaults
+from volery.ros.graph import Graph
+from volery.ros.graph.node import NodeId, Way
 from volery.run.simulated import LINK_DELAY
 
 FRAME = 30
@@ -43,7 +43,7 @@ class GraphWire:
         self._faults = faults
 
     def between(self, sender: NodeId, receiver: NodeId) -> Way:
-        """See ``volery.graph.Between``. Messages of a pair keep their order, unless faults say so."""
+        """See ``volery.ros.graph.Between``. Messages of a pair keep their order, unless faults say so."""
         return partial(self._carry, sender.name, receiver.name)
 
     def _carry(

@@ -7,20 +7,20 @@ from contextlib import contextmanager
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns
-from volery.graph import RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.wall import WallKernel
-from volery.transports.graph import TransportGraph
+from volery.ros.graph import RosGraph
+from volery.ros.transports.graph import TransportGraph
 
 
 def _ros1(kernel: Kernel, start_master: bool, epoch: Ns | None) -> TransportGraph:
-    from volery.transports.ros1 import ros1_graph
+    from volery.ros.transports.ros1 import ros1_graph
 
     return ros1_graph(kernel, start_master=start_master, epoch=epoch)
 
 
 def _ros2(kernel: Kernel, start_master: bool, epoch: Ns | None) -> TransportGraph:
-    from volery.transports.ros2 import ros2_graph
+    from volery.ros.transports.ros2 import ros2_graph
 
     return ros2_graph(kernel, epoch=epoch)
 

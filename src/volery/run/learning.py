@@ -14,10 +14,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from volery.base.errors import UsageError
+from volery.cost.native.costs import traced_costs
+from volery.cost.native.store import keep_costs
+from volery.cost.native.trace import Trace, read_trace
 from volery.model.system import System
-from volery.native.costs import traced_costs
-from volery.native.store import keep_costs
-from volery.native.trace import Trace, read_trace
 from volery.run.cpp import Ready, compile_all
 from volery.run.options import Options
 from volery.run.result import Run

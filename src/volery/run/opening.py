@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
 from volery.base.position import Position
-from volery.graph import RosGraph
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.links.shared import SharedLink
+from volery.ros.graph import RosGraph
 from volery.run.graphs import GRAPHS, open_graph
 from volery.run.serving import open_simulated
 from volery.run.simulated import HOME, Simulated, simulated

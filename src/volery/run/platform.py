@@ -16,7 +16,6 @@ from volery.components.instance import Seat
 from volery.components.ports import Travel
 from volery.components.pricing import FREE, Cost, Counted, Pricing, Stated
 from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
-from volery.graph.node import NodeId, Way
 from volery.kernel.api import Action
 from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
@@ -24,6 +23,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
+from volery.ros.graph.node import NodeId, Way
 from volery.run.background import occupy
 from volery.run.counted import core_of, ns_per_step
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from volery.base.errors import UsageError
 from volery.base.registry import Registry
 from volery.base.time import Ns
-from volery.messages.store import definition
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
+from volery.ros.messages.store import definition
 from volery.run.circumstances import Stopwatch, circumstances
 from volery.trace.events import Verdict
 from volery.trace.mcap_writer import Attachment, McapWriter

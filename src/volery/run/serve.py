@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from volery.autopilots.simulated.dialect import dialects
 from volery.base.errors import UsageError
 from volery.kernel.task import Place
 from volery.kernel.virtual import FOREVER, VirtualKernel
@@ -14,6 +13,7 @@ from volery.run.airfield import Airfield, airfield_of
 from volery.run.graphs import open_graph
 from volery.run.serving import serving
 from volery.run.simulated import Simulated
+from volery.simulation.autopilots.simulated.dialect import dialects
 from volery.vehicles.address import Address, parse_listen
 from volery.vehicles.carriers import listen
 

@@ -17,11 +17,11 @@ from volery.base.errors import CapabilityError
 from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
 from volery.bridge import VehicleNodeOptions, serve_pprzros, serve_vehicle
-from volery.graph import RosGraph
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
 from volery.links.wire import WireFaults
+from volery.ros.graph import RosGraph
 from volery.run.graph_wire import GraphWire, private_graph
 from volery.run.simulated import Simulated, link_to
 from volery.vehicles.driver import Driver, Opener, drivers

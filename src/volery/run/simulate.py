@@ -15,9 +15,9 @@ from volery.model.reader import load
 from volery.model.system import System
 from volery.requirements.observables import Observers
 from volery.run.airfield import Airfield
-from volery.run.apart import Apart, Host, Order, unallocated, without_computers
 from volery.run.build import Builder, Built
 from volery.run.cpp import compile_all, has_cpp
+from volery.run.distributed import Apart, Host, Order, unallocated, without_computers
 from volery.run.ending import Ending
 from volery.run.faults import inject
 from volery.run.options import AS_USUAL, Options
@@ -190,7 +190,7 @@ class _Simulation:
 
 
 class _OnGraph(_Simulation):
-    """One execution of ``simulate`` on a real graph: components are processes, see ``volery.run.apart``."""
+    """One execution of ``simulate`` on a real graph: components are processes, see ``volery.run.distributed``."""
 
     def __init__(self, system: System, options: Options) -> None:
         pace = options.pace or 1.0

@@ -15,7 +15,7 @@ from volery.cost.core import CoreLaw
 from volery.run.counted import options
 
 if TYPE_CHECKING:
-    from volery.native.program import Program
+    from volery.cost.native.program import Program
 
 WINDOW, STRIDE = 1024, 4096
 """Blocks that are told of so many: a run may enter billions."""
@@ -32,8 +32,8 @@ class Tracing:
         self, tools: Toolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
     ) -> list[Path]:
         """One object that tells, and what it tells it to. The compiler's own words come first."""
-        from volery.native.program import compile_program
-        from volery.native.running import runtime_objects
+        from volery.cost.native.program import compile_program
+        from volery.cost.native.running import runtime_objects
 
         one_by_one(tools, sources, include, flags)
         self.program = compile_program(sources, self.law, options(include, flags))
@@ -48,7 +48,7 @@ class Tracing:
 
     def begin(self, library: Library, file: Path) -> None:
         """Have a library that was compiled so tell it to *file*, until its ``volery_end`` is called."""
-        from volery.native.running import in_words
+        from volery.cost.native.running import in_words
 
         library.function("volery_model_caches")(in_words(self.law.memory).encode())
         each, of = ctypes.c_uint64(WINDOW), ctypes.c_uint64(STRIDE)

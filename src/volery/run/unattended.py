@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from volery.graph import Node, RosGraph
+from volery.ros.graph import Node, RosGraph
 from volery.vehicles import Vehicle
 
 

@@ -8,11 +8,11 @@ from random import Random
 from typing import Protocol
 
 from volery.base.seeds import stream
-from volery.graph.node import NodeId, Way
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
 from volery.links.wire import Wire, WireFaults
+from volery.ros.graph.node import NodeId, Way
 from volery.run.airfield import Airfield
 from volery.run.graph_wire import GIVEN_UP, GraphWire, private_graph
 from volery.run.serving import SIMULATED, on_links, serve, serving

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from volery.links.wire import WireFaults
+from volery.simulation.world.wind import Wind
 from volery.testing.stage_simulated import SimulatedStage
-from volery.world.wind import Wind
 
 WHOLE = WireFaults()
 

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import UsageError, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Altitude, Position
@@ -21,6 +20,7 @@ from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
 from volery.links.link import Frame, Link
 from volery.links.mavlink import constant
+from volery.simulation.autopilots.simulated.flight import Flight
 from volery.testing.access import Hand
 from volery.testing.checks import ImpossibleError, demand
 from volery.vehicles import Drone, Rover, Vehicle

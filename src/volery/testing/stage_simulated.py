@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import Flight
 from volery.base.errors import UsageError
 from volery.base.position import Position
 from volery.base.time import MINUTE, Ns, S
@@ -17,6 +15,8 @@ from volery.links.wire import WireFaults
 from volery.run.airfield import airfield_of
 from volery.run.opening import KINDS
 from volery.run.simulated import simulated
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import Flight
 from volery.testing.access import Hand, access_to
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from volery.base.errors import UsageError
 from volery.base.time import MS
-from volery.graph.node import Work
-from volery.messages import new, service
+from volery.ros.graph.node import Work
+from volery.ros.messages import new, service
 from volery.testing.checks import demand, raising
 from volery.testing.transports_site import LIMIT, Site, check
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.graph.services import ServiceError
 from volery.kernel.task import Place
-from volery.messages import new, request, service
+from volery.ros.graph.services import ServiceError
+from volery.ros.messages import new, request, service
 from volery.testing.checks import demand, raising
 from volery.testing.transports_site import LIMIT, Site, check
 

@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import Self
 
 from volery.base.time import MS, Ns, S
-from volery.graph.node import Node, RosGraph
 from volery.kernel.task import Place
+from volery.ros.graph.node import Node, RosGraph
 from volery.testing.checks import demand
 
 LIMIT: Ns = 10 * S

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from rigs.station import STATION, TARGET, Station, facts_of
-from volery.autopilots.ardupilot import DIALECT
 from volery.base.frames import LocalFrame
 from volery.base.time import from_seconds
+from volery.simulation.autopilots.ardupilot import DIALECT
 
 
 class Bench(Station):

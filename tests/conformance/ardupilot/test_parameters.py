@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-import volery.autopilots
-from volery.autopilots.ardupilot import DIALECT
+import volery.simulation.autopilots
 from volery.base.errors import UsageError
+from volery.simulation.autopilots.ardupilot import DIALECT
 
 REAL32, INT8 = 9, 2
 
@@ -133,7 +133,7 @@ def test_a_parameter_that_does_not_exist_is_an_error_with_a_hint(bench: Any) -> 
 
 def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> None:
     """What is listed as honoured is what the code of the dialect reads."""
-    room = Path(volery.autopilots.__file__).parent
+    room = Path(volery.simulation.autopilots.__file__).parent
     source = "".join(
         path.read_text(encoding="utf-8")
         for part in ("ardupilot", "simulated")

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from rigs.station import TARGET, Station, facts_of
-from volery.autopilots.px4 import DIALECT
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.api import Handle
+from volery.simulation.autopilots.px4 import DIALECT
 
 
 class Bench(Station):

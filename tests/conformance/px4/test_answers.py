@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-import volery.autopilots
-from volery.autopilots.px4 import DIALECT, events
-from volery.autopilots.simulated.parameters import REAL32
+import volery.simulation.autopilots
+from volery.simulation.autopilots.px4 import DIALECT, events
+from volery.simulation.autopilots.simulated.parameters import REAL32
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NOT_SENT = {
@@ -202,7 +202,7 @@ def test_integers_travel_as_bytes_and_types_must_match(bench: Any) -> None:
 
 
 def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> None:
-    room = Path(volery.autopilots.__file__).parent / "px4"
+    room = Path(volery.simulation.autopilots.__file__).parent / "px4"
     source = "".join(
         path.read_text(encoding="utf-8") for path in sorted(room.glob("*.py")) if path.name != "honoured.py"
     )

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.px4.boot import FIRST_HEARTBEAT
 from volery.base.time import S, from_seconds
+from volery.simulation.autopilots.px4.boot import FIRST_HEARTBEAT
 
 USES = {
     "ground-api": "onboard",

@@ -14,13 +14,13 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.time import S
-from volery.calibrate.machine import Machine
-from volery.calibrate.measured.campaign import prepared
-from volery.calibrate.measured.runs import running
-from volery.calibrate.ros.campaign import Circumstances
-from volery.calibrate.ros.entry import law_of, write_entry
-from volery.calibrate.ros.fitting import Cost, costs
-from volery.calibrate.ros.stage import Pace, own_master, stage
+from volery.calibration.machine import Machine
+from volery.calibration.measured.campaign import prepared
+from volery.calibration.measured.runs import running
+from volery.calibration.ros.campaign import Circumstances
+from volery.calibration.ros.entry import law_of, write_entry
+from volery.calibration.ros.fitting import Cost, costs
+from volery.calibration.ros.stage import Pace, own_master, stage
 from volery.cli.main import app
 from volery.cost import catalogue
 from volery.model.reader import load

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import Machine
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import Machine
 from volery.cost import catalogue
 from volery.model.reader import load
 from volery.run.learning import learn

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.components.cpp.build import CppComponent, Face, compile_component
 from volery.components.cpp.interfaces import operations
 from volery.components.cpp.program import CppObject, CppProgram
-from volery.faces import roscpp
 from volery.kernel.virtual import VirtualKernel
-from volery.messages.layout import FieldLayout, ros1_layout
 from volery.model.system import Argument, Interface, Signature
+from volery.ros import messages
+from volery.ros.client_libraries import roscpp
+from volery.ros.messages.layout import FieldLayout, ros1_layout
 
 pytestmark = pytest.mark.integration
 

@@ -10,8 +10,8 @@ import pytest
 
 from rigs.requirements import lacking
 from volery.components.cpp.build import INCLUDE
-from volery.faces import roscpp
-from volery.messages import from_cdr
+from volery.ros.client_libraries import roscpp
+from volery.ros.messages import from_cdr
 from volery.trace.events import Charge, Published, Text
 
 pytestmark = pytest.mark.integration

@@ -10,7 +10,6 @@ import pytest
 
 from rigs.sockets import HERE, PACE, flown, served
 from volery.base.errors import LinkGarbled
-from volery.drivers.paparazzi import open_driver
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.coded import CodedLink
@@ -20,6 +19,7 @@ from volery.links.udp import UdpLink
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
 from volery.vehicles.carriers import open_link
+from volery.vehicles.drivers.paparazzi import open_driver
 
 pytestmark = pytest.mark.integration
 

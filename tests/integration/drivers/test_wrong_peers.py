@@ -12,11 +12,11 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink_2
 
 from volery.base.errors import LinkError, LinkGarbled, LinkSilent, UsageError
-from volery.drivers.ardupilot import open_driver
 from volery.kernel.wall import WallKernel
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
 from volery.vehicles.carriers import open_link
+from volery.vehicles.drivers.ardupilot import open_driver
 
 pytestmark = pytest.mark.integration
 

@@ -14,10 +14,10 @@ from rigs.requirements import lacking
 from volery.base.errors import UsageError
 from volery.cli.main import app
 from volery.cost import catalogue
-from volery.native import CompilerError, compile_program, instrument
-from volery.native.estimate import estimate
-from volery.native.running import Wanted
-from volery.native.toolchain import toolchain
+from volery.cost.native import CompilerError, compile_program, instrument
+from volery.cost.native.estimate import estimate
+from volery.cost.native.running import Wanted
+from volery.cost.native.toolchain import toolchain
 
 pytestmark = pytest.mark.integration
 

@@ -11,7 +11,7 @@ import pytest
 
 from volery import AMSL, Drone, Options, Position, Rover, connect, fly
 from volery.base.errors import LinkLost
-from volery.world.sensors import declared_sigma
+from volery.simulation.world.sensors import declared_sigma
 
 pytestmark = pytest.mark.integration
 

@@ -17,13 +17,13 @@ import pytest
 
 from rigs.requirements import lacking
 from volery.base.time import MS, S
-from volery.graph import Node
 from volery.kernel.task import Place
 from volery.kernel.wall import WallKernel
+from volery.ros.graph import Node
+from volery.ros.transports.graph import TransportGraph
+from volery.ros.transports.ros1 import Roscore, available, ros1_graph
+from volery.ros.transports.ros1.roscore import environment
 from volery.trace.events import Text
-from volery.transports.graph import TransportGraph
-from volery.transports.ros1 import Roscore, available, ros1_graph
-from volery.transports.ros1.roscore import environment
 
 HERE = Path(__file__).parent
 LIMIT_S = 30

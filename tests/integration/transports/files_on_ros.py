@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from volery.messages import from_cdr
+from volery.ros.messages import from_cdr
 from volery.run.options import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Published

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from volery.base.time import MS, S
-from volery.graph import BEST_AVAILABLE, QoS
 from volery.kernel.wall import WallKernel
-from volery.messages import define_imported, to_cdr
+from volery.ros.graph import BEST_AVAILABLE, QoS
+from volery.ros.messages import define_imported, to_cdr
 from volery.run.graphs import open_graph
 
 EVERYTHING = QoS(None, BEST_AVAILABLE, BEST_AVAILABLE)

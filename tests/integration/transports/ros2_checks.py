@@ -16,13 +16,13 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.graph import LATCHED, QoS
 from volery.kernel.wall import WallKernel
-from volery.messages import new, request, service
+from volery.ros.graph import LATCHED, QoS
+from volery.ros.messages import new, request, service
+from volery.ros.transports.ros2 import carried, ros2_graph
 from volery.testing.checks import demand, raising
 from volery.testing.transports import ROS2, Site, no_fault, run_checks
 from volery.trace.events import Text
-from volery.transports.ros2 import carried, ros2_graph
 
 STRING = "std_msgs/msg/String"
 STATE, SET_MODE = "mavros_msgs/msg/State", "mavros_msgs/srv/SetMode"

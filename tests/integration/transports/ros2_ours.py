@@ -9,12 +9,12 @@ import sys
 from functools import partial
 from typing import Any
 
-from volery.graph import QoS
 from volery.kernel.task import Place
 from volery.kernel.wall import WallKernel
-from volery.messages import request, service, types
+from volery.ros.graph import QoS
+from volery.ros.messages import request, service, types
+from volery.ros.transports.ros2 import carried, ros2_graph
 from volery.testing.transports_topics import PUBLISHED
-from volery.transports.ros2 import carried, ros2_graph
 
 SET_BOOL = "std_srvs/srv/SetBool"
 

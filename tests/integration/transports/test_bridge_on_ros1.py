@@ -24,8 +24,8 @@ import volery
 from volery.links.link import Frame
 from volery.links.mavlink import encode
 from volery.links.parser import MAVLINK
-from volery.transports.ros1 import Roscore
-from volery.transports.ros1.packages import write_package
+from volery.ros.transports.ros1 import Roscore
+from volery.ros.transports.ros1.packages import write_package
 
 from .conftest import LIMIT_S, Run
 from .test_dji_on_ros1 import COMMAND

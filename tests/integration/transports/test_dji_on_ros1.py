@@ -10,7 +10,7 @@ import pytest
 
 import volery
 from volery import AboveHome, Position
-from volery.transports.ros1 import Roscore
+from volery.ros.transports.ros1 import Roscore
 
 pytestmark = pytest.mark.integration
 

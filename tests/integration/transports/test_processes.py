@@ -15,11 +15,11 @@ from typing import Any
 
 import pytest
 
-from volery.messages import from_cdr
+from volery.ros.messages import from_cdr
+from volery.ros.transports.ros1 import Roscore
+from volery.ros.transports.ros1.roscore import master_answers
 from volery.trace.events import Message, Published, Text
 from volery.trace.reader import read
-from volery.transports.ros1 import Roscore
-from volery.transports.ros1.roscore import master_answers
 
 from .conftest import Ours, python_of, surroundings
 

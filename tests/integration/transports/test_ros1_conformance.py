@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from volery.base.errors import UsageError
-from volery.messages import ros1_type
+from volery.ros.messages import ros1_type
 from volery.testing.transports import CHECKS, ROS1, Site
 
 from .conftest import Ours

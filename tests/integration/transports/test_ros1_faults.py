@@ -13,11 +13,11 @@ import pytest
 
 from volery.base.errors import LinkError, UsageError
 from volery.base.time import S
-from volery.graph import LATCHED, QoS
-from volery.messages import new
-from volery.transports.ros1 import Roscore
-from volery.transports.ros1.classes import message_carrier
-from volery.transports.ros1.rospy_copy import rospy_copy
+from volery.ros.graph import LATCHED, QoS
+from volery.ros.messages import new
+from volery.ros.transports.ros1 import Roscore
+from volery.ros.transports.ros1.classes import message_carrier
+from volery.ros.transports.ros1.rospy_copy import rospy_copy
 
 from .conftest import Ours, Run, Start
 
@@ -127,7 +127,7 @@ def test_a_message_that_is_none(ours: Ours, roscore: Roscore) -> None:
     heard: list[Any] = []
     subscription = listener.subscribe("imu", "sensor_msgs/msg/Imu", heard.append)
     ours.until(lambda: liar.get_num_connections() == 1, "they connect")
-    from volery.messages import to_ros1
+    from volery.ros.messages import to_ros1
 
     good = to_ros1(new("sensor_msgs/Imu", header={"frame_id": "imu"}))
     for data in (b"", good[:-1], good + b"\0", b"\xff" * 400, good):
@@ -206,7 +206,7 @@ def test_a_master_that_is_none(ours: Ours, tmp_path: Any) -> None:
     import threading
     from http.server import BaseHTTPRequestHandler, HTTPServer
 
-    from volery.transports.ros1.master import Master
+    from volery.ros.transports.ros1.master import Master
 
     class Page(BaseHTTPRequestHandler):
         def do_POST(self) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.messages import message_class, new
-from volery.messages.bag_writing import create_bag
-from volery.messages.bags import open_bag
+from volery.ros.messages import message_class, new
+from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bags import open_bag
 
 from .conftest import HERE, Ours, Run, Start
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
-from volery.graph import LATCHED
-from volery.messages import message_class, new, request, service
+from volery.ros.graph import LATCHED
+from volery.ros.messages import message_class, new, request, service
 
 from .conftest import Ours, Run, Start
 
@@ -115,7 +115,7 @@ rospy.spin()
 
 
 def test_plain_rospy_shares_a_type_that_is_not_installed(ours: Ours, start: Start) -> None:
-    from volery.messages import ros1_type
+    from volery.ros.messages import ros1_type
 
     kind = ros1_type("mavros_msgs/State")
     node = ours.spinning("vehicle")
@@ -159,7 +159,7 @@ def test_our_programs_start_a_master_if_none_answers(ours: Ours, tmp_path: Any) 
         port = asked.getsockname()[1]
     program = f"""
 from volery.kernel.wall import WallKernel
-from volery.transports.ros1 import master_answers, ros1_graph
+from volery.ros.transports.ros1 import master_answers, ros1_graph
 uri = "http://127.0.0.1:{port}"
 kernel = WallKernel()
 with kernel.adopt("script"):
@@ -184,7 +184,7 @@ def test_messages_are_those_of_the_packages(ours: Ours) -> None:
     """Ours and Debian's classes read each other's bytes."""
     from sensor_msgs.msg import Imu
 
-    from volery.messages import from_ros1, ros1_type, to_ros1
+    from volery.ros.messages import from_ros1, ros1_type, to_ros1
 
     theirs = Imu()
     theirs.linear_acceleration.z = 9.75

@@ -3,11 +3,11 @@
 import hashlib
 import sys
 
-from volery.autopilots.simulated.flight import Control, Setpoint, make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.world.specs import Multirotor, Rover
-from volery.world.wind import Wind
+from volery.simulation.autopilots.simulated.flight import Control, Setpoint, make_world
+from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.world.wind import Wind
 
 
 def main():

@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.ardupilot import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.dialect import dialects
-from volery.autopilots.simulated.flight import make_world
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
-from volery.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.dialect import dialects
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Multirotor, Rover
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from volery.autopilots.simulated.parameters import (
+from volery.base.errors import UsageError
+from volery.simulation.autopilots.simulated.parameters import (
     INT8,
     INT16,
     INT32,
@@ -14,7 +15,6 @@ from volery.autopilots.simulated.parameters import (
     quantised,
     single,
 )
-from volery.base.errors import UsageError
 
 LISTED = (
     Parameter("B_FIRST", INT8, 1.0),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from volery.autopilots.simulated.plan import (
+from volery.simulation.autopilots.simulated.plan import (
     CHANGE_SPEED,
     CONDITION_DELAY,
     CONDITION_YAW,

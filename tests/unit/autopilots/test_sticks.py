@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from volery.autopilots.simulated.sticks import Sticks, Travel
-from volery.autopilots.simulated.tuning import StickMap
 from volery.base.time import MS, S
+from volery.simulation.autopilots.simulated.sticks import Sticks, Travel
+from volery.simulation.autopilots.simulated.tuning import StickMap
 
 STICK = Travel(1000, 1500, 2000, 20)
 THROTTLE = Travel(1000, 1500, 2000, 30)

@@ -5,15 +5,15 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
-from volery.graph import Cost, Graph, free
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
+from volery.ros import messages
+from volery.ros.graph import Cost, Graph, free
 from volery.trace.events import Text
 
 

@@ -3,8 +3,8 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.time import MS
+from volery.ros import messages
 from volery.trace.events import Text
 
 LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"

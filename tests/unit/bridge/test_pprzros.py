@@ -9,14 +9,14 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.bridge import serve_pprzros
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprz_message import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
 from volery.links.pprzlink import PPRZLINK
-from volery.messages import new
+from volery.ros.graph import Graph
+from volery.ros.messages import new
 from volery.trace.events import Text
 
 SETPOINT = Frame(

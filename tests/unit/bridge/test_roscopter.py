@@ -7,7 +7,7 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER
-from volery.messages import ros1_type
+from volery.ros.messages import ros1_type
 
 RC = "roscopter/RC"
 BOOTED = 12_000_000

@@ -7,11 +7,11 @@ import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
-from volery.calibrate.measured.campaign import compare
-from volery.calibrate.measured.comparison import Compared, Estimate, compared
-from volery.calibrate.measured.meters.rospy import imported
-from volery.calibrate.measured.programs import programs
-from volery.calibrate.measured.runs import process_cpu
+from volery.calibration.measured.campaign import compare
+from volery.calibration.measured.comparison import Compared, Estimate, compared
+from volery.calibration.measured.meters.rospy import imported
+from volery.calibration.measured.programs import programs
+from volery.calibration.measured.runs import process_cpu
 from volery.model.reader import load
 from volery.run.vocabulary import vocabulary
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import Machine
-from volery.calibrate.python.campaign import evaluate
-from volery.calibrate.python.nonnegative import explain
-from volery.calibrate.python.pieces import Rounds, Timed, measure, program, programs, snippets
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import Machine
+from volery.calibration.python.campaign import evaluate
+from volery.calibration.python.nonnegative import explain
+from volery.calibration.python.pieces import Rounds, Timed, measure, program, programs, snippets
 from volery.components.operations import OPERATIONS
 from volery.cost import catalogue
 from volery.cost.interpreter import python_operations

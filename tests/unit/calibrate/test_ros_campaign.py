@@ -4,8 +4,8 @@ from typing import Any
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibrate.ros.campaign import Circumstances, Notebook, Plan, Progress, pursue
-from volery.calibrate.ros.stage import Pace
+from volery.calibration.ros.campaign import Circumstances, Notebook, Plan, Progress, pursue
+from volery.calibration.ros.stage import Pace
 
 from .ros_rounds import Probe
 

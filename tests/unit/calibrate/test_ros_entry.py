@@ -4,11 +4,11 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.calibrate.machine import Machine
-from volery.calibrate.ros.campaign import Circumstances
-from volery.calibrate.ros.entry import in_figures, law_of, write_entry
-from volery.calibrate.ros.fitting import costs
-from volery.calibrate.ros.plot import picture
+from volery.calibration.machine import Machine
+from volery.calibration.ros.campaign import Circumstances
+from volery.calibration.ros.entry import in_figures, law_of, write_entry
+from volery.calibration.ros.fitting import costs
+from volery.calibration.ros.plot import picture
 from volery.cost import RosLaw, catalogue
 
 from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe

@@ -4,8 +4,8 @@ from math import isclose
 import pytest
 
 from volery.base.errors import LinkError
-from volery.calibrate.ros.fitting import costs, fit
-from volery.calibrate.ros.samples import points_of, read_round
+from volery.calibration.ros.fitting import costs, fit
+from volery.calibration.ros.samples import points_of, read_round
 
 from .ros_rounds import ACCEPT, AGAIN, ONCE, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, SPIN, Probe
 

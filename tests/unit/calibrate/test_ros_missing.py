@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
-from volery.calibrate.ros import stage
-from volery.calibrate.ros.stage import check_client, roscpp_flags
+from volery.calibration.ros import stage
+from volery.calibration.ros.stage import check_client, roscpp_flags
 from volery.cli.main import app
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from volery import messages
 from volery.cli.main import app
-from volery.messages.bag_writing import create_bag
-from volery.messages.bags import open_bag
+from volery.ros import messages
+from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bags import open_bag
 
 
 def run(*arguments: object) -> Any:

@@ -6,9 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.cli.main import app
-from volery.messages.store import definition
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
+from volery.ros.messages.store import definition
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
 from volery.trace.mcap_writer import Attachment, McapWriter
 from volery.trace.scenery import scenery_to_json

@@ -16,8 +16,8 @@ from volery.components.cpp.interfaces import Required, glue, interfaces_header, 
 from volery.components.cpp.meter import Meter
 from volery.components.cpp.sources import find_sources
 from volery.components.cpp.types import kind_of
-from volery.faces.wire import Reader, Writer
 from volery.model.system import Argument, Interface, Signature
+from volery.ros.client_libraries.wire import Reader, Writer
 
 ROUTING = Interface(
     "Routing",

@@ -1,8 +1,8 @@
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.calibrate.catalogue_file import put_law
-from volery.calibrate.machine import Machine
+from volery.calibration.catalogue_file import put_law
+from volery.calibration.machine import Machine
 from volery.cost import catalogue
 from volery.cost.catalogue import read
 

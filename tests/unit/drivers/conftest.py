@@ -12,8 +12,8 @@ from rigs import scripted
 from rigs.bench import Bench
 from rigs.scripted import ACCEPTED, ASK, INTERVAL, STREAMED, Scripted
 from volery.base.time import S
-from volery.drivers.ardupilot import open_driver
-from volery.drivers.ardupilot.modes import COPTER, NUMBERS, ROVER
+from volery.vehicles.drivers.ardupilot import open_driver
+from volery.vehicles.drivers.ardupilot.modes import COPTER, NUMBERS, ROVER
 
 SET_MODE, ARM, TAKEOFF, YAW = 176, 400, 22, 115
 COMMON_HEALTH = 0x10000000  # the arming checks pass

@@ -9,13 +9,13 @@ import pytest
 
 from volery.base.errors import CapabilityError, LinkGarbled, UsageError
 from volery.base.time import S
-from volery.drivers.ardupilot import open_driver
-from volery.drivers.ardupilot.silence import if_silent
-from volery.drivers.mavlink.inquiries import value_of
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process import in_process
 from volery.vehicles import Rover
+from volery.vehicles.drivers.ardupilot import open_driver
+from volery.vehicles.drivers.ardupilot.silence import if_silent
+from volery.vehicles.drivers.mavlink.inquiries import value_of
 
 Make = Callable[..., Any]
 ARM = 400

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded
-from volery.drivers.ardupilot.hearing import Hearing
+from volery.vehicles.drivers.ardupilot.hearing import Hearing
 
 RECORDED = Recorded("ardupilot_telemetry", Hearing)
 replayed, changes = RECORDED.replayed, RECORDED.changes

@@ -13,13 +13,13 @@ from volery.base.errors import Failsafe, LinkLost, LinkSilent, NotArrived, Overr
 from volery.base.frames import LocalFrame
 from volery.base.time import HOUR, MS, S
 from volery.bridge import serve_vehicle
-from volery.drivers.ardupilot import open_driver, open_mavros
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
 from volery.links.wire import WireFaults
+from volery.ros.graph import Graph
 from volery.trace.events import LinkState, Text
 from volery.vehicles import Drone, Land, Rover, TakeOff, Vehicle, Waypoint
+from volery.vehicles.drivers.ardupilot import open_driver, open_mavros
 
 
 class Field(Airstrip):

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
-from volery.faces.importable import importable
-from volery.faces.launch import Launch
-from volery.graph import Cost, EmbeddedNode, Graph, free
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.ros.client_libraries.importable import importable
+from volery.ros.client_libraries.launch import Launch
+from volery.ros.graph import Cost, EmbeddedNode, Graph, free
 
 
 class Stage:

@@ -9,12 +9,12 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.faces import roscpp
-from volery.faces.launch import Launch
-from volery.faces.roscpp import values
-from volery.faces.wire import CppFlow, Reader, Writer
 from volery.kernel.task import Place
-from volery.messages import new, to_cdr
+from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries.launch import Launch
+from volery.ros.client_libraries.roscpp import values
+from volery.ros.client_libraries.wire import CppFlow, Reader, Writer
+from volery.ros.messages import new, to_cdr
 from volery.trace.events import Text
 
 HERE = Path(__file__)

@@ -4,8 +4,8 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.faces.rospy import Launch
 from volery.kernel.task import Place
+from volery.ros.client_libraries.rospy import Launch
 from volery.trace.events import Activation, Call, Failure, Text
 
 TALKER = """

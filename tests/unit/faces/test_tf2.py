@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
-from volery.faces.tf2.errors import ExtrapolationException, InvalidArgumentException
-from volery.faces.tf2.geometry import IDENTITY
-from volery.faces.tf2.tree import Tree
+from volery.ros.client_libraries.tf2.errors import ExtrapolationException, InvalidArgumentException
+from volery.ros.client_libraries.tf2.geometry import IDENTITY
+from volery.ros.client_libraries.tf2.tree import Tree
 
 BROADCASTER = """
 import rospy

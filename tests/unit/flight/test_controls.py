@@ -5,11 +5,11 @@ from math import radians
 
 import pytest
 
-from volery.autopilots.simulated.flight import Control, Setpoint
 from volery.base.errors import UsageError
 from volery.base.time import MS
-from volery.world.specs import Battery
-from volery.world.wind import Wind
+from volery.simulation.autopilots.simulated.flight import Control, Setpoint
+from volery.simulation.world.specs import Battery
+from volery.simulation.world.wind import Wind
 
 
 def test_off_means_that_motors_stand_still_and_idle_that_they_turn(drone):

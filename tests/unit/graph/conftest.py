@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery.base.time import S
-from volery.graph import Graph, NodeId, Way
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.ros.graph import Graph, NodeId, Way
 
 
 class Price(NamedTuple):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery import messages
 from volery.base.time import S
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.ros import messages
+from volery.ros.graph import Graph
 from volery.trace.events import Charge, Message
 
 STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"

@@ -3,10 +3,10 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.task import Place
+from volery.ros import messages
 from volery.trace.events import Activation
 
 EMPTY = "std_msgs/msg/Empty"

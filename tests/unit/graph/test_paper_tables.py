@@ -8,10 +8,10 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.cost import RosLaw, catalogue
-from volery.graph import Graph
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.ros.graph import Graph
 from volery.trace.events import Charge, Slice
 
 SLEEPS = 2566

@@ -2,11 +2,11 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.time import MS, US, S
-from volery.graph import NodeId
 from volery.kernel.task import Place
 from volery.kernel.waiting import at
+from volery.ros import messages
+from volery.ros.graph import NodeId
 from volery.trace.events import Charge, Message, Published, Slice
 
 from .conftest import Price

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.graph.playing import Playing, play
-from volery.graph.recording import Recorder
-from volery.messages.bag_writing import create_bag
-from volery.messages.bags import Bag, open_bag
+from volery.ros import messages
+from volery.ros.graph.playing import Playing, play
+from volery.ros.graph.recording import Recorder
+from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bags import Bag, open_bag
 
 from .conftest import Rig
 

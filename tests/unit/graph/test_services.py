@@ -2,10 +2,10 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.graph import ServiceError
+from volery.ros import messages
+from volery.ros.graph import ServiceError
 from volery.trace.events import Call
 
 SET_BOOL = "std_srvs/srv/SetBool"

@@ -2,10 +2,10 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.graph import AS_OFFERED, BEST_AVAILABLE, BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, QoS
+from volery.ros import messages
+from volery.ros.graph import AS_OFFERED, BEST_AVAILABLE, BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, QoS
 from volery.trace.events import NONE, Message, Published, Text
 
 STRING = "std_msgs/msg/String"

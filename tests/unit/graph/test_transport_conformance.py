@@ -2,8 +2,8 @@
 
 import pytest
 
-from volery.graph import Graph
 from volery.kernel.virtual import VirtualKernel
+from volery.ros.graph import Graph
 from volery.testing.transports import CHECKS, EMBEDDED, Site
 
 

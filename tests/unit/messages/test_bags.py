@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
 from volery.base.time import MS
-from volery.messages.bag_writing import create_bag
-from volery.messages.bags import BagTopic, open_bag
+from volery.ros import messages
+from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bags import BagTopic, open_bag
 
 WORDS, FIXES = "/words", "/drone_1/fix"
 KINDS = pytest.mark.parametrize("name", ["flight.bag", "flight"])

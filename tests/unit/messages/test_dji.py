@@ -6,8 +6,17 @@ from typing import Any
 
 import pytest
 
-from volery.messages import cdr_size, from_cdr, message_class, new, request, service, service_types, to_cdr
-from volery.messages.dji import (
+from volery.ros.messages import (
+    cdr_size,
+    from_cdr,
+    message_class,
+    new,
+    request,
+    service,
+    service_types,
+    to_cdr,
+)
+from volery.ros.messages.dji import (
     ANGLE_YAW_RATE_HEIGHT,
     POSITION_YAW,
     SETPOINT_TOPICS,

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
-from volery.messages.store import store
+from volery.ros import messages
+from volery.ros.messages.store import store
 
 
 @pytest.mark.parametrize("name", messages.types())

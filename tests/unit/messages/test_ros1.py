@@ -2,8 +2,8 @@
 
 import pytest
 
-from volery import messages
 from volery.base.errors import UsageError
+from volery.ros import messages
 
 SUMS = {
     "std_msgs/String": "992ce8a1687cec8c8bd883ec73ca41d1",

@@ -1,4 +1,4 @@
-from volery.native.code import Block, blocks, counted, edges, retarget, traced
+from volery.cost.native.code import Block, blocks, counted, edges, retarget, traced
 
 TEXT = """\
 target datalayout = "e-m:e"

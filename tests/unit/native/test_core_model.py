@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from volery.cost import catalogue
-from volery.native.assembly import End, Instruction, Piece
-from volery.native.costs import Ran, execute
-from volery.native.encoding import encode
+from volery.cost.native.assembly import End, Instruction, Piece
+from volery.cost.native.costs import Ran, execute
+from volery.cost.native.encoding import encode
 
 LAW = catalogue().processor("intel-i5-3470").core_law()
 REPEATS = 400

@@ -1,9 +1,9 @@
 import pytest
 
 from volery.cost import catalogue
-from volery.native import a64, x86
-from volery.native.assembly import End, Instruction, pieces
-from volery.native.instruction import OPERATIONS
+from volery.cost.native import a64, x86
+from volery.cost.native.assembly import End, Instruction, pieces
+from volery.cost.native.instruction import OPERATIONS
 
 X86 = """\
 \t.file\t1 "/src" "step.cpp"

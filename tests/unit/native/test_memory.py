@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from volery.cost import catalogue
-from volery.native.accesses import is_access, told
-from volery.native.assembly import pieces
-from volery.native.code import Block, accesses_of
-from volery.native.encoding import encode
-from volery.native.memory import served_late
-from volery.native.trace import Access, Trace
-from volery.native.walk import Machine, walk
+from volery.cost.native.accesses import is_access, told
+from volery.cost.native.assembly import pieces
+from volery.cost.native.code import Block, accesses_of
+from volery.cost.native.encoding import encode
+from volery.cost.native.memory import served_late
+from volery.cost.native.trace import Access, Trace
+from volery.cost.native.walk import Machine, walk
 
 TEXT = """\
 define void @mix(ptr %p, i64 %n) {

@@ -2,8 +2,8 @@
 
 import pytest
 
-from volery.native.assembly import pieces
-from volery.native.switches import Switch
+from volery.cost.native.assembly import pieces
+from volery.cost.native.switches import Switch
 
 
 def taken(value: int, *lines: str) -> list[bool | None]:

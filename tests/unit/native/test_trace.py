@@ -1,6 +1,6 @@
 import numpy as np
 
-from volery.native.trace import Access, Trace, trace_of
+from volery.cost.native.trace import Access, Trace, trace_of
 
 
 def test_values_of_switches_stand_between_blocks_with_their_sign() -> None:

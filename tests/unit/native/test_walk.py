@@ -1,9 +1,9 @@
 import pytest
 
-from volery.native.assembly import pieces
-from volery.native.code import Block
-from volery.native.trace import Trace
-from volery.native.walk import Machine, walk
+from volery.cost.native.assembly import pieces
+from volery.cost.native.code import Block
+from volery.cost.native.trace import Trace
+from volery.cost.native.walk import Machine, walk
 
 # a loop whose exit edge has a block of its own, and a callee
 TEXT = """\

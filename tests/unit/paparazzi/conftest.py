@@ -8,9 +8,6 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.paparazzi import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import Flight, make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
@@ -18,8 +15,11 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprz_aircraft import stock_aircraft
 from volery.links.wire import WireFaults, wire
-from volery.world.specs import Battery, Multirotor
-from volery.world.wind import Wind
+from volery.simulation.autopilots.paparazzi import DIALECT
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import Flight, make_world
+from volery.simulation.world.specs import Battery, Multirotor
+from volery.simulation.world.wind import Wind
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
 AIRCRAFT = 7

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from volery.world.wind import Wind
+from volery.simulation.world.wind import Wind
 
 Make = Callable[..., Any]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.paparazzi.basic_plan import PLAN
 from volery.links.pprz_aircraft import stock_aircraft
+from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
 
 Make = Callable[..., Any]
 

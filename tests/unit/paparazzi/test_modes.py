@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.paparazzi import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.dialect import dialects
-from volery.autopilots.simulated.flight import make_world
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
-from volery.world.specs import Rover
+from volery.simulation.autopilots.paparazzi import DIALECT
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.dialect import dialects
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Rover
 
 NO_RC, ARMED, KILLED, NOT_ALIGNED = 0, 3, 5, 15
 Make = Callable[..., Any]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.autopilots.paparazzi.airframe import FIGURES
-from volery.autopilots.paparazzi.assumed import ASSUMED
+from volery.simulation.autopilots.paparazzi.airframe import FIGURES
+from volery.simulation.autopilots.paparazzi.assumed import ASSUMED
 
 PAGE = Path(__file__).parents[3] / "docs" / "paparazzi.md"
 

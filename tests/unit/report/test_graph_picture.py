@@ -8,10 +8,10 @@ import pytest
 from lxml import etree
 
 from volery.base.errors import UsageError
-from volery.graph.node import ServiceState
-from volery.graph.portrait import Portrait, TopicLine
 from volery.report.graph_of_run import graph_of_run
 from volery.report.graph_picture import picture
+from volery.ros.graph.node import ServiceState
+from volery.ros.graph.portrait import Portrait, TopicLine
 from volery.testing.sample_run import sample_events, sample_setup
 from volery.trace.mcap_writer import McapWriter
 

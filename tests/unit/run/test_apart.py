@@ -16,8 +16,8 @@ from volery.base.position import AMSL, Position
 from volery.components.loading import Loader
 from volery.model.reader import load
 from volery.model.system import System
-from volery.run.apart import pipe, plan
-from volery.run.apart.values import Values
+from volery.run.distributed import pipe, plan
+from volery.run.distributed.values import Values
 from volery.run.vocabulary import vocabulary
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"

@@ -11,17 +11,17 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from volery.autopilots.ardupilot import DIALECT
-from volery.autopilots.simulated.dialect import dialects
 from volery.base.errors import UsageError
 from volery.cli.main import app
-from volery.drivers.ardupilot import open_driver
+from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.simulated.dialect import dialects
 from volery.testing import Outcome, conformance
 from volery.testing.checks import BrokenError, demand, raising
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import try_fault
 from volery.vehicles import Capability
 from volery.vehicles.driver import DriverFactory, drivers
+from volery.vehicles.drivers.ardupilot import open_driver
 
 
 class Cheat:

@@ -5,10 +5,10 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.world.battery import cell_voltage, current
-from volery.world.columns import U_THROTTLE
-from volery.world.specs import Battery, Multirotor, Rover
-from volery.world.world import STEP, World
+from volery.simulation.world.battery import cell_voltage, current
+from volery.simulation.world.columns import U_THROTTLE
+from volery.simulation.world.specs import Battery, Multirotor, Rover
+from volery.simulation.world.world import STEP, World
 
 
 def test_open_circuit_voltage_falls_without_a_jump():

@@ -4,10 +4,17 @@ import math
 
 import pytest
 
-from volery.world.columns import S_ON_GROUND, S_POSITION, S_RESTING, S_ROTORS, U_MOTOR_HEALTH, U_THROTTLE
-from volery.world.rover import S_SPEED, S_STEER
-from volery.world.specs import STANDARD_GRAVITY, Multirotor, Rover
-from volery.world.world import STEP, World
+from volery.simulation.world.columns import (
+    S_ON_GROUND,
+    S_POSITION,
+    S_RESTING,
+    S_ROTORS,
+    U_MOTOR_HEALTH,
+    U_THROTTLE,
+)
+from volery.simulation.world.rover import S_SPEED, S_STEER
+from volery.simulation.world.specs import STANDARD_GRAVITY, Multirotor, Rover
+from volery.simulation.world.world import STEP, World
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from volery.world.columns import (
+from volery.simulation.world.columns import (
     ACCEL,
     BARO,
     GPS_LEVEL,
@@ -15,9 +15,9 @@ from volery.world.columns import (
     M_MAG,
     MAG,
 )
-from volery.world.sensors import sensor_set
-from volery.world.specs import Multirotor
-from volery.world.world import World
+from volery.simulation.world.sensors import sensor_set
+from volery.simulation.world.specs import Multirotor
+from volery.simulation.world.world import World
 
 BODIES = 40
 

@@ -8,14 +8,22 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.world.columns import S_GUST, S_POSITION, S_RESTING, S_ROTORS, U_PAYLOAD, U_THROTTLE, U_WIND
-from volery.world.compiled import digest_of
-from volery.world.magnetism import magnetic_field
-from volery.world.sensors import declared_sigma, sensor_set
-from volery.world.specs import Multirotor, Rover
-from volery.world.terrain import Terrain
-from volery.world.wind import Wind
-from volery.world.world import STEP, World
+from volery.simulation.world.columns import (
+    S_GUST,
+    S_POSITION,
+    S_RESTING,
+    S_ROTORS,
+    U_PAYLOAD,
+    U_THROTTLE,
+    U_WIND,
+)
+from volery.simulation.world.compiled import digest_of
+from volery.simulation.world.magnetism import magnetic_field
+from volery.simulation.world.sensors import declared_sigma, sensor_set
+from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.world.terrain import Terrain
+from volery.simulation.world.wind import Wind
+from volery.simulation.world.world import STEP, World
 
 SPECS = (Multirotor(), Rover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))
 

@@ -16,7 +16,7 @@ from volery.base.time import MS, US
 from volery.bridge.modes import DJI_ID, GENERIC_ID, PAPARAZZI_ID, Firmware, mode_number
 from volery.kernel.api import Kernel
 from volery.links.mavlink import constant
-from volery.messages.dji import HEALTHY_GPS
+from volery.ros.messages.dji import HEALTHY_GPS
 from volery.vehicles.driver import Driver
 
 Fields = dict[str, Any]

@@ -63,7 +63,7 @@ def cost(
     clang-19 and llvm-19).
     """
     from volery.cli import cost as command
-    from volery.native.running import Wanted as Run
+    from volery.cost.native.running import Wanted as Run
 
     output = Output(quiet, as_json, debug)
     run = Run(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
@@ -124,7 +124,7 @@ def ros(
     command goes on from there. Exit status: 0 if every figure is known as well as asked for, 2 for bad
     input, 1 otherwise.
     """
-    from volery.calibrate.ros.campaign import Plan
+    from volery.calibration.ros.campaign import Plan
     from volery.cli import calibrate as command
 
     output = Output(quiet, as_json, debug)
@@ -157,7 +157,7 @@ def python(
     estimated factor by a measured one. Exit status: 0 if every time is known as well as asked for, 2 for
     bad input, 1 otherwise.
     """
-    from volery.calibrate.python.pieces import Rounds
+    from volery.calibration.python.pieces import Rounds
     from volery.cli import calibrate_python as command
 
     output = Output(quiet, as_json, debug)

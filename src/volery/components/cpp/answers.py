@@ -13,9 +13,9 @@ from volery.components import services
 from volery.components.cpp.errors import Exited
 from volery.components.cpp.interfaces import Operation
 from volery.components.stand_ins import EPOCH
-from volery.faces.wire import Answer, CppFlow, Reader, Writer
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
+from volery.ros.client_libraries.wire import Answer, CppFlow, Reader, Writer
 from volery.vehicles import Drone
 
 STICKS = 1000

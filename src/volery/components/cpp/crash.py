@@ -10,11 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from volery import components, faces
+from volery import components
 from volery.base.errors import ComponentError
+from volery.ros import client_libraries
 
 _LINE = 4096
-_OURS = tuple(f"{Path(package.__file__).parent}/" for package in (components, faces) if package.__file__)
+_OURS = tuple(
+    f"{Path(package.__file__).parent}/" for package in (components, client_libraries) if package.__file__
+)
 _WORDS = {
     "stack": "its stack is full: it recurses without end, or keeps too much in local variables",
     "frozen": "virtual time is frozen: it computes and asks nothing any more",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from volery.base.errors import ComponentError
 from volery.components.cpp.errors import CppError, Exited, no_answer
-from volery.faces.wire import Answers, Reader
+from volery.ros.client_libraries.wire import Answers, Reader
 
 _CALL, _ANSWER, _FAIL, _END = range(4)
 STACK_BYTES = 8 * 1024 * 1024
@@ -80,7 +80,7 @@ def house(path: Path) -> House:
 
 
 class Flow:
-    """One flow of control. See ``volery.faces.wire.CppFlow``."""
+    """One flow of control. See ``volery.ros.client_libraries.wire.CppFlow``."""
 
     def __init__(self, owner: House, component: str, dispatch: int, answers: Answers, hear: Hear) -> None:
         self._hear = hear

@@ -17,8 +17,8 @@ from volery.components.cpp.library import Library
 from volery.components.cpp.meter import Meter, Worth
 from volery.components.ports import PortList
 from volery.components.stand_ins.words import INFO
-from volery.faces.wire import Answers, Reader, Writer
 from volery.kernel.api import Kernel
+from volery.ros.client_libraries.wire import Answers, Reader, Writer
 from volery.trace.events import Text
 
 MAKE, RUN, OPERATIONS = range(3)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import ModelError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.faces.wire import Reader, Writer
+from volery.ros.client_libraries.wire import Reader, Writer
 
 _ALTITUDES = (AMSL, Ellipsoidal, AboveHome, AboveGround)
 """In the order of ``volery::Reference``."""

@@ -8,17 +8,17 @@ from typing import Any
 import pytest
 
 from rigs.missions import carried_out
-from volery.autopilots.dji import DIALECT
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.messages import new, request
+from volery.ros.graph import Graph
+from volery.ros.messages import new, request
+from volery.simulation.autopilots.dji import DIALECT
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.world.specs import Multirotor
 from volery.trace.events import Text
-from volery.world.specs import Multirotor
 
 FRAME = LocalFrame(46.0, -103.0, 900.0)
 TYPES = {

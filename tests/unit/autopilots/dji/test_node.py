@@ -10,7 +10,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.kernel.task import Place
-from volery.messages import new
+from volery.ros.messages import new
 
 Make = Callable[..., Any]
 

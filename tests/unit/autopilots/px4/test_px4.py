@@ -7,17 +7,6 @@ from typing import Any
 
 import pytest
 
-from volery.autopilots.px4 import DIALECT
-from volery.autopilots.px4.events import Checks, report
-from volery.autopilots.px4.joystick import Deflection, Joystick, deflection
-from volery.autopilots.px4.modes import custom_mode, main_and_sub
-from volery.autopilots.px4.offboard import Stream, Target, attitude_target
-from volery.autopilots.px4.piloted import curve
-from volery.autopilots.px4.ramps import interpolated
-from volery.autopilots.simulated.autopilot import Autopilot
-from volery.autopilots.simulated.flight import make_world
-from volery.autopilots.simulated.mavlink.habits import Texts
-from volery.autopilots.simulated.mavlink.texts import TextLine
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
@@ -25,7 +14,18 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.parameter_values import as_bytes, from_bytes
 from volery.links.status_texts import chunks
-from volery.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.px4 import DIALECT
+from volery.simulation.autopilots.px4.events import Checks, report
+from volery.simulation.autopilots.px4.joystick import Deflection, Joystick, deflection
+from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
+from volery.simulation.autopilots.px4.offboard import Stream, Target, attitude_target
+from volery.simulation.autopilots.px4.piloted import curve
+from volery.simulation.autopilots.px4.ramps import interpolated
+from volery.simulation.autopilots.simulated.autopilot import Autopilot
+from volery.simulation.autopilots.simulated.flight import make_world
+from volery.simulation.autopilots.simulated.mavlink.habits import Texts
+from volery.simulation.autopilots.simulated.mavlink.texts import TextLine
+from volery.simulation.world.specs import Multirotor, Rover
 
 
 def test_a_mode_is_two_numbers_in_one() -> None:

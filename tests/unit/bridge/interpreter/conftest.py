@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.base.frames import LocalFrame
 from volery.base.geoid import LevelGeoid
 from volery.base.time import S
 from volery.bridge import MAVROS, Interpreter, VehicleNode, VehicleNodeOptions
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
+from volery.ros import messages
+from volery.ros.graph import Graph
 from volery.run.airfield import airfield_of
 from volery.run.serving import open_simulated
 from volery.run.simulated import simulated

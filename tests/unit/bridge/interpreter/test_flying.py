@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from volery import messages
 from volery.bridge import ROSCOPTER
+from volery.ros import messages
 
 HOVERS = {"paparazzi": "GUIDED", "dji": "P_GPS"}
 

@@ -9,13 +9,13 @@ import pytest
 
 from rigs.missions import carried_out
 from volery.base.time import MS, S
-from volery.drivers.dji import open_driver
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.messages import message_class, new
-from volery.messages.dji import SETPOINT, SETPOINT_TOPICS
+from volery.ros.graph import Graph
+from volery.ros.messages import message_class, new
+from volery.ros.messages.dji import SETPOINT, SETPOINT_TOPICS
 from volery.vehicles import Drone
+from volery.vehicles.drivers.dji import open_driver
 
 HOME = (46.0, -103.0, 900.0)
 METRES = 111_195.0

@@ -21,10 +21,10 @@ from volery.base.errors import (
 )
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, S
-from volery.drivers.dji import DRIVER, open_driver
 from volery.kernel.task import Place
 from volery.vehicles import Drone
 from volery.vehicles.driver import Capability
+from volery.vehicles.drivers.dji import DRIVER, open_driver
 from volery.vehicles.telemetry import Said
 
 HOME = (46.0, -103.0, 900.0)

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.graph import ServiceError
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.wire import WireFaults
-from volery.messages import message_class, new, request
+from volery.ros.graph import ServiceError
+from volery.ros.messages import message_class, new, request
 from volery.run.graph_wire import GraphWire, private_graph
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
-from volery.drivers.dji.missions import plan_of
 from volery.vehicles import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
+from volery.vehicles.drivers.dji.missions import plan_of
 
 HOME = Position(46.0, -103.0, AMSL(900.0))
 

@@ -15,12 +15,12 @@ import pytest
 from rigs.bench import Bench
 from volery.base.frames import geodetic_to_ecef
 from volery.base.time import MS, S
-from volery.drivers.paparazzi import open_driver
-from volery.drivers.paparazzi.modes import NUMBERS
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame, Link
 from volery.links.pprzlink import PPRZLINK
 from volery.links.pprzlink_definitions import entry_value
+from volery.vehicles.drivers.paparazzi import open_driver
+from volery.vehicles.drivers.paparazzi.modes import NUMBERS
 
 ORIGIN = (43.4622222, 1.2733333)  # degrees
 AMSL_M, GEOID_M = 185.0, 48.5

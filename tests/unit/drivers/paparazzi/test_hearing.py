@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.drivers.paparazzi import open_driver
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprzlink import PPRZLINK
 from volery.links.pprzlink_definitions import TELEMETRY, Field, message_names, message_type
+from volery.vehicles.drivers.paparazzi import open_driver
 
 ORIGIN = {"lat0": 434622222, "lon0": 12733333, "alt0": 233_500, "hmsl0": 185_000}
 STATUS = {"ap_mode": 13, "gps_status": 3, "arming_status": 1, "vsupply": 12.25}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.drivers.paparazzi.modes import ASSUMED
+from volery.vehicles.drivers.paparazzi.modes import ASSUMED
 
 PAGE = Path(__file__).parents[4] / "docs" / "paparazzi.md"
 

@@ -12,8 +12,6 @@ from volery.base.errors import LinkSilent, UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS, S
 from volery.bridge import serve_pprzros
-from volery.drivers.paparazzi import open_pprzros
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
@@ -21,9 +19,11 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprz_message import TYPE, to_message
 from volery.links.pprzlink import PPRZLINK
-from volery.messages import new
+from volery.ros.graph import Graph
+from volery.ros.messages import new
 from volery.trace.events import Operation
 from volery.vehicles import Drone
+from volery.vehicles.drivers.paparazzi import open_pprzros
 
 LATITUDE, LONGITUDE = 43.4622222, 1.2733333
 NEAR = Position(LATITUDE + 0.0003, LONGITUDE, AboveHome(12.0))

@@ -15,10 +15,10 @@ from rigs import scripted
 from rigs.bench import Bench
 from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
 from volery.base.time import MS, S
-from volery.drivers.px4 import open_driver
-from volery.drivers.px4.events import event_id
-from volery.drivers.px4.modes import BY_STICKS, HOLD, LAND, MODES, OFFBOARD, RTL, TAKEOFF
 from volery.links.link import Frame
+from volery.vehicles.drivers.px4 import open_driver
+from volery.vehicles.drivers.px4.events import event_id
+from volery.vehicles.drivers.px4.modes import BY_STICKS, HOLD, LAND, MODES, OFFBOARD, RTL, TAKEOFF
 
 HOME = (454671168, -737578362, 32_575)  # degE7, degE7, mm AMSL
 REJECTED, UNSUPPORTED = 1, 3

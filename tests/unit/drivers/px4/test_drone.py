@@ -19,10 +19,10 @@ from volery.base.errors import (
 )
 from volery.base.position import AMSL, AboveGround, AboveHome, Position
 from volery.base.time import MS, S
-from volery.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD, RTL
 from volery.kernel.waiting import sleep
 from volery.trace.events import Operation
 from volery.vehicles import Capability, ChangeSpeed, Land, ReturnHome, TakeOff, Waypoint
+from volery.vehicles.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD, RTL
 
 Make = Callable[..., Any]
 LATITUDE, LONGITUDE = 45.4671168, -73.7578362

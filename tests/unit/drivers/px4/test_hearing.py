@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded, extract
-from volery.drivers.px4.events import SAID, event_id, words_of
-from volery.drivers.px4.hearing import Hearing
 from volery.links.link import Frame
 from volery.links.mavlink import encode
 from volery.links.parser import Parser
+from volery.vehicles.drivers.px4.events import SAID, event_id, words_of
+from volery.vehicles.drivers.px4.hearing import Hearing
 
 ARM, REJECTED = 400, 1
 FOLDER = "px4_telemetry"

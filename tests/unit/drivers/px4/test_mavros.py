@@ -12,14 +12,14 @@ from volery.base.errors import Overridden, UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS
 from volery.bridge import serve_vehicle
-from volery.drivers.mavros import MAVROS
-from volery.drivers.px4.modes import HOLD
-from volery.graph import Graph
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process import in_process
+from volery.ros.graph import Graph
 from volery.vehicles import Drone
+from volery.vehicles.drivers.mavros import MAVROS
+from volery.vehicles.drivers.px4.modes import HOLD
 
 Make = Callable[..., Any]
 NEAR = Position(45.4675168, -73.7578362, AboveHome(12.0))

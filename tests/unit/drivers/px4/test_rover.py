@@ -9,9 +9,9 @@ import pytest
 
 from volery.base.errors import CapabilityError, Overridden
 from volery.base.time import S
-from volery.drivers.px4.modes import HOLD
 from volery.kernel.waiting import sleep
 from volery.vehicles import Capability, Drone, Rover
+from volery.vehicles.drivers.px4.modes import HOLD
 
 Make = Callable[..., Any]
 NEAR = (45.4675168, -73.7578362)

@@ -1,0 +1,121 @@
+"""As many rounds as it takes until every figure is known, or until it is said which is not.
+
+What was measured is kept in a file, a line each round: a campaign that was broken off goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from volery.base.errors import UsageError
+from volery.base.seeds import stream
+from volery.calibration.ros.fitting import Cost, costs
+from volery.calibration.ros.samples import Round, Sample
+from volery.calibration.ros.stage import Pace, Stage
+
+PERIODS_MS = (20.0, 50.0)
+"""Of the cycles that calls are measured in, one a round: what has slept longer finds its caches colder."""
+
+LEAST_ROUNDS = 3
+"""Fewer say nothing about their spread."""
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What a campaign was measured under: rounds of another one do not mix with it."""
+
+    client: str
+    processor: str
+    frequency_mhz: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """At least and at most so many rounds; ``within`` is how well, relative, each figure is to be known."""
+
+    least: int = 10
+    most: int = 30
+    within: float = 0.1
+    seed: int = 1
+    pace: Pace = field(default_factory=Pace)
+
+    def pace_of(self, number: int) -> Pace:
+        """That of round *number*: least and greatest counts each time, others in turn, in an order drawn."""
+        counts = self.pace.counts
+        random = stream(self.seed, f"calibrate/{number}")
+        between = counts[1:-1]
+        chosen = [counts[0], counts[-1], *random.sample(between, min(2, len(between)))]
+        sleeps = list(self.pace.sleeps_ms)
+        random.shuffle(chosen)
+        random.shuffle(sleeps)
+        period = PERIODS_MS[number % len(PERIODS_MS)]
+        return replace(self.pace, period_ms=period, counts=tuple(chosen), sleeps_ms=tuple(sleeps))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """After each round: how many there are, and the figures that are not known well enough yet."""
+
+    rounds: int
+    most: int
+    loose: tuple[Cost, ...]
+
+
+Show = Callable[[Progress], None]
+
+
+class Notebook:
+    """The file that rounds are kept in. ``UsageError`` if it holds those of other circumstances."""
+
+    def __init__(self, file: Path, under: Circumstances) -> None:
+        self._file = file
+        self.rounds: list[Round] = []
+        header = vars(under)
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(header) + "\n", encoding="utf-8")
+            return
+        lines = file.read_text(encoding="utf-8").splitlines()
+        try:
+            known = json.loads(lines[0])
+            self.rounds = [tuple(Sample(*one) for one in json.loads(line)) for line in _whole(lines[1:])]
+        except (IndexError, ValueError, TypeError) as error:
+            raise UsageError(f"{file} holds no rounds of a campaign: remove it") from error
+        if known != header:
+            raise UsageError(f"{file} holds rounds of {known}, not of {header}: remove it or move it away")
+
+    def keep(self, one: Round) -> None:
+        """Add a round."""
+        self.rounds.append(one)
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(one) + "\n")
+
+    def forget(self) -> None:
+        """The campaign is over."""
+        self._file.unlink(missing_ok=True)
+
+
+def _whole(lines: list[str]) -> Iterator[str]:
+    """A last line that was cut off by a crash is left out."""
+    for number, line in enumerate(lines):
+        if number < len(lines) - 1 or line.endswith("]]"):
+            yield line
+
+
+def pursue(stage: Stage, plan: Plan, notebook: Notebook, show: Show = lambda progress: None) -> None:
+    """Measure rounds until all figures are tight or there are enough of them."""
+    while True:
+        done = len(notebook.rounds)
+        loose = loose_figures(notebook.rounds, plan.within) if done >= plan.least else ()
+        show(Progress(done, plan.most, loose))
+        if done >= plan.most or (done >= plan.least and not loose):
+            return
+        notebook.keep(stage.probe(plan.pace_of(done)))
+
+
+def loose_figures(rounds: Iterable[Round], within: float) -> tuple[Cost, ...]:
+    """The calls whose cost is not known to *within*."""
+    return tuple(cost for cost in costs(list(rounds)).values() if not cost.is_tight(within))

@@ -1,1 +1,0 @@
-"""Controllers, flying code and safety switches. Not there yet."""

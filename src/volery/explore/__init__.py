@@ -1,1 +1,0 @@
-"""Campaigns and design-space exploration. Not there yet."""

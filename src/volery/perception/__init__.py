@@ -1,1 +1,0 @@
-"""Mapping, marker detection and route planning. Not there yet."""

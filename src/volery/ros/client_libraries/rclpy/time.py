@@ -1,0 +1,199 @@
+"""rclpy's ``Time``, ``Duration`` and ``Clock``: nanoseconds of the graph's time."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from functools import total_ordering
+from typing import Any, ClassVar
+
+from volery.base.time import Ns, S, from_seconds
+from volery.ros.client_libraries.rclpy.context import Context, Contexts
+from volery.ros.client_libraries.rclpy.errors import NotInitializedException, ROSInterruptException
+from volery.ros.messages import new
+from volery.ros.messages.stamp import nanoseconds
+
+
+class ClockType(IntEnum):
+    """Which clock a time was read from. On the embedded graph they all tell the graph's time."""
+
+    ROS_TIME = 1
+    SYSTEM_TIME = 2
+    STEADY_TIME = 3
+
+
+def _whole(seconds: float, nanoseconds_: float) -> Ns:
+    return (from_seconds(seconds) if isinstance(seconds, float) else seconds * S) + int(nanoseconds_)
+
+
+@total_ordering
+class Duration:
+    """A span of time; may be negative."""
+
+    def __init__(self, *, seconds: float = 0, nanoseconds: float = 0) -> None:
+        self.nanoseconds: Ns = _whole(seconds, nanoseconds)
+
+    def __repr__(self) -> str:
+        return f"Duration(nanoseconds={self.nanoseconds})"
+
+    def __hash__(self) -> int:
+        return hash(self.nanoseconds)
+
+    def __eq__(self, other: object) -> bool:
+        return self.nanoseconds == other.nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __lt__(self, other: object) -> bool:
+        return self.nanoseconds < other.nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __add__(self, other: Any) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Duration(nanoseconds=self.nanoseconds + other.nanoseconds)
+
+    def __sub__(self, other: Any) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
+
+    def __mul__(self, factor: float) -> Duration:
+        return Duration(nanoseconds=round(self.nanoseconds * factor))
+
+    __rmul__ = __mul__
+
+    def to_msg(self) -> Any:
+        """A ``builtin_interfaces/msg/Duration``."""
+        seconds, rest = divmod(self.nanoseconds, S)
+        return new("builtin_interfaces/msg/Duration", sec=seconds, nanosec=rest)
+
+    @classmethod
+    def from_msg(cls, msg: Any) -> Duration:
+        """From a ``builtin_interfaces/msg/Duration``."""
+        return cls(nanoseconds=nanoseconds(msg))
+
+
+Infinite = Duration(nanoseconds=(1 << 63) - 1)
+
+
+@total_ordering
+class Time:
+    """A point in time. Two of different clocks can be neither compared nor subtracted."""
+
+    def __init__(
+        self, *, seconds: float = 0, nanoseconds: float = 0, clock_type: ClockType = ClockType.SYSTEM_TIME
+    ) -> None:
+        self.nanoseconds: Ns = _whole(seconds, nanoseconds)
+        self.clock_type = ClockType(clock_type)
+        if self.nanoseconds < 0:
+            raise ValueError("Seconds value must not be negative")
+
+    def __repr__(self) -> str:
+        return f"Time(nanoseconds={self.nanoseconds}, clock_type={self.clock_type.name})"
+
+    def __hash__(self) -> int:
+        return hash((self.nanoseconds, self.clock_type))
+
+    def seconds_nanoseconds(self) -> tuple[int, int]:
+        """Whole seconds and the rest."""
+        return divmod(self.nanoseconds, S)
+
+    def _check(self, other: Time) -> None:
+        if other.clock_type is not self.clock_type:
+            raise TypeError("Can't compare times with different clock types")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Time):
+            return NotImplemented
+        self._check(other)
+        return self.nanoseconds == other.nanoseconds
+
+    def __lt__(self, other: object) -> bool:
+        if not isinstance(other, Time):
+            return NotImplemented
+        self._check(other)
+        return self.nanoseconds < other.nanoseconds
+
+    def __add__(self, other: Any) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Time(nanoseconds=self.nanoseconds + other.nanoseconds, clock_type=self.clock_type)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        if isinstance(other, Time):
+            self._check(other)
+            return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
+        if isinstance(other, Duration):
+            return Time(nanoseconds=self.nanoseconds - other.nanoseconds, clock_type=self.clock_type)
+        return NotImplemented
+
+    def to_msg(self) -> Any:
+        """A ``builtin_interfaces/msg/Time``."""
+        seconds, rest = self.seconds_nanoseconds()
+        return new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+
+    @classmethod
+    def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
+        """From a ``builtin_interfaces/msg/Time``."""
+        return cls(nanoseconds=nanoseconds(msg), clock_type=clock_type)
+
+
+class Clock:
+    """Tells the graph's time."""
+
+    contexts: ClassVar[Contexts]
+
+    def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
+        self.clock_type = ClockType(clock_type)
+
+    @property
+    def ros_time_is_active(self) -> bool:
+        """Always: the graph's time is ROS time."""
+        return self.clock_type is ClockType.ROS_TIME
+
+    def now(self) -> Time:
+        """The time it is. An interaction point."""
+        return Time(nanoseconds=self.contexts.now(), clock_type=self.clock_type)
+
+    def sleep_until(self, until: Time, context: Context | None = None) -> bool:
+        """Block until then; False if the context was shut down meanwhile."""
+        if until.clock_type is not self.clock_type:
+            raise ValueError("until's clock type does not match this clock's type")
+        used = context or self.contexts.here()
+        if not used.ok():
+            raise NotInitializedException()
+        used.sleep(until.nanoseconds - self.contexts.now())
+        return used.ok()
+
+    def sleep_for(self, rel_time: Duration, context: Context | None = None) -> bool:
+        """Block for so long; False if the context was shut down meanwhile."""
+        used = context or self.contexts.here()
+        if not used.ok():
+            raise NotInitializedException()
+        used.sleep(rel_time.nanoseconds)
+        return used.ok()
+
+
+class ROSClock(Clock):
+    """A clock of ``ROS_TIME``."""
+
+    def __init__(self) -> None:
+        super().__init__(clock_type=ClockType.ROS_TIME)
+
+
+class Rate:
+    """Keeps a loop at a period. It does not need the node to be spun."""
+
+    def __init__(self, context: Context, period: Ns) -> None:
+        self._context = context
+        self._rate = context.node().rate(period)
+
+    def sleep(self) -> None:
+        """Block until the next release; ``ROSInterruptException`` at shutdown."""
+        if not self._context.ok():
+            raise ROSInterruptException()
+        self._rate.sleep()
+        if not self._context.ok():
+            raise ROSInterruptException()
+
+    def destroy(self) -> None:
+        """Nothing to let go of."""

@@ -1,0 +1,149 @@
+"""Headers of message and service types, generated from their definitions: ``std_msgs/String.h`` and so on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from volery.base.errors import UsageError
+from volery.ros import messages
+from volery.ros.messages.layout import Constant, FieldLayout, Layout, ros1_layout
+from volery.ros.messages.packages import ROS1_SPELLING
+
+INCLUDE = Path(__file__).parent / "include"
+_HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
+_BASES = {
+    "bool": "std::uint8_t", "byte": "std::int8_t", "char": "std::uint8_t", "octet": "std::uint8_t",
+    "int8": "std::int8_t", "uint8": "std::uint8_t", "int16": "std::int16_t", "uint16": "std::uint16_t",
+    "int32": "std::int32_t", "uint32": "std::uint32_t", "int64": "std::int64_t", "uint64": "std::uint64_t",
+    "float32": "float", "float64": "double", "string": "std::string",
+}  # fmt: skip
+_TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Duration": "ros::Duration"}
+
+
+def generate(includes: Sequence[str], path: Path) -> Mapping[str, str]:
+    """The headers that *includes* name, and those they include, by name.
+
+    *path* is the component's file or folder: packages of interfaces near it are found. What is of ROS and not
+    offered says so, lest the compiler finds a real one; other names are left to it. ``ModelError`` where an
+    interface's file is no definition.
+    """
+    named = [found for name in includes if (found := _HEADER.match(name))]
+    messages.define_packages(path, dict.fromkeys(found[1] for found in named))
+    packages = {name.partition("/")[0] for name in (*messages.types(), *messages.service_types())}
+    texts: dict[str, str] = {}
+    for found in named:
+        _add(texts, found[1], found[2])
+        ours = INCLUDE / found[0]
+        if found[0] not in texts and found[1] in {"ros", *packages} and not ours.exists():
+            texts[found[0]] = _REFUSED.format(name=found[0])
+    return texts
+
+
+_REFUSED = """\
+#error "volery: <{name}> is not offered on the embedded graph"
+"""
+
+
+def _add(texts: dict[str, str], package: str, label: str) -> None:
+    if f"{package}/{label}.h" in texts:
+        return
+    ours = ROS1_SPELLING.get(package, {}).get(label, label)
+    if f"{package}/srv/{ours}" in messages.service_types():
+        _add_service(texts, package, label, ours)
+        return
+    for name in (f"{package}/msg/{ours}", *_halves(package, ours)):
+        try:
+            layout = ros1_layout(name)
+        except UsageError:
+            continue
+        _add_message(texts, package, label, layout)
+        return
+
+
+def _halves(package: str, label: str) -> Iterable[str]:
+    """``TriggerRequest`` may be half of a service."""
+    for ending in ("Request", "Response"):
+        if label.endswith(ending):
+            yield f"{package}/srv/{label.removesuffix(ending)}_{ending}"
+
+
+def _add_service(texts: dict[str, str], package: str, label: str, ours: str) -> None:
+    kind = messages.service(f"{package}/srv/{ours}")
+    for ending, half in (("Request", kind.request), ("Response", kind.response)):
+        _add_message(texts, package, f"{label}{ending}", ros1_layout(half.__msgtype__))
+    texts[f"{package}/{label}.h"] = _SERVICE.format(package=package, label=label, name=kind.name)
+
+
+_SERVICE = """\
+// Generated from the definition of the service {package}/{label}.
+#pragma once
+#include "ros/message.h"
+#include "{package}/{label}Request.h"
+#include "{package}/{label}Response.h"
+
+namespace {package} {{
+
+struct {label} {{
+    using Request = {label}Request;
+    using Response = {label}Response;
+    Request request;
+    Response response;
+    static const char* name_() {{ return "{name}"; }}
+}};
+
+}}  // namespace {package}
+"""
+
+
+def _add_message(texts: dict[str, str], package: str, label: str, layout: Layout) -> None:
+    nested = dict.fromkeys(one.nested for one in layout.fields if one.nested and one.nested not in _TIMES)
+    texts[f"{package}/{label}.h"] = message_header(package, label, layout)
+    for name in nested:
+        inner_package, _, inner = _ros1(name).partition("/")
+        _add(texts, inner_package, inner)
+
+
+def _ros1(name: str) -> str:
+    return ros1_layout(name).label
+
+
+def message_header(package: str, label: str, layout: Layout) -> str:
+    """The text of ``package/label.h``."""
+    nested = dict.fromkeys(one.nested for one in layout.fields if one.nested and one.nested not in _TIMES)
+    lines = [
+        f"// Generated from the definition of {layout.label}.",
+        "#pragma once",
+        '#include "ros/message.h"',
+    ]
+    lines += [f'#include "{_ros1(name)}.h"' for name in nested]
+    lines += ["", f"namespace {package} {{", "", f"struct {label} {{"]
+    lines += [f"    using Ptr = boost::shared_ptr<{label}>;"]
+    lines += [f"    using ConstPtr = boost::shared_ptr<{label} const>;"]
+    lines += [f"    {_declared(one)}" for one in layout.constants]
+    lines += [f"    {_type(one)} {one.name}{{}};" for one in layout.fields]
+    lines += ["    template <class Visitor, class Message>"]
+    lines += ["    static void each_([[maybe_unused]] Visitor& visit, [[maybe_unused]] Message& message) {"]
+    lines += [f'        visit("{one.name}", message.{one.name});' for one in layout.fields if one.carried]
+    if not any(one.carried for one in layout.fields):
+        lines += ["        visit.nothing();"]
+    lines += ["    }", f'    static const char* name_() {{ return "{layout.name}"; }}', "};", ""]
+    lines += [f"using {label}Ptr = {label}::Ptr;", f"using {label}ConstPtr = {label}::ConstPtr;", ""]
+    lines += [f"using ros::message_operators::operator{one};" for one in ("<<", "==", "!=")]
+    return "\n".join([*lines, "", f"}}  // namespace {package}", ""])
+
+
+def _declared(one: Constant) -> str:
+    if one.base == "string":
+        text = str(one.value).replace("\\", "\\\\").replace('"', '\\"')
+        return f'static inline const std::string {one.name} = "{text}";'
+    value = str(one.value).lower() if isinstance(one.value, bool) else one.value
+    return f"static constexpr {_BASES[one.base]} {one.name} = static_cast<{_BASES[one.base]}>({value});"
+
+
+def _type(one: FieldLayout) -> str:
+    single = _BASES[one.base] if one.base else _TIMES.get(one.nested) or _ros1(one.nested).replace("/", "::")
+    if one.length is None:
+        return single
+    return f"boost::array<{single}, {one.length}>" if one.length else f"std::vector<{single}>"

@@ -1,0 +1,157 @@
+"""rospy's ``Publisher``, ``Subscriber`` and ``wait_for_message``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.kernel.waiting import Signal
+from volery.ros.client_libraries.rospy.anymsg import AnyMsg, AnySubscription
+from volery.ros.client_libraries.rospy.errors import ROSException, ROSSerializationException
+from volery.ros.client_libraries.rospy.session import Session, Sessions
+from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, Subscription
+from volery.ros.messages import Message
+
+
+def type_name(what: str, data_class: Any) -> str:
+    """The name of a message type that is given as its class."""
+    name = getattr(data_class, "__msgtype__", "")
+    if not name:
+        raise UsageError(f"rospy.{what}: {data_class!r} is no message class; import one, as in std_msgs.msg")
+    return str(name)
+
+
+def _listening(depth: int | None) -> QoS:
+    """ROS 1 knows no QoS: a subscriber takes what is offered."""
+    return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
+
+
+class Publisher:
+    """Publishes to a topic.
+
+    Connections are ready at once; ``queue_size`` is accepted, sending never waits.
+    """
+
+    sessions: ClassVar[Sessions]
+
+    def __init__(
+        self,
+        name: str,
+        data_class: Any,
+        subscriber_listener: Any = None,
+        tcp_nodelay: bool = False,
+        latch: bool = False,
+        headers: Any = None,
+        *,
+        queue_size: int | None = None,
+    ) -> None:
+        if subscriber_listener is not None:
+            raise NotImplementedError(
+                "rospy.Publisher: subscriber_listener is not there on the embedded graph"
+            )
+        session = self._session = self.sessions.early()
+        qos = LATCHED if latch else QoS(queue_size or None)
+        self.data_class = data_class
+        self.type = type_name("Publisher", data_class)
+        self._publisher = session.node.advertise(name, self.type, qos)
+        self.name = self.resolved_name = self._publisher.topic
+
+    def publish(self, *args: Any, **fields: Any) -> None:
+        """Publish a message, or one made of these fields; ``ROSException`` before ``init_node``."""
+        if not self._session.initialised:
+            raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
+        if len(args) == 1 and not fields and isinstance(args[0], Message):
+            message = args[0]
+        else:
+            message = _made(self.data_class, args, fields)
+        try:
+            self._publisher.publish(message)
+        except UsageError as error:
+            raise ROSSerializationException(str(error)) from error
+
+    def get_num_connections(self) -> int:
+        """How many subscribers it is connected to."""
+        return self._publisher.subscribers()
+
+    def unregister(self) -> None:
+        """Publish no longer."""
+        self._publisher.close()
+
+
+def _made(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+    try:
+        return data_class(*args, **fields)
+    except TypeError as error:
+        raise ROSSerializationException(f"{data_class.__msgtype__}: {error}") from error
+
+
+class Subscriber:
+    """Calls back with each message, in a thread of its own."""
+
+    sessions: ClassVar[Sessions]
+
+    def __init__(
+        self,
+        name: str,
+        data_class: Any,
+        callback: Callable[..., Any] | None = None,
+        callback_args: Any = None,
+        queue_size: int | None = None,
+        buff_size: int = 65536,
+        *,
+        tcp_nodelay: bool = False,
+    ) -> None:
+        session = self.sessions.early()
+        self.data_class = data_class
+        self.callback = callback
+        self._args = callback_args
+        topic = self.name = self.resolved_name = session.node.resolve(name)
+        qos = _listening(queue_size)
+        self._subscription: AnySubscription | Subscription
+        if data_class is AnyMsg:
+            self.type = AnyMsg._type
+            self._subscription = AnySubscription(session, topic, self._call, qos)
+            return
+        self.type = type_name("Subscriber", data_class)
+        group = session.spin_beside(topic, f"callback of {topic}")
+        self._subscription = session.node.subscribe(name, self.type, self._call, qos, group)
+
+    def _call(self, message: Any) -> None:
+        if self.callback is None:
+            return
+        if self._args is None:
+            self.callback(message)
+        else:
+            self.callback(message, self._args)
+
+    def get_num_connections(self) -> int:
+        """How many publishers it is connected to."""
+        return self._subscription.publishers()
+
+    def unregister(self) -> None:
+        """Receive no longer."""
+        self._subscription.close()
+
+
+def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns | None) -> Any:
+    """The next message of a topic; ``ROSException`` if none comes in time."""
+    received: list[Any] = []
+    arrived = Signal(session.kernel, f"{topic} (a message)")
+
+    def keep(message: Any) -> None:
+        received.append(message)
+        arrived.notify()
+
+    group = session.node.group()
+    kind = type_name("wait_for_message", data_class)
+    subscription = session.node.subscribe(topic, kind, keep, _listening(1), group)
+    try:
+        group.spin_once(timeout)
+    finally:
+        subscription.close()
+    session.check()
+    if not received:
+        raise ROSException(f"timeout exceeded while waiting for message on topic {subscription.topic}")
+    return received[0]

@@ -1,0 +1,54 @@
+"""ROS message types: definitions, values, and their bytes. The only room that imports rosbags.
+
+Within one process a message is a value of the class that this room makes for its type, in the definitions of
+ROS 2 Humble; the few packages that the stores lack are written out in ``definitions/``. Knows nobody but
+``base``: it must not know what a graph is, nor who sends what.
+"""
+
+from volery.ros.messages.cdr import cdr_size, from_cdr, to_cdr
+from volery.ros.messages.message import Message
+from volery.ros.messages.nearby import define_imported, define_packages
+from volery.ros.messages.packages import modules
+from volery.ros.messages.ros1 import Ros1Service, Ros1Type, from_ros1, ros1_service, ros1_type, to_ros1
+from volery.ros.messages.store import (
+    ServiceType,
+    define,
+    definition,
+    message_class,
+    message_name,
+    new,
+    request,
+    service,
+    service_name,
+    service_types,
+    type_hash,
+    types,
+)
+
+__all__ = [
+    "Message",
+    "Ros1Service",
+    "Ros1Type",
+    "ServiceType",
+    "cdr_size",
+    "define",
+    "define_imported",
+    "define_packages",
+    "definition",
+    "from_cdr",
+    "from_ros1",
+    "message_class",
+    "message_name",
+    "modules",
+    "new",
+    "request",
+    "ros1_service",
+    "ros1_type",
+    "service",
+    "service_name",
+    "service_types",
+    "to_cdr",
+    "to_ros1",
+    "type_hash",
+    "types",
+]

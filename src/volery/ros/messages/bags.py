@@ -1,0 +1,164 @@
+"""Recordings of ROS topics: rosbag 1, rosbag 2 and MCAP, read and written alike.
+
+Times are nanoseconds as the recording has them: since the Unix epoch, or since the start of a simulated run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag1 import ReaderError as Reader1Error
+from rosbags.rosbag2 import Reader as Reader2
+from rosbags.rosbag2 import ReaderError as Reader2Error
+from rosbags.typesys import get_types_from_idl, get_types_from_msg
+from rosbags.typesys.base import TypesysError
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.ros.messages.bag_salvage import RawMessage, salvage_mcap, salvage_rosbag1
+from volery.ros.messages.cdr import from_cdr
+from volery.ros.messages.message import Message
+from volery.ros.messages.ros1 import from_ros1, our_name
+from volery.ros.messages.store import store
+
+OF_THE_RUN = "/volery/"
+"""How the topics begin on which a run's trace keeps what is no ROS message."""
+
+ROSBAG1, ROSBAG2, MCAP = "rosbag 1", "rosbag 2", "MCAP"
+_SUFFIXES = {".bag": ROSBAG1, ".mcap": MCAP, ".db3": ROSBAG2}
+
+
+class BagTopic(NamedTuple):
+    """A recorded topic: its type (``package/msg/Name``) and how many messages there are of it."""
+
+    name: str
+    type: str
+    messages: int
+
+
+class BagMessage(NamedTuple):
+    """A recorded message."""
+
+    at: Ns
+    topic: str
+    message: Message
+
+
+@dataclass(frozen=True)
+class Bag:
+    """A recording. ``start`` and ``end`` are the times of its first and last message.
+
+    ``complete`` is False if it was cut short: then what is whole is read. ``unreadable`` says, by topic, why
+    messages of it cannot be read.
+    """
+
+    path: Path
+    format: str
+    topics: tuple[BagTopic, ...]
+    start: Ns
+    end: Ns
+    complete: bool
+    unreadable: dict[str, str]
+
+    @property
+    def usual(self) -> list[str]:
+        """The topics that are meant where none is named: all that can be read, but for what a run says of
+        itself.
+        """
+        names = (topic.name for topic in self.topics if not topic.name.startswith(OF_THE_RUN))
+        return [name for name in names if name not in self.unreadable]
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+        """The messages of *topics* (of all that can be read), in the order of time."""
+        readable = {topic.name: topic.type for topic in self.topics if topic.name not in self.unreadable}
+        wanted = readable if topics is None else {name: readable[name] for name in topics if name in readable}
+        decode = from_ros1 if self.format == ROSBAG1 else from_cdr
+        for raw in self._raw():
+            if raw.topic in wanted:
+                with suppress(UsageError, ValueError, IndexError):  # a message that is damaged is left out
+                    yield BagMessage(raw.at, raw.topic, decode(wanted[raw.topic], raw.data))
+
+    def _raw(self) -> Iterator[RawMessage]:
+        if not self.complete:
+            salvaged = salvage_rosbag1 if self.format == ROSBAG1 else salvage_mcap
+            yield from sorted(salvaged(self.path), key=lambda raw: raw.at)
+            return
+        with _reader(self.path, self.format) as reader:
+            for connection, at, data in reader.messages():
+                yield RawMessage(at, connection.topic, connection.msgtype, "", bytes(data))
+
+
+def open_bag(path: Path) -> Bag:
+    """The recording at *path*: a ``.bag`` or ``.mcap`` file, or the folder of a rosbag 2.
+
+    Raises ``UsageError`` if there is none, or nothing of it can be read.
+    """
+    if not path.exists():
+        raise UsageError(f"no recording {path}")
+    kind = ROSBAG2 if path.is_dir() else _SUFFIXES.get(path.suffix)
+    if kind is None:
+        raise UsageError(f"{path}: a recording is a .bag or .mcap file, or the folder of a rosbag 2")
+    try:
+        return _indexed(path, kind)
+    except (Reader1Error, Reader2Error, OSError, ValueError, KeyError, AssertionError) as error:
+        if kind != ROSBAG2:
+            return _salvaged(path, kind, str(error))
+        inside = sorted(path.glob("*.mcap")) if path.is_dir() else []
+        if not inside:
+            raise UsageError(f"{path} is no rosbag 2 that can be read: {error}") from error
+        return _salvaged(inside[0], MCAP, str(error))
+
+
+def _reader(path: Path, kind: str) -> Any:
+    return Reader1(path) if kind == ROSBAG1 else Reader2(path)
+
+
+def _indexed(path: Path, kind: str) -> Bag:
+    with _reader(path, kind) as reader:
+        topics: dict[str, BagTopic] = {}
+        unreadable: dict[str, str] = {}
+        for connection in reader.connections:
+            known = topics.get(connection.topic)
+            count = (connection.msgcount or 0) + (known.messages if known else 0)
+            topics[connection.topic] = BagTopic(connection.topic, connection.msgtype, count)
+            text = connection.msgdef.data if connection.msgdef is not None else ""
+            idl = connection.msgdef is not None and connection.msgdef.format == MessageDefinitionFormat.IDL
+            _learn(connection.topic, connection.msgtype, text, unreadable, idl=idl)
+        start, end = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
+    listed = tuple(topics[name] for name in sorted(topics))
+    return Bag(path, kind, listed, start, end, True, unreadable)
+
+
+def _salvaged(path: Path, kind: str, problem: str) -> Bag:
+    found: dict[str, BagTopic] = {}
+    unreadable: dict[str, str] = {}
+    times: list[Ns] = []
+    for raw in salvage_rosbag1(path) if kind == ROSBAG1 else salvage_mcap(path):
+        name = raw.type if raw.type.count("/") == 2 else our_name(raw.type)
+        if raw.topic not in found:
+            _learn(raw.topic, name, raw.definition, unreadable)
+        count = found[raw.topic].messages if raw.topic in found else 0
+        found[raw.topic] = BagTopic(raw.topic, name, count + 1)
+        times.append(raw.at)
+    if not times:
+        raise UsageError(f"{path}: nothing of it can be read: {problem}")
+    listed = tuple(found[name] for name in sorted(found))
+    return Bag(path, kind, listed, min(times), max(times), False, unreadable)
+
+
+def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl: bool = False) -> None:
+    """Types that nobody knows are defined as the recording says."""
+    if name in store().fielddefs:
+        return
+    parse: Callable[..., Any] = get_types_from_idl if idl else get_types_from_msg
+    try:
+        parsed = parse(text) if idl else parse(text, name)
+        store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
+    except TypesysError as error:
+        unreadable[topic] = f"its type {name} is not known and not defined in the recording: {error}"

@@ -1,0 +1,219 @@
+"""The classes of message values: every field has a default, an unknown one is an error, a copy is cheap.
+
+A class is a slotted dataclass. Arrays of numbers are numpy arrays of the field's type; a list is taken where
+one is assigned, and becomes an array when the message is copied (as publishing does).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field, make_dataclass
+from functools import partial
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+
+import numpy as np
+
+from volery.base.errors import UsageError
+from volery.ros.messages.copying import plain_copy
+
+Default = Callable[[], Any]
+Copier = Callable[[Any], Any]
+
+
+class Message:
+    """A ROS message. Its type's name is ``__msgtype__``, its fields' names are ``__match_args__``."""
+
+    __slots__ = ()
+    __msgtype__: ClassVar[str] = ""
+    __match_args__: ClassVar[tuple[str, ...]] = ()
+    _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
+    _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
+    _plain: ClassVar[Callable[[Any], Any] | None] = None
+    fields_of: ClassVar[list[Field]] = []
+    """The fields of the type, for this room."""
+    __hash__: ClassVar[Any] = None  # messages are mutable values
+
+    if TYPE_CHECKING:  # each class has the fields of its type
+
+        def __init__(self, *values: Any, **fields: Any) -> None: ...
+
+    def copy(self) -> Any:
+        """The message as it is now, lists made arrays.
+
+        ``UsageError`` where a value does not fit its field.
+        """
+        plain = type(self)._plain
+        if plain is None:
+            return self._copied_by_fields()
+        try:
+            return plain(self)
+        except AttributeError:
+            return self._copied_by_fields()  # which says what is wrong
+
+    def _copied_by_fields(self) -> Any:
+        cls = type(self)
+        values = cls._values(self)
+        copied = list(values)
+        for index, copier in cls._copiers:
+            try:
+                copied[index] = copier(copied[index])
+            except (TypeError, ValueError, AttributeError, OverflowError) as error:
+                name = f"{cls.__msgtype__}.{cls.__match_args__[index]}"
+                raise UsageError(f"{name}: {copied[index]!r} does not fit: {error}") from error
+        return cls(*copied)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Message) or other.__msgtype__ != self.__msgtype__:
+            return NotImplemented
+        return all(_same(getattr(self, name), getattr(other, name)) for name in self.__match_args__)
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return bool(np.array_equal(one, other))
+    return bool(one == other)
+
+
+class Header(Message):
+    """A header. ROS 1's ``seq`` may be written; ROS 2 does not carry it, so it reads as 0."""
+
+    __slots__ = ()
+
+    @property
+    def seq(self) -> int:
+        """Always 0."""
+        return 0
+
+    @seq.setter
+    def seq(self, value: int) -> None:
+        """Accepted and forgotten."""
+
+
+class Nothing(Message):
+    """A type without fields; its encoding has one byte that says nothing."""
+
+    __slots__ = ()
+    structure_needs_at_least_one_member = 0
+
+    def __init__(self, structure_needs_at_least_one_member: int = 0) -> None: ...
+
+
+_ROS2_DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
+"""Defaults that the ROS 2 definitions state; all others are zero, false or empty."""
+
+
+class Field(NamedTuple):
+    """A field of a type: exactly one of ``base`` (a number, bool or string) and ``nested`` is given.
+
+    ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array.
+    """
+
+    name: str
+    base: str
+    nested: type[Message] | None
+    length: int | None
+
+
+def make_class(
+    name: str, base: type[Message], constants: dict[str, Any], fields: list[Field]
+) -> type[Message]:
+    """The class of the values of type *name* (``package/msg/Name``), made of *base*."""
+    package, kind, label = name.split("/")
+    members = []
+    copiers = []
+    for index, one in enumerate(fields):
+        members.append((one.name, Any, _default(name, one)))
+        copier = _copier(one)
+        if copier:
+            copiers.append((index, copier))
+    namespace = {
+        **constants,
+        "__msgtype__": name,
+        "__module__": f"{package}.{kind}",
+        "_type": name,
+        "_copiers": tuple(copiers),
+        "_values": staticmethod(_values_of(tuple(one.name for one in fields))),
+        "fields_of": fields,
+    }
+    made: Any = make_dataclass(
+        label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
+    )
+    copy = plain_copy(made, fields)
+    made._plain = None if copy is None else staticmethod(copy)
+    return cast("type[Message]", made)
+
+
+def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    if not names:
+        return lambda message: ()
+    get = attrgetter(*names)
+    return get if len(names) > 1 else lambda message: (get(message),)
+
+
+def _default(owner: str, one: Field) -> Any:
+    if one.length is None:
+        if one.nested:
+            return field(default_factory=one.nested)
+        return field(default=_ROS2_DEFAULTS.get((owner, one.name), _zero(one.base)))
+    count = one.length
+    if one.nested:
+        nested = one.nested
+        return field(default_factory=lambda: [nested() for _ in range(count)])
+    if one.base == "string":
+        return field(default_factory=lambda: [""] * count)
+    return field(default_factory=partial(np.zeros, count, _dtype(one.base)))
+
+
+def _zero(base: str) -> Any:
+    if base == "string":
+        return ""
+    if base == "bool":
+        return False
+    return 0.0 if base.startswith("float") else 0
+
+
+def _dtype(base: str) -> np.dtype[Any]:
+    return np.dtype({"bool": "bool", "byte": "uint8", "char": "uint8", "octet": "uint8"}.get(base, base))
+
+
+def _copier(one: Field) -> Copier | None:
+    if one.length is None:
+        return partial(_copy_nested, one.nested) if one.nested else None
+    if one.nested:
+        return partial(_copy_list, partial(_copy_nested, one.nested), one.length)
+    if one.base == "string":
+        return partial(_copy_list, _string, one.length)
+    return partial(_copy_array, _dtype(one.base), one.length)
+
+
+def _copy_nested(cls: type[Message], value: Any) -> Any:
+    if not cls._copiers:
+        return cls(*cls._values(value))
+    copied = list(cls._values(value))
+    for index, copier in cls._copiers:
+        copied[index] = copier(copied[index])
+    return cls(*copied)
+
+
+def _string(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no string")
+    return value
+
+
+def _copy_list(copier: Copier, count: int, values: Any) -> list[Any]:
+    copied = [copier(value) for value in values]
+    if count and len(copied) != count:
+        raise ValueError(f"{len(copied)} values, but the field has {count}")
+    return copied
+
+
+def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
+    if isinstance(values, bytes):
+        values = np.frombuffer(values, np.uint8)
+    copied = np.array(values, dtype)
+    if copied.ndim != 1 or (count and copied.shape[0] != count):
+        wanted = count or "one row of"
+        raise ValueError(f"an array of shape {copied.shape}, but the field has {wanted} values")
+    return copied

@@ -1,0 +1,164 @@
+"""Messages as ROS 1 has them: names, checksums, definitions, and bytes.
+
+The values are the same as everywhere; only their encoding differs. ROS 1's ``Header`` has a ``seq`` that ROS
+2 dropped: it is written as 0 (who publishes counts it) and forgotten when read. Where the definitions of the
+two differ in more than the spelling of a field, the type cannot be carried, and an error says so.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from hashlib import md5
+from typing import Any, NamedTuple
+
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from volery.base.errors import UsageError
+from volery.ros.messages.cdr import from_cdr, to_cdr
+from volery.ros.messages.message import Message
+from volery.ros.messages.packages import ROS1_SPELLING
+from volery.ros.messages.store import message_class, message_name, service, service_name, store
+
+_HEADER = "std_msgs/msg/Header"
+_TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
+
+
+class Ros1Type(NamedTuple):
+    """A message type in ROS 1: ``package/Name``, its MD5 sum, its full text, whether a header comes first."""
+
+    name: str
+    md5: str
+    text: str
+    has_header: bool
+
+
+class Ros1Service(NamedTuple):
+    """A service type in ROS 1; ``md5`` is over request and response."""
+
+    name: str
+    md5: str
+    request: Ros1Type
+    response: Ros1Type
+
+
+@cache
+def _noetic() -> Typestore:
+    """The definitions of ROS 1 Noetic; what it lacks is added from ours when it is asked for."""
+    return get_typestore(Stores.ROS1_NOETIC)
+
+
+def definition_store(full: str) -> Typestore:
+    """Noetic's store with type *full* in it. ``UsageError`` if Noetic's differs from ours in its layout."""
+    ours, noetic = store(), _noetic()
+    for _, what in ours.fielddefs[full][1]:
+        inner = _nested(what)
+        if inner and inner not in _TIMES:
+            definition_store(inner)
+    if full not in noetic.fielddefs:
+        noetic.register({full: ours.fielddefs[full]})
+    elif _layout(ours, full) != _layout(noetic, full):
+        raise UsageError(f"{full} has other fields in ROS 1 than in ROS 2; it cannot be carried on ROS 1")
+    return noetic
+
+
+def _nested(what: Any) -> str:
+    kind, detail = what
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return _nested(detail[0])
+    return str(detail) if kind == Nodetype.NAME else ""
+
+
+def _layout(of: Typestore, full: str) -> list[Any]:
+    """The types of the fields; ``seq`` of a header apart, their names do not matter to the bytes."""
+    return [_plain(what) for name, what in of.fielddefs[full][1] if not (full == _HEADER and name == "seq")]
+
+
+def _plain(what: Any) -> Any:
+    kind, detail = what
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return kind, _plain(detail[0]), detail[1] if kind == Nodetype.ARRAY else 0
+    return detail[0] if kind == Nodetype.BASE else detail
+
+
+def ros1_name(name: str) -> str:
+    """``std_msgs/msg/String`` as ``std_msgs/String``; services likewise."""
+    package, _, label = name.replace("/msg/", "/").replace("/srv/", "/").partition("/")
+    for theirs, ours in ROS1_SPELLING.get(package, {}).items():
+        if label == ours:
+            return f"{package}/{theirs}"
+    return f"{package}/{label}"
+
+
+def our_name(name: str) -> str:
+    """``std_msgs/String`` as ``std_msgs/msg/String``; the type need not be known."""
+    package, _, label = name.partition("/")
+    return f"{package}/msg/{ROS1_SPELLING.get(package, {}).get(label, label)}" if label else name
+
+
+@cache
+def ros1_type(name: str) -> Ros1Type:
+    """What ROS 1 knows of a message type. ``UsageError`` if unknown, or if ROS 1's has other fields."""
+    full = message_name(name)
+    text, checksum = definition_store(full).generate_msgdef(full, ros_version=1)
+    fields = store().fielddefs[full][1]
+    return Ros1Type(ros1_name(full), checksum, text, bool(fields) and fields[0][1][1] == _HEADER)
+
+
+@cache
+def ros1_service(name: str) -> Ros1Service:
+    """What ROS 1 knows of a service type."""
+    kind = service(service_name(name))
+    label = ros1_name(kind.name)
+    halves = []
+    for end, cls in (("Request", kind.request), ("Response", kind.response)):
+        halves.append(ros1_type(cls.__msgtype__)._replace(name=f"{label}{end}"))
+    texts = _hashed(kind.request.__msgtype__) + _hashed(kind.response.__msgtype__)
+    return Ros1Service(label, md5(texts.encode(), usedforsecurity=False).hexdigest(), *halves)
+
+
+def _hashed(full: str) -> str:
+    """The text whose MD5 sum is that of the type: constants, then fields, nested types by their sums."""
+    noetic = definition_store(full)
+    constants, fields = noetic.fielddefs[full]
+    lines = [f"{kind} {name}={value}" for name, kind, value in constants]
+    for name, what in fields:
+        if name != "structure_needs_at_least_one_member":
+            lines.append(f"{_hashed_type(what)} {name}")
+    return "\n".join(lines)
+
+
+def _hashed_type(what: Any) -> str:
+    kind, detail = what
+    if kind == Nodetype.BASE:
+        return str(detail[0])
+    if kind == Nodetype.NAME:
+        return _TIMES.get(detail) or ros1_type(detail).md5
+    inner, count = detail
+    if inner[0] == Nodetype.NAME and inner[1] not in _TIMES:
+        return _hashed_type(inner)  # sums carry no brackets
+    return f"{_hashed_type(inner)}[{count if kind == Nodetype.ARRAY else ''}]"
+
+
+def to_ros1(message: Message) -> bytes:
+    """The message's bytes in ROS 1. Raises ``UsageError`` where a value does not fit its field."""
+    name = message.__msgtype__
+    ros1_type(name)
+    return cdr_to_ros1(name, to_cdr(message))
+
+
+def cdr_to_ros1(name: str, data: bytes) -> bytes:
+    """CDR bytes of type *name* as ROS 1's."""
+    return bytes(store().cdr_to_ros1(data, name))
+
+
+def from_ros1(name: str, data: bytes | memoryview) -> Any:
+    """The message of type *name* that these bytes of ROS 1 are. Raises ``UsageError`` if they are not one."""
+    full = message_name(name)
+    message_class(full)
+    try:
+        return from_cdr(full, store().ros1_to_cdr(data, full))
+    except (SerdeError, IndexError) as error:
+        raise UsageError(f"these {len(data)} bytes are no {full} of ROS 1: {error}") from error

@@ -1,0 +1,248 @@
+"""Which types there are, and one of each on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.base import TypesysError, normalize_fieldname
+from rosbags.typesys.store import Typestore
+
+from volery.base.errors import UsageError, choices, did_you_mean
+from volery.ros.messages.interface import parts
+from volery.ros.messages.message import Field, Header, Message, Nothing, make_class
+from volery.ros.messages.stamp import DurationValue, TimeValue
+
+_classes: dict[str, type[Message]] = {}
+_services: dict[str, ServiceType] = {}
+
+
+class ServiceType(NamedTuple):
+    """A service's name (``package/srv/Name``) and the classes of its request and response."""
+
+    name: str
+    request: type[Message]
+    response: type[Message]
+
+
+@cache
+def store() -> Typestore:
+    """The types of ROS 2 Humble and those of ``definitions/``. For this room only."""
+    humble = get_typestore(Stores.ROS2_HUMBLE)
+    texts: dict[str, str] = {}
+    written_out = files("volery.ros.messages").joinpath("definitions").iterdir()
+    for file in sorted(written_out, key=lambda file: file.name):
+        package, text = file.name.removesuffix(".txt"), file.read_text(encoding="utf-8")
+        for section in text.split("\n=== ")[1:]:
+            heading, body = section.split("\n", 1)
+            texts.update(parts(f"{package}/{heading.strip()}", body))
+    _register(humble, texts)
+    return humble
+
+
+def _register(into: Typestore, texts: dict[str, str]) -> None:
+    parsed = {}
+    for name, text in texts.items():
+        try:
+            # a service's halves read as messages, so that unqualified types are looked for among them
+            read_as = name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
+            [parsed[name]] = get_types_from_msg(text, read_as).values()
+        except TypesysError as error:
+            raise UsageError(f"{name}: not a ROS message definition: {error}") from error
+    for name, (_, fields) in parsed.items():
+        for label, what in fields:
+            inner = _inner_type(what)
+            if inner and inner not in parsed and inner not in into.fielddefs:
+                raise UsageError(f"{name}.{label}: no message type named {inner!r}; define it first")
+    try:
+        into.register(parsed)
+    except TypesysError as error:
+        raise UsageError(str(error)) from error
+
+
+def _inner_type(what: Any) -> str:
+    """The message type that a field is made of; empty for numbers and strings."""
+    kind, detail = what
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return _inner_type(detail[0])
+    return str(detail) if kind == Nodetype.NAME else ""
+
+
+def define(name: str, text: str) -> None:
+    """Add a type of your own from the text of its ``.msg``, ``.srv`` or ``.action`` file.
+
+    *name* is ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``. ``UsageError`` if the
+    text is no definition or the name is taken by another one.
+    """
+    define_all({name: text})
+
+
+def define_all(texts: Mapping[str, str]) -> None:
+    """``define`` several types, which may be made of each other."""
+    found: dict[str, str] = {}
+    for name, text in texts.items():
+        found.update(parts(name, text))
+    _register(store(), found)
+
+
+def types() -> list[str]:
+    """The names of all message types, sorted."""
+    return sorted(name for name in store().fielddefs if name.split("/")[1] == "msg")
+
+
+def type_hash(name: str) -> bytes:
+    """The 32 bytes of a message type's RIHS01 hash, by which ROS 2 knows whether two mean the same by it."""
+    return bytes.fromhex(store().hash_rihs01(name).rpartition("_")[2])
+
+
+def service_types() -> list[str]:
+    """The names of all service types, sorted; an action's are not among them."""
+    ending = "_Request"
+    names = (name for name in store().fielddefs if name.endswith(ending) and "/srv/" in name)
+    return sorted(name.removesuffix(ending) for name in names)
+
+
+def action_types() -> list[str]:
+    """The names of all action types, sorted."""
+    ending = "_FeedbackMessage"
+    return sorted(name.removesuffix(ending) for name in store().fielddefs if name.endswith(ending))
+
+
+def _full(name: str, kind: str) -> str:
+    package, _, rest = name.partition("/")
+    return name if "/" in rest else f"{package}/{kind}/{rest}"
+
+
+def _unknown(what: str, name: str, known: list[str]) -> UsageError:
+    package = name.partition("/")[0]
+    alike = [one for one in known if one.startswith(f"{package}/")]
+    hint = did_you_mean(name, known)
+    there = f"; {package} has {choices(one.split('/')[-1] for one in alike)}" if alike else ""
+    return UsageError(f"no {what} type named {name!r}{hint}{there}")
+
+
+def message_name(name: str) -> str:
+    """``std_msgs/String`` or ``std_msgs/msg/String`` as ``std_msgs/msg/String``.
+
+    A ``UsageError`` if unknown.
+    """
+    if name in store().fielddefs:
+        return name
+    full = _full(name, "msg")
+    if full not in store().fielddefs:
+        raise _unknown("message", full, types())
+    return full
+
+
+def service_name(name: str) -> str:
+    """``std_srvs/Trigger`` or ``std_srvs/srv/Trigger`` as ``std_srvs/srv/Trigger``.
+
+    A ``UsageError`` if unknown.
+    """
+    full = _full(name, "srv")
+    if f"{full}_Request" not in store().fielddefs:
+        raise _unknown("service", full, service_types())
+    return full
+
+
+def message_class(name: str) -> type[Message]:
+    """The class of a message type; made when first asked for."""
+    known = _classes.get(name)
+    if known:
+        return known
+    full = message_name(name)
+    if full not in _classes:
+        constants, fields = store().fielddefs[full]
+        described = [_describe(normalize_fieldname(key), what) for key, what in fields if key != _FILLER]
+        named = {normalize_fieldname(label): value for label, _, value in constants}
+        made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
+        _classes[full] = made
+        store().types[full] = made  # what bytes are decoded to
+        if issubclass(made, (TimeValue, DurationValue)):
+            _introduce(made)
+    _classes[name] = _classes[full]
+    return _classes[full]
+
+
+_TIME, _DURATION = "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"
+_BASES: dict[str, type[Message]] = {
+    _TIME: TimeValue,
+    _DURATION: DurationValue,
+    "std_msgs/msg/Header": Header,
+}
+_FILLER = "structure_needs_at_least_one_member"
+
+
+def _introduce(made: Any) -> None:
+    """Tell times and durations of each other: the difference of two times is a duration."""
+    if issubclass(made, TimeValue):
+        TimeValue.kind = made
+        message_class(_DURATION)
+    else:
+        DurationValue.kind = made
+        message_class(_TIME)
+
+
+def _describe(name: str, what: Any) -> Field:
+    kind, detail = what
+    if kind == Nodetype.BASE:
+        return Field(name, detail[0], None, None)
+    if kind == Nodetype.NAME:
+        return Field(name, "", message_class(detail), None)
+    (inner_kind, inner), count = detail
+    if kind == Nodetype.SEQUENCE:
+        count = 0  # a bound, if the definition states one, is not kept
+    if inner_kind == Nodetype.BASE:
+        return Field(name, inner[0], None, count)
+    return Field(name, "", message_class(inner), count)
+
+
+def service(name: str) -> ServiceType:
+    """A service type: its request and its response class."""
+    known = _services.get(name)
+    if known:
+        return known
+    full = service_name(name)
+    made = ServiceType(full, message_class(f"{full}_Request"), message_class(f"{full}_Response"))
+    _services[name] = made
+    return made
+
+
+def new(name: str, /, **fields: Any) -> Any:
+    """A message of type *name*; fields not given have their defaults, a nested one may be a ``dict``.
+
+    Raises ``UsageError`` for an unknown type or field.
+    """
+    cls = _classes.get(name) or message_class(name)
+    for key, value in fields.items():
+        if value.__class__ is dict:
+            fields[key] = _nested(cls, key, value)
+    try:
+        return cls(**fields)
+    except TypeError:
+        wrong = next(key for key in fields if key not in cls.__match_args__)
+        hint = did_you_mean(wrong, cls.__match_args__)
+        raise UsageError(
+            f"{cls.__msgtype__} has no field {wrong!r}{hint}; it has {choices(cls.__match_args__)}"
+        ) from None
+
+
+def _nested(cls: type[Message], key: str, value: dict[str, Any]) -> Any:
+    for label, what in store().fielddefs[cls.__msgtype__][1]:
+        if normalize_fieldname(label) == key and what[0] == Nodetype.NAME:
+            return new(str(what[1]), **value)
+    return value
+
+
+def request(name: str, /, **fields: Any) -> Any:
+    """A request of service type *name*, like ``new``."""
+    return new(f"{service_name(name)}_Request", **fields)
+
+
+def definition(name: str) -> str:
+    """A type's text in ROS 2's ``.msg`` format, those it is made of included (MCAP's ``ros2msg``)."""
+    return store().generate_msgdef(message_name(name), ros_version=2)[0]

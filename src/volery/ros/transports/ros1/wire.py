@@ -1,0 +1,308 @@
+"""One node of ROS 1, as rospy makes it."""
+
+from __future__ import annotations
+
+import struct
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import Any
+
+from volery.base.errors import LinkError, UsageError
+from volery.ros.graph import names
+from volery.ros.graph.node import TRANSIENT_LOCAL, QoS
+from volery.ros.messages import Message, ServiceType, from_ros1, ros1_service, ros1_type, to_ros1
+from volery.ros.messages.ros1 import cdr_to_ros1
+from volery.ros.transports.ros1.classes import message_carrier, service_carrier
+from volery.ros.transports.ros1.master import Master, TopicTypes, is_alive
+from volery.ros.transports.ros1.rospy_copy import Listening, rospy_copy
+from volery.ros.transports.wire import Arrived, Asked, Done, Parcel
+
+GOODBYE_S = 2.0
+Aside = Callable[[Callable[[], object]], None]
+"""Has something done beside the caller, who must not wait for a master that may be gone."""
+ANY = "*"
+"""The type of a subscriber that takes whatever comes."""
+
+
+class Ros1Outlet:
+    """A rospy publisher. ROS 1 latches the last message only, whatever the depth."""
+
+    def __init__(self, rospy: Any, topic: str, message_type: str, qos: QoS, aside: Aside) -> None:
+        self._aside = aside
+        self._type, self._class = message_type, message_carrier(message_type)
+        self._counts = ros1_type(message_type).has_header
+        self._sent = 0
+        self._publisher = rospy.Publisher(
+            topic,
+            self._class,
+            latch=qos.durability == TRANSIENT_LOCAL,
+            queue_size=qos.depth or 0,  # never None: then rospy would wait for the slowest receiver
+            tcp_nodelay=True,
+        )
+
+    def send(self, data: bytes) -> None:
+        """Queue a message for each connection."""
+        raw = cdr_to_ros1(self._type, data)
+        self._sent += 1
+        if self._counts:
+            raw = struct.pack("<I", self._sent & 0xFFFFFFFF) + raw[4:]  # the header's seq, as rospy counts
+        self._publisher.publish(self._class(raw))
+
+    def connected(self) -> int:
+        """How many connections there are."""
+        return int(self._publisher.get_num_connections())
+
+    def close(self) -> None:
+        """Unregister."""
+        self._aside(self._publisher.unregister)
+
+
+class Ros1Inlet:
+    """A rospy subscriber."""
+
+    def __init__(self, rospy: Any, topic: str, message_type: str, arrived: Arrived, aside: Aside) -> None:
+        self._aside = aside
+        read = partial(from_ros1, message_type)
+
+        def take(carrier: Any) -> None:
+            sender = carrier._connection_header.get("callerid", "")
+            arrived(Parcel(carrier.data, read, sender))
+
+        self._subscriber = rospy.Subscriber(topic, message_carrier(message_type), take, tcp_nodelay=True)
+
+    def connected(self) -> int:
+        """How many connections there are."""
+        return int(self._subscriber.get_num_connections())
+
+    def close(self) -> None:
+        """Unregister."""
+        self._aside(self._subscriber.unregister)
+
+
+class Ros1Served:
+    """A rospy service: each request holds a thread of rospy until it is answered."""
+
+    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: Asked, aside: Aside) -> None:
+        self._aside = aside
+        carrier = service_carrier(kind)
+        wanted, given = kind.request.__msgtype__, carrier._response_class
+
+        def handle(request: Any) -> Any:
+            ended = threading.Event()
+            outcome: list[tuple[Message | None, str]] = []
+
+            def done(answer: Message | None, problem: str) -> None:
+                outcome.append((answer, problem))
+                ended.set()
+
+            try:
+                asked(from_ros1(wanted, request.data), done)
+            except UsageError as error:
+                raise rospy.ServiceException(str(error)) from error
+            ended.wait()
+            answer, problem = outcome[0]
+            if answer is None:
+                raise rospy.ServiceException(problem)
+            return given(to_ros1(answer))
+
+        self._service = rospy.Service(name, carrier, handle)
+
+    def close(self) -> None:
+        """Unregister."""
+        self._aside(partial(self._service.shutdown, "closed"))
+
+
+class Ros1Caller:
+    """A rospy service proxy for each call."""
+
+    def __init__(self, rospy: Any, master: Master, name: str, kind: ServiceType) -> None:
+        self._rospy, self._master, self._name, self._kind = rospy, master, name, kind
+        self._carrier = service_carrier(kind)
+        self._answer = kind.response.__msgtype__
+
+    def call(self, request: Message, done: Done) -> Callable[[], None]:
+        """Ask in a thread of its own; giving up closes its connection."""
+        proxy = self._rospy.ServiceProxy(self._name, self._carrier)
+        wanted = self._carrier._request_class(to_ros1(request))
+
+        def ask() -> None:
+            try:
+                answer = from_ros1(self._answer, proxy.call(wanted).data)
+            except Exception as error:  # rospy raises what it likes, e.g. for a socket that was closed
+                done(None, _in_words(error))
+            else:
+                done(answer, "")
+
+        threading.Thread(target=ask, name=f"call {self._name}", daemon=True).start()
+        return partial(_hang_up, proxy)
+
+    def ready(self) -> bool:
+        """Whether the master knows a server."""
+        return self._master.find("lookupService", self._name) is not None
+
+    def close(self) -> None:
+        """Nothing is kept between calls."""
+
+
+def _hang_up(proxy: Any) -> None:
+    transport = proxy.transport
+    if transport is not None:
+        with suppress(OSError, AttributeError):
+            transport.socket.shutdown(2)  # wakes the thread that reads from it
+
+
+def _in_words(error: Exception) -> str:
+    text = str(error)
+    if "unavailable" in text or "unable to contact" in text or "unable to connect" in text.lower():
+        return f"nobody serves it: {text}"
+    # rospy wraps the server's words in bytes
+    return text.replace("b'", "'").replace('b"', '"')
+
+
+def _aside(work: Callable[[], object]) -> None:
+    threading.Thread(target=work, daemon=True).start()
+
+
+class Ros1Wire:
+    """See ``volery.ros.transports.wire.Wire``."""
+
+    def __init__(self, types: TopicTypes, name: str, namespace: str, lost: Callable[[str], None]) -> None:
+        self._types, master = types, types.master
+        self.name = names.node_name(name, namespace)
+        self.master = Master(master.uri, self.name)
+        self._check_free()
+        self.rospy = rospy = rospy_copy()
+        # what rospy would read from its command line: the namespace that the node's name is resolved in
+        rospy.names._set_caller_id(names.join(namespace, "unnamed"))
+        listening = Listening(rospy)
+        rospy.init_node(name, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
+        self._closing = False
+        self._gone = threading.Event()
+        rospy.core.add_preshutdown_hook(lambda reason: None if self._closing else lost(_thrown_out(reason)))
+        rospy.core.add_preshutdown_hook(lambda reason: self._gone.set())  # runs when all is unregistered
+        rospy.core.add_preshutdown_hook(lambda reason: listening.end())
+
+    def _check_free(self) -> None:
+        """A second node of a name would make the master end the first."""
+        other = self.master.find("lookupNode", self.name)
+        if other is not None and is_alive(other):
+            raise UsageError(
+                f"a node named {self.name} is there already (at {other}); "
+                f"choose another name or namespace for this one"
+            )
+
+    def _check_type(self, topic: str, message_type: str) -> None:
+        self.master.value("getPid")  # rospy would wait for a master that is gone
+        wanted, carried = ros1_type(message_type).name, self._types.of(topic)
+        if carried not in (wanted, ANY, ""):
+            publishers, subscribers, _ = self.master.value("getSystemState")
+            users = [user for at, who in (*publishers, *subscribers) if at == topic for user in who]
+            if users:
+                raise UsageError(
+                    f"node {self.name}: topic {topic} carries {carried} (of {', '.join(users)}), not {wanted}"
+                )
+        self._types.note(topic, wanted)
+
+    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros1Outlet:
+        """Publish to a topic."""
+        self._check_type(topic, message_type)
+        return Ros1Outlet(self.rospy, topic, message_type, qos, self._while_there)
+
+    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Ros1Inlet:
+        """Receive a topic. All that ROS 1 knows of QoS is the depth, which the house keeps."""
+        self._check_type(topic, message_type)
+        return Ros1Inlet(self.rospy, topic, message_type, arrived, self._while_there)
+
+    def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros1Served:
+        """Offer a service."""
+        self.master.value("getPid")
+        if self.master.find("lookupService", name) is not None:
+            _, _, services = self.master.value("getSystemState")
+            users = [user for at, who in services if at == name for user in who]
+            if any(is_alive(self.master.find("lookupNode", user) or "") for user in users):
+                raise UsageError(f"node {self.name}: service {name} is served by {', '.join(users)} already")
+        ros1_service(kind.name)
+        return Ros1Served(self.rospy, name, kind, asked, self._while_there)
+
+    def caller(self, name: str, kind: ServiceType) -> Ros1Caller:
+        """Call a service."""
+        return Ros1Caller(self.rospy, self.master, name, kind)
+
+    def has_service(self, name: str) -> bool:
+        """Whether the master knows a server."""
+        return self.master.find("lookupService", name) is not None
+
+    def get_parameter(self, name: str) -> Any:
+        """From the parameter server."""
+        code, _, value = self.master.ask("getParam", name)
+        if code != 1:
+            raise KeyError(name)
+        return value
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """At the parameter server."""
+        try:
+            self.master.value("setParam", name, value)
+        except (OverflowError, TypeError) as error:
+            raise UsageError(f"parameter {name}: ROS 1 cannot carry {value!r}: {error}") from error
+
+    def delete_parameter(self, name: str) -> None:
+        """From the parameter server."""
+        code, _, _ = self.master.ask("deleteParam", name)
+        if code != 1:
+            raise KeyError(name)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has left, or was thrown out."""
+        return self._closing or bool(self.rospy.core.is_shutdown_requested())
+
+    def known(self) -> bool:
+        """Whether the master knows this node at its present address."""
+        return bool(self.master.find("lookupNode", self.name) == self.rospy.core.get_node_uri())
+
+    def register_again(self) -> None:
+        """Tell a master that has forgotten everything what this node has."""
+        registration = self.rospy.impl.registration
+        topics, services = registration.get_topic_manager(), registration.get_service_manager()
+        uri = self.rospy.core.get_node_uri()
+        for topic, kind in topics.get_publications():
+            self.master.value("registerPublisher", topic, kind, uri)
+        for service, address in services.get_services():
+            self.master.value("registerService", service, address, uri)
+        for topic, kind in topics.get_subscriptions():
+            publishers = self.master.value("registerSubscriber", topic, kind, uri)
+            for listener in registration.get_registration_listeners().listeners:
+                listener.publisher_update(topic, publishers)
+
+    def _while_there(self, work: Callable[[], object]) -> None:
+        """Unregister one thing. A node that leaves unregisters all by itself, and not twice at a time."""
+        if not self.closed:
+            _aside(work)
+
+    def leave(self) -> None:
+        """What it has made goes with it."""
+        self._closing = True
+
+    def close(self) -> None:
+        """Leave the graph: at once for this process, for the others as soon as the master answers."""
+        self._closing = True
+        _aside(partial(self.rospy.core.signal_shutdown, "closed"))
+        self._gone.wait(GOODBYE_S)
+
+
+def _thrown_out(reason: str) -> str:
+    if "new node registered" in reason:
+        return "another node has taken its name, and the master ended this one"
+    return f"it was shut down from outside: {reason}"
+
+
+def is_reachable(master: Master) -> bool:
+    """Whether the master answers."""
+    try:
+        master.value("getPid")
+    except LinkError:
+        return False
+    return True

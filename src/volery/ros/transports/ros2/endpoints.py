@@ -1,0 +1,218 @@
+"""Publishers, subscriptions, services and clients of rclpy, carrying bytes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.ros.graph.node import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE, QoS
+from volery.ros.messages import Message, ServiceType, from_cdr
+from volery.ros.transports.ros2.types import from_rclpy, rclpy_class, rclpy_service, to_rclpy
+from volery.ros.transports.wire import Arrived, Asked, Done, Parcel
+
+
+def profile(qos: QoS) -> Any:
+    """Our quality of service in rclpy's words."""
+    words = import_module("rclpy.qos")
+    return words.QoSProfile(
+        depth=qos.depth or 0,
+        history=words.HistoryPolicy.KEEP_ALL if qos.depth is None else words.HistoryPolicy.KEEP_LAST,
+        reliability=words.ReliabilityPolicy[qos.reliability.upper()],
+        durability=words.DurabilityPolicy[qos.durability.upper()],
+    )
+
+
+class Ros2Outlet:
+    """An rclpy publisher of bytes."""
+
+    def __init__(self, node: Any, topic: str, message_type: str, qos: QoS) -> None:
+        self._node = node
+        offered = replace(
+            qos,
+            reliability=RELIABLE if qos.reliability == BEST_AVAILABLE else qos.reliability,
+            durability=VOLATILE if qos.durability == BEST_AVAILABLE else qos.durability,
+        )
+        self._publisher = node.create_publisher(rclpy_class(message_type), topic, profile(offered))
+
+    def send(self, data: bytes) -> None:
+        """Hand the bytes to DDS."""
+        self._publisher.publish(data)
+
+    def connected(self) -> int:
+        """How many subscriptions it is matched with."""
+        return int(self._publisher.get_subscription_count())
+
+    def close(self) -> None:
+        """Take it away."""
+        self._node.destroy_publisher(self._publisher)
+
+
+class Ros2Inlet:
+    """An rclpy subscription of bytes.
+
+    DDS leaves unconnected what does not fit, so where whatever is offered is wanted it is looked at again
+    whenever a publisher turns up: reliable unless one is not; with what is kept for those who come late if
+    all keep it. What is delivered twice over such a change is dropped by its time.
+    """
+
+    def __init__(self, node: Any, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> None:
+        self._node, self._topic, self._type, self._arrived = node, topic, message_type, arrived
+        self._wanted = qos
+        self._read = partial(from_cdr, message_type)
+        self._guard = threading.Lock()
+        self._open = True
+        self._latest = self._repeated = (
+            0  # source times: of the last message, and of the last before a change
+        )
+        self._now = self._fitting()
+        self._subscription = self._subscribe()
+
+    def _fitting(self) -> QoS:
+        """The most that all publishers known by now offer, where that is wanted."""
+        offers = [one.qos_profile for one in self._node.get_publishers_info_by_topic(self._topic)]
+        reliability, durability = self._wanted.reliability, self._wanted.durability
+        if reliability == BEST_AVAILABLE:
+            unreliable = any(one.reliability.name == "BEST_EFFORT" for one in offers)
+            reliability = BEST_EFFORT if unreliable else RELIABLE
+        if durability == BEST_AVAILABLE:
+            kept = offers and all(one.durability.name == "TRANSIENT_LOCAL" for one in offers)
+            durability = TRANSIENT_LOCAL if kept else VOLATILE
+        return replace(self._wanted, reliability=reliability, durability=durability)
+
+    def _subscribe(self) -> Any:
+        callbacks = import_module("rclpy.event_handler").SubscriptionEventCallbacks
+        events = {"incompatible_qos": self._look_again}
+        if hasattr(callbacks(), "matched"):  # from Iron on
+            events["matched"] = self._look_again
+        return self._node.create_subscription(
+            rclpy_class(self._type),
+            self._topic,
+            self._take,
+            profile(self._now),
+            raw=True,
+            event_callbacks=callbacks(**events),
+        )
+
+    def _take(self, data: bytes, about: Any) -> None:
+        self._latest = at = about["source_timestamp"]
+        if at > self._repeated:
+            self._arrived(Parcel(data, self._read, ""))
+
+    def _look_again(self, event: Any) -> None:
+        """A publisher has turned up. Called within rclpy's wait, so what is to be done is done beside it."""
+        if BEST_AVAILABLE in (self._wanted.reliability, self._wanted.durability):
+            threading.Thread(target=self._adapt, daemon=True).start()
+
+    def _adapt(self) -> None:
+        with self._guard:
+            fitting = self._fitting()
+            if self._open and fitting != self._now:
+                self._now = fitting
+                self._node.destroy_subscription(self._subscription)
+                self._repeated = self._latest
+                self._subscription = self._subscribe()
+
+    def connected(self) -> int:
+        """How many publishers there are that it hears."""
+        words = import_module("rclpy.qos")
+        known = self._node.get_publishers_info_by_topic(self._topic)
+        mine = profile(self._now)
+        bad = words.QoSCompatibility.ERROR
+        return sum(1 for one in known if words.qos_check_compatible(one.qos_profile, mine)[0] != bad)
+
+    def close(self) -> None:
+        """Take it away."""
+        with self._guard:
+            self._open = False
+            self._node.destroy_subscription(self._subscription)
+
+
+class NoAnswerError(Exception):
+    """Leaves a service's callback where there is nothing to answer: ROS 2 has no word for failure."""
+
+
+class Ros2Served:
+    """An rclpy service; a request that fails is not answered, as ROS 2 has it."""
+
+    def __init__(self, node: Any, name: str, kind: ServiceType, asked: Asked) -> None:
+        types = rclpy_service(kind)
+        self._node = node
+        future_class = import_module("rclpy.task").Future
+
+        async def handle(request: Any, response: Any) -> Any:
+            answered = future_class(executor=node.executor)
+
+            def done(answer: Message | None, problem: str) -> None:
+                if not answered.done():
+                    answered.set_result(answer)
+                    node.executor.wake()  # it looks at what waits for a result only when it wakes
+
+            asked(from_rclpy(kind.request.__msgtype__, request), done)
+            answer = await answered
+            if answer is None:
+                raise NoAnswerError
+            return to_rclpy(answer, types.response)
+
+        # in a group that lets others in: a request that is being answered must not hold up its node
+        group = import_module("rclpy.callback_groups").ReentrantCallbackGroup()
+        self._service = node.create_service(types.type, name, handle, callback_group=group)
+
+    def close(self) -> None:
+        """Take it away."""
+        self._node.destroy_service(self._service)
+
+
+class Ros2Caller:
+    """An rclpy client."""
+
+    def __init__(self, node: Any, name: str, kind: ServiceType) -> None:
+        self._node, self._name, self._kind = node, name, kind
+        self._types = rclpy_service(kind)
+        self._client = node.create_client(self._types.type, name)
+
+    def call(self, request: Message, done: Done) -> Callable[[], None]:
+        """Ask. Without a server rclpy would wait for ever, so that is looked at first."""
+        if not self._client.service_is_ready():
+            done(None, "nobody serves it")
+            return lambda: None
+        future = self._client.call_async(to_rclpy(request, self._types.request))
+
+        def finish(ended: Any) -> None:
+            answer = None if ended.cancelled() else ended.result()
+            if answer is None:
+                done(None, f"no answer: {ended.exception() or 'cancelled'}")
+            else:
+                done(from_rclpy(self._kind.response.__msgtype__, answer), "")
+
+        future.add_done_callback(finish)
+        return partial(self._give_up, future)
+
+    def _give_up(self, future: Any) -> None:
+        with suppress(KeyError, ValueError):
+            self._client.remove_pending_request(future)
+
+    def ready(self) -> bool:
+        """Whether a server has been discovered."""
+        return bool(self._client.service_is_ready())
+
+    def close(self) -> None:
+        """Take it away."""
+        self._node.destroy_client(self._client)
+
+
+def check_type(node: Any, topic: str, message_type: str, who: str) -> None:
+    """``UsageError`` if the topic is known to carry another type: DDS would leave them unconnected."""
+    ends = (*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic))
+    others = [one for one in ends if one.topic_type != message_type]
+    if others:
+        users = sorted({f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in others})
+        raise UsageError(
+            f"node {who}: topic {topic} carries {others[0].topic_type} "
+            f"(of {', '.join(users)}), not {message_type}"
+        )

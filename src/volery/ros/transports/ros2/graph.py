@@ -1,0 +1,279 @@
+"""The graph that ROS 2's nodes discover: one rclpy context, one thread that spins for all nodes here."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.kernel.api import Kernel
+from volery.ros.graph import names
+from volery.ros.graph.context import Records
+from volery.ros.graph.graph import everything
+from volery.ros.graph.node import QoS, ServiceState, TopicState
+from volery.ros.messages import ServiceType
+from volery.ros.transports.abroad import GLANCE_S
+from volery.ros.transports.graph import TransportGraph
+from volery.ros.transports.ros2.endpoints import (
+    NoAnswerError,
+    Ros2Caller,
+    Ros2Inlet,
+    Ros2Outlet,
+    Ros2Served,
+    check_type,
+)
+from volery.ros.transports.ros2.parameters import OtherParameters, OwnParameters, owner
+from volery.ros.transports.wire import Arrived, Asked
+
+DISCOVERY_S = 0.6
+"""How long after its start a process is taken to know who is there already."""
+GOODBYE_S = 2.0
+WATCH_S = 1.0
+"""How often it looks for topics that carry several types."""
+NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"
+"""What DDS calls the node of an end that was discovered before its node was."""
+HIDDEN = "_volery"
+"""Names that begin so are the transport's own and are not shown."""
+_MISSING = (
+    "ROS 2 needs rclpy, which this Python does not see: source your installation's setup.bash, or install "
+    "the wheels with scripts/ros2-venv, and use that Python"
+)
+
+
+def available() -> bool:
+    """Whether rclpy can be imported."""
+    return find_spec("rclpy") is not None
+
+
+class Ros2Wire:
+    """See ``volery.ros.transports.wire.Wire``."""
+
+    def __init__(self, library: Ros2, name: str, namespace: str) -> None:
+        self.name = names.node_name(name, namespace)
+        self._library = library
+        self._node = library.make(name, namespace)
+
+    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros2Outlet:
+        """Publish to a topic."""
+        check_type(self._node, topic, message_type, self.name)
+        return Ros2Outlet(self._node, topic, message_type, qos)
+
+    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Ros2Inlet:
+        """Receive a topic."""
+        check_type(self._node, topic, message_type, self.name)
+        return Ros2Inlet(self._node, topic, message_type, qos, arrived)
+
+    def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros2Served:
+        """Offer a service."""
+        for one in self._library.services():
+            if one.name == name:
+                raise UsageError(f"node {self.name}: service {name} is served by {one.server} already")
+        return Ros2Served(self._node, name, kind, asked)
+
+    def caller(self, name: str, kind: ServiceType) -> Ros2Caller:
+        """Call a service."""
+        return Ros2Caller(self._node, name, kind)
+
+    def has_service(self, name: str) -> bool:
+        """Whether somebody is known to serve it."""
+        return bool(self._node.count_services(name))
+
+    def _parameters(self, name: str) -> tuple[OwnParameters | OtherParameters, str]:
+        node, rest = owner(name, self.name, self._library.node_names())
+        return (OwnParameters(self._node) if node == self.name else OtherParameters(self._node, node)), rest
+
+    def get_parameter(self, name: str) -> Any:
+        """Of this node, or of the one whose name begins it."""
+        of, rest = self._parameters(name)
+        return of.get(rest)
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """Of this node, or of the one whose name begins it."""
+        try:
+            of, rest = self._parameters(name)
+        except KeyError:
+            raise UsageError(
+                f"parameter {name}: in ROS 2 parameters belong to nodes, and no node's name begins it; "
+                f"name one of your own with '~'"
+            ) from None
+        of.set(rest, value)
+
+    def delete_parameter(self, name: str) -> None:
+        """Of this node."""
+        of, rest = self._parameters(name)
+        of.delete(rest)
+
+    def leave(self) -> None:
+        """Nothing need be known before."""
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._library.remove(self._node)
+
+
+class Ros2:
+    """See ``volery.ros.transports.wire.Library``."""
+
+    def __init__(self, domain: int | None) -> None:
+        if not available():
+            raise UsageError(_MISSING)
+        self._rclpy: Any = import_module("rclpy")
+        self._context = import_module("rclpy.context").Context()
+        no_signals = import_module("rclpy.signals").SignalHandlerOptions.NO
+        self._rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=no_signals)
+        self._executor = import_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
+        self._over = threading.Event()
+        self._left: set[str] = set()
+        self._told: set[str] = set()
+        self.say: Callable[[str], None] = lambda text: None
+        self._own = self._create(
+            f"{HIDDEN}_{os.getpid()}", "/", enable_rosout=False, start_parameter_services=False
+        )
+        self._began = time.monotonic()
+        self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
+        self._thread.start()
+
+    def _create(self, name: str, namespace: str, **options: Any) -> Any:
+        return self._rclpy.create_node(
+            name,
+            namespace=namespace,
+            context=self._context,
+            use_global_arguments=False,
+            allow_undeclared_parameters=True,
+            **options,
+        )
+
+    def _spin(self) -> None:
+        looked = time.monotonic()
+        while not self._over.is_set():
+            if time.monotonic() - looked > WATCH_S:
+                looked = time.monotonic()
+                self._tell_of_types()
+            try:
+                self._executor.spin_once(timeout_sec=0.5)
+            except NoAnswerError:
+                pass
+            except Exception as error:  # rclpy raises what went wrong anywhere in it; the others go on
+                if not self._over.is_set():
+                    self.say(f"rclpy: {type(error).__name__}: {error}")
+
+    def _tell_of_types(self) -> None:
+        """DDS leaves ends of different types unconnected without a word; each such topic is told once."""
+        for name, kinds in self._own.get_topic_names_and_types():
+            if len(kinds) > 1 and name not in self._told:
+                ends = self._own.get_publishers_info_by_topic(name)
+                ends += self._own.get_subscriptions_info_by_topic(name)
+                if any(one.node_name == NOT_KNOWN_YET for one in ends):
+                    continue  # the next look tells who it is
+                self._told.add(name)
+                by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
+                said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
+                self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
+
+    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Wire:
+        """Make a node."""
+        full = names.node_name(name, namespace)
+        if self._is_taken(full):
+            raise UsageError(
+                f"a node named {full} is there already; choose another name or namespace for this one"
+            )
+        return Ros2Wire(self, name, namespace)
+
+    def _is_taken(self, full: str) -> bool:
+        """A node of ours that has just left is seen for a moment longer."""
+        end = time.monotonic() + DISCOVERY_S
+        while full in self.node_names():
+            if full not in self._left or time.monotonic() > end:
+                return True
+            time.sleep(GLANCE_S)
+        return False
+
+    def make(self, name: str, namespace: str) -> Any:
+        """A node of rclpy that is spun."""
+        node = self._create(name, namespace)
+        self._executor.add_node(node)
+        return node
+
+    def remove(self, node: Any) -> None:
+        """A node leaves."""
+        self._left.add(names.join(node.get_namespace(), node.get_name()))
+        self._executor.remove_node(node)
+        with suppress(Exception):  # rclpy destroys what may be in use by its wait; it is gone either way
+            node.destroy_node()
+
+    def _wait_for_discovery(self) -> None:
+        """Whoever has just joined knows nobody yet."""
+        left = self._began + DISCOVERY_S - time.monotonic()
+        if left > 0:
+            time.sleep(left)
+
+    def node_names(self) -> list[str]:
+        """Whom it has discovered."""
+        self._wait_for_discovery()
+        known = self._own.get_node_names_and_namespaces()
+        return sorted({names.join(space, name) for name, space in known if not name.startswith(HIDDEN)})
+
+    def topics(self) -> list[TopicState]:
+        """What it has discovered."""
+        self._wait_for_discovery()
+        found = []
+        for name, kinds in sorted(self._own.get_topic_names_and_types()):
+            publishers = _users(self._own.get_publishers_info_by_topic(name))
+            subscribers = _users(self._own.get_subscriptions_info_by_topic(name))
+            if publishers or subscribers:
+                found.append(TopicState(name, kinds[0], publishers, subscribers))
+        return found
+
+    def services(self) -> list[ServiceState]:
+        """What it has discovered."""
+        self._wait_for_discovery()
+        servers: dict[str, tuple[str, str]] = {}
+        for name, space in self._own.get_node_names_and_namespaces():
+            with suppress(Exception):  # a node that has just left
+                for service, kinds in self._own.get_service_names_and_types_by_node(name, space):
+                    servers[service] = (kinds[0], names.join(space, name))
+        return [ServiceState(name, kind, server) for name, (kind, server) in sorted(servers.items())]
+
+    def announce_clock(self) -> None:
+        """There is no word for it: each node has a parameter of its own."""
+
+    def close(self) -> None:
+        """Nothing is spun any longer."""
+        self._over.set()
+        self._executor.wake()
+        self._thread.join(GOODBYE_S)
+        with suppress(Exception):
+            self._own.destroy_node()
+            self._executor.shutdown(timeout_sec=0)
+        self._rclpy.shutdown(context=self._context)
+
+
+def _users(ends: list[Any]) -> tuple[str, ...]:
+    users = {
+        names.join(one.node_namespace, one.node_name) for one in ends if not one.node_name.startswith(HIDDEN)
+    }
+    return tuple(sorted(users))
+
+
+def ros2_graph(
+    kernel: Kernel,
+    *,
+    domain: int | None = None,
+    records: Records = everything,
+    epoch: Ns | None = None,
+) -> TransportGraph:
+    """The graph of ROS 2 nodes in *domain* (``ROS_DOMAIN_ID`` if it is not given).
+
+    ``UsageError`` where this Python sees no rclpy.
+    """
+    library = Ros2(domain)
+    made = TransportGraph(kernel, library, records=records, epoch=epoch)
+    library.say = made.warn
+    return made

@@ -1,0 +1,197 @@
+"""What ArduPilot 4.5.6 does by itself after it is switched on: the recorded timeline, as data.
+
+Times are seconds after boot. Parameters are announced with index 65535, with the value that they have then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.arming import INFO
+from volery.simulation.autopilots.simulated.dialect import Act, Event
+from volery.simulation.autopilots.simulated.mavlink.dialect import BootBytes
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+DEBUG = 7
+
+BANNER = (
+    "\n\nInit {name} V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\nFirmware change: erasing EEPROM...\n"
+    "done.\nload_all took 11661us\n0 0 0 AP_Logger_File: buffer size=204800\n"
+)
+
+
+def banner(name: str) -> bytes:
+    """The text with which the firmware greets its console."""
+    return BANNER.format(name=name).encode()
+
+
+def words(seconds: float, *texts: str, severity: int = INFO) -> Event:
+    """Say these."""
+
+    def act(vehicle: Vehicle) -> None:
+        for text in texts:
+            vehicle.say(severity, text)
+
+    return Event(round(seconds * S), act)
+
+
+def announced(seconds: float, *names: str) -> Event:
+    """Announce these parameters."""
+
+    def act(vehicle: Vehicle) -> None:
+        for name in names:
+            if name in vehicle.parameters:
+                vehicle.outlet.parameter(name)
+
+    return Event(round(seconds * S), act)
+
+
+def measured(seconds: float, values: Sequence[tuple[str, float]]) -> Event:
+    """Set these parameters to what was measured, and announce them."""
+
+    def act(vehicle: Vehicle) -> None:
+        for name, value in values:
+            vehicle.set_parameter(name, value)
+
+    return Event(round(seconds * S), act)
+
+
+def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
+    """Bytes on the wire that are no message."""
+    return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
+
+
+def at(seconds: float, act: Act) -> Event:
+    """Do it then."""
+    return Event(round(seconds * S), act)
+
+
+def origin_set(vehicle: Vehicle) -> None:
+    """The estimator has an origin; home is where the vehicle stands."""
+    vehicle.flight.set_origin()
+
+
+def home_set(vehicle: Vehicle) -> None:
+    """A moment later the position is good enough for a home."""
+    if vehicle.estimate.position_ok and vehicle.home is None:
+        vehicle.home_is_here()
+
+
+def field_elevation(vehicle: Vehicle) -> None:
+    """Said once home is known."""
+    if vehicle.home is not None:
+        vehicle.say(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
+
+
+def using_gps(vehicle: Vehicle, units: Sequence[int]) -> None:
+    """Said when the estimator uses satellites."""
+    for unit in units:
+        vehicle.say(INFO, f"EKF3 IMU{unit} is using GPS")
+
+
+def both(text: str) -> tuple[str, str]:
+    """The same of both estimator units."""
+    return text.format(unit=0), text.format(unit=1)
+
+
+ALIGNED = (
+    *(words(5.63, text) for text in both("EKF3 IMU{unit} tilt alignment complete")),
+    *(words(5.73, text) for text in both("EKF3 IMU{unit} MAG0 initial yaw alignment complete")),
+    words(9.64, "GPS 1: detected as u-blox at 230400 baud"),
+)
+
+_IDS = ("INS_GYR_ID", "INS_ACC_ID", "INS_GYR2_ID", "INS_ACC2_ID")
+
+
+def _gyros(first: tuple[float, float, float], second: tuple[float, float, float]) -> list[tuple[str, float]]:
+    axes = "XYZ"
+    return [
+        *((f"INS_GYROFFS_{axis}", value) for axis, value in zip(axes, first, strict=True)),
+        ("INS_GYR_ID", 2_752_772),
+        ("INS_GYR1_CALTEMP", 25.018353),
+        *((f"INS_GYR2OFFS_{axis}", value) for axis, value in zip(axes, second, strict=True)),
+        ("INS_GYR2_ID", 2_752_780),
+        ("INS_GYR2_CALTEMP", 25.018353),
+        *((f"INS_GYR3OFFS_{axis}", 0.0) for axis in axes),
+        ("INS_GYR3_ID", 0),
+    ]
+
+
+COPTER_GYROS = _gyros(
+    (3.5415786e-05, 3.0671483e-05, 2.865993e-05), (1.474886e-05, 6.246919e-07, -3.2503358e-06)
+)
+ROVER_GYROS = _gyros(
+    (2.1818953e-05, -4.2986367e-06, -3.8552480e-07), (6.7699526e-05, 1.7263334e-06, -1.9344696e-05)
+)
+COPTER_PRESSURE = (("BARO1_GND_PRESS", 101079.71), ("BARO2_GND_PRESS", 101081.83))
+ROVER_PRESSURE = (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))
+
+
+def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
+    """Store what a boot measured, without a word."""
+    for name, value in values:
+        vehicle.parameters.set(name, value)
+
+
+def copter_events(ready: Act) -> tuple[Event, ...]:
+    """A copter's. *ready* is done when the set-up has ended."""
+    return (
+        announced(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
+        announced(
+            0.01, "ESC_CALIBRATION", "RELAY1_FUNCTION", "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"
+        ),
+        words(0.16, "Calibrating barometer"),
+        announced(0.16, "MNT1_TYPE", "CAM1_TYPE", "BARO_ALT_OFFSET"),
+        words(1.75, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
+        measured(1.75, (("BARO1_GND_PRESS", 94502.516), ("BARO2_GND_PRESS", 94502.242))),
+        announced(1.75, *_IDS),
+        at(2.28, ready),
+        words(2.28, "ArduPilot Ready", "AHRS: DCM active"),
+        measured(2.28, COPTER_GYROS),
+        words(2.58, "RC7: SaveWaypoint LOW"),
+        announced(3.28, "EK3_SRC1_POSXY"),
+        words(4.28, *both("EKF3 IMU{unit} initialised"), "AHRS: EKF3 active"),
+        *ALIGNED,
+        at(19.84, origin_set),
+        at(19.852, home_set),
+        words(19.852, "EKF3 IMU0 origin set"),
+        measured(19.885, COPTER_PRESSURE),
+        at(19.885, field_elevation),
+        words(20.05, "EKF3 IMU1 origin set"),
+        at(41.45, partial(using_gps, units=(0,))),
+        at(41.456, partial(using_gps, units=(1,))),
+    )
+
+
+def rover_events(ready: Act) -> tuple[Event, ...]:
+    """A rover's."""
+    return (
+        words(0.01, "Calibrating barometer"),
+        announced(0.01, "BARO_ALT_OFFSET"),
+        words(1.73, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
+        measured(1.73, (("SIM_PIN_MASK", 125), ("SIM_PIN_MASK", 121))),
+        words(1.73, "Beginning INS calibration. Do not move vehicle"),
+        measured(1.73, (("BARO1_GND_PRESS", 94503.914), ("BARO2_GND_PRESS", 94503.42))),
+        announced(1.73, "RELAY1_FUNCTION", "RELAY2_FUNCTION", "MNT1_TYPE", "CAM1_TYPE"),
+        announced(1.83, *_IDS),
+        words(2.35, "INS: alloc 6144 bytes for ISB (free=131072)", severity=DEBUG),
+        at(2.355, ready),
+        words(2.355, "ArduPilot Ready", "AHRS: DCM active"),
+        measured(2.355, ROVER_GYROS),
+        announced(3.37, "EK3_SRC1_POSXY"),
+        words(4.38, *both("EKF3 IMU{unit} initialised")),
+        *(words(5.98, text) for text in both("EKF3 IMU{unit} tilt alignment complete")),
+        *(words(6.06, text) for text in both("EKF3 IMU{unit} MAG0 initial yaw alignment complete")),
+        words(9.67, "GPS 1: detected as u-blox at 230400 baud"),
+        at(10.34, origin_set),
+        measured(10.345, (("BARO1_GND_PRESS", 94504.55), ("BARO2_GND_PRESS", 94503.32))),
+        at(10.36, home_set),
+        words(19.86, *both("EKF3 IMU{unit} origin set")),
+        at(19.94, field_elevation),
+        measured(21.34, (("BARO1_GND_PRESS", 101020.25), ("BARO2_GND_PRESS", 101018.77))),
+        measured(32.34, ROVER_PRESSURE),
+        at(42.08, partial(using_gps, units=(0, 1))),
+        words(42.085, "AHRS: EKF3 active"),
+    )

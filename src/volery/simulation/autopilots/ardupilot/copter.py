@@ -1,0 +1,285 @@
+"""ArduCopter 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.base.time import MS, S, from_seconds
+from volery.simulation.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
+from volery.simulation.autopilots.ardupilot.arming import (
+    INFO,
+    Check,
+    between,
+    disarm,
+    failing,
+    flies_by_position,
+    lost_position,
+    low_battery,
+    needs_no_position,
+    no_mission,
+    not_armable,
+)
+from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
+from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
+from volery.simulation.autopilots.ardupilot.honoured import COPTER as HONOURED
+from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, switch
+from volery.simulation.autopilots.ardupilot.status import (
+    ACTIVE,
+    CRITICAL,
+    STANDBY,
+    XY_CONTROL,
+    Z_CONTROL,
+    Health,
+)
+from volery.simulation.autopilots.ardupilot.tables import streams
+from volery.simulation.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
+from volery.simulation.autopilots.simulated.manoeuvres.guided import Guided
+from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission, copter_leg
+from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold, ByPilot, Loiter, Stabilize
+from volery.simulation.autopilots.simulated.manoeuvres.points import Brake, Land, Return
+from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.simulation.autopilots.simulated.mode import Mode
+from volery.simulation.autopilots.simulated.parameters import Parameter, load
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+QUADROTOR = 2
+"""MAV_TYPE."""
+
+CAPABILITIES = 64_495
+"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+
+BY_HAND = CUSTOM | STABILIZED | MANUAL
+BY_ITSELF = BY_HAND | GUIDED
+LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
+
+READY = round(2.28 * S)
+ORIGIN = round(19.852 * S)
+POSITION = round(41.45 * S)
+EACH_SECOND = round(0.285 * S)
+
+ARMED_WORDS = ("Arming motors", "Disarming motors")
+LANDED_TO_DISARM = 200 * MS
+"""Recorded: disarmed 2.07 s after touch-down. The landed detector takes most of it."""
+ALIGNS_ABOVE = 2.5
+"""Height [m] at which the compass is trusted anew."""
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(0, "STABILIZE", BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(2, "ALT_HOLD", BY_HAND, AltitudeHold, Z_CONTROL, pilot=True),
+        Mode(
+            3,
+            "AUTO",
+            BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, copter_leg, missions.leaves_ground),
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            armable=False,
+            starts_high=True,
+        ),
+        Mode(
+            4,
+            "GUIDED",
+            BY_ITSELF,
+            Guided,
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            user_takeoff=True,
+            starts_high=True,
+        ),
+        Mode(
+            5,
+            "LOITER",
+            BY_ITSELF,
+            Loiter,
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            pilot=True,
+            user_takeoff=True,
+        ),
+        Mode(6, "RTL", BY_ITSELF, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(9, "LAND", BY_HAND, Land, LEVEL_AND_HEIGHT, armable=False),
+        Mode(17, "BRAKE", BY_ITSELF, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+    )
+}
+
+CHECKS = (
+    Check("Need Alt Estimate", flies_by_position(0.0, 5.7)),
+    Check("Gyros not healthy", between(0.0, 1.8)),
+    Check("Accels inconsistent", between(1.8, 11.5)),
+    Check("Gyros inconsistent", between(11.5, 22.35)),
+    Check("EKF attitude is bad", between(0.0, 5.6)),
+    Check("Compass not healthy", between(0.0, 2.4)),
+    Check("AHRS: EKF3 not started", needs_no_position(0.0, 4.28)),
+    Check("AHRS: waiting for home", flies_by_position(0.0, 19.852)),
+    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Battery 1 below minimum arming voltage", low_battery),
+    Check("Need Position Estimate", lost_position),
+    Check("Mode requires mission", no_mission),
+)
+
+HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
+
+
+def before_arming(vehicle: Vehicle) -> list[str]:
+    """What would show as not ready."""
+    return failing(vehicle, CHECKS)
+
+
+def problems(vehicle: Vehicle) -> list[str]:
+    """All that speaks against arming now: readiness first, then mode and sticks."""
+    found = before_arming(vehicle)
+    may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
+    if not may_arm_auto:
+        found += not_armable(vehicle)
+    throttle = vehicle.tuning.sticks.throttle
+    if vehicle.parameters["FS_THR_ENABLE"] and vehicle.sticks[throttle] < vehicle.parameters["FS_THR_VALUE"]:
+        found.append("Throttle below failsafe")
+    elif not vehicle.mode.starts_high and _throttle_is_high(vehicle):
+        found.append("Throttle too high")
+    return found
+
+
+def _throttle_is_high(vehicle: Vehicle) -> bool:
+    sticks = ByPilot(vehicle)
+    throttle = sticks.pilot.throttle
+    return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
+
+
+def ready(vehicle: Vehicle) -> None:
+    """Set-up has ended: on the ground, in the mode that INITIAL_MODE names."""
+    vehicle.landed = True
+    initial = MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
+    if initial is not vehicle.mode:
+        vehicle.enter(initial)
+
+
+def warm(vehicle: Vehicle) -> None:
+    """As its boot leaves it, but for the position."""
+    boot.keep(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
+    ready(vehicle)
+
+
+def on_step(vehicle: Vehicle) -> None:
+    """At each tick: sticks that expire, touch-down, disarming by itself."""
+    radio.on_step(vehicle)
+    if not vehicle.armed:
+        return
+    if not vehicle.landed:
+        vehicle.idle_since = vehicle.kernel.now()
+        vehicle.flight_time += COPTER.tick
+        _notice_flight(vehicle)
+    else:
+        _disarm_by_itself(vehicle)
+
+
+def _notice_flight(vehicle: Vehicle) -> None:
+    height = vehicle.height
+    if height > ALIGNS_ABOVE and "aligned" not in vehicle.said:
+        vehicle.said.add("aligned")
+        for text in boot.both("EKF3 IMU{unit} MAG0 in-flight yaw alignment complete"):
+            vehicle.say(INFO, text)
+    if height < 1.0:
+        truth = vehicle.flight.truth()
+        if truth.contacts != vehicle.contacts:
+            vehicle.contacts = truth.contacts
+            vehicle.say(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
+
+
+def _disarm_by_itself(vehicle: Vehicle) -> None:
+    now = vehicle.kernel.now()
+    finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
+    if finished and now - vehicle.landed_at >= LANDED_TO_DISARM:
+        disarm(vehicle, ARMED_WORDS[1], force=True)
+        return
+    if ByPilot(vehicle).pilot.throttle > 0.0:
+        vehicle.idle_since = now
+    delay = vehicle.parameters["DISARM_DELAY"]
+    if delay > 0.0 and now - vehicle.idle_since >= from_seconds(delay):
+        disarm(vehicle, ARMED_WORDS[1], force=True)
+
+
+def on_disarmed(vehicle: Vehicle) -> None:
+    """The hover throttle that was learnt is stored."""
+    vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
+
+
+def system_status(vehicle: Vehicle) -> int:
+    """MAV_STATE: a failsafe, standing, or flying."""
+    if vehicle.failsafes:
+        return CRITICAL
+    return STANDBY if vehicle.landed else ACTIVE
+
+
+def greet(vehicle: Vehicle) -> None:
+    """Said to whoever lists the parameters."""
+    shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
+    introduce(vehicle, "ArduCopter")
+    vehicle.say(INFO, f"Frame: QUAD/{shape}")
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """The recorded list."""
+    return load("volery.simulation.autopilots.ardupilot", "data/copter.parameters")
+
+
+def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
+    """A copter does not store stream rates."""
+
+
+_FAILSAFES = CopterFailsafes(switch, ARMED_WORDS[1])
+
+_MAVLINK = mavlink(
+    boot_bytes=boot.bytes_at(
+        (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
+    ),
+    heartbeat_first=(round(1.05 * S),),
+    heartbeat_from=round(2.037 * S),
+    messages={
+        **builders(QUADROTOR, CAPABILITIES, HEALTH, system_status),
+        "ESC_TELEMETRY_1_TO_4": status.esc_telemetry,
+        "TERRAIN_REPORT": status.terrain_report,
+        "WIND": status.wind,
+    },
+    streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
+    on_stream_request=_ignored,
+    commands=commands.copter(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    handlers={
+        **HEARD,
+        "SET_ATTITUDE_TARGET": copter_attitude,
+        "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
+        "SET_POSITION_TARGET_LOCAL_NED": copter_local,
+    },
+    on_parameter_list=greet,
+)
+
+COPTER = ardupilot(
+    kind="multirotor",
+    face=partial(MavlinkFace, _MAVLINK),
+    boot_mode=MODES[0],
+    boot_events=boot.copter_events(ready),
+    ready_after=READY,
+    origin_after=ORIGIN,
+    position_after=POSITION,
+    local_position_after=POSITION,
+    on_warm=warm,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
+    each_second=partial(routine.each_second, before_arming=before_arming),
+    each_second_from=EACH_SECOND,
+    modes=MODES,
+    tuning=tuning.copter,
+    transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    stands=True,
+    motors_rest=2 * S,
+    spool_time=500 * MS,
+    takeoff_slew=100 * MS,
+    resigns_after=1500 * MS,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=on_disarmed,
+    mission_ended=missions.copter_ended,
+    parameters=parameters,
+    honoured=HONOURED,
+)

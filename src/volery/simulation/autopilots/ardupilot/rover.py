@@ -1,0 +1,235 @@
+"""ArduRover 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.base.time import MS, S
+from volery.simulation.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
+from volery.simulation.autopilots.ardupilot.arming import (
+    WARNING,
+    Check,
+    between,
+    failing,
+    lost_position,
+    low_battery,
+    no_mission,
+    not_armable,
+)
+from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
+from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
+from volery.simulation.autopilots.ardupilot.honoured import ROVER as HONOURED
+from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, switch
+from volery.simulation.autopilots.ardupilot.motion import nav_controller
+from volery.simulation.autopilots.ardupilot.status import (
+    ACTIVE,
+    ATTITUDE_CONTROL,
+    CALIBRATING,
+    CRITICAL,
+    RATE_CONTROL,
+    STANDBY,
+    XY_CONTROL,
+    YAW_CONTROL,
+    Health,
+)
+from volery.simulation.autopilots.ardupilot.tables import ALL, streams
+from volery.simulation.autopilots.ardupilot.targets import rover_global, rover_local
+from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
+from volery.simulation.autopilots.simulated.manoeuvres.rover import (
+    GuidedRover,
+    Manual,
+    ReturnRover,
+    Stand,
+    rover_leg,
+)
+from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.simulation.autopilots.simulated.mavlink.telemetry import Fields
+from volery.simulation.autopilots.simulated.mode import Mode
+from volery.simulation.autopilots.simulated.parameters import Parameter, load
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+GROUND_ROVER = 10
+"""MAV_TYPE."""
+
+CAPABILITIES = 61_935
+"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+
+BY_ITSELF = CUSTOM | GUIDED
+STEERED = RATE_CONTROL | ATTITUDE_CONTROL | YAW_CONTROL | XY_CONTROL
+
+READY = round(2.355 * S)
+HOME = round(10.36 * S)
+POSITION = round(42.08 * S)
+
+ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(0, "MANUAL", CUSTOM | MANUAL, Manual, pilot=True),
+        Mode(4, "HOLD", CUSTOM, Stand),
+        Mode(
+            10,
+            "AUTO",
+            BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, rover_leg),
+            STEERED,
+            needs_position=True,
+        ),
+        Mode(11, "RTL", BY_ITSELF, ReturnRover, STEERED, needs_position=True, armable=False),
+        Mode(15, "GUIDED", BY_ITSELF, GuidedRover, STEERED, needs_position=True),
+    )
+}
+
+INITIALISING = Mode(16, "INITIALISING", CUSTOM | MANUAL, Stand, armable=False)
+
+CHECKS = (
+    Check("Gyros not healthy", between(0.0, 1.85)),
+    Check("Accels inconsistent", between(1.85, 11.5)),
+    Check("Gyros inconsistent", between(11.5, 22.4)),
+    Check("Compass not healthy", between(0.0, 2.4)),
+    Check("AHRS: waiting for home", between(0.0, 10.36)),
+    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Battery 1 below minimum arming voltage", low_battery),
+    Check("Need Position Estimate", lost_position),
+    Check("Mode requires mission", no_mission),
+)
+
+HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))
+
+STREAM_PARAMETERS = {
+    1: "RAW_SENS",
+    2: "EXT_STAT",
+    3: "RC_CHAN",
+    4: "RAW_CTRL",
+    6: "POSITION",
+    10: "EXTRA1",
+    11: "EXTRA2",
+    12: "EXTRA3",
+    13: "ADSB",
+}
+"""Where a rover stores the rate of a stream."""
+
+
+def before_arming(vehicle: Vehicle) -> list[str]:
+    """What would show as not ready."""
+    return failing(vehicle, CHECKS)
+
+
+def problems(vehicle: Vehicle) -> list[str]:
+    """All that speaks against arming now."""
+    return before_arming(vehicle) + not_armable(vehicle)
+
+
+def ready(vehicle: Vehicle) -> None:
+    """Set-up has ended."""
+    vehicle.enter(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
+
+
+def warm(vehicle: Vehicle) -> None:
+    """As its boot leaves it, but for the position."""
+    boot.keep(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
+    ready(vehicle)
+
+
+def on_step(vehicle: Vehicle) -> None:
+    """At each tick: sticks that expire."""
+    radio.on_step(vehicle)
+    if vehicle.armed:
+        vehicle.flight_time += ROVER.tick
+
+
+def guided_arrived(vehicle: Vehicle) -> None:
+    """A rover says so as if it were a mission."""
+    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": 0})
+
+
+def guided_stale(vehicle: Vehicle) -> None:
+    """No target for three seconds."""
+    vehicle.say(WARNING, "target not received last 3secs, stopping")
+
+
+def system_status(vehicle: Vehicle) -> int:
+    """MAV_STATE: a failsafe, starting, holding, or driving."""
+    if vehicle.failsafes:
+        return CRITICAL
+    if vehicle.mode is INITIALISING:
+        return CALIBRATING
+    return STANDBY if vehicle.mode.name == "HOLD" else ACTIVE
+
+
+def greet(vehicle: Vehicle) -> None:
+    """Said to whoever lists the parameters."""
+    introduce(vehicle, "ArduRover")
+
+
+def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
+    """A rover stores the rates that it was asked for."""
+    names = STREAM_PARAMETERS.values() if stream == ALL else [STREAM_PARAMETERS[stream]]
+    for name in names:
+        vehicle.set_parameter(f"SR{index}_{name}", rate)
+
+
+def navigation(vehicle: Vehicle) -> Fields | None:
+    """NAV_CONTROLLER_OUTPUT: only in modes that steer by themselves."""
+    return nav_controller(vehicle) if vehicle.mode.controls else None
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """What is recorded of them, and documented."""
+    return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
+
+
+_FAILSAFES = RoverFailsafes(switch, ARMED_WORDS[1])
+
+_MAVLINK = mavlink(
+    boot_bytes=boot.bytes_at(
+        (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+    ),
+    heartbeat_first=(round(1.025 * S),),
+    heartbeat_from=round(3.04 * S),
+    least_period=25 * MS,
+    messages={
+        **builders(GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
+        "NAV_CONTROLLER_OUTPUT": navigation,
+        "RC_CHANNELS_SCALED": status.rc_channels_scaled,
+    },
+    streams=streams(("RC_CHANNELS_SCALED",), ()),
+    on_stream_request=on_stream_request,
+    commands=commands.rover(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    handlers={
+        **HEARD,
+        "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
+        "SET_POSITION_TARGET_LOCAL_NED": rover_local,
+    },
+    on_parameter_list=greet,
+)
+
+ROVER = ardupilot(
+    kind="rover",
+    face=partial(MavlinkFace, _MAVLINK),
+    boot_mode=INITIALISING,
+    boot_events=boot.rover_events(ready),
+    ready_after=READY,
+    origin_after=HOME,
+    position_after=POSITION,
+    local_position_after=HOME,
+    on_warm=warm,
+    on_warm_position=partial(routine.on_position, before_arming=before_arming),
+    each_second=partial(routine.each_second, before_arming=before_arming),
+    each_second_from=round(0.345 * S),
+    modes=MODES,
+    tuning=tuning.rover,
+    transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+    throttle_centred=True,
+    stands=False,
+    watches=_FAILSAFES.watches(),
+    on_step=on_step,
+    on_disarmed=lambda _vehicle: None,
+    guided_arrived=guided_arrived,
+    guided_stale=guided_stale,
+    mission_ended=missions.rover_ended,
+    parameters=parameters,
+    honoured=HONOURED,
+)

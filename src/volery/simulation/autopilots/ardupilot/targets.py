@@ -1,0 +1,189 @@
+"""SET_POSITION_TARGET_LOCAL_NED, _GLOBAL_INT and SET_ATTITUDE_TARGET: masks, frames, and what GUIDED makes
+of them.
+
+A group of three (position, velocity, acceleration) counts only whole. Outside GUIDED all of it is ignored.
+"""
+
+from __future__ import annotations
+
+from math import cos, hypot, isfinite, sin
+from typing import Any, NamedTuple
+
+from volery.base.frames import Vector
+from volery.simulation.autopilots.simulated.manoeuvres.guided import Guided, Turn
+from volery.simulation.autopilots.simulated.manoeuvres.rover import GuidedRover
+from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
+from volery.simulation.autopilots.simulated.plan import (
+    BODY_NED,
+    BODY_OFFSET_NED,
+    GLOBAL,
+    GLOBAL_INT,
+    GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT,
+    GLOBAL_TERRAIN,
+    GLOBAL_TERRAIN_INT,
+    LOCAL_NED,
+    LOCAL_OFFSET_NED,
+)
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+POSITION, VELOCITY, ACCELERATION, YAW, YAW_RATE = 0b111, 0b111 << 3, 0b111 << 6, 1 << 10, 1 << 11
+"""Bits of ``type_mask``: set means ignore."""
+LEVEL_POSITION, LEVEL_VELOCITY = 0b11, 0b11 << 3
+"""What a rover looks at."""
+FORCE = 1 << 9
+
+GLOBAL_FRAMES = (
+    GLOBAL,
+    GLOBAL_INT,
+    GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT,
+    GLOBAL_TERRAIN,
+    GLOBAL_TERRAIN_INT,
+)
+LOCAL_FRAMES = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
+BODY_FRAMES = (BODY_NED, BODY_OFFSET_NED)
+
+ATTITUDE_IGNORED, THROTTLE_IGNORED, YAW_RATE_IGNORED = 1 << 7, 1 << 6, 1 << 2
+"""Bits of SET_ATTITUDE_TARGET's ``type_mask``."""
+
+
+class Target(NamedTuple):
+    """What a message asks for, in the autopilot's frame; ``None``: not asked."""
+
+    position: Vector | None
+    velocity: Vector | None
+    acceleration: Vector | None
+    turn: Turn
+    force: bool
+
+
+def _given(mask: int, group: int) -> bool:
+    return not mask & group
+
+
+def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
+    """Forward, right, down to north, east, down, by the heading alone."""
+    heading = vehicle.estimate.attitude[2]
+    c, s = cos(heading), sin(heading)
+    return vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c, vector[2]
+
+
+def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:
+    mask = fields["type_mask"]
+    yaw = fields["yaw"] if _given(mask, YAW) and isfinite(fields["yaw"]) else None
+    if yaw is not None and body:
+        yaw += vehicle.estimate.attitude[2]
+    rate = None
+    if _given(mask, YAW_RATE) and isfinite(fields["yaw_rate"]):
+        fastest = vehicle.tuning.pilot_yaw_rate
+        rate = min(fastest, max(-fastest, fields["yaw_rate"]))
+    return Turn(None if rate is not None else yaw, rate)
+
+
+def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
+    mask, frame = fields["type_mask"], fields["coordinate_frame"]
+    if frame not in LOCAL_FRAMES:
+        return None
+    body = frame in BODY_FRAMES
+    place: Vector = (fields["x"], fields["y"], fields["z"])
+    velocity: Vector = (fields["vx"], fields["vy"], fields["vz"])
+    push: Vector = (fields["afx"], fields["afy"], fields["afz"])
+    if body:
+        place, velocity, push = _turned(vehicle, place), _turned(vehicle, velocity), _turned(vehicle, push)
+    if frame != LOCAL_NED:
+        here = vehicle.estimate.position
+        place = (here[0] + place[0], here[1] + place[1], here[2] + place[2])
+    return _target(mask, (place, velocity, push), _turn(vehicle, fields, body))
+
+
+def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target | None:
+    place, velocity, push = groups
+    for group, values in ((POSITION, place), (VELOCITY, velocity), (ACCELERATION, push)):
+        if _given(mask, group) and not sound(values, FARTHEST):
+            return None
+    return Target(
+        place if _given(mask, POSITION) else None,
+        velocity if _given(mask, VELOCITY) else None,
+        push if _given(mask, ACCELERATION) else None,
+        turn,
+        bool(mask & FORCE),
+    )
+
+
+def _of_global(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
+    mask, frame = fields["type_mask"], fields["coordinate_frame"]
+    if frame not in GLOBAL_FRAMES:
+        return None
+    place = vehicle.point(frame, fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, fields["alt"])
+    velocity: Vector = (fields["vx"], fields["vy"], fields["vz"])
+    push: Vector = (fields["afx"], fields["afy"], fields["afz"])
+    return _target(mask, (place, velocity, push), _turn(vehicle, fields, body=False))
+
+
+def _obey(vehicle: Vehicle, target: Target | None) -> None:
+    guided = vehicle.manoeuvre
+    if target is None or not isinstance(guided, Guided) or (target.force and target.acceleration is not None):
+        return
+    if target.position is not None:
+        guided.go_to(target.position, target.turn)
+    elif target.velocity is not None:
+        guided.follow_velocity(target.velocity, target.turn)
+    elif target.acceleration is not None:
+        guided.follow_acceleration(target.acceleration, target.turn)
+
+
+def copter_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_LOCAL_NED to a copter."""
+    _obey(vehicle, _of_local(vehicle, fields))
+
+
+def copter_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_GLOBAL_INT to a copter."""
+    _obey(vehicle, _of_global(vehicle, fields))
+
+
+def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_ATTITUDE_TARGET: attitude, turn rate, and thrust as a climb rate."""
+    guided, mask = vehicle.manoeuvre, fields["type_mask"]
+    if not isinstance(guided, Guided) or mask & THROTTLE_IGNORED:
+        return
+    if not sound((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+        return
+    w, x, y, z = fields["q"]
+    size = hypot(w, x, y, z)
+    attitude = None if mask & ATTITUDE_IGNORED or size < 0.5 else (w / size, x / size, y / size, z / size)
+    rate = None if mask & YAW_RATE_IGNORED else fields["body_yaw_rate"]
+    guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])))
+
+
+def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_LOCAL_NED to a rover: only what lies in the plane counts."""
+    _drive(
+        vehicle, _of_local(vehicle, _level(fields)), fields["coordinate_frame"] in BODY_FRAMES, fields["vx"]
+    )
+
+
+def rover_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_GLOBAL_INT to a rover."""
+    _drive(vehicle, _of_global(vehicle, _level(fields)), ahead_given=False, ahead=0.0)
+
+
+def _level(fields: dict[str, Any]) -> dict[str, Any]:
+    """The same with the vertical bits as the plane's: a rover takes two axes for three."""
+    mask = fields["type_mask"]
+    for group, level in ((POSITION, LEVEL_POSITION), (VELOCITY, LEVEL_VELOCITY)):
+        mask = mask & ~group if not mask & level else mask | group
+    return {**fields, "type_mask": mask}
+
+
+def _drive(vehicle: Vehicle, target: Target | None, ahead_given: bool, ahead: float) -> None:
+    guided = vehicle.manoeuvre
+    if target is None or not isinstance(guided, GuidedRover):
+        return
+    if target.position is not None:
+        guided.go_to(target.position)
+    elif target.velocity is not None and ahead_given:
+        guided.follow_speed(ahead, target.turn)
+    elif target.velocity is not None:
+        guided.follow_velocity(target.velocity, target.turn)

@@ -1,0 +1,16 @@
+"""Paparazzi's rotorcraft firmware as a dialect of the simulated flight stack, behind pprzlink 2.0.
+
+The protocol and the firmware's rules are from public definitions; none of it was compared with a flight.
+"""
+
+from volery.links.pprzlink import PPRZLINK
+from volery.simulation.autopilots.paparazzi.rotorcraft import ROTORCRAFT
+from volery.simulation.autopilots.simulated.dialect import Family, Station
+
+GROUND_SEGMENT = Station("udp://127.0.0.1:4242?from=4243")
+"""Paparazzi's ground segment hears aircraft at port 4242 and speaks to their port 4243."""
+
+DIALECT = Family("paparazzi", {"multirotor": ROTORCRAFT}, codec=PPRZLINK, stations=(GROUND_SEGMENT,))
+"""The firmware. Rovers are built from another firmware, which is not simulated."""
+
+__all__ = ["DIALECT"]

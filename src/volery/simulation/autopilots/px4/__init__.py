@@ -1,0 +1,16 @@
+"""PX4 1.14.0, multirotor and rover, as a dialect of the simulated flight stack: as recorded, not as we think
+it is.
+"""
+
+from volery.simulation.autopilots.px4.copter import COPTER
+from volery.simulation.autopilots.px4.rover import ROVER
+from volery.simulation.autopilots.px4.tables import ONBOARD, STATION
+from volery.simulation.autopilots.simulated.dialect import Family, Station
+
+STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
+"""As the firmware's own simulator has them: for programs, and for ground stations."""
+
+DIALECT = Family("px4", {"multirotor": COPTER, "rover": ROVER}, stations=STATIONS)
+"""The firmware, by kind of vehicle."""
+
+__all__ = ["DIALECT"]

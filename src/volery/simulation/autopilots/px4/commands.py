@@ -1,0 +1,221 @@
+"""PX4's commands: what each does and with which MAV_RESULT it is acknowledged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite, isnan
+
+from volery.base.frames import Vector
+from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4.commander import CRITICAL, FORCE, INFO, of
+from volery.simulation.autopilots.px4.planned import Hold
+from volery.simulation.autopilots.simulated.mavlink.command_service import (
+    ACCEPTED,
+    DENIED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    Command,
+    Handler,
+)
+from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
+from volery.simulation.autopilots.simulated.plan import GLOBAL_INT
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
+DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
+REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 246, 300, 400, 519
+
+CUSTOM_MODE_ENABLED = 1
+CHANGE_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS."""
+
+SPEED_OVER_GROUND = (0, 1)
+
+
+def whole(value: float) -> int:
+    """The nearest integer; -1 for what is no number."""
+    return round(value) if isfinite(value) else -1
+
+
+def on_set_mode(vehicle: Vehicle, command: Command) -> int:
+    """DO_SET_MODE: main and sub-mode. On the ground everything is accepted; nonsense changes nothing."""
+    if not whole(command.param1) & CUSTOM_MODE_ENABLED:
+        return ACCEPTED if not vehicle.armed else UNSUPPORTED
+    main, sub = whole(command.param2), whole(command.param3)
+    if not 0 <= main <= 255 or not 0 <= sub <= 255:
+        return ACCEPTED if not vehicle.armed else UNSUPPORTED
+    return switch(vehicle, modes.custom_mode(main, sub))
+
+
+def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
+    """SET_MODE."""
+    main, sub = modes.main_and_sub(number)
+    return switch(vehicle, modes.custom_mode(main, sub))
+
+
+def switch(vehicle: Vehicle, number: int) -> int:
+    """To a mode, as the user's wish."""
+    return of(vehicle).wish(number)
+
+
+def on_arm(vehicle: Vehicle, command: Command) -> int:
+    """COMPONENT_ARM_DISARM."""
+    force = whole(command.param2) == FORCE
+    if command.param1 == 1.0:
+        return of(vehicle).arm(force)
+    if command.param1 == 0.0:
+        return of(vehicle).disarm(force)
+    return UNSUPPORTED
+
+
+def on_takeoff(vehicle: Vehicle, command: Command) -> int:
+    """NAV_TAKEOFF: AMSL; accepted while disarmed, too: then arming takes off."""
+    commander = of(vehicle)
+    if vehicle.armed and not commander.can_fly(modes.TAKEOFF):
+        return TEMPORARILY_REJECTED
+    commander.takeoff_amsl = command.z if isfinite(command.z) and command.z != 0.0 else None
+    commander.wish_anew(modes.TAKEOFF)
+    return ACCEPTED
+
+
+def on_land(vehicle: Vehicle, _command: Command) -> int:
+    """NAV_LAND: here."""
+    commander = of(vehicle)
+    if commander.wish(modes.LAND) != ACCEPTED:
+        return TEMPORARILY_REJECTED
+    vehicle.say(INFO, "Landing at current position\t")
+    commander.log.tell(events.LANDING_HERE)
+    return ACCEPTED
+
+
+def on_return(vehicle: Vehicle, _command: Command) -> int:
+    """NAV_RETURN_TO_LAUNCH."""
+    commander = of(vehicle)
+    if vehicle.armed and not commander.can_fly(modes.RTL):
+        vehicle.say(CRITICAL, "Return to launch denied\t")
+        return TEMPORARILY_REJECTED
+    vehicle.say(INFO, "Returning to launch\t")
+    commander.log.tell(events.RETURNING)
+    return commander.wish(modes.RTL)
+
+
+def place_of(vehicle: Vehicle, command: Command) -> Vector | None:
+    """The point that a command names, AMSL; what it leaves out is the vehicle's own. ``None``: nowhere."""
+    latitude, longitude, amsl = vehicle.estimate.geodetic
+    if isfinite(command.x) and isfinite(command.y) and (command.x or command.y):
+        latitude, longitude = command.x, command.y
+    if isfinite(command.z):
+        amsl = command.z
+    if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return None
+    point = vehicle.point(GLOBAL_INT, latitude, longitude, amsl)
+    return point if sound(point, FARTHEST) else None
+
+
+def on_reposition(vehicle: Vehicle, command: Command) -> int:
+    """DO_REPOSITION: without its flag it is refused, and in AUTO.LOITER flown all the same."""
+    commander = of(vehicle)
+    point = place_of(vehicle, command)
+    if point is None or not vehicle.has_position:
+        return DENIED
+    heading = None if isnan(command.param4) else command.param4
+    flagged = whole(command.param2) == CHANGE_MODE
+    if not flagged:
+        holding = vehicle.manoeuvre
+        if vehicle.mode.number == modes.LOITER and vehicle.armed and isinstance(holding, Hold):
+            _move_hold(holding, point, heading, command.param1)
+        return UNSUPPORTED
+    speed = vehicle.speed
+    commander.wish_anew(modes.LOITER)
+    holding = vehicle.manoeuvre
+    if isinstance(holding, Hold):
+        vehicle.speed = speed
+        _move_hold(holding, point, heading, command.param1)
+    return ACCEPTED
+
+
+def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float) -> None:
+    holding.point = holding.target = point
+    holding.yaw = heading
+    if isfinite(speed) and speed > 0.0:
+        holding.speed = speed
+
+
+def on_change_speed(vehicle: Vehicle, command: Command) -> int:
+    """DO_CHANGE_SPEED: over the ground."""
+    if whole(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
+        vehicle.speed = command.param2
+    return ACCEPTED
+
+
+def on_set_home(vehicle: Vehicle, command: Command) -> int:
+    """DO_SET_HOME."""
+    if command.param1 == 1.0:
+        if not vehicle.has_position:
+            return TEMPORARILY_REJECTED
+        vehicle.home_is_here()
+        vehicle.home_by_user = True
+        return ACCEPTED
+    given = (command.x, command.y, command.z)
+    if not sound(given) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
+        return DENIED
+    vehicle.set_home(*given)
+    vehicle.home_by_user = True
+    return ACCEPTED
+
+
+def on_orbit(vehicle: Vehicle, command: Command) -> int:
+    """DO_ORBIT: radius, speed; about the place or here."""
+    commander = of(vehicle)
+    centre = place_of(vehicle, command)
+    if centre is None or not vehicle.has_position or not vehicle.armed:
+        return TEMPORARILY_REJECTED
+    radius = command.param1 if isfinite(command.param1) and abs(command.param1) >= 1.0 else 5.0
+    speed = command.param2 if isfinite(command.param2) and command.param2 else 1.0
+    commander.orbit = (centre, radius, speed)
+    commander.wish_anew(modes.ORBIT)
+    return ACCEPTED
+
+
+def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
+    """MISSION_START: the mode, and arming."""
+    commander = of(vehicle)
+    if len(vehicle.plan) == 0 or commander.wish(modes.MISSION) != ACCEPTED:
+        return DENIED
+    return ACCEPTED if commander.arm(force=False) == ACCEPTED else DENIED
+
+
+def on_terminate(vehicle: Vehicle, command: Command) -> int:
+    """DO_FLIGHTTERMINATION: the motors stop."""
+    if not isfinite(command.param1) or command.param1 <= 0.5:
+        return TEMPORARILY_REJECTED
+    if vehicle.armed:
+        of(vehicle).disarmed("termination", events.BY_COMMAND)
+    return ACCEPTED
+
+
+def refused(_vehicle: Vehicle, _command: Command) -> int:
+    """PREFLIGHT_REBOOT_SHUTDOWN on a simulator."""
+    return DENIED
+
+
+def accepted(_vehicle: Vehicle, _command: Command) -> int:
+    """Acknowledged, and that is all."""
+    return ACCEPTED
+
+
+SHARED: Mapping[int, Handler] = {
+    RETURN: on_return,
+    DO_SET_MODE: on_set_mode,
+    CHANGE_SPEED: on_change_speed,
+    SET_HOME: on_set_home,
+    FLIGHT_TERMINATION: on_terminate,
+    REPOSITION: on_reposition,
+    REBOOT: refused,
+    MISSION_START: on_mission_start,
+    ARM_DISARM: on_arm,
+    REQUEST_PROTOCOL: accepted,
+}
+
+COPTER: Mapping[int, Handler] = {**SHARED, LAND: on_land, TAKEOFF: on_takeoff, ORBIT: on_orbit}
+"""A multirotor's. All others are unsupported, among them NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""

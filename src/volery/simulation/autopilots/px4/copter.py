@@ -1,0 +1,116 @@
+"""PX4 1.14.0 on a multirotor: its modes and its habits, put together as a dialect."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from volery.base.time import MS, S
+from volery.simulation.autopilots.px4 import commands, missions, modes, radio, tuning
+from volery.simulation.autopilots.px4.commander import of
+from volery.simulation.autopilots.px4.firmware import px4
+from volery.simulation.autopilots.px4.honoured import COPTER as HONOURED
+from volery.simulation.autopilots.px4.mavlink import mavlink
+from volery.simulation.autopilots.px4.piloted import Position
+from volery.simulation.autopilots.px4.planned import Descent, Hold, Orbit, Return, TakeOff
+from volery.simulation.autopilots.px4.pursuit import Offboard
+from volery.simulation.autopilots.px4.returning import tell_stage
+from volery.simulation.autopilots.px4.watching import on_step
+from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
+from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold, Stabilize
+from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.simulation.autopilots.simulated.mode import Manoeuvre, Mode
+from volery.simulation.autopilots.simulated.parameters import Parameter, load
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+QUADROTOR = 2
+"""MAV_TYPE."""
+
+
+def _take_off(vehicle: Vehicle) -> Manoeuvre:
+    """To the altitude of the command; at least MIS_TAKEOFF_ALT above where it stands."""
+    commander = of(vehicle)
+    here = vehicle.estimate.geodetic[2]
+    least = vehicle.parameters["MIS_TAKEOFF_ALT"]
+    amsl = commander.takeoff_amsl
+    if amsl is None or amsl < here + least:
+        amsl = here + least
+        commander.least_height = least
+        if vehicle.armed:
+            commander.tell_least_height()
+    return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
+
+
+def _orbit(vehicle: Vehicle) -> Manoeuvre:
+    asked = of(vehicle).orbit
+    centre, radius, speed = asked or (vehicle.estimate.position, 5.0, 1.0)
+    return Orbit(vehicle, centre, radius, speed)
+
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, AltitudeHold, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, Position, needs_position=True, pilot=True),
+        Mode(modes.ORBIT, "ORBIT", modes.BY_COMPUTER, _orbit, needs_position=True, armable=False),
+        Mode(modes.ACRO, "ACRO", modes.BY_RATES, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, Offboard, needs_position=True),
+        Mode(modes.STABILIZE, "STABILIZED", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.BY_ITSELF, _take_off, needs_position=True),
+        Mode(modes.LOITER, "AUTO.LOITER", modes.BY_ITSELF, Hold, needs_position=True),
+        Mode(
+            modes.MISSION,
+            "AUTO.MISSION",
+            modes.BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, missions.leg, lambda _vehicle: True),
+            needs_position=True,
+        ),
+        Mode(
+            modes.RTL,
+            "AUTO.RTL",
+            modes.BY_ITSELF,
+            lambda vehicle: Return(vehicle, tell_stage),
+            needs_position=True,
+            armable=False,
+        ),
+        Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Descent, armable=False),
+        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.BY_COMPUTER, Hold, needs_position=True, armable=False),
+    )
+}
+
+
+def _on_step(vehicle: Vehicle) -> None:
+    on_step(vehicle)
+    manoeuvre = vehicle.manoeuvre
+    if vehicle.armed and not vehicle.landed and isinstance(manoeuvre, TakeOff) and manoeuvre.arrived():
+        _stay_here(vehicle)
+
+
+def _stay_here(vehicle: Vehicle) -> None:
+    """The take-off has ended: it stays at the height at which that was noticed."""
+    here = vehicle.estimate.position
+    of(vehicle).follow_up(modes.LOITER)
+    if isinstance(vehicle.manoeuvre, Hold):
+        vehicle.manoeuvre.point = here
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """The recorded list."""
+    return load("volery.simulation.autopilots.px4", "data/copter.parameters")
+
+
+COPTER = px4(
+    kind="multirotor",
+    face=partial(MavlinkFace, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
+    boot_mode=MODES[modes.LOITER],
+    modes=MODES,
+    tuning=tuning.copter,
+    stands=True,
+    spool_time=1 * S,
+    takeoff_slew=200 * MS,
+    resigns_after=1500 * MS,
+    on_step=_on_step,
+    parameters=parameters,
+    honoured=HONOURED,
+)

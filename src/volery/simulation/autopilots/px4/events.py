@@ -1,0 +1,150 @@
+"""PX4's events: what it says to machines. Numbers, levels and arguments as recorded.
+
+An event's number is a hash of its name; the names here say what was seen to cause it. Some things are said in
+events alone, above all why arming is refused: a report of all checks goes out when it changes, at most every
+two seconds, as a summary, the checks that fail, and a summary of the sensors.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from volery.base.time import MS
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+
+class Event(NamedTuple):
+    """``levels``: internal and external severity."""
+
+    id: int
+    levels: int
+
+
+ARMED = Event(0x0190CAF3, 0x66)
+DISARMED = Event(0x01F46777, 0x66)
+DISARM_REFUSED = Event(0x017C97C5, 0x62)
+THROTTLE_HIGH = Event(0x011AB045, 0x62)
+TAKEOFF_DETECTED = Event(0x01414569, 0x66)
+LANDING_DETECTED = Event(0x019638AC, 0x66)
+LANDING_HERE = Event(0x0132B2DE, 0x66)
+RETURNING = Event(0x01352CE4, 0x66)
+RETURN_ACTIVATED = Event(0x0114827B, 0x66)
+RETURN_HOME = Event(0x01AA3FA9, 0x66)
+RETURN_CLIMB = Event(0x018C8C09, 0x66)
+RETURN_FLY = Event(0x01F62F50, 0x66)
+RETURN_DESCEND = Event(0x01B911E0, 0x66)
+RETURN_LAND = Event(0x0102D3AA, 0x66)
+MISSION_TAKEOFF = Event(0x01E7315E, 0x66)
+LEAST_TAKEOFF = Event(0x01DBF722, 0x66)
+FAILSAFE = Event(0x01DEDBD0, 0x42)
+FAILSAFE_HOLD = Event(0x01D11DF6, 0x42)
+FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
+STICKS_LOST = Event(0x0155CD44, 0x62)
+STICKS_BACK = Event(0x010AE2BD, 0x66)
+PILOT_TOOK_OVER = Event(0x010EAC3F, 0x66)
+MODE_REFUSED = Event(0x01A04397, 0x62)
+FRAME_UNSUPPORTED = Event(0x01B04541, 0x33)
+SETPOINT_INVALID = Event(0x015637A5, 0x33)
+
+CHECKS_SUMMARY = Event(0x01A893E0, 0x88)
+NO_ATTITUDE = Event(0x019F748F, 0x22)
+NO_LOCAL_POSITION = Event(0x01D31BB9, 0x33)
+NO_GLOBAL_POSITION = Event(0x0198C273, 0x33)
+NO_MISSION = Event(0x0105C2D9, 0x66)
+NO_OFFBOARD_SIGNAL = Event(0x012F1DC7, 0x33)
+NO_STICKS = Event(0x0106ED29, 0x44)
+MODE_NOT_ARMABLE = Event(0x011C8F61, 0x66)
+STILL_STARTING = Event(0x0167C97B, 0x66)
+SENSORS_SUMMARY = Event(0x011D3727, 0x88)
+
+BY_COMMAND, BY_LANDING, BY_WAITING = b"\x04", b"\x06", b"\x07"
+"""Why it was armed or disarmed."""
+
+FIRST_SEQUENCE = 65_526
+"""Of the first event after a boot."""
+
+_EVENTS_OF_OFFBOARD, _EVENTS_OF_STICKS = 1 << 20, 1 << 7
+
+
+class Log:
+    """The events of one vehicle, counted."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self.latest = FIRST_SEQUENCE
+
+    def tell(self, event: Event, arguments: bytes = b"") -> None:
+        """Send it to everyone."""
+        self.latest = (self.latest + 1) % 65_536
+        fields = {
+            "id": event.id,
+            "event_time_boot_ms": self._vehicle.uptime() // MS,
+            "sequence": self.latest,
+            "log_levels": event.levels,
+            "arguments": tuple(arguments),
+        }
+        self._vehicle.outlet.tell("EVENT", fields)
+
+
+class Checks(NamedTuple):
+    """What speaks for and against arming."""
+
+    started: bool
+    attitude: bool
+    position: bool
+    sticks: bool
+    mission: bool
+    offboard: bool
+    mode: bool
+    """Whether the wished mode is one that may be armed."""
+
+
+def _modes(checks: Checks) -> int:
+    """A bit for each mode that could be flown now, by its navigation state."""
+    missing: list[int] = []
+    if not checks.position:
+        missing += [2, 3, 4, 5, 17, 18, 19, 20, 21, 22]
+    if not checks.attitude:
+        missing += [12]
+    if not checks.sticks:
+        missing += [0, 1, 2, 10, 15]
+    if not checks.mission:
+        missing += [3]
+    if not checks.offboard:
+        missing += [14]
+    allowed = 0xFFFF_FFFF
+    for state in missing:
+        allowed &= ~(1 << state)
+    return allowed
+
+
+def report(checks: Checks) -> list[tuple[Event, bytes]]:
+    """The events that tell it."""
+    able = _modes(checks)
+    errors = 0 if checks.offboard else _EVENTS_OF_OFFBOARD
+    warnings = 0 if checks.sticks else _EVENTS_OF_STICKS
+    found = [(CHECKS_SUMMARY, struct.pack("<BIIII", 0, errors, warnings, able, able))]
+    if not checks.attitude:
+        found.append((NO_ATTITUDE, bytes.fromhex("3ed07e0014")))
+    if not checks.position:
+        found.append((NO_LOCAL_POSITION, bytes.fromhex("3c007e0014")))
+        found.append((NO_GLOBAL_POSITION, bytes.fromhex("3800000014")))
+    if not checks.mission:
+        found.append((NO_MISSION, bytes.fromhex("0800000014")))
+    if not checks.offboard:
+        found.append((NO_OFFBOARD_SIGNAL, bytes.fromhex("0040000014")))
+    if not checks.sticks:
+        found.append((NO_STICKS, bytes.fromhex("ffffffff07")))
+    if not checks.mode:
+        found.append((MODE_NOT_ARMABLE, bytes.fromhex("20303c0014")))
+    if not checks.started:
+        found.append((STILL_STARTING, bytes.fromhex("ffffffff0c")))
+    sensors = 0x80 * checks.sticks | 0x08 * checks.position | 0x02
+    found.append((SENSORS_SUMMARY, bytes((0, sensors, 0x18 if checks.started else 0x08, 0x02, 0x28))))
+    return found
+
+
+def real(value: float) -> bytes:
+    """A number as an argument."""
+    return struct.pack("<f", value)

@@ -1,0 +1,186 @@
+"""PX4 1.14.0 on a rover. There is no recording of one: what it shares with the multirotor is recorded, how
+it drives is assumed.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from math import atan2, hypot, isfinite
+
+from volery.base.frames import Vector
+from volery.simulation.autopilots.px4 import commands, copter, modes, radio, tuning
+from volery.simulation.autopilots.px4.commander import of
+from volery.simulation.autopilots.px4.firmware import px4
+from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
+from volery.simulation.autopilots.px4.mavlink import mavlink
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
+from volery.simulation.autopilots.px4.watching import on_step
+from volery.simulation.autopilots.simulated.flight import Control, Setpoint
+from volery.simulation.autopilots.simulated.manoeuvres.guided import Turn
+from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
+from volery.simulation.autopilots.simulated.manoeuvres.rover import (
+    DriveTo,
+    FollowSpeed,
+    Manual,
+    ReturnRover,
+    Stand,
+    rover_leg,
+)
+from volery.simulation.autopilots.simulated.mavlink.command_service import (
+    ACCEPTED,
+    DENIED,
+    UNSUPPORTED,
+    Command,
+    Handler,
+)
+from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
+from volery.simulation.autopilots.simulated.mode import Manoeuvre, Mode
+from volery.simulation.autopilots.simulated.parameters import REAL32, Parameter
+from volery.simulation.autopilots.simulated.vehicle import Vehicle
+
+GROUND_ROVER = 10
+"""MAV_TYPE."""
+
+ASSUMED = (Parameter("GND_SPEED_MAX", REAL32, 10.0), Parameter("GND_SPEED_TRIM", REAL32, 3.0))
+"""Documented defaults of parameters that the recorded multirotor does not list."""
+
+
+class HoldRover(Manoeuvre):
+    """AUTO.LOITER: stand, or drive to where it was sent."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._doing: Manoeuvre = Stand(vehicle)
+
+    def send_to(self, point: Vector) -> None:
+        """Drive there and stand."""
+        self._doing = DriveTo(self.vehicle, point)
+        self.target = point
+
+    def step(self) -> None:
+        """Go on."""
+        if isinstance(self._doing, DriveTo) and self._doing.arrived():
+            self._doing = Stand(self.vehicle)
+        self._doing.step()
+
+
+class OffboardRover(Manoeuvre):
+    """A point, or a speed over the ground in a direction: whatever the stream says."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._doing: Manoeuvre = Stand(vehicle)
+
+    def enter(self) -> None:
+        """Stand until told."""
+        self.take(of(self.vehicle).stream.target)
+
+    def take(self, target: Target | AttitudeTarget | None) -> None:
+        """A set-point came; attitudes mean nothing to wheels."""
+        if not isinstance(target, Target):
+            return
+        north, east, _ = target.position
+        if isfinite(north) and isfinite(east):
+            self._drive_to((north, east, 0.0))
+            return
+        north, east, _ = (value if isfinite(value) else 0.0 for value in target.velocity)
+        speed = hypot(north, east)
+        turn = Turn(target.yaw, target.yaw_rate)
+        self.target = None
+        if speed < 0.05 and turn.rate is None:
+            self._doing = Stand(self.vehicle)
+        else:
+            if turn == Turn():
+                turn = Turn(_course(north, east, self.vehicle.estimate.attitude[2]))
+            self._doing = FollowSpeed(self.vehicle, speed, turn)
+
+    def _drive_to(self, point: Vector) -> None:
+        if not isinstance(self._doing, DriveTo) or self._doing.point != point:
+            self._doing = DriveTo(self.vehicle, point)
+        self.target = point
+
+    def step(self) -> None:
+        """Go on; on a point it stands."""
+        doing = self._doing
+        if isinstance(doing, DriveTo) and doing.arrived():
+            Stand(self.vehicle).step()
+        else:
+            doing.step()
+
+
+def _course(north: float, east: float, otherwise: float) -> float:
+    return atan2(east, north) if north or east else otherwise
+
+
+class StickDrive(Manual):
+    """MANUAL, and POSCTL with or without sticks: without them it brakes and stands."""
+
+    def step(self) -> None:
+        """Pass the sticks on."""
+        if of(self.vehicle).joystick.valid:
+            super().step()
+        else:
+            accel = self.vehicle.tuning.accel
+            self.vehicle.drive(Setpoint(Control.DRIVE, speed=self.vehicle.tuning.speed, accel=accel))
+
+
+def on_reposition(vehicle: Vehicle, command: Command) -> int:
+    """DO_REPOSITION, with its flag."""
+    point = commands.place_of(vehicle, command)
+    if point is None or not vehicle.has_position:
+        return DENIED
+    if commands.whole(command.param2) != commands.CHANGE_MODE:
+        return UNSUPPORTED
+    of(vehicle).wish_anew(modes.LOITER)
+    if isinstance(vehicle.manoeuvre, HoldRover):
+        vehicle.manoeuvre.send_to(point)
+    return ACCEPTED
+
+
+COMMANDS: dict[int, Handler] = {**commands.SHARED, commands.REPOSITION: on_reposition}
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, StickDrive, pilot=True),
+        Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, StickDrive, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, StickDrive, pilot=True),
+        Mode(modes.ACRO, "ACRO", modes.BY_RATES, StickDrive, pilot=True),
+        Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, OffboardRover, needs_position=True),
+        Mode(modes.STABILIZE, "STABILIZED", modes.BY_HAND, StickDrive, pilot=True),
+        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.BY_ITSELF, HoldRover, needs_position=True),
+        Mode(modes.LOITER, "AUTO.LOITER", modes.BY_ITSELF, HoldRover, needs_position=True),
+        Mode(
+            modes.MISSION,
+            "AUTO.MISSION",
+            modes.BY_ITSELF,
+            lambda vehicle: FlyMission(vehicle, rover_leg, lambda _vehicle: True),
+            needs_position=True,
+        ),
+        Mode(modes.RTL, "AUTO.RTL", modes.BY_ITSELF, ReturnRover, needs_position=True, armable=False),
+        Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Stand, armable=False),
+    )
+}
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """The multirotor's recorded list, with a rover's type and what only a rover has."""
+    shared = (
+        parameter._replace(value=float(GROUND_ROVER)) if parameter.name == "MAV_TYPE" else parameter
+        for parameter in copter.parameters()
+    )
+    return (*shared, *ASSUMED)
+
+
+ROVER = px4(
+    kind="rover",
+    face=partial(MavlinkFace, mavlink(GROUND_ROVER, COMMANDS, radio.ROVER)),
+    boot_mode=MODES[modes.LOITER],
+    modes=MODES,
+    tuning=tuning.rover,
+    stands=False,
+    on_step=on_step,
+    parameters=parameters,
+    honoured=HONOURED,
+)

@@ -1,0 +1,19 @@
+"""ArduPilot: its sequences, written once, and two ways to reach it: a MAVLink link, and MAVROS on a graph."""
+
+from __future__ import annotations
+
+from volery.vehicles.driver import DriverFactory
+from volery.vehicles.drivers.ardupilot.driver import ArduPilot
+from volery.vehicles.drivers.ardupilot.mavlink import MavlinkCommands
+from volery.vehicles.drivers.ardupilot.mavros import MavrosCommands
+from volery.vehicles.drivers.mavlink.opening import Opening
+
+__all__ = ["DRIVER", "ArduPilot", "open_driver", "open_mavros"]
+
+_OPENING = Opening("ardupilot", ArduPilot, MavlinkCommands, MavrosCommands)
+
+open_driver = _OPENING.on_link
+open_mavros = _OPENING.on_graph
+
+DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
+"""ArduPilot on a MAVLink link; on a graph it goes by MAVROS's names."""

@@ -1,0 +1,45 @@
+"""DJI aircraft through the ROS node of their onboard SDK: ``dji_sdk`` 3.8, or the vehicle node of
+``dji_osdk_ros`` 4.1, over any graph.
+
+The protocol is from public definitions and has not been flown; what is assumed: ``assumed``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from volery.base.errors import UsageError, choices
+from volery.kernel.api import Kernel
+from volery.ros.graph import Node
+from volery.ros.messages.dji import NEW_NAMES, OLD_NAMES
+from volery.vehicles.driver import DriverFactory
+from volery.vehicles.drivers.dji.carrier import Carrier
+from volery.vehicles.drivers.dji.driver import Dji
+from volery.vehicles.drivers.dji.names import Names, NewNames, OldNames
+from volery.vehicles.drivers.options import check_options, recorded
+
+__all__ = ["DRIVER", "Dji", "open_driver"]
+
+OPTIONS = ("names", "namespace", "texts")
+NAMES: Mapping[str, Callable[[Node, str], Names]] = {OLD_NAMES: OldNames, NEW_NAMES: NewNames}
+
+
+def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Dji:
+    """A DJI aircraft behind its ROS node, commanded by *node*. It begins to listen at once.
+
+    Options: ``namespace`` of its names, else ``/dji_sdk``; ``names``: ``dji_sdk`` or ``dji_osdk_ros``, by
+    default the one that the namespace ends in, else ``dji_sdk``; ``texts=unrecorded`` where the aircraft
+    records what happens itself, as a simulated one does.
+    """
+    check_options("dji", options, *OPTIONS)
+    namespace = options.get("namespace", f"/{OLD_NAMES}").rstrip("/")
+    last = namespace.rpartition("/")[2]
+    names = options.get("names", last if last in NAMES else OLD_NAMES)
+    if names not in NAMES:
+        raise UsageError(f"names={names!r}; there is {choices(NAMES)}")
+    carrier = Carrier(kernel, node, name, NAMES[names](node, namespace), record=recorded(options))
+    return Dji(kernel, name, carrier)
+
+
+DRIVER = DriverFactory(on_graph=open_driver, namespace=f"/{{name}}/{OLD_NAMES}", graph_names=OLD_NAMES)
+"""Over a graph only: bytes to a DJI aircraft are encrypted, and its own library speaks them."""

@@ -1,0 +1,222 @@
+"""A DJI aircraft's sequences: what it wants to be asked, and how one sees it done.
+
+What shapes them: tasks (take-off, landing, going home) need no authority, everything else does; a take-off
+goes to a fixed height of its own, the rest is climbed by set-points; a position is a stream of remaining
+offsets; and the authority is the pilot's to take at any time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import radians
+
+from volery.base.errors import CapabilityError, LinkError, Refused
+from volery.base.frames import heading_to_yaw
+from volery.base.position import Position
+from volery.base.time import Ns
+from volery.kernel.api import Action, Kernel
+from volery.ros.messages.dji import DisplayMode
+from volery.vehicles.driver import Capability, Step, Sticks
+from volery.vehicles.drivers.arrival import at, standing
+from volery.vehicles.drivers.dji.carrier import Carrier
+from volery.vehicles.drivers.dji.mission_flight import MissionFlight
+from volery.vehicles.drivers.dji.missions import above_home
+from volery.vehicles.drivers.dji.pieces import DESCENDS, SDK, STARTS, WAITS, Pieces
+from volery.vehicles.drivers.dji.stream import STILL, ByHand, Moving, Point, yaw_of
+from volery.vehicles.drivers.dji.tasks import Tasks
+from volery.vehicles.drivers.steps import (
+    ANSWERED_WITHIN,
+    STOPPED_WITHIN,
+    TURNED_WITHIN,
+    at_once,
+    check_not_idle,
+    heads,
+)
+from volery.vehicles.mission import MissionItem
+from volery.vehicles.telemetry import Velocity
+
+LOW_THROTTLE = 0.3
+"""Below it, in the air, thrust by the sticks would let it fall."""
+
+CAN = frozenset(Capability) - {Capability.TERRAIN}
+_NOTHING: frozenset[Capability] = frozenset()
+
+
+class Dji:
+    """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
+
+    comes_down = DESCENDS
+    cycle: Action | None = None
+
+    def __init__(self, kernel: Kernel, name: str, carrier: Carrier) -> None:
+        self.name = name
+        self.telemetry = carrier.telemetry
+        self._kernel = kernel
+        self._carrier = carrier
+        self._stream = carrier.stream
+        self._pieces = Pieces(name, carrier)
+        self._tasks = Tasks(self._pieces)
+        self._mission = MissionFlight(self._pieces, self._tasks)
+
+    @property
+    def handover(self) -> str:
+        """It hovers and takes commands: by position, or without one in ATTITUDE. In ``NAVI_SDK_CTRL``, which
+        no pilot can choose, it obeys a computer already: another node of ours has had it.
+        """
+        seen = self.telemetry
+        if seen.mode == SDK:
+            return SDK
+        return DisplayMode.ATTITUDE.name if seen.mode == DisplayMode.ATTITUDE.name else WAITS
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        """All but terrain; none until it has been heard."""
+        return CAN if self.telemetry.kind else _NOTHING
+
+    def look(self) -> None:
+        """What arrives is taken in by itself."""
+
+    def problem(self) -> LinkError | CapabilityError | None:
+        """What is wrong with the way to the aircraft."""
+        return self._carrier.problem()
+
+    def if_silent(self) -> str:
+        """Assumed: the public definitions do not say, and no parameter of the aircraft can be read."""
+        return (
+            "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low or the pilot "
+            "takes it; landing, going home and missions go on"
+        )
+
+    def close(self) -> None:
+        """Stop talking."""
+        self._carrier.close()
+
+    # -- on the ground, off it and back
+
+    def ready(self, within: Ns) -> Sequence[Step]:
+        """Activated, a position that may be trusted, and a local reference."""
+        return self._pieces.ready(within)
+
+    def arm(self) -> Sequence[Step]:
+        """Start the motors."""
+        return self._tasks.arm()
+
+    def disarm(self, force: bool) -> Sequence[Step]:
+        """Stop the motors. In the air the aircraft would fall: that takes *force*."""
+        return self._tasks.disarm(force)
+
+    def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
+        """Task 4, which starts the motors and goes to its own height; then to *height* by set-points."""
+        return self._tasks.takeoff(height, within)
+
+    def return_home(self, within: Ns) -> Sequence[Step]:
+        """Task 1: it climbs, goes home and lands; near home it lands at once."""
+        return self._tasks.return_home(within)
+
+    def land(self, within: Ns) -> Sequence[Step]:
+        """Task 6, until the motors have stopped."""
+        return self._tasks.land(within)
+
+    # -- by set-points
+
+    def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
+        """Remaining offsets, streamed; the height counts from the point of take-off."""
+        home = self.telemetry.home
+        if home is None:
+            raise Refused(self.name, f"go to {goal}", "it is not known where it took off")
+        height = above_home(goal, home)
+        self._pieces.check_height(height, f"go to {goal}")
+
+        def there() -> Point:
+            return Point(goal.latitude, goal.longitude, height, yaw_of(self.telemetry), speed)
+
+        return self._pieces.to_point(f"reach {goal}", there, at(goal, False), within)
+
+    def hold(self) -> Sequence[Step]:
+        """Zero velocity until it stands; then it hovers by itself. Without a position it cannot."""
+        if self.telemetry.flying and not self.telemetry.ready:
+            raise Refused(self.name, "hold", f"it has no position ({self.telemetry.fix}) and drifts; land()")
+        brake = Step(
+            ask="stop",
+            send=lambda: self._follow(STILL, 0.0, STOPPED_WITHIN),
+            done=lambda seen: standing(seen) and not self._stream.fresh,
+            within=STOPPED_WITHIN,
+            enters=SDK,
+            leads_to=(WAITS,),
+            armed=True,
+        )
+        return (*self._pieces.free(), self._pieces.authority(), brake, self._pieces.hover())
+
+    def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Streamed for as long as it lasts; then it stops."""
+        follow = at_once("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
+        return (*self._pieces.free(), self._pieces.authority(), follow)
+
+    def _follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
+        self._pieces.aim(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
+
+    def heading(self, degrees: float) -> Sequence[Step]:
+        """In place."""
+
+        def turn() -> Point | None:
+            here = self._pieces.over_here(self.telemetry.above_home)
+            return here._replace(yaw=heading_to_yaw(radians(degrees))) if here is not None else None
+
+        return self._pieces.to_point(f"turn to {degrees:g} degrees", turn, heads(degrees), TURNED_WITHIN)
+
+    # -- by sticks
+
+    def stabilize(self) -> Sequence[Step]:
+        """Lean angles, turn rate and thrust."""
+        check_not_idle(self.telemetry, self._stream.held or Sticks(), LOW_THROTTLE)
+        return self._by_hand("fly stabilized", ByHand(keeps_height=False))
+
+    def altitude_hold(self) -> Sequence[Step]:
+        """Lean angles, turn rate and climb rate."""
+        return self._by_hand("hold the altitude", ByHand(keeps_height=True))
+
+    def _by_hand(self, ask: str, aim: ByHand) -> Sequence[Step]:
+        def send() -> None:
+            if self._stream.held is None:
+                self._stream.held = Sticks() if self.telemetry.flying else Sticks(throttle=0.0)
+            self._pieces.aim(aim)
+
+        step = Step(
+            ask=ask,
+            send=send,
+            done=lambda seen: not seen.armed or seen.mode == SDK,
+            within=ANSWERED_WITHIN,
+            enters=SDK,
+            leads_to=STARTS,
+        )
+        return (self._pieces.activated(), *self._pieces.free(), self._pieces.authority(), step)
+
+    def manual(self) -> Sequence[Step]:
+        """There are no DJI rovers."""
+        raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
+
+    def sticks(self, sticks: Sticks | None) -> None:
+        """They are sent while it is flown by them."""
+        if sticks is None:
+            if self._stream.by_hand:
+                self._stream.stop()
+            self._stream.held = None
+            return
+        self._stream.held = sticks
+        if self._stream.by_hand:
+            self._stream.fresh = True
+            self._carrier.stir()
+
+    def stop(self) -> None:
+        """Nothing is sent any more: it brakes and hovers."""
+        self._stream.stop()
+
+    # -- missions
+
+    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
+        """As waypoints above the point of take-off."""
+        return self._mission.upload(mission)
+
+    def start_mission(self, within: Ns) -> Sequence[Step]:
+        """Take off, start it; to its end: down, or standing at the last point."""
+        return self._mission.start(within)

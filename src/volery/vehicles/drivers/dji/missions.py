@@ -1,0 +1,119 @@
+"""Missions as DJI aircraft take them: waypoints above the point of take-off, one speed, one ending."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan
+from typing import Any, NamedTuple
+
+from volery.base.errors import UsageError
+from volery.base.position import AMSL, AboveHome, Position
+from volery.ros.messages import message_class
+from volery.ros.messages.dji import MISSION_SPEEDS
+from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
+
+FEWEST, MOST = 2, 99
+USUAL_SPEED = 5.0
+STAY = 0
+NO_ACTION, GO_HOME, LAND = 0, 1, 2
+YAW_AUTO, YAW_BY_WAYPOINT = 0, 3
+GO_ON_WITHOUT_RC = 1
+DAMPING_M = 0.2
+
+
+class Plan(NamedTuple):
+    """What is uploaded, and what is not part of it: the take-off. ``end`` is where it ends in the air."""
+
+    task: Any
+    takeoff: float | None
+    end: Position | None
+
+
+def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Position, here: Position) -> Plan:
+    """The mission for the messages of *package*; *home* and *here* have AMSL altitudes.
+
+    A take-off becomes a waypoint over the place where it stands. Raises ``UsageError`` for what these
+    aircraft cannot fly: a speed that changes on the way, landing or returning but at the end.
+    """
+    items = list(mission)
+    takeoff = items.pop(0).height if isinstance(items[0], TakeOff) else None  # type: ignore[union-attr]
+    points: list[Waypoint] = []
+    if takeoff is not None:
+        points.append(Waypoint(Position(here.latitude, here.longitude, AboveHome(takeoff))))
+    speeds: set[float] = set()
+    finish = NO_ACTION
+    for number, item in enumerate(items, start=1 if takeoff is None else 2):
+        if finish != NO_ACTION:
+            raise UsageError(f"{name}: mission item {number}: a DJI mission ends with landing or going home")
+        if isinstance(item, Waypoint):
+            points.append(item)
+        elif isinstance(item, ChangeSpeed):
+            speeds.add(item.speed)
+        elif isinstance(item, ReturnHome):
+            finish = GO_HOME
+        elif isinstance(item, Land):
+            finish = LAND
+            points += [Waypoint(over)] if (over := _over(item, points)) is not None else []
+        else:
+            raise UsageError(f"{name}: mission item {number}: a DJI mission takes off first or not at all")
+    if len(speeds) > 1:
+        raise UsageError(f"{name}: a DJI mission has one speed; this one states {sorted(speeds)}")
+    if not FEWEST <= len(points) <= MOST:
+        raise UsageError(
+            f"{name}: a DJI mission has {FEWEST} to {MOST} waypoints; this one has {len(points)}"
+        )
+    task = _task(package, points, home, _speed(name, speeds), finish)
+    return Plan(task, takeoff, points[-1].position if finish == NO_ACTION else None)
+
+
+def _over(item: Land, points: Sequence[Waypoint]) -> Position | None:
+    """Where it is to land, at the height at which it comes."""
+    if item.position is None or not points:
+        return None
+    return Position(item.position.latitude, item.position.longitude, points[-1].position.altitude)
+
+
+def _speed(name: str, speeds: set[float]) -> float:
+    speed = next(iter(speeds), USUAL_SPEED)
+    low, high = MISSION_SPEEDS
+    if not low <= speed <= high:
+        raise UsageError(f"{name}: a DJI mission flies at {low:g} to {high:g} m/s, not at {speed:g}")
+    return speed
+
+
+def _task(package: str, points: Sequence[Waypoint], home: Position, speed: float, finish: int) -> Any:
+    turns = any(not isnan(point.heading) for point in points)
+    made: Any = message_class(f"{package}/msg/MissionWaypointTask")()
+    made.velocity_range, made.idle_velocity = MISSION_SPEEDS.highest, speed
+    made.action_on_finish, made.mission_exec_times = finish, 1
+    made.yaw_mode = YAW_BY_WAYPOINT if turns else YAW_AUTO
+    made.action_on_rc_lost = GO_ON_WITHOUT_RC
+    made.mission_waypoint = [_waypoint(package, point, home) for point in points]
+    return made
+
+
+def _waypoint(package: str, point: Waypoint, home: Position) -> Any:
+    made: Any = message_class(f"{package}/msg/MissionWaypoint")()
+    made.latitude, made.longitude = point.position.latitude, point.position.longitude
+    made.altitude = above_home(point.position, home)
+    made.damping_distance = DAMPING_M
+    if not isnan(point.heading):
+        made.target_yaw = round((point.heading + 180.0) % 360.0 - 180.0)
+    if point.stay_s > 0.0:
+        made.has_action, made.action_time_limit = 1, min(65_535, round(point.stay_s) + 60)
+        action = made.waypoint_action
+        action.action_repeat = 0x11
+        action.command_list[0] = STAY
+        action.command_parameter[0] = min(65_535, round(point.stay_s * 1000.0))
+    return made
+
+
+def above_home(position: Position, home: Position) -> float:
+    """Metres above *home* (AMSL), which is the point of take-off. Raises ``UsageError`` for altitudes that
+    count from elsewhere.
+    """
+    if isinstance(position.altitude, AboveHome):
+        return position.altitude.metres
+    if isinstance(position.altitude, AMSL):
+        return position.altitude.metres - home.altitude.metres
+    raise UsageError(f"{position}: a DJI aircraft takes AMSL and AboveHome")

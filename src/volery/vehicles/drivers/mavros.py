@@ -1,0 +1,32 @@
+"""Whatever flies behind a vehicle node with MAVROS's names: an ArduPilot unless the address says another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from volery.base.errors import UsageError, choices, did_you_mean
+from volery.kernel.api import Kernel
+from volery.ros.graph import Node
+from volery.vehicles.driver import Driver, DriverFactory, Opener
+from volery.vehicles.drivers import ardupilot, px4
+
+AUTOPILOTS: Mapping[str, Opener] = {"ardupilot": ardupilot.open_mavros, "px4": px4.open_mavros}
+
+
+def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Driver:
+    """A vehicle behind a vehicle node, commanded by *node*.
+
+    Options: ``autopilot`` (``ardupilot`` or ``px4``), ``namespace`` of the vehicle node (else ``/`` and
+    *name*), ``geoid``: ``egm96``, which is also what holds without it, or metres above the ellipsoid.
+    """
+    rest = dict(options)
+    autopilot = rest.pop("autopilot", "ardupilot")
+    opener = AUTOPILOTS.get(autopilot)
+    if opener is None:
+        hint = did_you_mean(autopilot, AUTOPILOTS)
+        raise UsageError(f"autopilot={autopilot!r} over MAVROS{hint}; there is {choices(AUTOPILOTS)}")
+    return opener(kernel, node, name, rest)
+
+
+MAVROS = DriverFactory(on_graph=open_driver)
+"""On a graph only."""

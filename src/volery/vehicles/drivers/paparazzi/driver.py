@@ -1,0 +1,217 @@
+"""Paparazzi's sequences: what its rotorcraft firmware wants to be told, and how one sees it done.
+
+Facts behind them, from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors
+start and stop by a setting or by a block of the flight plan. Blocks take off and land; in between it goes by
+set-points in GUIDED, which stand until the next one. Telemetry is 0.25 s (position) to 2 s (block) late, but
+a change of mode is told at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import radians
+
+from volery.base.errors import CapabilityError, LinkError, Refused
+from volery.base.position import AboveHome, Position
+from volery.base.time import Ns, S
+from volery.kernel.api import Action, Kernel
+from volery.vehicles.driver import Capability, Step, Sticks
+from volery.vehicles.drivers.aim import Aim
+from volery.vehicles.drivers.arrival import DRONE_KIND
+from volery.vehicles.drivers.eviction import Eviction
+from volery.vehicles.drivers.paparazzi.ground import LIFTED_M, Blocks, Ground
+from volery.vehicles.drivers.paparazzi.if_silent import if_silent
+from volery.vehicles.drivers.paparazzi.modes import BY_ATTITUDE, BY_HEIGHT, FAILSAFE, GUIDED
+from volery.vehicles.drivers.paparazzi.pieces import Pieces
+from volery.vehicles.drivers.paparazzi.uplink import Uplink
+from volery.vehicles.drivers.steps import (
+    READY_WITHIN,
+    TURNED_WITHIN,
+    at_once,
+    check_not_idle,
+    heads,
+    until_ready,
+)
+from volery.vehicles.mission import MissionItem
+from volery.vehicles.telemetry import Velocity
+
+CAN = frozenset(
+    {
+        Capability.TAKEOFF,
+        Capability.GOTO,
+        Capability.VELOCITY,
+        Capability.HEADING,
+        Capability.RETURN_HOME,
+        Capability.LAND,
+        Capability.HOLD,
+        Capability.STICKS,
+        Capability.STABILIZE,
+        Capability.ALTITUDE_HOLD,
+    }
+)
+"""No speed: GUIDED flies at the aircraft's own. No missions: a flight plan is built into the aircraft."""
+_NOTHING: frozenset[Capability] = frozenset()
+
+
+class Paparazzi:
+    """The driver. See ``vehicles.driver.Driver`` for what the methods mean.
+
+    Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*.
+    """
+
+    comes_down = frozenset({FAILSAFE})
+    cycle: Action | None = None
+
+    def __init__(self, kernel: Kernel, uplink: Uplink, blocks: Blocks) -> None:
+        self.name = uplink.telemetry.name
+        self.telemetry = uplink.telemetry
+        self._uplink = uplink
+        self._pieces = Pieces(kernel, uplink)
+        self._setpoints = self._pieces.setpoints
+        self._ground = Ground(self._pieces, blocks)
+        self._eviction = Eviction(kernel, uplink.telemetry, GUIDED)
+
+    @property
+    def handover(self) -> str:
+        """GUIDED; words that are no mode while somebody else has it there."""
+        return self._eviction.handover
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        """Those of a rotorcraft; none until it has been heard."""
+        return CAN if self.telemetry.kind == DRONE_KIND else _NOTHING
+
+    def look(self) -> None:
+        """What arrives is taken in by itself."""
+
+    def if_silent(self) -> str:
+        """From its flight plan, as far as that says it."""
+        return if_silent(self._uplink.aircraft) if self.telemetry.kind == DRONE_KIND else ""
+
+    def problem(self) -> LinkError | CapabilityError | None:
+        """What is wrong with the way to the aircraft, or with what is there."""
+        return self._uplink.problem()
+
+    def close(self) -> None:
+        """Stop talking and let go of the link."""
+        self.stop()
+        self._eviction.end()
+        self._uplink.close()
+
+    # -- on the ground
+
+    def ready(self, within: Ns) -> Sequence[Step]:
+        """Until it has a fix, an origin and an aligned attitude, and its settings are the ones meant."""
+        advice = (
+            "it needs a 3D fix, an origin (blocks 'Wait GPS' and 'Geo init' done, INS_REF sent), an aligned "
+            "attitude, and to answer GET_SETTING"
+        )
+        return (until_ready(within, advice),)
+
+    def arm(self) -> Sequence[Step]:
+        """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""
+        return (self._pieces.know_settings(), self._pieces.start_motors())
+
+    def disarm(self, force: bool) -> Sequence[Step]:
+        """Paparazzi itself would stop the motors in the air, too: without *force* it is not asked to."""
+        if self.telemetry.flying and not force:
+            said = "it flies, and would fall: a Paparazzi stops its motors in the air, too; land() first"
+            raise Refused(self.name, "disarm", said)
+        return (self._pieces.stop_motors(force=force),)
+
+    def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
+        """Ready, off the ground by blocks or without, up in GUIDED."""
+        return (*self.ready(READY_WITHIN), *self._ground.climb(height, within))
+
+    # -- by position
+
+    def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
+        """GUIDED, then a set-point, with the heading as it is."""
+        del speed  # there is no such capability
+        return (*self._pieces.guided(), self._reach(goal, within))
+
+    def _reach(self, goal: Position, within: Ns) -> Step:
+        aim = Aim(self.telemetry, self._eviction)
+        return aim.reach(goal, lambda: self._uplink.setpoint(self._pieces.at(goal)), GUIDED, within)
+
+    def hold(self) -> Sequence[Step]:
+        """In GUIDED, first without velocity, then where it has stopped."""
+        return (*self._pieces.guided(), self._setpoints.braking(), at_once("stay", self._pieces.stay))
+
+    def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """GUIDED, then repeated until it has lasted long enough; then it stops."""
+        self._pieces.yaw = None
+        return (
+            *self._pieces.guided(),
+            at_once("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
+        )
+
+    def heading(self, degrees: float) -> Sequence[Step]:
+        """In GUIDED, where it is."""
+
+        def turn() -> None:
+            self._pieces.yaw = radians(degrees)
+            self._pieces.stay()
+
+        step = Step(
+            ask=f"turn to {degrees:g} degrees",
+            send=turn,
+            done=heads(degrees),
+            within=TURNED_WITHIN,
+            again=4 * S,
+            mode=GUIDED,
+            armed=True,
+        )
+        return (*self._pieces.guided(), step)
+
+    def return_home(self, within: Ns) -> Sequence[Step]:
+        """In GUIDED over home at the height it has, then down: mode HOME goes there, but does not land."""
+        if not self.telemetry.armed:
+            return ()
+        home = self.telemetry.home
+        if home is None:
+            raise Refused(self.name, "return home", "it has not told where its home is")
+        above = AboveHome(max(self.telemetry.above_home, LIFTED_M))
+        over = Position(home.latitude, home.longitude, above)
+        reach = replace(self._reach(over, within), ask="be over home")
+        return (*self._pieces.guided(), reach, *self._ground.land_by_plan(within))
+
+    def land(self, within: Ns) -> Sequence[Step]:
+        """By the plan's block, or without it far from home; without a fix in FAILSAFE, which needs none."""
+        return self._ground.land(within) if self.telemetry.armed else ()
+
+    # -- by sticks
+
+    def stabilize(self) -> Sequence[Step]:
+        """ATTITUDE_DIRECT, with the sticks held. In the air not with an idle throttle: it would fall."""
+        self._setpoints.hold_any()
+        check_not_idle(self.telemetry, self._setpoints.held)
+        return (self._pieces.change(BY_ATTITUDE),)
+
+    def altitude_hold(self) -> Sequence[Step]:
+        """ATTITUDE_RC_CLIMB, with the sticks held."""
+        self._setpoints.hold_any()
+        return (self._pieces.change(BY_HEIGHT),)
+
+    def manual(self) -> Sequence[Step]:
+        """Rovers only."""
+        raise CapabilityError(f"{self.name}: a rotorcraft has no wheels to steer by hand")
+
+    def sticks(self, sticks: Sticks | None) -> None:
+        """Keep sending them, as long as the mode is ours."""
+        self._setpoints.take(sticks)
+
+    def stop(self) -> None:
+        """No set-point and no stick is repeated any more."""
+        self._setpoints.end()
+
+    # -- missions
+
+    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
+        """A flight plan is built into the aircraft."""
+        raise CapabilityError(f"{self.name}: {len(mission)} items: a Paparazzi's plan is built into it")
+
+    def start_mission(self, within: Ns) -> Sequence[Step]:
+        """A flight plan is built into the aircraft."""
+        raise CapabilityError(f"{self.name}: a Paparazzi's flight plan is built into it")

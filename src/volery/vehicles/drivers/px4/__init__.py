@@ -1,0 +1,19 @@
+"""PX4: its sequences, written once, and two ways to reach it: a MAVLink link, and MAVROS on a graph."""
+
+from __future__ import annotations
+
+from volery.vehicles.driver import DriverFactory
+from volery.vehicles.drivers.mavlink.opening import Opening
+from volery.vehicles.drivers.px4.driver import PX4
+from volery.vehicles.drivers.px4.mavlink import MavlinkCommands
+from volery.vehicles.drivers.px4.mavros import MavrosCommands
+
+__all__ = ["DRIVER", "PX4", "open_driver", "open_mavros"]
+
+_OPENING = Opening("px4", PX4, MavlinkCommands, MavrosCommands)
+
+open_driver = _OPENING.on_link
+open_mavros = _OPENING.on_graph
+
+DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
+"""PX4 on a MAVLink link; on a graph it goes by MAVROS's names."""
