@@ -14,9 +14,9 @@ from time import perf_counter
 
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.simulation.autopilots.simulated.flight import Control, Flight, Setpoint, make_world
-from volery.simulation.world.columns import U_THROTTLE
-from volery.simulation.world.specs import Multirotor
+from volery.simulation.autopilots.flight_stack.flight import Control, Flight, Setpoint, make_world
+from volery.simulation.world.body_specs import Multirotor
+from volery.simulation.world.state_layout import U_THROTTLE
 from volery.simulation.world.world import STEP, World
 
 HERE = LocalFrame(47.3977, 8.5456, 488.0)

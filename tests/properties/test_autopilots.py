@@ -14,22 +14,18 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame, Link
 from volery.links.mavlink import message_type
 from volery.simulation.autopilots.ardupilot import DIALECT
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.autopilots.simulated.manoeuvres.points import (
-    root_speed,
-    stopping_distance,
-    stopping_point,
-)
-from volery.simulation.autopilots.simulated.parameters import INT8, INT16, INT32, REAL32, quantised
-from volery.simulation.autopilots.simulated.sticks import Travel
-from volery.simulation.world.specs import Multirotor
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, REAL32, quantised
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.autopilots.manoeuvres.to_point import root_speed, stopping_distance, stopping_point
+from volery.simulation.autopilots.manual_control import ChannelRange
+from volery.simulation.world.body_specs import Multirotor
 
 speeds = st.floats(0.0, 50.0)
 accels = st.floats(0.1, 10.0)
 pulses = st.integers(0, 65_535)
 travels = st.builds(
-    Travel,
+    ChannelRange,
     st.integers(800, 2200),
     st.integers(800, 2200),
     st.integers(800, 2200),
@@ -58,7 +54,7 @@ def test_a_stop_lies_ahead(velocity: tuple[float, float, float], accel: float, a
 
 
 @given(travels, pulses)
-def test_deflections_stay_within_their_ends(travel: Travel, pulse: int) -> None:
+def test_deflections_stay_within_their_ends(travel: ChannelRange, pulse: int) -> None:
     assert -1.0 <= travel.deflection(pulse) <= 1.0
     assert 0.0 <= travel.share(pulse) <= 1.0
 

@@ -15,11 +15,11 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprzlink import PPRZLINK
 from volery.links.pprzlink_definitions import message_type
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import DIALECT
 from volery.simulation.autopilots.paparazzi.datalink import HANDLERS
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor
+from volery.simulation.world.body_specs import Multirotor
 
 AIRCRAFT = 1
 FULL_SETTINGS = range(4)

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint, make_world
-from volery.simulation.world.specs import Multirotor, Rover
-from volery.simulation.world.wind import Wind
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.environment_models import Wind
 
 HERE = LocalFrame(47.4, 8.5, 400.0)
 LENGTH = 4000  # milliseconds

@@ -15,9 +15,9 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame, Link
 from volery.links.wire import WireFaults, wire
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.trace.events import Operation
 from volery.vehicles import Drone, Vehicle
 

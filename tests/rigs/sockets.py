@@ -14,9 +14,9 @@ from volery.base.time import HOUR
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.coded import CodedLink
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor
 from volery.vehicles import Drone, drivers
 
 HERE = "127.0.0.1"

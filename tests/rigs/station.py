@@ -12,10 +12,10 @@ from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.dialect import Family
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.firmware import Family
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 STATION, STATION_COMPONENT = 255, 190

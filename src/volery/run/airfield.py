@@ -20,11 +20,11 @@ from volery.model.environment import Wind as WindModel
 from volery.run.options import SAMPLING_PERIOD
 from volery.run.progress import VehicleProgress
 from volery.run.simulated import LINK_DELAY, Simulated
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.dialect import Family, dialects
-from volery.simulation.autopilots.simulated.flight import Flight, make_world
-from volery.simulation.world.specs import Battery, BodySpec, Multirotor, Rover
-from volery.simulation.world.wind import Wind
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.firmware import Family, dialects
+from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
+from volery.simulation.world.body_specs import Battery, BodySpec, Multirotor, Rover
+from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.world import World
 
 CELL_NOMINAL_VOLTS = 3.7

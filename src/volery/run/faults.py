@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from volery.kernel.api import Kernel
 from volery.model.environment import Fault
 from volery.run.airfield import Airfield
-from volery.simulation.autopilots.simulated.flight import Flight
+from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.trace.events import Text
 
 Break = Callable[[Flight, bool], None]

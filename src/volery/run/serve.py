@@ -13,7 +13,7 @@ from volery.run.airfield import Airfield, airfield_of
 from volery.run.graphs import open_graph
 from volery.run.serving import serving
 from volery.run.simulated import Simulated
-from volery.simulation.autopilots.simulated.dialect import dialects
+from volery.simulation.autopilots.firmware import dialects
 from volery.vehicles.address import Address, parse_listen
 from volery.vehicles.carriers import listen
 

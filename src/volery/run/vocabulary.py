@@ -8,7 +8,7 @@ from volery.cost import catalogue
 from volery.model.system import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
 from volery.run.faults import KINDS
-from volery.simulation.autopilots.simulated.dialect import dialects
+from volery.simulation.autopilots.firmware import dialects
 
 LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
 """Languages of components that run today."""

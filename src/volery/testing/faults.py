@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from volery.links.wire import WireFaults
-from volery.simulation.world.wind import Wind
+from volery.simulation.world.environment_models import Wind
 from volery.testing.stage_simulated import SimulatedStage
 
 WHOLE = WireFaults()

@@ -20,7 +20,7 @@ from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
 from volery.links.link import Frame, Link
 from volery.links.mavlink import constant
-from volery.simulation.autopilots.simulated.flight import Flight
+from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.access import Hand
 from volery.testing.checks import ImpossibleError, demand
 from volery.vehicles import Drone, Rover, Vehicle

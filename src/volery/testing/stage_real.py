@@ -8,7 +8,7 @@ from volery.base.errors import CapabilityError, UsageError
 from volery.kernel.wall import WallKernel
 from volery.run.graphs import GRAPHS
 from volery.run.opening import EMBEDDED
-from volery.simulation.autopilots.simulated.flight import Flight
+from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
 from volery.testing.tap import Tap

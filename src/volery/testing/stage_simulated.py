@@ -15,8 +15,8 @@ from volery.links.wire import WireFaults
 from volery.run.airfield import airfield_of
 from volery.run.opening import KINDS
 from volery.run.simulated import simulated
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import Flight
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.access import Hand, access_to
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage

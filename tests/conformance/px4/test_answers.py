@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 import volery.simulation.autopilots
+from volery.simulation.autopilots.autopilot_parameters import REAL32
 from volery.simulation.autopilots.px4 import DIALECT, events
-from volery.simulation.autopilots.simulated.parameters import REAL32
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NOT_SENT = {

@@ -5,9 +5,9 @@ import sys
 
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint, make_world
-from volery.simulation.world.specs import Multirotor, Rover
-from volery.simulation.world.wind import Wind
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.environment_models import Wind
 
 
 def main():

@@ -14,10 +14,10 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.simulation.autopilots.ardupilot import DIALECT
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.dialect import dialects
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import UsageError
-from volery.simulation.autopilots.simulated.parameters import (
+from volery.simulation.autopilots.autopilot_parameters import (
     INT8,
     INT16,
     INT32,

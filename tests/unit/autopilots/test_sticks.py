@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.simulated.sticks import Sticks, Travel
-from volery.simulation.autopilots.simulated.tuning import StickMap
+from volery.simulation.autopilots.manual_control import ChannelRange, RcChannels, StickMap
 
-STICK = Travel(1000, 1500, 2000, 20)
-THROTTLE = Travel(1000, 1500, 2000, 30)
+STICK = ChannelRange(1000, 1500, 2000, 20)
+THROTTLE = ChannelRange(1000, 1500, 2000, 30)
 
 
 @pytest.mark.parametrize(
@@ -34,14 +33,14 @@ def test_a_reversed_throttle_is_closed_at_its_high_end() -> None:
     assert reversed_throttle.share(1000) == 1.0
 
 
-@pytest.mark.parametrize("travel", [Travel(1500, 1500, 1500, 20), Travel(2000, 1500, 1000, 20)])
-def test_a_travel_without_a_way_gives_nothing(travel: Travel) -> None:
+@pytest.mark.parametrize("travel", [ChannelRange(1500, 1500, 1500, 20), ChannelRange(2000, 1500, 1000, 20)])
+def test_a_travel_without_a_way_gives_nothing(travel: ChannelRange) -> None:
     assert travel.share(1500) == 0.0
     assert travel.deflection(1500) == 0.0
 
 
 def test_an_override_holds_until_it_is_released() -> None:
-    sticks = Sticks([1500, 1500, 1000])
+    sticks = RcChannels([1500, 1500, 1000])
     sticks.override(3, 1700, 0)
     assert sticks.pulses() == [1500, 1500, 1700]
     assert sticks[3] == 1700
@@ -51,7 +50,7 @@ def test_an_override_holds_until_it_is_released() -> None:
 
 
 def test_an_override_that_is_not_repeated_expires_alone() -> None:
-    sticks = Sticks([1500, 1500, 1000])
+    sticks = RcChannels([1500, 1500, 1000])
     sticks.override(1, 1600, 0)
     sticks.override(2, 1600, 2 * S)
     assert not sticks.expire(3 * S, 3 * S)
@@ -60,14 +59,14 @@ def test_an_override_that_is_not_repeated_expires_alone() -> None:
 
 
 def test_channels_that_do_not_exist_are_not_overridden() -> None:
-    sticks = Sticks([1500])
+    sticks = RcChannels([1500])
     sticks.override(0, 1700, 0)
     sticks.override(2, 1700, 0)
     assert sticks.pulses() == [1500]
 
 
 def test_a_map_says_which_channel_is_which_stick() -> None:
-    sticks = Sticks([1000, 2000, 1500, 1500])
+    sticks = RcChannels([1000, 2000, 1500, 1500])
     pilot = StickMap(roll=2, pitch=1, throttle=3, yaw=4, travels=(STICK, STICK, THROTTLE, STICK)).read(sticks)
     assert (pilot.roll, pilot.pitch, pilot.yaw) == (1.0, -1.0, 0.0)
     assert pilot.throttle == pytest.approx(0.4845, abs=1e-4)

@@ -7,8 +7,8 @@ import pytest
 
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint, make_world
-from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
+from volery.simulation.world.body_specs import Multirotor, Rover
 
 HERE = LocalFrame(-35.363261, 149.165230, 584.0)
 LOOK = 50 * MS

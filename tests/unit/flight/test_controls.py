@@ -7,9 +7,9 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import MS
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint
-from volery.simulation.world.specs import Battery
-from volery.simulation.world.wind import Wind
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.world.body_specs import Battery
+from volery.simulation.world.environment_models import Wind
 
 
 def test_off_means_that_motors_stand_still_and_idle_that_they_turn(drone):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from volery.simulation.autopilots.simulated.flight import Control
+from volery.simulation.autopilots.flight_stack.flight import Control
 
 
 def horizontal_error(estimate, truth, flight):

@@ -15,11 +15,11 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.pprz_aircraft import stock_aircraft
 from volery.links.wire import WireFaults, wire
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.autopilots.paparazzi import DIALECT
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import Flight, make_world
-from volery.simulation.world.specs import Battery, Multirotor
-from volery.simulation.world.wind import Wind
+from volery.simulation.world.body_specs import Battery, Multirotor
+from volery.simulation.world.environment_models import Wind
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
 AIRCRAFT = 7

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from volery.simulation.world.wind import Wind
+from volery.simulation.world.environment_models import Wind
 
 Make = Callable[..., Any]
 

@@ -10,11 +10,11 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import DIALECT
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.dialect import dialects
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Rover
+from volery.simulation.world.body_specs import Rover
 
 NO_RC, ARMED, KILLED, NOT_ALIGNED = 0, 3, 5, 15
 Make = Callable[..., Any]

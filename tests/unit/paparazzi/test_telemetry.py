@@ -11,7 +11,7 @@ import pytest
 from volery.base.frames import LocalFrame, ecef_to_geodetic
 from volery.links.pprz_aircraft import stock_aircraft
 from volery.links.pprzlink import PPRZLINK
-from volery.simulation.world.specs import Battery
+from volery.simulation.world.body_specs import Battery
 
 Make = Callable[..., Any]
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from volery.base.errors import UsageError
 from volery.cli.main import app
 from volery.simulation.autopilots.ardupilot import DIALECT
-from volery.simulation.autopilots.simulated.dialect import dialects
+from volery.simulation.autopilots.firmware import dialects
 from volery.testing import Outcome, conformance
 from volery.testing.checks import BrokenError, demand, raising
 from volery.testing.driver_conformance import chosen

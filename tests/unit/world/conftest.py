@@ -4,7 +4,7 @@ import pytest
 
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.simulation.world.specs import Battery
+from volery.simulation.world.body_specs import Battery
 
 IDEAL = Battery(capacity_ah=1e12, resistance_ohm=1e-18)
 

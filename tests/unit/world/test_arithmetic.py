@@ -4,9 +4,15 @@ import random
 import numpy as np
 import pytest
 
-from volery.simulation.world.arithmetic import arc_tangent2, exponential, logarithm, sine_cosine, wrap_angle
-from volery.simulation.world.atmosphere import altitude_at, pressure_at
-from volery.simulation.world.noise import gaussian
+from volery.simulation.world.arithmetic import (
+    arc_tangent2,
+    exponential,
+    gaussian,
+    logarithm,
+    sine_cosine,
+    wrap_angle,
+)
+from volery.simulation.world.environment_models import altitude_at, pressure_at
 
 DRAW = random.Random(20)
 

@@ -5,9 +5,9 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.simulation.world.battery import cell_voltage, current
-from volery.simulation.world.columns import U_THROTTLE
-from volery.simulation.world.specs import Battery, Multirotor, Rover
+from volery.simulation.world.body_specs import Battery, Multirotor, Rover
+from volery.simulation.world.dynamics import battery_current, cell_voltage
+from volery.simulation.world.state_layout import U_THROTTLE
 from volery.simulation.world.world import STEP, World
 
 
@@ -21,12 +21,12 @@ def test_open_circuit_voltage_falls_without_a_jump():
 
 def test_current_gives_the_power_at_the_terminals():
     for power in (0.0, 10.0, 150.0, 600.0):
-        amps = current(12.6, 0.02, power)
+        amps = battery_current(12.6, 0.02, power)
         assert (12.6 - 0.02 * amps) * amps == pytest.approx(power, abs=1e-9)
 
 
 def test_beyond_its_largest_power_the_battery_browns_out():
-    assert current(12.0, 0.1, 1e9) == pytest.approx(60.0)
+    assert battery_current(12.0, 0.1, 1e9) == pytest.approx(60.0)
 
 
 def own_ocv(left):
@@ -106,7 +106,7 @@ def test_an_impossible_battery_is_refused(values):
 def test_a_cell_breaks_down_once_it_is_empty():
     assert cell_voltage(-0.01) < 2.5
     assert cell_voltage(-1.0) == 0.0
-    assert current(0.0, 0.01, 50.0) == 0.0
+    assert battery_current(0.0, 0.01, 50.0) == 0.0
 
 
 def test_an_empty_battery_stops_the_rotors(clock, frame):

@@ -4,7 +4,9 @@ import math
 
 import pytest
 
-from volery.simulation.world.columns import (
+from volery.simulation.world.body_specs import STANDARD_GRAVITY, Multirotor, Rover
+from volery.simulation.world.dynamics import S_SPEED, S_STEER
+from volery.simulation.world.state_layout import (
     S_ON_GROUND,
     S_POSITION,
     S_RESTING,
@@ -12,8 +14,6 @@ from volery.simulation.world.columns import (
     U_MOTOR_HEALTH,
     U_THROTTLE,
 )
-from volery.simulation.world.rover import S_SPEED, S_STEER
-from volery.simulation.world.specs import STANDARD_GRAVITY, Multirotor, Rover
 from volery.simulation.world.world import STEP, World
 
 

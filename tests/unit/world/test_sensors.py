@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from volery.simulation.world.columns import (
+from volery.simulation.world.body_specs import Multirotor
+from volery.simulation.world.sensors import sensor_set
+from volery.simulation.world.state_layout import (
     ACCEL,
     BARO,
     GPS_LEVEL,
@@ -15,8 +17,6 @@ from volery.simulation.world.columns import (
     M_MAG,
     MAG,
 )
-from volery.simulation.world.sensors import sensor_set
-from volery.simulation.world.specs import Multirotor
 from volery.simulation.world.world import World
 
 BODIES = 40

@@ -8,7 +8,11 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.simulation.world.columns import (
+from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_step import digest_of
+from volery.simulation.world.environment_models import Terrain, Wind, magnetic_field
+from volery.simulation.world.sensors import declared_sigma, sensor_set
+from volery.simulation.world.state_layout import (
     S_GUST,
     S_POSITION,
     S_RESTING,
@@ -17,12 +21,6 @@ from volery.simulation.world.columns import (
     U_THROTTLE,
     U_WIND,
 )
-from volery.simulation.world.compiled import digest_of
-from volery.simulation.world.magnetism import magnetic_field
-from volery.simulation.world.sensors import declared_sigma, sensor_set
-from volery.simulation.world.specs import Multirotor, Rover
-from volery.simulation.world.terrain import Terrain
-from volery.simulation.world.wind import Wind
 from volery.simulation.world.world import STEP, World
 
 SPECS = (Multirotor(), Rover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))

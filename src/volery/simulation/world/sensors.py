@@ -18,7 +18,8 @@ import numpy as np
 from numba import njit
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.simulation.world.columns import (
+from volery.simulation.world.arithmetic import gaussian
+from volery.simulation.world.state_layout import (
     ACCEL,
     BARO,
     GPS_HEIGHT,
@@ -63,7 +64,6 @@ from volery.simulation.world.columns import (
     W_ROTATION,
     Array,
 )
-from volery.simulation.world.noise import gaussian
 
 RTK_FIX = 6  # MAVLink's GPS_FIX_TYPE_RTK_FIXED
 SLOW_EVERY = 50  # steps: slow errors and the field instruments move at 10 Hz
@@ -255,7 +255,7 @@ def _satellites(row: Array, key: np.uint64, k: int) -> None:
 
 
 @njit(cache=False)
-def sense(row: Array, key: np.uint64, k: int) -> None:
+def sample_sensors(row: Array, key: np.uint64, k: int) -> None:
     """Take the samples that fall due at step *k*; ``W_ROTATION`` is the body's at that step."""
     if k % SLOW_EVERY == 0:
         _drift(row, key, k)

@@ -17,8 +17,10 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Quaternion, Vector
 from volery.base.seeds import key
 from volery.base.time import MS, Ns
-from volery.simulation.world.bodies import advance_bodies
-from volery.simulation.world.columns import (
+from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_state
+from volery.simulation.world.body_step import advance_bodies
+from volery.simulation.world.environment_models import Terrain, Wind
+from volery.simulation.world.state_layout import (
     P_CAPACITY,
     S_AMPS,
     S_ATTITUDE,
@@ -45,9 +47,6 @@ from volery.simulation.world.columns import (
     Array,
     Bodies,
 )
-from volery.simulation.world.specs import BodySpec, fill_parameters, fill_state
-from volery.simulation.world.terrain import Terrain
-from volery.simulation.world.wind import Wind
 
 STEP: Ns = 2 * MS
 """The grid: 500 Hz."""

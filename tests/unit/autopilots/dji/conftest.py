@@ -14,10 +14,10 @@ from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.graph import Graph
 from volery.ros.messages import new, request
+from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.dji import DIALECT
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.world.specs import Multirotor
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor
 from volery.trace.events import Text
 
 FRAME = LocalFrame(46.0, -103.0, 900.0)

@@ -14,6 +14,10 @@ from volery.links.in_process import in_process
 from volery.links.link import Frame
 from volery.links.parameter_values import as_bytes, from_bytes
 from volery.links.status_texts import chunks
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
+from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.px4 import DIALECT
 from volery.simulation.autopilots.px4.events import Checks, report
 from volery.simulation.autopilots.px4.joystick import Deflection, Joystick, deflection
@@ -21,11 +25,7 @@ from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
 from volery.simulation.autopilots.px4.offboard import Stream, Target, attitude_target
 from volery.simulation.autopilots.px4.piloted import curve
 from volery.simulation.autopilots.px4.ramps import interpolated
-from volery.simulation.autopilots.simulated.autopilot import Autopilot
-from volery.simulation.autopilots.simulated.flight import make_world
-from volery.simulation.autopilots.simulated.mavlink.habits import Texts
-from volery.simulation.autopilots.simulated.mavlink.texts import TextLine
-from volery.simulation.world.specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, Rover
 
 
 def test_a_mode_is_two_numbers_in_one() -> None:
@@ -105,8 +105,10 @@ def test_curves() -> None:
 
 def test_texts_wait_for_a_station_keep_their_distance_and_the_newest_four() -> None:
     kernel, sent = VirtualKernel(), []
-    line = TextLine(
-        kernel, Texts(to_stations=True, spacing=50 * MS), lambda fields: sent.append((kernel.now(), fields))
+    line = StatusTextQueue(
+        kernel,
+        StatusTextPolicy(to_stations=True, spacing=50 * MS),
+        lambda fields: sent.append((kernel.now(), fields)),
     )
     for number in range(6):
         line.put(chunks(6, f"text {number}", number))

@@ -4,7 +4,7 @@ think it is.
 
 from volery.simulation.autopilots.ardupilot.copter import COPTER
 from volery.simulation.autopilots.ardupilot.rover import ROVER
-from volery.simulation.autopilots.simulated.dialect import Family
+from volery.simulation.autopilots.firmware import Family
 
 DIALECT = Family("ardupilot", {"multirotor": COPTER, "rover": ROVER})
 """The firmware, by kind of vehicle."""

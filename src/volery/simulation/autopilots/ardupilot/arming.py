@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from volery.base.time import Ns, S
-from volery.simulation.autopilots.simulated.mavlink.command_service import ACCEPTED, FAILED
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.command import ACCEPTED, FAILED
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CRITICAL, WARNING, INFO = 2, 4, 6
 """MAV_SEVERITY."""

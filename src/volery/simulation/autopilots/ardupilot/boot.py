@@ -10,9 +10,9 @@ from functools import partial
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.arming import INFO
-from volery.simulation.autopilots.simulated.dialect import Act, Event
-from volery.simulation.autopilots.simulated.mavlink.dialect import BootBytes
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.firmware import Act, Event
+from volery.simulation.autopilots.mavlink.firmware import BootBytes
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 DEBUG = 7
 

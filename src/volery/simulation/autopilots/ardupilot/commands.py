@@ -9,11 +9,11 @@ from math import isfinite, isnan, nan, radians
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot.arming import FORCE, SKIP_CHECKS, arm, disarm
 from volery.simulation.autopilots.ardupilot.modes import set_mode, switch
-from volery.simulation.autopilots.simulated.manoeuvres.guided import Guided, Turn
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import Loiter
-from volery.simulation.autopilots.simulated.manoeuvres.rover import GuidedRover
-from volery.simulation.autopilots.simulated.mavlink.command_service import (
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
+from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
+from volery.simulation.autopilots.mavlink.command import (
     ACCEPTED,
     DENIED,
     FAILED,
@@ -21,9 +21,9 @@ from volery.simulation.autopilots.simulated.mavlink.command_service import (
     Command,
     Handler,
 )
-from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
-from volery.simulation.autopilots.simulated.plan import GLOBAL, GLOBAL_RELATIVE, Item
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, MissionItem
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
@@ -170,7 +170,7 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
 def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: float | None = None) -> bool:
     """In GUIDED: go to latitude, longitude [degrees] and altitude [m] in a MAVLink frame."""
     point = vehicle.point(frame, *place)
-    if not sound(point, FARTHEST):
+    if not all_within(point, FARTHEST):
         return False
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, Guided):
@@ -182,7 +182,7 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
     return True
 
 
-def go_to_item(vehicle: Vehicle, item: Item) -> bool:
+def go_to_item(vehicle: Vehicle, item: MissionItem) -> bool:
     """A mission item with ``current`` 2: the old way to command GUIDED."""
     return item.has_place and go_to(vehicle, item.frame, (item.x / 1e7, item.y / 1e7, item.z))
 

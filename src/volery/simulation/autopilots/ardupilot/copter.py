@@ -33,14 +33,14 @@ from volery.simulation.autopilots.ardupilot.status import (
 )
 from volery.simulation.autopilots.ardupilot.tables import streams
 from volery.simulation.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
-from volery.simulation.autopilots.simulated.manoeuvres.guided import Guided
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission, copter_leg
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold, ByPilot, Loiter, Stabilize
-from volery.simulation.autopilots.simulated.manoeuvres.points import Brake, Land, Return
-from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
-from volery.simulation.autopilots.simulated.mode import Mode
-from volery.simulation.autopilots.simulated.parameters import Parameter, load
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Loiter, Stabilize
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
+from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
+from volery.simulation.autopilots.mode import Mode
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -257,7 +257,7 @@ _MAVLINK = mavlink(
 
 COPTER = ardupilot(
     kind="multirotor",
-    face=partial(MavlinkFace, _MAVLINK),
+    face=partial(MavlinkEndpoint, _MAVLINK),
     boot_mode=MODES[0],
     boot_events=boot.copter_events(ready),
     ready_after=READY,

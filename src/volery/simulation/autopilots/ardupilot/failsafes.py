@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 
 from volery.base.time import S, from_seconds
 from volery.simulation.autopilots.ardupilot.arming import CRITICAL, WARNING, disarm
-from volery.simulation.autopilots.simulated.dialect import Watch
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.firmware import Watch
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Switch = Callable[[Vehicle, int], bool]
 """Changes the mode if it may; the failsafe's own way, without a station's answer."""

@@ -11,11 +11,11 @@ from volery.simulation.autopilots.ardupilot.arming import INFO
 from volery.simulation.autopilots.ardupilot.modes import set_mode
 from volery.simulation.autopilots.ardupilot.status import Health
 from volery.simulation.autopilots.ardupilot.tables import BUILDERS, ORDER
-from volery.simulation.autopilots.simulated.dialect import Dialect
-from volery.simulation.autopilots.simulated.flight import Flight
-from volery.simulation.autopilots.simulated.mavlink.command_service import DENIED, FAILED
-from volery.simulation.autopilots.simulated.mavlink.dialect import Builder, MavlinkDialect
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.firmware import Dialect
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.mavlink.command import DENIED, FAILED
+from volery.simulation.autopilots.mavlink.firmware import Builder, MavlinkDialect
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 def board(vehicle: Vehicle) -> str:

@@ -6,9 +6,9 @@ from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.arming import INFO, disarm
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
-from volery.simulation.autopilots.simulated.manoeuvres.points import ToPoint
-from volery.simulation.autopilots.simulated.mavlink.numbers import number
-from volery.simulation.autopilots.simulated.plan import (
+from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
+from volery.simulation.autopilots.mavlink.message_fields import finite
+from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     CONDITION_DELAY,
     CONDITION_DISTANCE,
@@ -32,9 +32,9 @@ from volery.simulation.autopilots.simulated.plan import (
     SPLINE_WAYPOINT,
     TAKEOFF,
     WAYPOINT,
-    Item,
+    MissionItem,
 )
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
 """MAV_MISSION_RESULT."""
@@ -93,7 +93,7 @@ STORED_FRAMES = {
 MISSION_FRAME = 2
 
 
-def stored_item(item: Item) -> Item | int:
+def stored_item(item: MissionItem) -> MissionItem | int:
     """As it is kept: frames without their integer twins, numbers that are none as zero."""
     if item.command not in NAMES and item.command not in KEPT_ONLY:
         return UNSUPPORTED
@@ -105,15 +105,15 @@ def stored_item(item: Item) -> Item | int:
     frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in PLACED else GLOBAL
     return item._replace(
         frame=frame,
-        param1=number(item.param1),
-        param2=number(item.param2),
-        param3=number(item.param3),
-        param4=number(item.param4),
-        z=number(item.z),
+        param1=finite(item.param1),
+        param2=finite(item.param2),
+        param3=finite(item.param3),
+        param4=finite(item.param4),
+        z=finite(item.z),
     )
 
 
-def _wrong_parameter(item: Item) -> int:
+def _wrong_parameter(item: MissionItem) -> int:
     """The result that names the parameter that is no number; a heading of three commands need not be one."""
     for place, value in enumerate((item.param1, item.param2, item.param3, item.param4)):
         may_be_none = place == 3 and item.command in (WAYPOINT, LAND, TAKEOFF)
@@ -122,7 +122,7 @@ def _wrong_parameter(item: Item) -> int:
     return 0
 
 
-def _wrong_place(item: Item) -> int:
+def _wrong_place(item: MissionItem) -> int:
     if abs(item.x) > 900_000_000:
         return INVALID_X
     if abs(item.y) > 1_800_000_000:
@@ -130,12 +130,14 @@ def _wrong_place(item: Item) -> int:
     return 0 if abs(item.z) < HIGHEST else INVALID_Z  # a NaN is not less
 
 
-def home_item(vehicle: Vehicle) -> Item | None:
+def home_item(vehicle: Vehicle) -> MissionItem | None:
     """Item 0 is home."""
     home = vehicle.home
     if home is None:
         return None
-    return Item(WAYPOINT, GLOBAL, x=round(home.latitude * 1e7), y=round(home.longitude * 1e7), z=home.amsl)
+    return MissionItem(
+        WAYPOINT, GLOBAL, x=round(home.latitude * 1e7), y=round(home.longitude * 1e7), z=home.amsl
+    )
 
 
 def mission_grew(vehicle: Vehicle, count: int) -> None:
@@ -143,19 +145,19 @@ def mission_grew(vehicle: Vehicle, count: int) -> None:
     vehicle.set_parameter("MIS_TOTAL", count)
 
 
-def item_begins(vehicle: Vehicle, index: int, item: Item) -> None:
+def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     """Another item is flown."""
     vehicle.say(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
 
 
-def item_done(vehicle: Vehicle, index: int, item: Item) -> None:
+def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     """MISSION_ITEM_REACHED, and words for what is not a take-off or the end."""
     vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": index})
     if item.command in (WAYPOINT, SPLINE_WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_TO_ALTITUDE, DELAY):
         vehicle.say(INFO, f"Reached command #{index}")
 
 
-def act(vehicle: Vehicle, item: Item) -> None:
+def act(vehicle: Vehicle, item: MissionItem) -> None:
     """Items that are done at once."""
     if item.command == CHANGE_SPEED:
         change_speed(vehicle, round(item.param1), item.param2)

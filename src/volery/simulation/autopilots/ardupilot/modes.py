@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from volery.simulation.autopilots.ardupilot.arming import CRITICAL, WARNING
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import Stabilize
-from volery.simulation.autopilots.simulated.mavlink.command_service import ACCEPTED, DENIED, FAILED
-from volery.simulation.autopilots.simulated.mode import Mode
-from volery.simulation.autopilots.simulated.plan import DELAY, TAKEOFF
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
+from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, FAILED
+from volery.simulation.autopilots.mode import Mode
+from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CUSTOM_MODE_ENABLED = 1
 

@@ -9,16 +9,17 @@ from math import atan2, degrees, hypot, nan, pi
 
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
-from volery.simulation.autopilots.simulated.manoeuvres.points import bearing
-from volery.simulation.autopilots.simulated.mavlink.numbers import short, word
-from volery.simulation.autopilots.simulated.mavlink.telemetry import (
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
+from volery.simulation.autopilots.mavlink.message_fields import (
     EPOCH_US,
     Fields,
     boot_ms,
     boot_us,
     heading_cdeg,
+    to_int16,
+    to_uint16,
 )
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 NO_FIX_AFTER = int(9.64 * S)
 """From this uptime on the receiver is known."""
@@ -48,7 +49,7 @@ def global_position(vehicle: Vehicle) -> Fields:
     north, east, down = estimate.velocity
     fields["lat"], fields["lon"] = round(latitude * 1e7), round(longitude * 1e7)
     fields["alt"], fields["relative_alt"] = _cm(amsl), round(vehicle.height * 1000.0)
-    fields["vx"], fields["vy"], fields["vz"] = (short(speed * 100.0) for speed in (north, east, down))
+    fields["vx"], fields["vy"], fields["vz"] = (to_int16(speed * 100.0) for speed in (north, east, down))
     return fields
 
 
@@ -82,12 +83,12 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
 def _imu(vehicle: Vehicle) -> Fields:
     estimate = vehicle.estimate
     return {
-        "xacc": short(estimate.accel[0] * GRAVITY_MILLI),
-        "yacc": short(estimate.accel[1] * GRAVITY_MILLI),
-        "zacc": short(estimate.accel[2] * GRAVITY_MILLI),
-        "xgyro": short(estimate.gyro[0] * 1000.0),
-        "ygyro": short(estimate.gyro[1] * 1000.0),
-        "zgyro": short(estimate.gyro[2] * 1000.0),
+        "xacc": to_int16(estimate.accel[0] * GRAVITY_MILLI),
+        "yacc": to_int16(estimate.accel[1] * GRAVITY_MILLI),
+        "zacc": to_int16(estimate.accel[2] * GRAVITY_MILLI),
+        "xgyro": to_int16(estimate.gyro[0] * 1000.0),
+        "ygyro": to_int16(estimate.gyro[1] * 1000.0),
+        "zgyro": to_int16(estimate.gyro[2] * 1000.0),
         **_compass(vehicle),
         "temperature": ZERO_CELSIUS_RISE,
     }
@@ -97,7 +98,7 @@ def _compass(vehicle: Vehicle) -> Fields:
     if vehicle.uptime() < vehicle.dialect.ready_after:
         return {}
     x, y, z = vehicle.estimate.mag
-    return {"xmag": short(x * 1000.0), "ymag": short(y * 1000.0), "zmag": short(z * 1000.0)}
+    return {"xmag": to_int16(x * 1000.0), "ymag": to_int16(y * 1000.0), "zmag": to_int16(z * 1000.0)}
 
 
 def raw_imu(vehicle: Vehicle) -> Fields:
@@ -146,9 +147,9 @@ def gps_raw(vehicle: Vehicle) -> Fields:
         "lat": round(fix.latitude * 1e7),
         "lon": round(fix.longitude * 1e7),
         "alt": _cm(fix.amsl),
-        "eph": word(fix.eph * 100.0),
-        "epv": word(fix.epv * 100.0),
-        "vel": word(speed * 100.0),
+        "eph": to_uint16(fix.eph * 100.0),
+        "epv": to_uint16(fix.epv * 100.0),
+        "vel": to_uint16(speed * 100.0),
         "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
         "satellites_visible": fix.satellites,
         "alt_ellipsoid": _cm(fix.amsl),
@@ -299,6 +300,6 @@ def distance_sensor(vehicle: Vehicle) -> Fields | None:
         "time_boot_ms": boot_ms(vehicle),
         "min_distance": 20,
         "max_distance": 3000,
-        "current_distance": word(distance * 100.0),
+        "current_distance": to_uint16(distance * 100.0),
         "orientation": 25,
     }

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from volery.base.time import from_seconds
-from volery.simulation.autopilots.simulated.sticks import Travel
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.manual_control import ChannelRange
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 IGNORE, RELEASE = 65_535, 65_534
 LAST_PLAIN_CHANNEL = 8
@@ -73,7 +73,7 @@ def _share(axis: int) -> float | None:
     return min(1.0, max(0.0, (axis + 1000) / 2000.0))
 
 
-def _give(vehicle: Vehicle, channel: int, travel: Travel, share: float | None) -> None:
+def _give(vehicle: Vehicle, channel: int, travel: ChannelRange, share: float | None) -> None:
     pulse = 0 if share is None else max(0, travel.pulse(share))
     vehicle.sticks.override(channel, pulse, vehicle.kernel.now())
 

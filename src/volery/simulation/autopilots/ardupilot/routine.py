@@ -7,7 +7,7 @@ from collections.abc import Callable
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot import boot
 from volery.simulation.autopilots.ardupilot.arming import look_before_arming
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 STORE_COUNTERS_EVERY = 30 * S
 

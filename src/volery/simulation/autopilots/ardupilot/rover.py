@@ -34,19 +34,19 @@ from volery.simulation.autopilots.ardupilot.status import (
 )
 from volery.simulation.autopilots.ardupilot.tables import ALL, streams
 from volery.simulation.autopilots.ardupilot.targets import rover_global, rover_local
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
-from volery.simulation.autopilots.simulated.manoeuvres.rover import (
+from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
     Manual,
     ReturnRover,
     Stand,
     rover_leg,
 )
-from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
-from volery.simulation.autopilots.simulated.mavlink.telemetry import Fields
-from volery.simulation.autopilots.simulated.mode import Mode
-from volery.simulation.autopilots.simulated.parameters import Parameter, load
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
+from volery.simulation.autopilots.mavlink.message_fields import Fields
+from volery.simulation.autopilots.mode import Mode
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -208,7 +208,7 @@ _MAVLINK = mavlink(
 
 ROVER = ardupilot(
     kind="rover",
-    face=partial(MavlinkFace, _MAVLINK),
+    face=partial(MavlinkEndpoint, _MAVLINK),
     boot_mode=INITIALISING,
     boot_events=boot.rover_events(ready),
     ready_after=READY,

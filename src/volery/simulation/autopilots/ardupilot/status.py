@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.motion import FIX_AFTER, NO_FIX_AFTER
-from volery.simulation.autopilots.simulated.mavlink.numbers import short, word
-from volery.simulation.autopilots.simulated.mavlink.telemetry import Fields, boot_ms, boot_us
-from volery.simulation.autopilots.simulated.plan import Plan
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.message_fields import Fields, boot_ms, boot_us, to_int16, to_uint16
+from volery.simulation.autopilots.onboard_mission import OnboardMission
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
@@ -94,8 +93,8 @@ def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
     capacity = vehicle.parameters["BATT_CAPACITY"]
     left = 1.0 - estimate.battery_used_mah / capacity if capacity > 0.0 else 0.0
     return (
-        word(estimate.battery_volts * 1000.0),
-        short(estimate.battery_amps * 100.0),
+        to_uint16(estimate.battery_volts * 1000.0),
+        to_int16(estimate.battery_amps * 100.0),
         int(max(0.0, left) * 100.0),
     )
 
@@ -183,7 +182,7 @@ NO_MISSION, NOT_STARTED, IN_PROGRESS, COMPLETE = 1, 2, 3, 5
 """MISSION_STATE."""
 
 
-def _mission_state(plan: Plan) -> int:
+def _mission_state(plan: OnboardMission) -> int:
     if len(plan) <= 1:
         return NO_MISSION
     if plan.complete:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from volery.simulation.autopilots.ardupilot import motion, status
-from volery.simulation.autopilots.simulated.mavlink import telemetry
-from volery.simulation.autopilots.simulated.mavlink.dialect import Builder
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink import message_fields
+from volery.simulation.autopilots.mavlink.firmware import Builder
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RAW_SENSORS, EXTENDED_STATUS, RC_CHANNELS, RAW_CONTROLLER, POSITION = 1, 2, 3, 4, 6
 EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
@@ -22,8 +22,8 @@ def nothing(_vehicle: Vehicle) -> None:
 BUILDERS: Mapping[str, Builder] = {
     "AHRS": motion.ahrs,
     "AHRS2": motion.ahrs2,
-    "ATTITUDE": telemetry.attitude,
-    "ATTITUDE_QUATERNION": telemetry.attitude_quaternion,
+    "ATTITUDE": message_fields.attitude,
+    "ATTITUDE_QUATERNION": message_fields.attitude_quaternion,
     "BATTERY_STATUS": status.battery_status,
     "DISTANCE_SENSOR": motion.distance_sensor,
     "EKF_STATUS_REPORT": status.ekf_status,

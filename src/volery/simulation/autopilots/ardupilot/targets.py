@@ -10,10 +10,10 @@ from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
-from volery.simulation.autopilots.simulated.manoeuvres.guided import Guided, Turn
-from volery.simulation.autopilots.simulated.manoeuvres.rover import GuidedRover
-from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
-from volery.simulation.autopilots.simulated.plan import (
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
+from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
+from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.onboard_mission import (
     BODY_NED,
     BODY_OFFSET_NED,
     GLOBAL,
@@ -25,7 +25,7 @@ from volery.simulation.autopilots.simulated.plan import (
     LOCAL_NED,
     LOCAL_OFFSET_NED,
 )
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 POSITION, VELOCITY, ACCELERATION, YAW, YAW_RATE = 0b111, 0b111 << 3, 0b111 << 6, 1 << 10, 1 << 11
 """Bits of ``type_mask``: set means ignore."""
@@ -100,7 +100,7 @@ def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
 def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target | None:
     place, velocity, push = groups
     for group, values in ((POSITION, place), (VELOCITY, velocity), (ACCELERATION, push)):
-        if _given(mask, group) and not sound(values, FARTHEST):
+        if _given(mask, group) and not all_within(values, FARTHEST):
             return None
     return Target(
         place if _given(mask, POSITION) else None,
@@ -148,7 +148,7 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
     guided, mask = vehicle.manoeuvre, fields["type_mask"]
     if not isinstance(guided, Guided) or mask & THROTTLE_IGNORED:
         return
-    if not sound((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+    if not all_within((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
         return
     w, x, y, z = fields["q"]
     size = hypot(w, x, y, z)

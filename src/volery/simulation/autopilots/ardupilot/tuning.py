@@ -8,9 +8,8 @@ from __future__ import annotations
 from math import radians
 
 from volery.base.time import MS, from_seconds
-from volery.simulation.autopilots.simulated.parameters import Parameters
-from volery.simulation.autopilots.simulated.sticks import Travel
-from volery.simulation.autopilots.simulated.tuning import StickMap, Tuning
+from volery.simulation.autopilots.autopilot_parameters import Parameters, Tuning
+from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 
 CHANNELS = 16
 FASTEST = 1000.0
@@ -18,9 +17,9 @@ SLOWEST = 0.1
 """Speed [m/s] where a parameter asks for less than none; the firmware's own least values are of that size."""
 
 
-def travel(parameters: Parameters, channel: int) -> Travel:
+def travel(parameters: Parameters, channel: int) -> ChannelRange:
     """How channel *channel* moves."""
-    return Travel(
+    return ChannelRange(
         parameters[f"RC{channel}_MIN"],
         parameters[f"RC{channel}_TRIM"],
         parameters[f"RC{channel}_MAX"],

@@ -5,7 +5,7 @@ for figures, ``parameters``.
 """
 
 from volery.simulation.autopilots.dji.copter import COPTER
-from volery.simulation.autopilots.simulated.dialect import Family
+from volery.simulation.autopilots.firmware import Family
 
 DIALECT = Family("dji", {"multirotor": COPTER}, codec=None)
 """The firmware, by kind of vehicle. It has no links: it is reached over a graph."""

@@ -13,9 +13,9 @@ from volery.ros.messages.dji import M100, DisplayMode, FlightStatus, M100Status
 from volery.simulation.autopilots.dji import missions
 from volery.simulation.autopilots.dji.parameters import AIRCRAFT
 from volery.simulation.autopilots.dji.setpoints import Obey, command_of
-from volery.simulation.autopilots.simulated.plan import Item
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 INFO, WARNING = 6, 4
 """Severities as in syslog."""
@@ -275,7 +275,7 @@ class Controller:
             self.vehicle.speed = metres_per_second
         return True
 
-    def item_begins(self, number: int, _item: Item) -> None:
+    def item_begins(self, number: int, _item: MissionItem) -> None:
         """Turn to the waypoint's heading, where the mission says so."""
         if self.task is not None and self.task.yaw_mode == missions.YAW_BY_WAYPOINT:
             point = self.task.mission_waypoint[number % len(self.task.mission_waypoint)]

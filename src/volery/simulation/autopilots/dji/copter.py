@@ -8,13 +8,13 @@ from volery.simulation.autopilots.dji.controller import Controller, controller_o
 from volery.simulation.autopilots.dji.face import DjiFace
 from volery.simulation.autopilots.dji.parameters import HONOURED, parameters, tuning
 from volery.simulation.autopilots.dji.setpoints import Obey
-from volery.simulation.autopilots.simulated.dialect import Dialect, Event, Watch
-from volery.simulation.autopilots.simulated.flight import Flight
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission, copter_leg
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold, Loiter
-from volery.simulation.autopilots.simulated.manoeuvres.points import Land, Return, TakeOff
-from volery.simulation.autopilots.simulated.mode import Manoeuvre, Mode
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.firmware import Dialect, Event, Watch
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff
+from volery.simulation.autopilots.mode import Manoeuvre, Mode
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 READY, ORIGIN, POSITION = 3 * S, 15 * S, 25 * S
 """After it was switched on: when it speaks, when it knows where it is, when that may be trusted. Assumed."""

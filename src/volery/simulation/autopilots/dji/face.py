@@ -18,7 +18,7 @@ from volery.ros.messages.dji import NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOP
 from volery.simulation.autopilots.dji.controller import Controller, controller_of
 from volery.simulation.autopilots.dji.services import Services
 from volery.simulation.autopilots.dji.telemetry import FAST, REFERENCE, SLOW, USUAL, Topic, topics
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
 LOOK_EVERY: Ns = 200 * MS

@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any
 
 from volery.ros.messages.dji import MISSION_SPEEDS
-from volery.simulation.autopilots.simulated.plan import GLOBAL_RELATIVE, WAYPOINT, Item
+from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
 
 FEWEST, MOST = 2, 99
 """Waypoints of a mission: assumed."""
@@ -34,16 +34,16 @@ def refusal(task: Any) -> str:
     return ""
 
 
-def items_of(task: Any) -> list[Item]:
+def items_of(task: Any) -> list[MissionItem]:
     """The items of a mission that is taken."""
     once = [_item(point, coordinated=task.trace_mode == 1) for point in task.mission_waypoint]
     items = once * max(1, min(2, task.mission_exec_times))
     return [*items, items[0]] if task.action_on_finish == TO_FIRST else items
 
 
-def _item(point: Any, coordinated: bool) -> Item:
+def _item(point: Any, coordinated: bool) -> MissionItem:
     stay = _stay(point)
-    return Item(
+    return MissionItem(
         WAYPOINT,
         GLOBAL_RELATIVE,
         param1=stay or (0.0 if coordinated else STOPS_S),

@@ -9,8 +9,14 @@ from collections.abc import Mapping
 from math import radians
 
 from volery.ros.messages.dji import HARDWARE
-from volery.simulation.autopilots.simulated.parameters import INT8, REAL32, Parameter, Parameters, quantised
-from volery.simulation.autopilots.simulated.tuning import Tuning
+from volery.simulation.autopilots.autopilot_parameters import (
+    INT8,
+    REAL32,
+    Parameter,
+    Parameters,
+    Tuning,
+    quantised,
+)
 
 AIRCRAFT = tuple(HARDWARE)
 """By the value of the parameter AIRCRAFT."""

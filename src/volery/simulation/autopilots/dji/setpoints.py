@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 from volery.base.frames import Vector
 from volery.ros.messages.dji import HORIZONTAL, SETPOINT_HEIGHTS, VERTICAL, Flag
 from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import Stabilize
-from volery.simulation.autopilots.simulated.mode import Manoeuvre
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
+from volery.simulation.autopilots.mode import Manoeuvre
 
 if TYPE_CHECKING:
-    from volery.simulation.autopilots.simulated.vehicle import Vehicle
+    from volery.simulation.autopilots.vehicle_state import Vehicle
 
 LIFTS_ABOVE_M, LIFTS_ABOVE_M_S, LIFTS_ABOVE_PERCENT = 0.5, 0.1, 20.0
 """A set-point of more than that takes an aircraft that stands with turning motors off the ground: assumed."""

@@ -4,8 +4,8 @@ The protocol and the firmware's rules are from public definitions; none of it wa
 """
 
 from volery.links.pprzlink import PPRZLINK
+from volery.simulation.autopilots.firmware import Family, Station
 from volery.simulation.autopilots.paparazzi.rotorcraft import ROTORCRAFT
-from volery.simulation.autopilots.simulated.dialect import Family, Station
 
 GROUND_SEGMENT = Station("udp://127.0.0.1:4242?from=4243")
 """Paparazzi's ground segment hears aircraft at port 4242 and speaks to their port 4243."""

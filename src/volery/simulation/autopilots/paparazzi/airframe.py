@@ -11,10 +11,9 @@ from math import radians
 from typing import NamedTuple
 
 from volery.links.pprz_aircraft import stock_aircraft
-from volery.simulation.autopilots.simulated.flight import Flight
-from volery.simulation.autopilots.simulated.parameters import REAL32, Parameter, Parameters
-from volery.simulation.autopilots.simulated.sticks import Travel
-from volery.simulation.autopilots.simulated.tuning import StickMap, Tuning
+from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 
 MANUAL_SWITCH, AUTO1_SWITCH, AUTO2_SWITCH = "MODE_MANUAL", "MODE_AUTO1", "MODE_AUTO2"
 """What the three positions of a transmitter's mode switch mean."""
@@ -63,7 +62,7 @@ FIGURES: Mapping[str, Figure] = {
 }
 """By name. The model's ``parameters`` of a vehicle replace them."""
 
-_FULL = Travel(1000.0, 1500.0, 2000.0, 0.0)
+_FULL = ChannelRange(1000.0, 1500.0, 2000.0, 0.0)
 
 
 def parameters() -> tuple[Parameter, ...]:

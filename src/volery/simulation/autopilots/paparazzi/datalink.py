@@ -17,7 +17,7 @@ from volery.simulation.autopilots.paparazzi.guided import Guided
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.radio import FULL, PER_COUNT, StickFrame, bounded
 from volery.simulation.autopilots.paparazzi.telemetry import waypoint
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Fields = dict[str, Any]
 

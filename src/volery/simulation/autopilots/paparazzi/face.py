@@ -11,7 +11,7 @@ from volery.links.link import Frame, Link
 from volery.simulation.autopilots.paparazzi.datalink import HANDLERS
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.telemetry import REGULAR, Regular, rotorcraft_status
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
 ANSWER_DELAY: Ns = 5 * MS

@@ -7,6 +7,7 @@ goes back while the reason is still there.
 from __future__ import annotations
 
 from volery.base.time import from_seconds
+from volery.simulation.autopilots.firmware import Watch
 from volery.simulation.autopilots.paparazzi import gps
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.modes import (
@@ -20,8 +21,7 @@ from volery.simulation.autopilots.paparazzi.modes import (
     set_mode,
 )
 from volery.simulation.autopilots.paparazzi.radio import REALLY_LOST
-from volery.simulation.autopilots.simulated.dialect import Watch
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 def _navigates(vehicle: Vehicle) -> bool:

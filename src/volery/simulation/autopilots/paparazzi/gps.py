@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from volery.base.time import S
 from volery.simulation.autopilots.paparazzi.memory import of
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 FIX_3D = 3
 ACQUIRED_AFTER = 12 * S

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from volery.base.time import Ns
+from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.paparazzi.navigation import Navigation
 from volery.simulation.autopilots.paparazzi.radio import Radio
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 @dataclass

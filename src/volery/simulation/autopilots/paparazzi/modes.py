@@ -10,7 +10,7 @@ from __future__ import annotations
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.radio import OK
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 KILL, FAILSAFE, HOME = 0, 1, 2
 ATTITUDE_DIRECT, ATTITUDE_RC_CLIMB, ATTITUDE_Z_HOLD, HOVER_Z_HOLD = 4, 6, 9, 12

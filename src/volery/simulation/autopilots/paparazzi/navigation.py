@@ -13,7 +13,7 @@ from typing import NamedTuple
 from volery.base.frames import Vector, ned_to_enu, wrap
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.paparazzi.flight_plan import FlightPlan
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CARROT_M = 12.0
 """So far ahead on a line or a circle lies the point that it flies to."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from volery.base.time import Ns
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 OK, LOST, REALLY_LOST = 0, 1, 2
 FULL = 9600

@@ -7,6 +7,9 @@ assumed stands in docs/paparazzi.md.
 from __future__ import annotations
 
 from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.firmware import Dialect, Event
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
+from volery.simulation.autopilots.mode import Mode
 from volery.simulation.autopilots.paparazzi import airframe, gps
 from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
 from volery.simulation.autopilots.paparazzi.face import PaparazziFace
@@ -24,10 +27,7 @@ from volery.simulation.autopilots.paparazzi.manoeuvres import (
 from volery.simulation.autopilots.paparazzi.memory import Memory, of
 from volery.simulation.autopilots.paparazzi.modes import HOME, in_flight, set_mode
 from volery.simulation.autopilots.paparazzi.navigation import Navigation
-from volery.simulation.autopilots.simulated.dialect import Dialect, Event
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold
-from volery.simulation.autopilots.simulated.mode import Mode
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 TICK: Ns = S // 16
 """Navigation runs sixteen times a second; so does everything else here."""

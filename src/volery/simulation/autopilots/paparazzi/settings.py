@@ -13,7 +13,7 @@ from typing import NamedTuple
 from volery.links.pprz_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi.airframe import AUTO2_SWITCH
 from volery.simulation.autopilots.paparazzi.modes import set_mode_by_datalink, set_motors
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 class Variable(NamedTuple):

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Vector, enu_to_ned, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
+from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.paparazzi import gps, modes
 from volery.simulation.autopilots.paparazzi.guided import Guided
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.navigation import Vertical
 from volery.simulation.autopilots.paparazzi.radio import FULL
 from volery.simulation.autopilots.paparazzi.settings import NUMBERED, read
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Fields = dict[str, Any]
 

@@ -2,10 +2,10 @@
 it is.
 """
 
+from volery.simulation.autopilots.firmware import Family, Station
 from volery.simulation.autopilots.px4.copter import COPTER
 from volery.simulation.autopilots.px4.rover import ROVER
 from volery.simulation.autopilots.px4.tables import ONBOARD, STATION
-from volery.simulation.autopilots.simulated.dialect import Family, Station
 
 STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
 """As the firmware's own simulator has them: for programs, and for ground stations."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.base.time import MS, Ns
+from volery.simulation.autopilots.firmware import Event
+from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.px4.commander import READY_AFTER, Commander, of
-from volery.simulation.autopilots.simulated.dialect import Event
-from volery.simulation.autopilots.simulated.flight import Flight
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 ORIGIN: Ns = 6_200 * MS
 """Recorded: positions from 6.4 s on."""

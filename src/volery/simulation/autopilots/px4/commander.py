@@ -9,16 +9,12 @@ from __future__ import annotations
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.mavlink.command import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from volery.simulation.autopilots.px4 import events, modes
 from volery.simulation.autopilots.px4.joystick import Joystick
 from volery.simulation.autopilots.px4.offboard import Stream
-from volery.simulation.autopilots.simulated.mavlink.command_service import (
-    ACCEPTED,
-    TEMPORARILY_REJECTED,
-    UNSUPPORTED,
-)
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CRITICAL, INFO = 2, 6
 """MAV_SEVERITY."""

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from math import isfinite, isnan
 
 from volery.base.frames import Vector
-from volery.simulation.autopilots.px4 import events, modes
-from volery.simulation.autopilots.px4.commander import CRITICAL, FORCE, INFO, of
-from volery.simulation.autopilots.px4.planned import Hold
-from volery.simulation.autopilots.simulated.mavlink.command_service import (
+from volery.simulation.autopilots.mavlink.command import (
     ACCEPTED,
     DENIED,
     TEMPORARILY_REJECTED,
@@ -17,9 +14,12 @@ from volery.simulation.autopilots.simulated.mavlink.command_service import (
     Command,
     Handler,
 )
-from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
-from volery.simulation.autopilots.simulated.plan import GLOBAL_INT
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
+from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4.commander import CRITICAL, FORCE, INFO, of
+from volery.simulation.autopilots.px4.planned import Hold
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
@@ -109,7 +109,7 @@ def place_of(vehicle: Vehicle, command: Command) -> Vector | None:
     if abs(latitude) > 90.0 or abs(longitude) > 180.0:
         return None
     point = vehicle.point(GLOBAL_INT, latitude, longitude, amsl)
-    return point if sound(point, FARTHEST) else None
+    return point if all_within(point, FARTHEST) else None
 
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
@@ -157,7 +157,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
         vehicle.home_by_user = True
         return ACCEPTED
     given = (command.x, command.y, command.z)
-    if not sound(given) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
+    if not all_within(given) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
         return DENIED
     vehicle.set_home(*given)
     vehicle.home_by_user = True

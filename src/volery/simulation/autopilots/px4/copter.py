@@ -5,6 +5,11 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S
+from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Stabilize
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
+from volery.simulation.autopilots.mode import Manoeuvre, Mode
 from volery.simulation.autopilots.px4 import commands, missions, modes, radio, tuning
 from volery.simulation.autopilots.px4.commander import of
 from volery.simulation.autopilots.px4.firmware import px4
@@ -15,12 +20,7 @@ from volery.simulation.autopilots.px4.planned import Descent, Hold, Orbit, Retur
 from volery.simulation.autopilots.px4.pursuit import Offboard
 from volery.simulation.autopilots.px4.returning import tell_stage
 from volery.simulation.autopilots.px4.watching import on_step
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
-from volery.simulation.autopilots.simulated.manoeuvres.pilot import AltitudeHold, Stabilize
-from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
-from volery.simulation.autopilots.simulated.mode import Manoeuvre, Mode
-from volery.simulation.autopilots.simulated.parameters import Parameter, load
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -102,7 +102,7 @@ def parameters() -> tuple[Parameter, ...]:
 
 COPTER = px4(
     kind="multirotor",
-    face=partial(MavlinkFace, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
+    face=partial(MavlinkEndpoint, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
     boot_mode=MODES[modes.LOITER],
     modes=MODES,
     tuning=tuning.copter,

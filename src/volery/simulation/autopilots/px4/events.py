@@ -11,7 +11,7 @@ import struct
 from typing import NamedTuple
 
 from volery.base.time import MS
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 class Event(NamedTuple):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
+from volery.simulation.autopilots.firmware import Dialect
 from volery.simulation.autopilots.px4 import boot, missions
 from volery.simulation.autopilots.px4.commander import READY_AFTER
-from volery.simulation.autopilots.simulated.dialect import Dialect
 
 STICKS_AT_REST = (1500,) * 4 + (0,) * 12
 

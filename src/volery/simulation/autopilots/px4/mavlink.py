@@ -6,19 +6,23 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from volery.base.time import MS
+from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.firmware import (
+    MavlinkDialect,
+    MissionUploadPolicy,
+    ParameterPolicy,
+    StatusTextPolicy,
+)
 from volery.simulation.autopilots.px4 import boot, commands, missions
 from volery.simulation.autopilots.px4.tables import ORDER, USES, builders
-from volery.simulation.autopilots.simulated.mavlink.command_service import DENIED, FAILED, Handler
-from volery.simulation.autopilots.simulated.mavlink.dialect import MavlinkDialect
-from volery.simulation.autopilots.simulated.mavlink.habits import ParameterHabits, Texts, UploadHabits
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Hear = Callable[[Vehicle, dict[str, Any], int], None]
 
-TEXTS = Texts(numbered=True, to_stations=True, spacing=48 * MS)
+TEXTS = StatusTextPolicy(numbered=True, to_stations=True, spacing=48 * MS)
 """Recorded: at most one text each 48 to 52 ms."""
 
-PARAMETERS = ParameterHabits(
+PARAMETERS = ParameterPolicy(
     burst=20,
     period=20 * MS,
     read_delay=2 * MS,
@@ -48,7 +52,9 @@ def mavlink(kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, Hea
         home_told=("GPS_GLOBAL_ORIGIN",),
         texts=TEXTS,
         parameter_habits=PARAMETERS,
-        upload_habits=UploadHabits(missions.asks_with, received="", turns_to_integers=True, keeps_old=True),
+        upload_habits=MissionUploadPolicy(
+            missions.asks_with, received="", turns_to_integers=True, keeps_old=True
+        ),
         wrong_target=FAILED,
         reads_nan=True,
         messages=builders(kind),

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns, from_seconds
-from volery.simulation.autopilots.px4 import events, modes
-from volery.simulation.autopilots.px4.commander import INFO, of
-from volery.simulation.autopilots.px4.commands import on_return
-from volery.simulation.autopilots.px4.planned import Descent, Hold, TakeOff
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FOREVER, Leg, item_point, point_height
-from volery.simulation.autopilots.simulated.manoeuvres.points import bearing
-from volery.simulation.autopilots.simulated.mavlink.command_service import Command
-from volery.simulation.autopilots.simulated.mode import Manoeuvre
-from volery.simulation.autopilots.simulated.plan import (
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
+    FOREVER,
+    Leg,
+    item_point,
+    point_height,
+)
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
+from volery.simulation.autopilots.mavlink.command import Command
+from volery.simulation.autopilots.mode import Manoeuvre
+from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     DELAY,
     GLOBAL,
@@ -27,9 +28,13 @@ from volery.simulation.autopilots.simulated.plan import (
     SET_HOME,
     TAKEOFF,
     WAYPOINT,
-    Item,
+    MissionItem,
 )
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4.commander import INFO, of
+from volery.simulation.autopilots.px4.commands import on_return
+from volery.simulation.autopilots.px4.planned import Descent, Hold, TakeOff
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
 """MAV_MISSION_RESULT."""
@@ -55,14 +60,14 @@ def asks_with(number: int) -> str:
     return "MISSION_REQUEST" if number == 0 else "MISSION_REQUEST_INT"
 
 
-def stored_item(item: Item) -> Item | int:
+def stored_item(item: MissionItem) -> MissionItem | int:
     """As it was sent."""
     if item.command not in FLOWN | KEPT:
         return UNSUPPORTED
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
 
 
-def no_home_item(_vehicle: Vehicle) -> Item | None:
+def no_home_item(_vehicle: Vehicle) -> MissionItem | None:
     """Item 0 is the first of the mission."""
     return None
 
@@ -72,7 +77,7 @@ def runs(_vehicle: Vehicle) -> bool:
     return False
 
 
-def goes_nowhere(_vehicle: Vehicle, _item: Item) -> bool:
+def goes_nowhere(_vehicle: Vehicle, _item: MissionItem) -> bool:
     """An item that is no part of a mission is refused."""
     return False
 
@@ -81,7 +86,7 @@ def grew(_vehicle: Vehicle, _count: int) -> None:
     """Nothing counts along."""
 
 
-def item_done(vehicle: Vehicle, index: int, _item: Item) -> None:
+def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """MISSION_ITEM_REACHED, again and again."""
 
     def tell() -> None:
@@ -92,7 +97,7 @@ def item_done(vehicle: Vehicle, index: int, _item: Item) -> None:
         vehicle.kernel.call_at(vehicle.kernel.now() + again * REACHED_EVERY, tell)
 
 
-def item_begins(vehicle: Vehicle, _index: int, item: Item) -> None:
+def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
     """A take-off says how high; a return is the mode of that name."""
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
@@ -110,7 +115,7 @@ def _loiter(vehicle: Vehicle) -> None:
         of(vehicle).follow_up(modes.LOITER)
 
 
-def act(vehicle: Vehicle, item: Item) -> None:
+def act(vehicle: Vehicle, item: MissionItem) -> None:
     """Items that are done at once."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
         vehicle.speed = item.param2
@@ -185,7 +190,7 @@ class Going(Hold):
             super().step()
 
 
-def leg(vehicle: Vehicle, item: Item, _goes_on: bool) -> Leg:
+def leg(vehicle: Vehicle, item: MissionItem, _goes_on: bool) -> Leg:
     """The leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
         climbing = TakeOff(vehicle, point_height(vehicle, item))
@@ -198,7 +203,7 @@ def leg(vehicle: Vehicle, item: Item, _goes_on: bool) -> Leg:
     return _go(vehicle, item)
 
 
-def _go(vehicle: Vehicle, item: Item) -> Leg:
+def _go(vehicle: Vehicle, item: MissionItem) -> Leg:
     p = vehicle.parameters
     point = vehicle.estimate.position if item.command == DELAY else item_point(vehicle, item)
     far = not Hold(vehicle, point).near(p["NAV_ACC_RAD"], 1e9)

@@ -6,20 +6,21 @@ from math import atan2, degrees, hypot, nan
 
 from volery.base.frames import euler_to_quaternion, quaternion_to_euler
 from volery.base.time import MS, US, Ns
-from volery.simulation.autopilots.px4 import modes
-from volery.simulation.autopilots.px4.commander import ATTITUDE_AFTER, of
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget
-from volery.simulation.autopilots.px4.planned import Orbit
-from volery.simulation.autopilots.simulated.mavlink import telemetry
-from volery.simulation.autopilots.simulated.mavlink.numbers import short, word
-from volery.simulation.autopilots.simulated.mavlink.telemetry import (
+from volery.simulation.autopilots.mavlink import message_fields
+from volery.simulation.autopilots.mavlink.message_fields import (
     EPOCH_US,
     Fields,
     boot_ms,
     boot_us,
     heading_cdeg,
+    to_int16,
+    to_uint16,
 )
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.px4 import modes
+from volery.simulation.autopilots.px4.commander import ATTITUDE_AFTER, of
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget
+from volery.simulation.autopilots.px4.planned import Orbit
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GLOBAL_AFTER: Ns = 6_500 * MS
 """Recorded: the first GLOBAL_POSITION_INT a tenth of a second after the first ATTITUDE."""
@@ -36,12 +37,12 @@ def _aligned(vehicle: Vehicle) -> bool:
 
 def attitude(vehicle: Vehicle) -> Fields | None:
     """ATTITUDE: once the estimator is aligned."""
-    return telemetry.attitude(vehicle) if _aligned(vehicle) else None
+    return message_fields.attitude(vehicle) if _aligned(vehicle) else None
 
 
 def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
     """ATTITUDE_QUATERNION: likewise."""
-    return telemetry.attitude_quaternion(vehicle) if _aligned(vehicle) else None
+    return message_fields.attitude_quaternion(vehicle) if _aligned(vehicle) else None
 
 
 def global_position(vehicle: Vehicle) -> Fields | None:
@@ -57,9 +58,9 @@ def global_position(vehicle: Vehicle) -> Fields | None:
         "lon": round(longitude * 1e7),
         "alt": round(amsl * 1000.0),
         "relative_alt": round(vehicle.height * 1000.0),
-        "vx": short(north * 100.0),
-        "vy": short(east * 100.0),
-        "vz": short(down * 100.0),
+        "vx": to_int16(north * 100.0),
+        "vy": to_int16(east * 100.0),
+        "vz": to_int16(down * 100.0),
         "hdg": heading_cdeg(estimate.attitude[2]),
     }
 
@@ -179,9 +180,9 @@ def gps_raw(vehicle: Vehicle) -> Fields:
         "lat": round(fix.latitude * 1e7),
         "lon": round(fix.longitude * 1e7),
         "alt": round(fix.amsl * 1000.0),
-        "eph": word(fix.eph * 100.0),
-        "epv": word(fix.epv * 100.0),
-        "vel": word(speed * 100.0),
+        "eph": to_uint16(fix.eph * 100.0),
+        "epv": to_uint16(fix.epv * 100.0),
+        "vel": to_uint16(speed * 100.0),
         "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
         "satellites_visible": fix.satellites,
         "alt_ellipsoid": round(fix.amsl * 1000.0),
@@ -280,7 +281,7 @@ def distance_sensor(vehicle: Vehicle) -> Fields:
     return {
         "time_boot_ms": boot_ms(vehicle),
         "max_distance": 10_000,
-        "current_distance": word(height * 100.0),
+        "current_distance": to_uint16(height * 100.0),
         "orientation": 25,
     }
 

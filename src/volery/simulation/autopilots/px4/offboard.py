@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Quaternion, Vector
 from volery.base.time import Ns
-from volery.simulation.autopilots.px4.events import FRAME_UNSUPPORTED, SETPOINT_INVALID, Log
-from volery.simulation.autopilots.simulated.mavlink.numbers import FARTHEST, sound
-from volery.simulation.autopilots.simulated.plan import (
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.onboard_mission import (
     BODY_NED,
     GLOBAL_INT,
     GLOBAL_RELATIVE_INT,
     GLOBAL_TERRAIN_INT,
     LOCAL_NED,
 )
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.px4.events import FRAME_UNSUPPORTED, SETPOINT_INVALID, Log
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CRITICAL = 2
 """MAV_SEVERITY."""
@@ -104,7 +104,7 @@ def _target(fields: dict[str, Any], position: Vector) -> Target | None:
     velocity = _masked((fields["vx"], fields["vy"], fields["vz"]), mask, 3)
     push = _masked((fields["afx"], fields["afy"], fields["afz"]), mask, 6)
     given = [value for value in (*position, *velocity, *push) if isfinite(value)]
-    if not given or not sound(given, FARTHEST):
+    if not given or not all_within(given, FARTHEST):
         return None
     yaw = fields["yaw"] if not mask & NO_YAW and isfinite(fields["yaw"]) else None
     rate = fields["yaw_rate"] if not mask & NO_YAW_RATE and isfinite(fields["yaw_rate"]) else None
@@ -152,7 +152,7 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: Log) -> Target 
 def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | None:
     """Of SET_ATTITUDE_TARGET; ``None`` for what is not understood."""
     mask = fields["type_mask"]
-    if mask & (ATTITUDE_IGNORED | THRUST_IGNORED) or not sound((*fields["q"], fields["thrust"])):
+    if mask & (ATTITUDE_IGNORED | THRUST_IGNORED) or not all_within((*fields["q"], fields["thrust"])):
         return None
     w, x, y, z = fields["q"]
     size = hypot(w, x, y, z)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol, runtime_checkable
 
+from volery.simulation.autopilots.mavlink.channel import GROUND_STATION
 from volery.simulation.autopilots.px4 import events, modes, offboard
 from volery.simulation.autopilots.px4.commander import Commander, of
 from volery.simulation.autopilots.px4.joystick import deflection, move_channels
 from volery.simulation.autopilots.px4.watching import OFFBOARD_LOST
-from volery.simulation.autopilots.simulated.mavlink.texts import GROUND_STATION
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Hear = Callable[[Vehicle, dict[str, Any], int], None]
 

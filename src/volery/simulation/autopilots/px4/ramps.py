@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 from volery.base.time import to_seconds
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
 """Share of a climb rate over the time since it left the ground, in MPC_TKO_RAMP_T: as recorded."""

@@ -6,7 +6,7 @@ import struct
 
 from volery.simulation.autopilots.px4 import events
 from volery.simulation.autopilots.px4.commander import INFO, of
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 def tell_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:

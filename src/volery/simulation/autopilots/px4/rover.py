@@ -8,17 +8,11 @@ from functools import cache, partial
 from math import atan2, hypot, isfinite
 
 from volery.base.frames import Vector
-from volery.simulation.autopilots.px4 import commands, copter, modes, radio, tuning
-from volery.simulation.autopilots.px4.commander import of
-from volery.simulation.autopilots.px4.firmware import px4
-from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
-from volery.simulation.autopilots.px4.mavlink import mavlink
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
-from volery.simulation.autopilots.px4.watching import on_step
-from volery.simulation.autopilots.simulated.flight import Control, Setpoint
-from volery.simulation.autopilots.simulated.manoeuvres.guided import Turn
-from volery.simulation.autopilots.simulated.manoeuvres.mission import FlyMission
-from volery.simulation.autopilots.simulated.manoeuvres.rover import (
+from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.rover_driving import (
     DriveTo,
     FollowSpeed,
     Manual,
@@ -26,17 +20,17 @@ from volery.simulation.autopilots.simulated.manoeuvres.rover import (
     Stand,
     rover_leg,
 )
-from volery.simulation.autopilots.simulated.mavlink.command_service import (
-    ACCEPTED,
-    DENIED,
-    UNSUPPORTED,
-    Command,
-    Handler,
-)
-from volery.simulation.autopilots.simulated.mavlink.face import MavlinkFace
-from volery.simulation.autopilots.simulated.mode import Manoeuvre, Mode
-from volery.simulation.autopilots.simulated.parameters import REAL32, Parameter
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, UNSUPPORTED, Command, Handler
+from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
+from volery.simulation.autopilots.mode import Manoeuvre, Mode
+from volery.simulation.autopilots.px4 import commands, copter, modes, radio, tuning
+from volery.simulation.autopilots.px4.commander import of
+from volery.simulation.autopilots.px4.firmware import px4
+from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
+from volery.simulation.autopilots.px4.mavlink import mavlink
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
+from volery.simulation.autopilots.px4.watching import on_step
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -175,7 +169,7 @@ def parameters() -> tuple[Parameter, ...]:
 
 ROVER = px4(
     kind="rover",
-    face=partial(MavlinkFace, mavlink(GROUND_ROVER, COMMANDS, radio.ROVER)),
+    face=partial(MavlinkEndpoint, mavlink(GROUND_ROVER, COMMANDS, radio.ROVER)),
     boot_mode=MODES[modes.LOITER],
     modes=MODES,
     tuning=tuning.rover,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from volery.base.time import S
+from volery.simulation.autopilots.mavlink.message_fields import Fields, boot_us, to_int16, to_uint16
 from volery.simulation.autopilots.px4 import modes
 from volery.simulation.autopilots.px4.commander import of
-from volery.simulation.autopilots.simulated.mavlink.numbers import short, word
-from volery.simulation.autopilots.simulated.mavlink.telemetry import Fields, boot_us
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
@@ -68,8 +67,8 @@ def sys_status(vehicle: Vehicle) -> Fields:
         "onboard_control_sensors_enabled": ENABLED,
         "onboard_control_sensors_health": healthy,
         "load": 100,
-        "voltage_battery": word(estimate.battery_volts * 1000.0),
-        "current_battery": short(estimate.battery_amps * 100.0),
+        "voltage_battery": to_uint16(estimate.battery_volts * 1000.0),
+        "current_battery": to_int16(estimate.battery_amps * 100.0),
         "battery_remaining": _percent(vehicle),
         "onboard_control_sensors_health_extended": 1,
     }
@@ -87,8 +86,8 @@ def battery_status(vehicle: Vehicle) -> Fields:
         "battery_function": 1,
         "type": 1,
         "temperature": 32_767,
-        "voltages": (word(estimate.battery_volts * 1000.0), *([NOT_THERE] * 9)),
-        "current_battery": short(estimate.battery_amps * 100.0),
+        "voltages": (to_uint16(estimate.battery_volts * 1000.0), *([NOT_THERE] * 9)),
+        "current_battery": to_int16(estimate.battery_amps * 100.0),
         "current_consumed": int(estimate.battery_used_mah),
         "energy_consumed": -1,
         "battery_remaining": _percent(vehicle),

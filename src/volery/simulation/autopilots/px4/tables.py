@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from volery.base.time import Ns, S
+from volery.simulation.autopilots.mavlink.firmware import Builder
 from volery.simulation.autopilots.px4 import motion, status
-from volery.simulation.autopilots.simulated.mavlink.dialect import Builder
 
 
 def _every(rates: Mapping[float, Sequence[str]]) -> dict[str, Ns]:

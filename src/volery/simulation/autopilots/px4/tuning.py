@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from math import radians
 
-from volery.simulation.autopilots.simulated.parameters import Parameters
-from volery.simulation.autopilots.simulated.sticks import Travel
-from volery.simulation.autopilots.simulated.tuning import StickMap, Tuning
+from volery.simulation.autopilots.autopilot_parameters import Parameters, Tuning
+from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 
 SLOWEST, FASTEST = 0.1, 100.0
 """Bounds of a speed or an acceleration [m/s, m/s^2]: a parameter beyond them stops or flings nothing."""
 
-STICKS = StickMap(1, 2, 3, 4, (Travel(1000, 1500, 2000, 0),) * 4)
+STICKS = StickMap(1, 2, 3, 4, (ChannelRange(1000, 1500, 2000, 0),) * 4)
 
 
 def _moving(value: float) -> float:

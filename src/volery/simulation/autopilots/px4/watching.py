@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 
 from volery.base.time import MS, Ns, from_seconds, to_seconds
+from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.px4 import events, modes
 from volery.simulation.autopilots.px4.commander import CRITICAL, INFO, Commander, of
-from volery.simulation.autopilots.simulated.sticks import NEVER
-from volery.simulation.autopilots.simulated.vehicle import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 WARNING = 4
 """MAV_SEVERITY."""

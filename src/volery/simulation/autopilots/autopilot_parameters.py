@@ -1,0 +1,155 @@
+"""The parameter store of a simulated autopilot: names, types and values in the order of their indices.
+
+Values are kept as the wire carries them: a ``float`` rounded to the parameter's own type (an integer type
+rounds, a real type is single precision). Knows no protocol and no vehicle.
+
+Figures that manoeuvres fly by, in SI units and radians. A dialect works them out from its parameters.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from math import isfinite, radians
+from typing import NamedTuple
+
+from volery.base.errors import UsageError, did_you_mean
+from volery.base.time import Ns, S
+from volery.simulation.autopilots.manual_control import StickMap
+
+INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
+"""MAV_PARAM_TYPE of the types that the recorded firmwares use."""
+
+_BOUNDS = {INT8: (-128, 127), INT16: (-32_768, 32_767), INT32: (-2_147_483_648, 2_147_483_647)}
+_SINGLE = struct.Struct("<f")
+
+
+def single(value: float) -> float:
+    """The nearest single-precision number: what a ``float`` field of a message carries."""
+    rounded: float = _SINGLE.unpack(_SINGLE.pack(value))[0]
+    return rounded
+
+
+class Parameter(NamedTuple):
+    """One parameter: ``type`` is a MAV_PARAM_TYPE, ``value`` a number of that type."""
+
+    name: str
+    type: int
+    value: float
+
+
+def quantised(kind: int, value: float) -> float:
+    """*value* as a parameter of type *kind* holds it: out-of-range integers stay at the end of the range."""
+    if kind not in _BOUNDS:
+        return single(value)
+    low, high = _BOUNDS[kind]
+    return float(min(high, max(low, round(value))))
+
+
+def load(package: str, resource: str) -> tuple[Parameter, ...]:
+    """Read a packaged list: ``name type value`` a line, ``#`` starts a comment."""
+    found = []
+    for line in files(package).joinpath(resource).read_text(encoding="ascii").splitlines():
+        if line and not line.startswith("#"):
+            name, kind, value = line.split()
+            found.append(Parameter(name, int(kind), quantised(int(kind), float(value))))
+    return tuple(found)
+
+
+class Parameters:
+    """What a vehicle's parameters are now. Reading one that does not exist is a ``KeyError``: a fault of
+    the house.
+    """
+
+    def __init__(self, defaults: Iterable[Parameter], overrides: Mapping[str, float] | None = None) -> None:
+        self._order = tuple(defaults)
+        self._index = {parameter.name: index for index, parameter in enumerate(self._order)}
+        self._values = {parameter.name: parameter.value for parameter in self._order}
+        for name, value in (overrides or {}).items():
+            if name not in self._index:
+                raise UsageError(f"the autopilot has no parameter {name!r}{did_you_mean(name, self._index)}")
+            if self.set(name, value) is None:
+                raise UsageError(f"parameter {name} cannot be {value}: it takes finite numbers")
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._index
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return (self.at(index) for index in range(len(self._order)))
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def at(self, index: int) -> Parameter:
+        """The parameter with that index."""
+        name, kind, _ = self._order[index]
+        return Parameter(name, kind, self._values[name])
+
+    def index(self, name: str) -> int:
+        """The index of a parameter that exists."""
+        return self._index[name]
+
+    def find(self, name: str) -> Parameter | None:
+        """The parameter of that name, or ``None``."""
+        index = self._index.get(name)
+        return None if index is None else self.at(index)
+
+    def set(self, name: str, value: float) -> Parameter | None:
+        """Set it, rounded to its type; ``None`` if there is no such parameter or *value* is not finite."""
+        index = self._index.get(name)
+        if index is None or not isfinite(value):
+            return None
+        self._values[name] = quantised(self._order[index].type, value)
+        return self.at(index)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Speeds m/s, accelerations m/s^2, angles rad, lengths m, times ns."""
+
+    sticks: StickMap = field(default_factory=StickMap)
+    speed: float = 10.0
+    speed_up: float = 2.5
+    speed_down: float = 1.5
+    accel: float = 2.5
+    accel_z: float = 1.0
+    tilt: float = radians(30.0)
+    waypoint_radius: float = 2.0
+    face_path: bool = True
+    """Turn the nose along the path of a mission."""
+
+    land_speed: float = 0.5
+    land_speed_high: float = 1.5
+    land_slow_below: float = 10.0
+
+    return_height: float = 15.0
+    return_climb_min: float = 0.0
+    return_cone: float = 3.0
+    return_speed: float = 10.0
+    return_wait: Ns = 5 * S
+    return_final: float = 0.0
+    """Height at which it stays over home; 0: it lands."""
+
+    pilot_up: float = 2.5
+    pilot_down: float = 2.5
+    pilot_accel_z: float = 2.5
+    pilot_yaw_rate: float = radians(202.5)
+    throttle_dead: float = 0.1
+    """Half of the throttle's dead zone about its middle, on its scale of 0..1."""
+    hover_throttle: float = 0.39
+
+    loiter_speed: float = 12.5
+    loiter_accel: float = 5.0
+    loiter_tilt: float = radians(20.0)
+    loiter_brake: float = 2.5
+    loiter_brake_delay: Ns = S
+
+    circle_radius: float = 10.0
+    circle_rate: float = radians(20.0)
+
+    target_timeout: Ns = 3 * S

@@ -1,0 +1,179 @@
+"""The landed detector of a multirotor: motors at their lower limit and nothing moves for a second.
+
+The rule is ArduCopter's as documented: while flying, lower limit and acceleration below 1 m/s^2 and vertical
+speed below 1 m/s for one second; on the ground, flight begins when the collective leaves the lower half of
+hover.
+
+Attitude and rate loops and the motor mixer of a multirotor: every grid step.
+
+Attitude error as a quaternion, square-root limited into rates; a PID on each rate with its derivative on the
+measurement; motors mixed so that roll and pitch come before yaw and yaw before collective. Motor output is
+linear in thrust through ArduPilot's thrust curve (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX: documented
+parameters).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from numba import njit
+
+from volery.simulation.autopilots.flight_stack.flight_layout import (
+    IDLE,
+    K_ACCEL,
+    K_ACCEL_SMOOTH,
+    K_ATTITUDE,
+    K_DEMAND,
+    K_HOVER,
+    K_LANDED,
+    K_LANDED_FOR,
+    K_LOWER_LIMIT,
+    K_MOTORS,
+    K_RATE_BEFORE,
+    K_RATE_INTEGRAL,
+    K_RATE_SLOPE,
+    K_RATES,
+    K_SPOOL,
+    K_THROTTLE,
+    K_VELOCITY,
+    K_YAW_SPEED,
+    OFF,
+)
+from volery.simulation.autopilots.flight_stack.guidance import approach
+from volery.simulation.world.arithmetic import clip
+from volery.simulation.world.body_step import STEP_S
+from volery.simulation.world.state_layout import P_ROTOR_SPIN, P_ROTOR_X, P_ROTOR_Y, Array
+
+_PERIOD = 0.01  # [s]
+_SURE = 1.0  # [s]
+
+
+@njit(cache=False)
+def detect_landing(row: Array, control: int) -> None:
+    """One guidance period of the detector."""
+    motion = 0.0
+    for axis in range(3):
+        smooth = row[K_ACCEL_SMOOTH + axis]
+        smooth += 0.06 * (row[K_ACCEL + axis] - smooth)  # 1 Hz
+        row[K_ACCEL_SMOOTH + axis] = smooth
+        motion += smooth * smooth
+    if row[K_LANDED] > 0.5:
+        row[K_LANDED_FOR] = 0.0
+        flying = control not in (OFF, IDLE) and row[K_SPOOL] >= 1.0
+        if flying and row[K_THROTTLE] > 0.8 * row[K_HOVER]:
+            row[K_LANDED] = 0.0
+        return
+    quiet = motion < 1.0 and abs(row[K_VELOCITY + 2]) < 1.0
+    low = row[K_LOWER_LIMIT] > 0.5 or row[K_THROTTLE] < 0.3 * row[K_HOVER]
+    if quiet and low:
+        row[K_LANDED_FOR] += _PERIOD
+        if row[K_LANDED_FOR] >= _SURE:
+            row[K_LANDED] = 1.0
+    else:
+        row[K_LANDED_FOR] = 0.0
+
+
+_ATTITUDE_GAIN = 4.5  # [1/s]
+_YAW_GAIN = 4.0  # [1/s]
+_TILT_BRAKE = 19.2  # [rad/s^2]: 1100 degrees
+_YAW_BRAKE = 4.7  # [rad/s^2]: 270 degrees
+_TOP_RATE = 3.84  # [rad/s]: 220 degrees
+_P = (0.11, 0.11, 0.5)
+_I = (0.11, 0.11, 0.05)
+_D = (0.0022, 0.0022, 0.0)
+_I_MOST = 0.25
+_SLOPE_FILTER = 0.2  # share of a new sample: 20 Hz
+_SPIN_ARM = 0.10
+_SPIN_MIN = 0.15
+_SPIN_MAX = 0.95
+_EXPO = 0.65
+_SPOOL_TIME = 0.5  # [s]
+_YAW_ROOM = 0.2  # of full thrust that yaw may always have
+
+
+@njit(cache=False)
+def _rate_targets(row: Array) -> tuple[float, float, float]:
+    """Rates that turn the attitude into the demanded one, forward, right, down [rad/s]."""
+    w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
+    tw, tx, ty, tz = row[K_DEMAND], row[K_DEMAND + 1], row[K_DEMAND + 2], row[K_DEMAND + 3]
+    ew = w * tw + x * tx + y * ty + z * tz
+    sign = 2.0 if ew >= 0.0 else -2.0
+    roll = sign * (w * tx - x * tw - y * tz + z * ty)
+    pitch = sign * (w * ty + x * tz - y * tw - z * tx)
+    yaw = sign * (w * tz - x * ty + y * tx - z * tw)
+    return (
+        clip(approach(roll, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
+        clip(approach(pitch, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
+        clip(approach(yaw, _YAW_GAIN, _YAW_BRAKE) + row[K_YAW_SPEED], -_TOP_RATE, _TOP_RATE),
+    )
+
+
+@njit(cache=False)
+def _torque(row: Array, axis: int, wanted: float) -> float:
+    """One rate's PID: a share of full thrust by which motors are to differ."""
+    rate = row[K_RATES + axis]
+    error = wanted - rate
+    if row[K_LANDED] > 0.5 or row[K_SPOOL] < 1.0:
+        row[K_RATE_INTEGRAL + axis] *= 1.0 - STEP_S / 0.2
+    else:
+        grown = row[K_RATE_INTEGRAL + axis] + _I[axis] * error * STEP_S
+        row[K_RATE_INTEGRAL + axis] = clip(grown, -_I_MOST, _I_MOST)
+    slope = (rate - row[K_RATE_BEFORE + axis]) / STEP_S
+    row[K_RATE_BEFORE + axis] = rate
+    row[K_RATE_SLOPE + axis] += _SLOPE_FILTER * (slope - row[K_RATE_SLOPE + axis])
+    torque: float = _P[axis] * error + row[K_RATE_INTEGRAL + axis] - _D[axis] * row[K_RATE_SLOPE + axis]
+    return torque
+
+
+@njit(cache=False)
+def motor_output(thrust: float) -> float:
+    """Motor command 0..1 for a share of full thrust."""
+    linear = 1.0 - _EXPO
+    curve = (sqrt(linear * linear + 4.0 * _EXPO * clip(thrust, 0.0, 1.0)) - linear) / (2.0 * _EXPO)
+    return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * curve
+
+
+@njit(cache=False)
+def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
+    """Motor commands from three torques and the collective."""
+    reach = 1e-9
+    for i in range(4):
+        reach = max(reach, abs(row[P_ROTOR_X + i]), abs(row[P_ROTOR_Y + i]))
+    low, high = 0.0, 0.0
+    for i in range(4):
+        share = (roll * row[P_ROTOR_Y + i] + pitch * row[P_ROTOR_X + i]) / reach
+        row[K_MOTORS + i] = share
+        low, high = min(low, share), max(high, share)
+    scale = 1.0 if high - low <= 1.0 else 1.0 / (high - low)
+    low, high = low * scale, high * scale
+    wanted = row[K_THROTTLE] * row[K_SPOOL]
+    collective = clip(wanted, -low, max(1.0 - high, -low))
+    row[K_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
+    room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
+    yaw = clip(yaw, -room, room)
+    for i in range(4):
+        thrust = collective + scale * row[K_MOTORS + i] - yaw * row[P_ROTOR_SPIN + i]
+        row[K_MOTORS + i] = motor_output(thrust)
+
+
+@njit(cache=False)
+def run_attitude_loops(row: Array, control: int) -> None:
+    """One grid step of the inner loops: from the demanded attitude and collective to four motor commands."""
+    if control in (OFF, IDLE):
+        idle = _SPIN_ARM if control == IDLE else 0.0
+        for i in range(4):
+            row[K_MOTORS + i] = min(idle, row[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
+        for axis in range(3):
+            row[K_RATE_INTEGRAL + axis] = 0.0
+            row[K_RATE_BEFORE + axis] = row[K_RATES + axis]
+            row[K_RATE_SLOPE + axis] = 0.0
+        row[K_SPOOL] = 0.0
+        row[K_LOWER_LIMIT] = 1.0
+        return
+    row[K_SPOOL] = min(1.0, row[K_SPOOL] + STEP_S / _SPOOL_TIME)
+    roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
+    roll = _torque(row, 0, roll_rate)
+    pitch = _torque(row, 1, pitch_rate)
+    yaw = _torque(row, 2, yaw_rate)
+    spool = row[K_SPOOL]
+    _mix(row, roll * spool, pitch * spool, yaw * spool)

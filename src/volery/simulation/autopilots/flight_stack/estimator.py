@@ -1,0 +1,418 @@
+"""The estimator, compiled: what an autopilot believes, from its instruments alone.
+
+Attitude: gyros integrated every step; heading held by the compass; tilt held by what the velocity filter
+finds wrong with the acceleration (it takes an unknown lean for an acceleration that is not there), or by
+gravity itself while no satellites help. Position and velocity: one Kalman filter for each axis, of position,
+velocity and acceleration error (Gelb, Applied Optimal Estimation, 4.2), fed by satellites in the plane and by
+the barometer in height, or by satellites alone where they are the better (a real-time kinematic fix).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from numba import njit
+
+from volery.simulation.autopilots.flight_stack.flight_layout import (
+    C_AIDED,
+    K_ACCEL,
+    K_ACCEL_BIAS,
+    K_AIDED,
+    K_ALIGNED,
+    K_ATTITUDE,
+    K_COVARIANCE,
+    K_EULER,
+    K_GPS_AGE,
+    K_GPS_LEVEL,
+    K_GYRO_BIAS,
+    K_HEADING_ERROR,
+    K_HEIGHT_ZERO,
+    K_ORIGIN,
+    K_POSITION,
+    K_RATES,
+    K_SEEN_BARO,
+    K_SEEN_GPS,
+    K_SEEN_MAG,
+    K_SPREAD,
+    K_VELOCITY,
+)
+from volery.simulation.world.arithmetic import arc_tangent2, sine_cosine, wrap_angle
+from volery.simulation.world.body_step import STEP_S
+from volery.simulation.world.dynamics import rotation_matrix
+from volery.simulation.world.sensors import RTK_FIX
+from volery.simulation.world.state_layout import (
+    BARO,
+    GPS_HEIGHT,
+    GPS_LEVEL,
+    GPS_SPEED,
+    M_ACCEL,
+    M_BARO,
+    M_BARO_COUNT,
+    M_GPS,
+    M_GPS_COUNT,
+    M_GPS_FIX,
+    M_GPS_VELOCITY,
+    M_GYRO,
+    M_MAG,
+    M_MAG_COUNT,
+    P_FIELD,
+    P_GRAVITY,
+    P_PERFECT,
+    P_SENSOR,
+    S_ATTITUDE,
+    S_FORCE,
+    S_POSITION,
+    S_RATES,
+    S_VELOCITY,
+    SENSOR_SLOW,
+    SENSOR_WHITE,
+    W_BELIEF,
+    W_ROTATION,
+    W_TURN,
+    Array,
+)
+
+FUSE_EVERY = 25  # steps: 20 Hz, where the barometer's, the compass' and the receiver's samples fall
+_FUSE_S = FUSE_EVERY * STEP_S
+_HALF_ROOT = 0.7071067811865476
+_ACCEL_DENSITY = 0.03  # (m/s^2)^2/Hz that velocity may wander
+_BIAS_DENSITY = 0.0004  # (m/s^2)^2/s that the acceleration error may wander
+_TILT_GAIN = 0.5  # [1/s]
+_TILT_INTEGRAL = 0.01  # [1/s^2]
+_HEADING_GAIN = 0.4  # [1/s]
+_HEADING_INTEGRAL = 0.01  # [1/s^2]
+_GRAVITY_GAIN = 0.3  # [1/s] while nothing better is known
+_STALE = 1.0  # [s] after which a fix no longer holds the tilt
+
+
+@njit(cache=False)
+def _euler(row: Array) -> None:
+    """Roll, pitch and yaw of the estimated quaternion."""
+    w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
+    sine = min(max(2.0 * (w * y - z * x), -1.0), 1.0)
+    row[K_EULER] = arc_tangent2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    row[K_EULER + 1] = arc_tangent2(sine, sqrt(1.0 - sine * sine))
+    row[K_EULER + 2] = arc_tangent2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@njit(cache=False)
+def _turn_body(row: Array, x: float, y: float, z: float) -> None:
+    """Turn the attitude by a small angle about body axes [rad]."""
+    w0, x0, y0, z0 = (
+        row[K_ATTITUDE],
+        row[K_ATTITUDE + 1],
+        row[K_ATTITUDE + 2],
+        row[K_ATTITUDE + 3],
+    )
+    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+    w1 = w0 - x0 * x - y0 * y - z0 * z
+    x1 = x0 + w0 * x + y0 * z - z0 * y
+    y1 = y0 + w0 * y - x0 * z + z0 * x
+    z1 = z0 + w0 * z + x0 * y - y0 * x
+    scale = 1.5 - 0.5 * (w1 * w1 + x1 * x1 + y1 * y1 + z1 * z1)
+    row[K_ATTITUDE] = w1 * scale
+    row[K_ATTITUDE + 1] = x1 * scale
+    row[K_ATTITUDE + 2] = y1 * scale
+    row[K_ATTITUDE + 3] = z1 * scale
+
+
+@njit(cache=False)
+def _correct(row: Array, integral: float) -> None:
+    """Turn the attitude by *turn* about north, east, down and move the gyro bias the other way."""
+    for axis in range(3):
+        angle = (
+            row[W_BELIEF + axis] * row[W_TURN]
+            + row[W_BELIEF + 3 + axis] * row[W_TURN + 1]
+            + row[W_BELIEF + 6 + axis] * row[W_TURN + 2]
+        )
+        row[K_GYRO_BIAS + axis] -= integral * angle
+    bx = (
+        row[W_BELIEF] * row[W_TURN]
+        + row[W_BELIEF + 3] * row[W_TURN + 1]
+        + row[W_BELIEF + 6] * row[W_TURN + 2]
+    )
+    by = (
+        row[W_BELIEF + 1] * row[W_TURN]
+        + row[W_BELIEF + 4] * row[W_TURN + 1]
+        + row[W_BELIEF + 7] * row[W_TURN + 2]
+    )
+    bz = (
+        row[W_BELIEF + 2] * row[W_TURN]
+        + row[W_BELIEF + 5] * row[W_TURN + 1]
+        + row[W_BELIEF + 8] * row[W_TURN + 2]
+    )
+    _turn_body(row, bx, by, bz)
+
+
+@njit(cache=False)
+def _predict(row: Array) -> None:
+    """One grid step of dead reckoning."""
+    for axis in range(3):
+        row[K_RATES + axis] = row[M_GYRO + axis] - row[K_GYRO_BIAS + axis]
+    _turn_body(row, row[K_RATES] * STEP_S, row[K_RATES + 1] * STEP_S, row[K_RATES + 2] * STEP_S)
+    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
+    fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
+    aided = row[K_AIDED] > 0.5
+    for axis in range(3):
+        accel = (
+            row[W_BELIEF + 3 * axis] * fx
+            + row[W_BELIEF + 3 * axis + 1] * fy
+            + row[W_BELIEF + 3 * axis + 2] * fz
+        )
+        if axis == 2:
+            accel += row[P_GRAVITY]
+        accel += row[K_ACCEL_BIAS + axis]
+        row[K_ACCEL + axis] = accel
+        if axis == 2 or aided:
+            row[K_POSITION + axis] += (row[K_VELOCITY + axis] + 0.5 * accel * STEP_S) * STEP_S
+            row[K_VELOCITY + axis] += accel * STEP_S
+
+
+@njit(cache=False)
+def _spread(row: Array, axis: int) -> None:
+    """Propagate one axis' covariance (pp pv pb vv vb bb) over a fusion period."""
+    at = K_COVARIANCE + 6 * axis
+    t = _FUSE_S
+    pp, pv, pb = row[at], row[at + 1], row[at + 2]
+    vv, vb, bb = row[at + 3], row[at + 4], row[at + 5]
+    row[at] = pp + t * (2.0 * pv + t * (vv + pb + t * (vb + 0.25 * t * bb)))
+    row[at + 1] = pv + t * (vv + pb + t * (1.5 * vb + 0.5 * t * bb))
+    row[at + 2] = pb + t * (vb + 0.5 * t * bb)
+    row[at + 3] = vv + t * (2.0 * vb + t * bb) + _ACCEL_DENSITY * t
+    row[at + 4] = vb + t * bb
+    row[at + 5] = bb + _BIAS_DENSITY * t
+
+
+@njit(cache=False)
+def _fuse_position(row: Array, axis: int, innovation: float, variance: float) -> float:
+    """Kalman's update of one axis by a position; returns the innovation in sigmas."""
+    at = K_COVARIANCE + 6 * axis
+    pp, pv, pb = row[at], row[at + 1], row[at + 2]
+    total = pp + variance
+    gain_p, gain_v, gain_b = pp / total, pv / total, pb / total
+    row[K_POSITION + axis] += gain_p * innovation
+    row[K_VELOCITY + axis] += gain_v * innovation
+    row[K_ACCEL_BIAS + axis] += gain_b * innovation
+    row[at + 3] -= gain_v * pv
+    row[at + 4] -= gain_v * pb
+    row[at + 5] -= gain_b * pb
+    row[at] = (1.0 - gain_p) * pp
+    row[at + 1] = (1.0 - gain_p) * pv
+    row[at + 2] = (1.0 - gain_p) * pb
+    return abs(innovation) / sqrt(total)
+
+
+@njit(cache=False)
+def _fuse_velocity(row: Array, axis: int, innovation: float, variance: float) -> None:
+    """Kalman's update of one axis by a velocity."""
+    at = K_COVARIANCE + 6 * axis
+    pv, vv, vb = row[at + 1], row[at + 3], row[at + 4]
+    total = vv + variance
+    gain_p, gain_v, gain_b = pv / total, vv / total, vb / total
+    row[K_POSITION + axis] += gain_p * innovation
+    row[K_VELOCITY + axis] += gain_v * innovation
+    row[K_ACCEL_BIAS + axis] += gain_b * innovation
+    row[at] -= gain_p * pv
+    row[at + 2] -= gain_p * vb
+    row[at + 5] -= gain_b * vb
+    row[at + 1] = (1.0 - gain_v) * pv
+    row[at + 3] = (1.0 - gain_v) * vv
+    row[at + 4] = (1.0 - gain_v) * vb
+
+
+@njit(cache=False)
+def _variance(row: Array, sensor: int) -> float:
+    """What the instrument's maker declares: white and slow error together."""
+    white = row[P_SENSOR + 4 * sensor + SENSOR_WHITE]
+    slow = row[P_SENSOR + 4 * sensor + SENSOR_SLOW]
+    declared: float = white * white + slow * slow
+    return declared
+
+
+@njit(cache=False)
+def _trust(row: Array, axis: int, position: float, velocity: float) -> None:
+    """Start one axis' covariance with two variances."""
+    at = K_COVARIANCE + 6 * axis
+    for i in range(6):
+        row[at + i] = 0.0
+    row[at] = position
+    row[at + 3] = velocity
+    row[at + 5] = 0.04
+
+
+@njit(cache=False)
+def _aid(row: Array) -> None:
+    """Begin or end the use of satellites as told."""
+    wanted = row[C_AIDED] > 0.5
+    if wanted and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
+        row[K_AIDED] = 1.0
+        row[K_GPS_AGE] = 0.0
+        for axis in range(3):
+            row[K_POSITION + axis] = row[M_GPS + axis]
+            row[K_ORIGIN + axis] = row[M_GPS + axis]
+        for axis in range(2):
+            row[K_VELOCITY + axis] = row[M_GPS_VELOCITY + axis]
+            row[K_ACCEL_BIAS + axis] = 0.0
+            _trust(row, axis, _variance(row, GPS_LEVEL), _variance(row, GPS_SPEED))
+        row[K_HEIGHT_ZERO] = row[M_BARO] + row[M_GPS + 2]
+    if not wanted and row[K_AIDED] > 0.5:
+        row[K_AIDED] = 0.0
+        for axis in range(2):
+            row[K_VELOCITY + axis] = 0.0
+            row[K_ACCEL_BIAS + axis] = 0.0
+
+
+@njit(cache=False)
+def _hear_satellites(row: Array) -> None:
+    """Fuse a new fix, and let the tilt take over part of what the filter calls an acceleration error."""
+    level, speed = _variance(row, GPS_LEVEL), _variance(row, GPS_SPEED)
+    worst = 0.0
+    for axis in range(2):
+        missed = row[M_GPS + axis] - row[K_POSITION + axis]
+        worst = max(worst, _fuse_position(row, axis, missed, level))
+        _fuse_velocity(row, axis, row[M_GPS_VELOCITY + axis] - row[K_VELOCITY + axis], speed)
+    row[K_GPS_LEVEL] = worst
+    if row[M_GPS_FIX] >= RTK_FIX:
+        _fuse_position(row, 2, row[M_GPS + 2] - row[K_POSITION + 2], _variance(row, GPS_HEIGHT))
+        row[K_HEIGHT_ZERO] = row[M_BARO] + row[K_POSITION + 2]
+    _fuse_velocity(row, 2, row[M_GPS_VELOCITY + 2] - row[K_VELOCITY + 2], 4.0 * speed)
+    share = _TILT_GAIN * min(row[K_GPS_AGE], _STALE)
+    north, east = share * row[K_ACCEL_BIAS], share * row[K_ACCEL_BIAS + 1]
+    row[K_ACCEL_BIAS] -= north
+    row[K_ACCEL_BIAS + 1] -= east
+    row[W_TURN] = east / row[P_GRAVITY]
+    row[W_TURN + 1] = -north / row[P_GRAVITY]
+    row[W_TURN + 2] = 0.0
+    _correct(row, _TILT_INTEGRAL / _TILT_GAIN)
+    row[K_GPS_AGE] = 0.0
+
+
+@njit(cache=False)
+def _feel_gravity(row: Array, gravity: float) -> None:
+    """Without satellites: what the accelerometer calls up is up."""
+    fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
+    north = row[W_BELIEF] * fx + row[W_BELIEF + 1] * fy + row[W_BELIEF + 2] * fz
+    east = row[W_BELIEF + 3] * fx + row[W_BELIEF + 4] * fy + row[W_BELIEF + 5] * fz
+    share = _GRAVITY_GAIN * _FUSE_S / gravity
+    row[W_TURN] = -east * share
+    row[W_TURN + 1] = north * share
+    row[W_TURN + 2] = 0.0
+    _correct(row, 0.02)
+
+
+@njit(cache=False)
+def _hear_compass(row: Array) -> None:
+    """Turn towards the heading in which the measured field points as the earth's does here."""
+    mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
+    north = row[W_BELIEF] * mx + row[W_BELIEF + 1] * my + row[W_BELIEF + 2] * mz
+    east = row[W_BELIEF + 3] * mx + row[W_BELIEF + 4] * my + row[W_BELIEF + 5] * mz
+    declination = arc_tangent2(row[P_FIELD + 1], row[P_FIELD])
+    error = wrap_angle(arc_tangent2(east, north) - declination)
+    row[K_HEADING_ERROR] = error
+    row[W_TURN] = 0.0
+    row[W_TURN + 1] = 0.0
+    row[W_TURN + 2] = -_HEADING_GAIN * _FUSE_S * error
+    _correct(row, _HEADING_INTEGRAL / _HEADING_GAIN)
+
+
+@njit(cache=False)
+def _fuse(row: Array) -> None:
+    """What falls due twenty times a second."""
+    _aid(row)
+    row[K_GPS_AGE] += _FUSE_S
+    for axis in range(3):
+        if axis == 2 or row[K_AIDED] > 0.5:
+            _spread(row, axis)
+    if row[M_BARO_COUNT] != row[K_SEEN_BARO]:
+        row[K_SEEN_BARO] = row[M_BARO_COUNT]
+        if not (row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5):
+            missed = row[K_HEIGHT_ZERO] - row[M_BARO] - row[K_POSITION + 2]
+            _fuse_position(row, 2, missed, _variance(row, BARO))
+    if row[M_MAG_COUNT] != row[K_SEEN_MAG]:
+        row[K_SEEN_MAG] = row[M_MAG_COUNT]
+        _hear_compass(row)
+    if row[M_GPS_COUNT] != row[K_SEEN_GPS] and row[K_AIDED] > 0.5:
+        row[K_SEEN_GPS] = row[M_GPS_COUNT]
+        _hear_satellites(row)
+    if row[K_AIDED] < 0.5 or row[K_GPS_AGE] > _STALE:
+        _feel_gravity(row, row[P_GRAVITY])
+    for index in range(2):
+        at = K_COVARIANCE + 12 * index
+        row[K_SPREAD + index] = sqrt(max(row[at], 0.0))
+        row[K_SPREAD + 2 + index] = sqrt(max(row[at + 3], 0.0))
+
+
+@njit(cache=False)
+def _align(row: Array) -> None:
+    """The first attitude: level by the accelerometer, heading by the compass."""
+    fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
+    roll = arc_tangent2(-fy, -fz)
+    pitch = arc_tangent2(fx, sqrt(fy * fy + fz * fz))
+    sr, cr = sine_cosine(0.5 * roll)
+    sp, cp = sine_cosine(0.5 * pitch)
+    row[K_ATTITUDE] = cr * cp
+    row[K_ATTITUDE + 1] = sr * cp
+    row[K_ATTITUDE + 2] = cr * sp
+    row[K_ATTITUDE + 3] = -sr * sp
+    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
+    mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
+    north = row[W_BELIEF] * mx + row[W_BELIEF + 1] * my + row[W_BELIEF + 2] * mz
+    east = row[W_BELIEF + 3] * mx + row[W_BELIEF + 4] * my + row[W_BELIEF + 5] * mz
+    yaw = arc_tangent2(row[P_FIELD + 1], row[P_FIELD]) - arc_tangent2(east, north)
+    sy, cy = sine_cosine(0.5 * yaw)
+    row[K_ATTITUDE] = cr * cp * cy + sr * sp * sy
+    row[K_ATTITUDE + 1] = sr * cp * cy - cr * sp * sy
+    row[K_ATTITUDE + 2] = cr * sp * cy + sr * cp * sy
+    row[K_ATTITUDE + 3] = cr * cp * sy - sr * sp * cy
+    row[K_ALIGNED] = 1.0
+
+
+@njit(cache=False)
+def _know(row: Array) -> None:
+    """The belief of a vehicle with perfect instruments: the truth, in the autopilot's axes."""
+    for axis in range(3):
+        source = 1 - axis if axis < 2 else 2
+        sign = 1.0 if axis < 2 else -1.0
+        row[K_POSITION + axis] = sign * row[S_POSITION + source]
+        row[K_VELOCITY + axis] = sign * row[S_VELOCITY + source]
+        force = 0.0
+        for body_axis in range(3):
+            force += row[W_ROTATION + 3 * source + body_axis] * row[S_FORCE + body_axis]
+        gravity = row[P_GRAVITY] if axis == 2 else 0.0
+        row[K_ACCEL + axis] = sign * force + gravity
+        row[K_RATES + axis] = row[S_RATES + axis] if axis == 0 else -row[S_RATES + axis]
+    w, x, y, z = row[S_ATTITUDE], row[S_ATTITUDE + 1], row[S_ATTITUDE + 2], row[S_ATTITUDE + 3]
+    row[K_ATTITUDE] = _HALF_ROOT * (w + z)
+    row[K_ATTITUDE + 1] = _HALF_ROOT * (x + y)
+    row[K_ATTITUDE + 2] = _HALF_ROOT * (x - y)
+    row[K_ATTITUDE + 3] = _HALF_ROOT * (w - z)
+    row[K_ALIGNED] = 1.0
+    row[K_GPS_AGE] = 0.0
+    if row[C_AIDED] > 0.5 and row[K_AIDED] < 0.5:
+        for axis in range(3):
+            row[K_ORIGIN + axis] = row[K_POSITION + axis]
+    row[K_AIDED] = row[C_AIDED]
+
+
+@njit(cache=False)
+def initialise_estimate(row: Array) -> None:
+    """What the estimator makes of the first samples."""
+    if row[P_PERFECT] > 0.5:
+        _know(row)
+    else:
+        _align(row)
+        row[K_HEIGHT_ZERO] = row[M_BARO]
+        _trust(row, 2, _variance(row, BARO), 0.01)
+    _euler(row)
+
+
+@njit(cache=False)
+def update_estimate(row: Array, k: int) -> None:
+    """The estimate of grid step *k*, just reached."""
+    if row[P_PERFECT] > 0.5:
+        _know(row)
+    else:
+        _predict(row)
+        if k % FUSE_EVERY == 0:
+            _fuse(row)
+    _euler(row)

@@ -1,0 +1,346 @@
+"""Fly the mission on board: one leg for each item that navigates, actions between them, conditions that
+hold actions.
+
+Actions between two legs are done when the first of the legs ends. A condition lets the next leg begin and
+holds back only the actions that follow it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin, sqrt
+
+from volery.base.frames import Vector
+from volery.base.time import Ns, from_seconds
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff, ToPoint, bearing
+from volery.simulation.autopilots.mode import Manoeuvre
+from volery.simulation.autopilots.onboard_mission import (
+    CONDITION_DELAY,
+    CONDITION_DISTANCE,
+    DELAY,
+    JUMP,
+    LAND,
+    LOITER_TIME,
+    LOITER_TURNS,
+    LOITER_UNLIMITED,
+    RETURN,
+    SPLINE_WAYPOINT,
+    TAKEOFF,
+    WAYPOINT,
+    MissionItem,
+)
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+FOREVER = -1
+
+
+@dataclass
+class Leg:
+    """A manoeuvre, when it is done, and how long to stay then."""
+
+    manoeuvre: Manoeuvre
+    done: Callable[[], bool]
+    stay: Ns = 0
+
+
+MakeLeg = Callable[[Vehicle, MissionItem, bool], Leg]
+"""Vehicle, item, whether the mission goes on to a waypoint without a stop."""
+
+
+class FlyMission(Manoeuvre):
+    """Runs the vehicle's plan from its current item."""
+
+    slow_start = True
+
+    def __init__(
+        self, vehicle: Vehicle, make_leg: MakeLeg, leaves_ground: Callable[[Vehicle], bool] | None = None
+    ) -> None:
+        super().__init__(vehicle)
+        self._make_leg = make_leg
+        self._leaves_ground = leaves_ground
+        self._leg: Leg | None = None
+        self._flown = (0, MissionItem(WAYPOINT))
+        """Index and item of the leg: an upload may replace the plan meanwhile."""
+        self._reached_at: Ns | None = None
+        self._jumps: dict[int, int] = {}
+        self._held: deque[MissionItem] = deque()
+        self._condition_since: Ns = 0
+        self.started = False
+        """Whether it may leave the ground: a station started the mission, or *leaves_ground* said so."""
+
+    def enter(self) -> None:
+        """Wait for the next step: the mission begins once the vehicle is armed."""
+        self._leg = None
+        self.started = self.started or (self.vehicle.armed and not self.vehicle.landed)
+
+    def start(self) -> None:
+        """It may leave the ground; begin if it is armed."""
+        self.started = True
+        if self.vehicle.armed and self._leg is None:
+            self._begin_current()
+
+    def wants_to_fly(self) -> bool:
+        """If its leg does and it may."""
+        if not self.started and self._leaves_ground is not None:
+            self.started = self._leaves_ground(self.vehicle)
+        if self._leg is None:
+            self._begin_current()
+        return self.started and self._leg is not None and self._leg.manoeuvre.wants_to_fly()
+
+    def step(self) -> None:
+        """Go on with the leg; when it is done, to the next."""
+        self._progress()
+        if self._leg is not None and self.vehicle.armed and not self.vehicle.landed:
+            self._leg.manoeuvre.step()
+            self._mirror(self._leg.manoeuvre)
+
+    def on_ground(self) -> None:
+        """A leg may end on the ground."""
+        self._progress()
+
+    def item_chosen(self) -> None:
+        """Another item is current: begin it at the next step."""
+        self._leg = None
+
+    def _progress(self) -> None:
+        if self._leg is None:
+            self._begin_current()
+        leg, now = self._leg, self.vehicle.kernel.now()
+        if leg is None:
+            return
+        self._run_held()
+        if self._reached_at is None and leg.done():
+            self._reached_at = now
+        if self._reached_at is not None and leg.stay >= 0 and now - self._reached_at >= leg.stay:
+            self._finish()
+
+    def _mirror(self, manoeuvre: Manoeuvre) -> None:
+        self.target, self.landing, self.taking_off = manoeuvre.target, manoeuvre.landing, manoeuvre.taking_off
+
+    # -- from item to item
+
+    def _begin_current(self) -> None:
+        plan = self.vehicle.plan
+        if len(plan) and not plan.complete:
+            self._advance_to(max(self.vehicle.dialect.first_item, plan.current))
+
+    def _finish(self) -> None:
+        index, item = self._flown
+        self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
+        self._advance_to(index + 1)
+
+    def _advance_to(self, index: int) -> None:
+        vehicle, plan = self.vehicle, self.vehicle.plan
+        self._leg = None
+        self._held.clear()
+        for _ in range(len(plan) + 100):  # jumps may go in circles: without a leg between them, for ever
+            if index >= len(plan):
+                break
+            item = plan[index]
+            if item.navigates:
+                self._begin(index, item)
+                return
+            index = self._act(index, item)
+        plan.complete = True
+        plan.current = 0
+        vehicle.dialect.mission_ended(vehicle)
+
+    def _begin(self, index: int, item: MissionItem) -> None:
+        vehicle = self.vehicle
+        vehicle.plan.current = index
+        vehicle.dialect.mission_item_begins(vehicle, index, item)
+        self._flown = index, item
+        self._leg = self._make_leg(vehicle, item, self._goes_on(index))
+        self._reached_at = None
+        self._leg.manoeuvre.enter()
+        self._mirror(self._leg.manoeuvre)
+
+    def _goes_on(self, index: int) -> bool:
+        """Whether the next item that navigates is a waypoint and this one asks for no stop."""
+        plan = self.vehicle.plan
+        following = next((item for item in plan.items[index + 1 :] if item.navigates), None)
+        stops = plan[index].param1 > 0.0
+        return following is not None and following.command in (WAYPOINT, SPLINE_WAYPOINT) and not stops
+
+    # -- actions
+
+    def _act(self, index: int, item: MissionItem) -> int:
+        """Do an item that does not navigate; returns the index of the next."""
+        if item.command == JUMP:
+            return self._jump(index, item)
+        if item.is_condition or self._held:
+            if not self._held:
+                self._condition_since = self.vehicle.kernel.now()
+            self._held.append(item)
+        else:
+            self._do(item)
+            if self.vehicle.dialect.actions_count:
+                self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
+        return index + 1
+
+    def _jump(self, index: int, item: MissionItem) -> int:
+        done = self._jumps.get(index, 0)
+        if item.param2 != FOREVER and done >= item.param2:
+            return index + 1
+        self._jumps[index] = done + 1
+        return max(self.vehicle.dialect.first_item, round(item.param1))
+
+    def _do(self, item: MissionItem) -> None:
+        self.vehicle.dialect.mission_action(self.vehicle, item)
+
+    def _run_held(self) -> None:
+        while self._held:
+            item = self._held[0]
+            if item.is_condition and not self._met(item):
+                return
+            self._held.popleft()
+            self._condition_since = self.vehicle.kernel.now()
+            if not item.is_condition or item.command not in (CONDITION_DELAY, CONDITION_DISTANCE):
+                self._do(item)
+
+    def _met(self, item: MissionItem) -> bool:
+        if item.command == CONDITION_DELAY:
+            return self.vehicle.kernel.now() - self._condition_since >= from_seconds(item.param1)
+        if item.command == CONDITION_DISTANCE and self._leg is not None:
+            return self._leg.manoeuvre.distance() <= item.param1
+        return True
+
+
+class Circle(Manoeuvre):
+    """Turns about a centre at a height, at a turn rate; negative: anticlockwise."""
+
+    def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, rate: float) -> None:
+        super().__init__(vehicle)
+        self._centre, self._radius, self._rate = centre, max(1.0, radius), rate
+        self._angle = 0.0
+        self.turned = 0.0
+        """Radians so far."""
+
+    def enter(self) -> None:
+        """From where it is."""
+        self.target = self._centre
+        self._angle = self._bearing()
+
+    def _bearing(self) -> float:
+        north, east, _ = self.vehicle.estimate.position
+        return atan2(east - self._centre[1], north - self._centre[0])
+
+    def step(self) -> None:
+        """Along the tangent, with a pull to the circle."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        north, east, _ = vehicle.estimate.position
+        angle = self._bearing()
+        passed = (angle - self._angle + pi) % (2.0 * pi) - pi
+        self._angle = angle
+        away = hypot(north - self._centre[0], east - self._centre[1])
+        pull = self._radius - away
+        if abs(pull) < 0.5 * self._radius:
+            self.turned += abs(passed)
+        fastest = sqrt(tuning.accel * self._radius)  # faster, and it could not stay on the circle
+        along = max(-fastest, min(fastest, self._rate * self._radius))
+        velocity = (pull * cos(angle) - along * sin(angle), pull * sin(angle) + along * cos(angle), 0.0)
+        vehicle.drive(
+            Setpoint(
+                Control.VELOCITY_HEIGHT,
+                position=self._centre,
+                velocity=velocity,
+                yaw=(angle + pi) if vehicle.yaw_target is None else vehicle.yaw_target,
+                speed=vehicle.speed or tuning.speed,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+# --- legs of a multirotor ----------------------------------------------------------------------------------
+
+
+def item_point(vehicle: Vehicle, item: MissionItem) -> Vector:
+    """Where an item is; where it gives no place or no height, the vehicle's own."""
+    here = vehicle.estimate.position
+    point = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
+    if not item.has_place:
+        return here[0], here[1], (point_height(vehicle, item) if item.z else here[2])
+    return point if item.z else (point[0], point[1], here[2])
+
+
+def point_height(vehicle: Vehicle, item: MissionItem) -> float:
+    """The item's altitude as down about the estimator's origin."""
+    latitude, longitude, _ = vehicle.estimate.geodetic
+    return vehicle.point(item.frame, latitude, longitude, item.z)[2]
+
+
+def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+    """The leg of a multirotor for an item that navigates."""
+    if item.command == TAKEOFF:
+        return _take_off(vehicle, item)
+    if item.command == LAND:
+        return Leg(
+            LandAt(vehicle, item_point(vehicle, item) if item.has_place else None), lambda: vehicle.landed
+        )
+    if item.command == RETURN:
+        return Leg(Return(vehicle), lambda: vehicle.landed)
+    if item.command == LOITER_TURNS:
+        return _turns(vehicle, item)
+    if item.command == DELAY:
+        waiting = ToPoint(vehicle)
+        return Leg(waiting, lambda: True, from_seconds(max(0.0, item.param1)))
+    return _go(vehicle, item, goes_on)
+
+
+def _take_off(vehicle: Vehicle, item: MissionItem) -> Leg:
+    home = vehicle.home.ned[2] if vehicle.home else 0.0
+    climbing = TakeOff(vehicle, home - point_height(vehicle, item))
+    return Leg(climbing, climbing.arrived)
+
+
+def _go(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+    point = item_point(vehicle, item)
+    here = vehicle.estimate.position
+    away = hypot(point[0] - here[0], point[1] - here[1])
+    facing = (
+        bearing(here, point) if vehicle.tuning.face_path and away > vehicle.tuning.waypoint_radius else None
+    )
+    going = ToPoint(vehicle, point, facing)
+    stay = from_seconds(max(0.0, item.param1)) if item.command in (WAYPOINT, LOITER_TIME) else 0
+    if item.command == LOITER_UNLIMITED:
+        stay = FOREVER
+    return Leg(going, lambda: going.arrived(passing=goes_on), stay)
+
+
+def _turns(vehicle: Vehicle, item: MissionItem) -> Leg:
+    tuning = vehicle.tuning
+    radius = abs(item.param3) or tuning.circle_radius
+    rate = tuning.circle_rate * (-1.0 if item.param3 < 0.0 else 1.0)
+    circling = Circle(vehicle, item_point(vehicle, item), radius, rate)
+    return Leg(circling, lambda: circling.turned >= 2.0 * pi * item.param1)
+
+
+class LandAt(Manoeuvre):
+    """Fly level to a place, then land there; without a place, here."""
+
+    def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
+        super().__init__(vehicle)
+        self._landing = Land(vehicle, point)
+        self._going: ToPoint | None = None
+        if point is not None:
+            self._going = ToPoint(vehicle, (point[0], point[1], vehicle.estimate.position[2]))
+
+    def enter(self) -> None:
+        """Begin with whichever comes first."""
+        (self._going or self._landing).enter()
+        self.target = self._going.target if self._going else None
+        self.landing = self._going is None
+
+    def step(self) -> None:
+        """Go, then sink."""
+        if self._going is not None and self._going.arrived():
+            self._going = None
+            self._landing.enter()
+            self.target = None
+            self.landing = True
+        (self._going or self._landing).step()

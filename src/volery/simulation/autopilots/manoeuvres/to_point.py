@@ -1,0 +1,259 @@
+"""Manoeuvres of a multirotor towards a point: take off, hold, go, land, return, brake."""
+
+from __future__ import annotations
+
+from math import atan2, dist, hypot, sqrt
+
+from volery.base.frames import Vector
+from volery.base.time import Ns
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.mode import Manoeuvre
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+CLOSE = 0.1
+"""Metres within which a height or a shaped target counts as there."""
+
+SLOW = 0.05
+"""Metres per second below which it counts as standing still."""
+
+
+def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
+    """The speed [m/s] from which one can stop within *distance* [m] at *accel* [m/s^2].
+
+    Proportional by *gain* [1/s] close to the end, the square root of the distance beyond: the shape of the
+    position controllers of ArduPilot (its documentation calls it the square-root controller).
+    """
+    bend = accel / gain**2
+    if distance <= bend:
+        return max(0.0, distance) * gain
+    return sqrt(2.0 * accel * (distance - bend / 2.0))
+
+
+def stopping_distance(speed: float, accel: float, gain: float = 1.0) -> float:
+    """Metres [m] in which it comes to rest: the inverse of ``root_speed``."""
+    bend = accel / gain
+    return speed / gain if speed <= bend else speed**2 / (2.0 * accel) + bend / (2.0 * gain)
+
+
+def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: float) -> Vector:
+    """Where a vehicle comes to rest that brakes at *accel* in the plane and *accel_z* [m/s^2] up and down."""
+    north, east, down = velocity
+    speed = hypot(north, east)
+    share = stopping_distance(speed, accel) / speed if speed > SLOW else 0.0
+    fall = stopping_distance(abs(down), accel_z) if abs(down) > SLOW else 0.0
+    return (
+        position[0] + north * share,
+        position[1] + east * share,
+        position[2] + (fall if down > 0.0 else -fall),
+    )
+
+
+def bearing(start: Vector, end: Vector) -> float:
+    """Radians clockwise from north."""
+    return atan2(end[1] - start[1], end[0] - start[0])
+
+
+class ToPoint(Manoeuvre):
+    """Go to a point with limited speed and stay there. Without a point: stop and stay."""
+
+    def __init__(self, vehicle: Vehicle, point: Vector | None = None, yaw: float | None = None) -> None:
+        super().__init__(vehicle)
+        self.point = point
+        self.yaw = yaw
+        self.speed: float | None = None
+
+    def enter(self) -> None:
+        """Where no point was given it is where the vehicle can stop."""
+        if self.point is None:
+            estimate = self.vehicle.estimate
+            tuning = self.vehicle.tuning
+            self.point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
+        else:
+            self.target = self.point
+
+    def step(self) -> None:
+        """Drive there."""
+        if self.point is not None:
+            self.vehicle.drive(self.towards(self.point))
+
+    def towards(self, point: Vector) -> Setpoint:
+        """The set-point for a point, with the limits that hold now."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        return Setpoint(
+            Control.POSITION,
+            position=point,
+            yaw=self.yaw if vehicle.yaw_target is None else vehicle.yaw_target,
+            speed=self.speed or vehicle.speed or tuning.speed,
+            speed_up=vehicle.speed_up or tuning.speed_up,
+            speed_down=vehicle.speed_down or tuning.speed_down,
+            accel=tuning.accel,
+            accel_z=tuning.accel_z,
+            tilt=tuning.tilt,
+        )
+
+    def arrived(self, passing: bool = False) -> bool:
+        """Whether the vehicle is there: the path to it has ended, or it flies past within the radius."""
+        if self.point is None:
+            return True
+        estimate, radius = self.vehicle.estimate, self.vehicle.tuning.waypoint_radius
+        near = dist(estimate.position, self.point) < radius
+        return near and (passing or dist(estimate.target, self.point) < CLOSE)
+
+
+class TakeOff(ToPoint):
+    """Straight up to a height above home."""
+
+    taking_off = True
+    slow_start = True
+
+    def __init__(self, vehicle: Vehicle, height: float) -> None:
+        super().__init__(vehicle)
+        self.height = height
+
+    def enter(self) -> None:
+        """From where it stands."""
+        north, east, _ = self.vehicle.estimate.position
+        home = self.vehicle.home
+        self.point = (north, east, (home.ned[2] if home else 0.0) - self.height)
+
+    def wants_to_fly(self) -> bool:
+        """That is what it is for."""
+        return True
+
+    def arrived(self, passing: bool = False) -> bool:
+        """Within a decimetre of the height, or above it."""
+        return self.vehicle.height > self.height - CLOSE
+
+
+class Land(Manoeuvre):
+    """Straight down: fast while high, slowly near the ground. Without a position it sinks level."""
+
+    landing = True
+
+    def __init__(self, vehicle: Vehicle, point: Vector | None = None) -> None:
+        super().__init__(vehicle)
+        self.point = point
+
+    def enter(self) -> None:
+        """Above the point, or where the vehicle can stop."""
+        if self.point is None:
+            estimate = self.vehicle.estimate
+            tuning = self.vehicle.tuning
+            self.point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
+
+    def sink(self) -> float:
+        """Metres per second down at the present height."""
+        tuning = self.vehicle.tuning
+        above = self.vehicle.height - tuning.land_slow_below
+        return max(tuning.land_speed, min(tuning.land_speed_high, root_speed(above, tuning.accel_z)))
+
+    def step(self) -> None:
+        """Sink over the point."""
+        vehicle, tuning, sink = self.vehicle, self.vehicle.tuning, self.sink()
+        if not vehicle.has_position or self.point is None:
+            vehicle.drive(Setpoint(Control.CLIMB, climb=-sink, speed_down=sink, accel_z=tuning.accel_z))
+            return
+        vehicle.drive(
+            Setpoint(
+                Control.POSITION_CLIMB,
+                position=self.point,
+                climb=-sink,
+                yaw=vehicle.yaw_target,
+                speed=tuning.speed,
+                speed_down=max(tuning.land_speed_high, sink),
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+class Return(Manoeuvre):
+    """Climb, fly home, wait, land: each stage is a manoeuvre of its own."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._stage: Manoeuvre = ToPoint(vehicle)
+        self._name = ""
+        self._home: Vector = (0.0, 0.0, 0.0)
+        self._waiting_since: Ns = 0
+
+    def enter(self) -> None:
+        """Straight up first, to the height of the return."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        ground = vehicle.home.ned if vehicle.home else (0.0, 0.0, 0.0)
+        estimate = vehicle.estimate
+        here = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
+        away = hypot(ground[0] - here[0], ground[1] - here[1])
+        height = max(vehicle.height + tuning.return_climb_min, self._climb(vehicle.height, away))
+        self._home = (ground[0], ground[1], ground[2] - height)
+        self._to("climb", ToPoint(vehicle, (here[0], here[1], ground[2] - height)))
+
+    def _climb(self, height: float, away: float) -> float:
+        """Height of the return: lower within a cone about home."""
+        tuning = self.vehicle.tuning
+        wanted = tuning.return_height
+        if tuning.return_cone > 0.0:
+            wanted = min(wanted, max(away * tuning.return_cone, 2.0))
+        return max(height, wanted)
+
+    def _to(self, name: str, stage: Manoeuvre) -> None:
+        self._name, self._stage = name, stage
+        if isinstance(stage, ToPoint) and name != "climb":
+            stage.speed = self.vehicle.tuning.return_speed
+        stage.enter()
+        self.target = stage.target if name in ("fly", "climb") else None
+        self.landing = stage.landing
+
+    def step(self) -> None:
+        """Go on to the next stage when one is done."""
+        stage, now = self._stage, self.vehicle.kernel.now()
+        if self._name == "climb" and self._near(stage):
+            self._to("fly", ToPoint(self.vehicle, self._home))
+        elif self._name == "fly" and isinstance(stage, ToPoint) and stage.arrived():
+            self._waiting_since = now
+            self._to("wait", ToPoint(self.vehicle, self._home))
+        elif self._name == "wait" and now - self._waiting_since >= self.vehicle.tuning.return_wait:
+            self._finish()
+        self._stage.step()
+
+    def _near(self, stage: Manoeuvre) -> bool:
+        return isinstance(stage, ToPoint) and stage.arrived(passing=True)
+
+    def _finish(self) -> None:
+        final = self.vehicle.tuning.return_final
+        north, east, down = self._home
+        if final > 0.0:
+            ground = self.vehicle.home.ned[2] if self.vehicle.home else 0.0
+            self._to("final", ToPoint(self.vehicle, (north, east, ground - final)))
+        else:
+            self._to("land", Land(self.vehicle, (north, east, down)))
+
+
+class Brake(Manoeuvre):
+    """Stop as fast as it may, and stay there."""
+
+    ACCEL = 7.5
+    """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
+    STANDS = 0.3
+    """Speed [m/s] below which it holds its place."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._held: Vector | None = None
+
+    def step(self) -> None:
+        """No speed, then a place."""
+        estimate, tuning = self.vehicle.estimate, self.vehicle.tuning
+        north, east, _ = estimate.velocity
+        if self._held is None and hypot(north, east) < self.STANDS:
+            self._held = estimate.target
+        self.vehicle.drive(
+            Setpoint(
+                Control.VELOCITY if self._held is None else Control.POSITION,
+                position=self._held or (0.0, 0.0, 0.0),
+                accel=self.ACCEL,
+                accel_z=tuning.pilot_accel_z,
+                tilt=tuning.tilt,
+            )
+        )

@@ -1,0 +1,135 @@
+"""What the pilot's sticks say: a transmitter that is always there, and overrides that expire.
+
+Channels count from 1; a value is the pulse width in microseconds, 0 where the receiver has none. An
+override replaces one channel of the transmitter until it is released or has not been repeated for the
+override time. Deflections are worked out from the channel's own minimum, trim, maximum and dead zone. Knows
+no message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from volery.base.time import Ns
+
+NEVER: Ns = -(1 << 62)
+
+
+class ChannelRange(NamedTuple):
+    """How a channel's pulse widths are meant: ends, middle and dead zone in microseconds."""
+
+    low: float
+    trim: float
+    high: float
+    dead: float
+    reversed: bool = False
+
+    def deflection(self, pulse: float) -> float:
+        """-1..1 about the trim; 0 within the dead zone."""
+        upper, lower = self.trim + self.dead, self.trim - self.dead
+        sign = -1.0 if self.reversed else 1.0
+        if pulse > upper and self.high > upper:
+            return sign * min(1.0, (pulse - upper) / (self.high - upper))
+        if pulse < lower and lower > self.low:
+            return sign * max(-1.0, (pulse - lower) / (lower - self.low))
+        return 0.0
+
+    def share(self, pulse: float) -> float:
+        """0..1 between the ends, with the dead zone at the low end: a throttle."""
+        start = self.low + self.dead
+        if self.high <= start:
+            return 0.0
+        within = min(max(pulse, self.low), self.high)
+        if self.reversed:
+            within = self.low + self.high - within
+        return max(0.0, (within - start) / (self.high - start))
+
+    def pulse(self, share: float) -> int:
+        """The pulse width that lies at *share* (0..1) between the ends."""
+        along = 1.0 - share if self.reversed else share
+        return int(self.low + (self.high - self.low) * along)
+
+
+class RcChannels:
+    """Sixteen channels as the autopilot reads them."""
+
+    def __init__(self, transmitter: Sequence[int]) -> None:
+        self.transmitter = list(transmitter)
+        self._override = [0] * len(transmitter)
+        self._given = [NEVER] * len(transmitter)
+
+    def override(self, channel: int, pulse: int, now: Ns) -> None:
+        """Replace a channel from now on; 0 gives it back to the transmitter."""
+        if 1 <= channel <= len(self._override):
+            self._override[channel - 1] = pulse
+            self._given[channel - 1] = now
+
+    def release(self) -> None:
+        """Give every channel back to the transmitter."""
+        self._override = [0] * len(self._override)
+
+    def expire(self, now: Ns, within: Ns) -> bool:
+        """Drop overrides that were not repeated within that time. True if one was dropped."""
+        if not any(self._override):
+            return False
+        dropped = False
+        for index, given in enumerate(self._given):
+            if self._override[index] and now - given > within:
+                self._override[index] = 0
+                dropped = True
+        return dropped
+
+    @property
+    def overridden(self) -> bool:
+        """Whether any channel is not the transmitter's."""
+        return any(self._override)
+
+    def __getitem__(self, channel: int) -> int:
+        return self._override[channel - 1] or self.transmitter[channel - 1]
+
+    def pulses(self) -> list[int]:
+        """All channels, in order."""
+        return [over or given for over, given in zip(self._override, self.transmitter, strict=True)]
+
+
+class StickPositions(NamedTuple):
+    """The four sticks, dead zones taken off: right, back (nose up), clockwise -1..1; throttle 0..1 from its
+    low end.
+    """
+
+    roll: float
+    pitch: float
+    throttle: float
+    yaw: float
+
+
+@dataclass(frozen=True)
+class StickMap:
+    """Which channel is which stick, and how each travels."""
+
+    roll: int = 1
+    pitch: int = 2
+    throttle: int = 3
+    yaw: int = 4
+    travels: tuple[ChannelRange, ChannelRange, ChannelRange, ChannelRange] = (
+        ChannelRange(1000, 1500, 2000, 20),
+    ) * 4
+    """Of roll, pitch, throttle, yaw."""
+
+    def read(self, sticks: RcChannels) -> StickPositions:
+        """What the pilot asks for."""
+        roll, pitch, throttle, yaw = self.travels
+        return StickPositions(
+            roll.deflection(sticks[self.roll]),
+            pitch.deflection(sticks[self.pitch]),
+            throttle.share(sticks[self.throttle]),
+            yaw.deflection(sticks[self.yaw]),
+        )
+
+    @property
+    def throttle_middle(self) -> float:
+        """Where the middle of the throttle stick's travel lies on its scale of 0..1."""
+        travel = self.travels[2]
+        return travel.share((travel.low + travel.high) / 2.0)

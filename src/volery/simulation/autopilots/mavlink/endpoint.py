@@ -1,0 +1,305 @@
+"""The MAVLink face of a vehicle: links, heartbeats, streams, and which part answers which message.
+
+A frame is handled a few milliseconds after it arrived, in order. What handling it makes the vehicle say
+goes out after the answer, as the recorded firmware does it once it has booted.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import count
+from typing import Any
+
+from volery.base.time import S
+from volery.kernel.api import Action, Handle
+from volery.links.link import Frame, Link
+from volery.links.rates import Streams
+from volery.links.status_texts import chunks
+from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
+from volery.simulation.autopilots.mavlink.firmware import MavlinkDialect
+from volery.simulation.autopilots.mavlink.microservices import (
+    CommandService,
+    MissionService,
+    ParameterService,
+)
+from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import Text
+
+Handler = Callable[[Peer, dict[str, Any]], None]
+
+BROADCAST = 0
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+
+
+class MavlinkEndpoint:
+    """One vehicle's ``Outlet``, and its ear."""
+
+    def __init__(self, dialect: MavlinkDialect, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self.dialect = dialect
+        self._kernel = vehicle.kernel
+        self.channels: list[MavlinkChannel] = []
+        self._arrived: deque[tuple[MavlinkChannel, Frame]] = deque()
+        self._handling = False
+        self._after: list[Action] = []
+        self._text_id = 0
+        self._clocks: list[Handle] = []
+        self._parameters = parameters = ParameterService(vehicle, dialect.parameter_habits)
+        missions = MissionService(vehicle, dialect)
+        self._commands = CommandService(vehicle, dialect)
+        self._handlers: dict[str, Handler] = {
+            "COMMAND_INT": self._commands.on_int,
+            "COMMAND_LONG": self._commands.on_long,
+            "MISSION_ACK": missions.on_ack,
+            "MISSION_CLEAR_ALL": missions.on_clear,
+            "MISSION_COUNT": missions.on_count,
+            "MISSION_ITEM": missions.on_item,
+            "MISSION_ITEM_INT": missions.on_item_int,
+            "MISSION_REQUEST": missions.on_request,
+            "MISSION_REQUEST_INT": missions.on_request_int,
+            "MISSION_REQUEST_LIST": missions.on_request_list,
+            "MISSION_SET_CURRENT": missions.on_set_current,
+            "PARAM_REQUEST_LIST": self._on_parameter_list(parameters.on_list),
+            "PARAM_REQUEST_READ": parameters.on_read,
+            "PARAM_SET": parameters.on_set,
+            "PING": self._on_ping,
+            "REQUEST_DATA_STREAM": self._on_stream_request,
+            "SET_MODE": self._on_set_mode,
+            "TIMESYNC": self._on_timesync,
+        }
+
+    # -- links
+
+    @property
+    def banner(self) -> bytes:
+        """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
+        return self.dialect.boot_bytes[0].data if self.dialect.boot_bytes else b""
+
+    def connect(self, link: Link, use: str = "") -> None:
+        """Listen to and speak on this link, too. *use* is what the firmware has it for."""
+        vehicle, uses = self._vehicle, self.dialect.uses
+        taken = {channel.index for channel in self.channels}
+        index = next(index for index in count() if index not in taken)
+        channel = MavlinkChannel(link, index, vehicle.system, uses[use] if use else next(iter(uses.values())))
+        channel.streams = Streams(
+            self._kernel,
+            self.dialect.message_order,
+            lambda names: self._burst(channel, names),
+            least=self.dialect.least_period,
+        )
+        channel.texts = StatusTextQueue(
+            self._kernel, self.dialect.texts, lambda fields: channel.send("STATUSTEXT", fields)
+        )
+        self.channels.append(channel)
+        if vehicle.uptime() >= vehicle.dialect.ready_after:
+            channel.stream()
+        link.receive(lambda frame: self._hear(channel, frame))
+
+    def disconnect(self, link: Link) -> None:
+        """Nobody is there any more."""
+        for channel in [channel for channel in self.channels if channel.link is link]:
+            channel.hang_up()
+            self.channels.remove(channel)
+
+    def hang_up(self) -> None:
+        """Stop serving all of them."""
+        for channel in self.channels:
+            channel.hang_up()
+        self.channels.clear()
+
+    @property
+    def listens_to(self) -> frozenset[str]:
+        """The messages that change something or are answered."""
+        return frozenset(self._handlers) | frozenset(self.dialect.handlers)
+
+    def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
+        messages, vehicle = self.dialect.messages, self._vehicle
+        for name in names:
+            fields = messages[name](vehicle)
+            if fields is not None:
+                channel.send(name, fields)
+
+    def _send_bytes(self, data: bytes) -> None:
+        """Bytes that are no message, to links that carry bytes."""
+        for channel in self.channels:
+            channel.send_bytes(data)
+
+    # -- the clock
+
+    def start(self) -> None:
+        """The vehicle was switched on: heartbeats and time requests from its boot on."""
+        self.stop()
+        vehicle, dialect = self._vehicle, self.dialect
+        age = vehicle.uptime()
+        for words in dialect.boot_bytes[1:] if not age else ():
+            self._at_uptime(words.after, partial(self._send_bytes, words.data))
+        for after in dialect.heartbeat_first:
+            if after >= age:
+                self._at_uptime(after, lambda: self.announce("HEARTBEAT"))
+        self._regularly(dialect.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
+        if dialect.timesync_every:
+            self._regularly(dialect.timesync_every, dialect.timesync_every, self._ask_time)
+        if age >= vehicle.dialect.ready_after:
+            self.stream()
+        else:
+            self._at_uptime(vehicle.dialect.ready_after, self.stream)
+
+    def stop(self) -> None:
+        """Fall silent."""
+        for clock in self._clocks:
+            clock.cancel()
+        self._clocks.clear()
+        for channel in self.channels:
+            channel.streams.stop()
+
+    def stream(self) -> None:
+        """Send what was asked for."""
+        for channel in self.channels:
+            channel.stream()
+
+    def _at_uptime(self, uptime: int, action: Action) -> None:
+        self._clocks.append(self._kernel.call_at(self._vehicle.boot_at + uptime, action))
+
+    def _regularly(self, first: int, period: int, action: Action) -> None:
+        """Each *period*, in phase with the boot; not before *first*."""
+        age = self._vehicle.uptime()
+        if age > first:
+            first += -(-(age - first) // period) * period
+        self._at_uptime(first, lambda: self._clocks.append(self._kernel.every(period, action)))
+
+    def _ask_time(self) -> None:
+        fields = {"tc1": 0, "ts1": self._vehicle.uptime() // 1000 * 1000 + self._vehicle.system}
+        for channel in self.channels:
+            channel.send("TIMESYNC", fields)
+
+    # -- speaking
+
+    def say(self, severity: int, text: str) -> None:
+        """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
+        self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text.strip()))
+        numbered = self.dialect.texts.numbered or len(chunks(severity, text, 0)) > 1
+        if numbered:
+            self._text_id = self._text_id % 65_535 + 1
+        pieces = chunks(severity, text, self._text_id if numbered else 0)
+
+        def tell() -> None:
+            for channel in self.channels:
+                channel.texts.put(pieces)
+
+        self.after_answer(tell)
+
+    def parameter(self, name: str) -> None:
+        """PARAM_VALUE to everyone."""
+        fields = self._parameters.unlisted(name)
+        if fields is not None:
+            self._tell_all("PARAM_VALUE", fields)
+
+    def mode_changed(self) -> None:
+        """What a change of mode sends, to everyone."""
+        for message in self.dialect.mode_told:
+            self.announce(message)
+
+    def home_changed(self) -> None:
+        """What a change of home sends, to everyone."""
+        for message in self.dialect.home_told:
+            self.announce(message)
+
+    def announce(self, message: str) -> None:
+        """That message to everyone."""
+        fields = self.dialect.messages[message](self._vehicle)
+        if fields is not None:
+            self._tell_all(message, fields)
+
+    def tell(self, message: str, fields: dict[str, Any]) -> None:
+        """A message that is no state, such as an event, to everyone."""
+        self._tell_all(message, fields)
+
+    def _tell_all(self, name: str, fields: dict[str, Any]) -> None:
+        def tell() -> None:
+            for channel in self.channels:
+                channel.send(name, fields)
+
+        self.after_answer(tell)
+
+    def after_answer(self, action: Action) -> None:
+        """Once the frame in hand has been answered; at once if there is none, or the autopilot is still
+        booting.
+        """
+        if self._handling and self._vehicle.uptime() >= self._vehicle.dialect.ready_after:
+            self._after.append(action)
+        else:
+            action()
+
+    # -- hearing
+
+    def _hear(self, channel: MavlinkChannel, frame: Frame) -> None:
+        if not channel.open:
+            return
+        self._arrived.append((channel, frame))
+        self._kernel.call_at(self._kernel.now() + self.dialect.answer_delay, self._handle)
+
+    def _handle(self) -> None:
+        channel, frame = self._arrived.popleft()
+        fields = frame.fields
+        if not self._is_for_me(frame):
+            self._turn_away(channel, frame)
+            return
+        if frame.name == "HEARTBEAT":
+            channel.texts.on_heartbeat(fields["type"])
+        self._handling = True
+        own = self._handlers.get(frame.name)
+        if own is not None:
+            own(Peer(channel, frame.system, frame.component), fields)
+        else:
+            heard = self.dialect.handlers.get(frame.name)
+            if heard is not None:
+                heard(self._vehicle, fields, frame.system)
+        self._handling = False
+        after, self._after = self._after, []
+        for action in after:
+            action()
+
+    def _is_for_me(self, frame: Frame) -> bool:
+        fields, strict = frame.fields, self.dialect.wrong_target is not None
+        system, component = fields.get("target_system", BROADCAST), fields.get("target_component", BROADCAST)
+        if strict and frame.name in COMMANDS and system != self._vehicle.system:
+            return False
+        if system not in (BROADCAST, self._vehicle.system):
+            return False
+        return not strict or component in (BROADCAST, AUTOPILOT)
+
+    def _turn_away(self, channel: MavlinkChannel, frame: Frame) -> None:
+        result = self.dialect.wrong_target
+        if result is not None and frame.name in COMMANDS:
+            peer = Peer(channel, frame.system, frame.component)
+            self._commands.acknowledge(peer, frame.fields["command"], result)
+
+    def _on_parameter_list(self, listing: Handler) -> Handler:
+        def on_list(peer: Peer, fields: dict[str, Any]) -> None:
+            listing(peer, fields)
+            self.dialect.on_parameter_list(self._vehicle)
+
+        return on_list
+
+    def _on_stream_request(self, peer: Peer, fields: dict[str, Any]) -> None:
+        vehicle, dialect = self._vehicle, self.dialect
+        stream = fields["req_stream_id"]
+        rate = fields["req_message_rate"] if fields["start_stop"] else 0
+        names = dialect.streams.get(stream)
+        if names is not None:
+            peer.channel.streams.set(names, S // rate if rate else 0)
+            dialect.on_stream_request(vehicle, peer.channel.index, stream, rate)
+
+    def _on_set_mode(self, peer: Peer, fields: dict[str, Any]) -> None:
+        result = self.dialect.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
+        self._commands.acknowledge(peer, self.dialect.set_mode_ack, result)
+
+    def _on_ping(self, peer: Peer, fields: dict[str, Any]) -> None:
+        if fields["target_system"] == BROADCAST:
+            peer.answer("PING", time_usec=fields["time_usec"], seq=fields["seq"])
+
+    def _on_timesync(self, peer: Peer, fields: dict[str, Any]) -> None:
+        if fields["tc1"] == 0:
+            peer.channel.send("TIMESYNC", {"tc1": self._vehicle.uptime(), "ts1": fields["ts1"]})

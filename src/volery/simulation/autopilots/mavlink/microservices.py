@@ -1,0 +1,422 @@
+"""MAVLink's commands: handed to the dialect, acknowledged.
+
+What concerns the link itself (message intervals, single messages) is answered here.
+
+MAVLink's parameter protocol: list, read and set.
+
+MAVLink's mission protocol: upload, download, clear, choose. What an item means is not its business.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+from zlib import crc32
+
+from volery.base.time import MS, US, Ns, S
+from volery.kernel.api import Handle
+from volery.links.mavlink import message_type_of
+from volery.links.parameter_values import as_bytes, from_bytes
+from volery.simulation.autopilots.autopilot_parameters import Parameter
+from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
+from volery.simulation.autopilots.mavlink.command import (
+    ACCEPTED,
+    FAILED,
+    UNSUPPORTED,
+    Command,
+    from_int,
+    from_long,
+)
+from volery.simulation.autopilots.mavlink.firmware import ParameterPolicy
+from volery.simulation.autopilots.mavlink.message_fields import finite
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+if TYPE_CHECKING:
+    from volery.simulation.autopilots.mavlink.firmware import MavlinkDialect
+    from volery.simulation.autopilots.vehicle_state import Vehicle
+
+GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
+REQUEST_CAPABILITIES = 520
+
+
+class CommandService:
+    """Answers for one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, dialect: MavlinkDialect) -> None:
+        self._vehicle = vehicle
+        self._dialect = dialect
+        self._own: dict[int, Callable[[Peer, Command], int]] = {
+            GET_MESSAGE_INTERVAL: self._get_interval,
+            SET_MESSAGE_INTERVAL: self._set_interval,
+            REQUEST_MESSAGE: self._request_message,
+            REQUEST_CAPABILITIES: lambda peer, _: self._send(peer, "AUTOPILOT_VERSION"),
+        }
+
+    def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """COMMAND_LONG."""
+        self._perform(peer, from_long(fields, self._dialect.reads_nan))
+
+    def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """COMMAND_INT."""
+        self._perform(peer, from_int(fields, self._dialect.reads_nan))
+
+    def _perform(self, peer: Peer, command: Command) -> None:
+        own = self._own.get(command.number)
+        if own is not None:
+            result = own(peer, command)
+        else:
+            handler = self._dialect.commands.get(command.number)
+            result = UNSUPPORTED if handler is None else handler(self._vehicle, command)
+        self.acknowledge(peer, command.number, result)
+
+    def acknowledge(self, peer: Peer, number: int, result: int) -> None:
+        """Send the COMMAND_ACK."""
+        peer.answer("COMMAND_ACK", command=number, result=result, progress=0, result_param2=0)
+
+    # -- messages on request
+
+    def _get_interval(self, peer: Peer, command: Command) -> int:
+        number = round(finite(command.param1))
+        name = self._name(number)
+        if name is None:
+            return FAILED
+        period = peer.channel.streams.period(name)
+        peer.channel.send("MESSAGE_INTERVAL", {"message_id": number, "interval_us": period // US or -1})
+        return ACCEPTED
+
+    def _set_interval(self, peer: Peer, command: Command) -> int:
+        number, interval = round(finite(command.param1)), finite(command.param2)
+        name = self._name(number)
+        if name is None:
+            return self._dialect.refuse_interval(self._vehicle, number)
+        if self._vehicle.uptime() < self._dialect.deaf_until:
+            return ACCEPTED
+        if interval == 0.0:
+            period = peer.channel.usual.get(name, 0)
+        else:
+            period = max(MS, round(interval) * US // MS * MS) if interval > 0 else 0
+        peer.channel.streams.set((name,), period)
+        return ACCEPTED
+
+    def _request_message(self, peer: Peer, command: Command) -> int:
+        name = self._name(round(finite(command.param1)))
+        if name is None:
+            return self._dialect.unknown_message
+        return self._send(peer, name)
+
+    def _send(self, peer: Peer, name: str) -> int:
+        """Send it after the acknowledgement."""
+
+        def send() -> None:
+            fields = self._dialect.messages[name](self._vehicle)
+            if fields is not None:
+                peer.channel.send(name, fields)
+
+        self._vehicle.outlet.after_answer(send)
+        return ACCEPTED
+
+    def _name(self, number: int) -> str | None:
+        kind = message_type_of(number)
+        return kind.name if kind is not None and kind.name in self._dialect.messages else None
+
+
+UNSOLICITED = 65535
+"""The index of a value that nobody listed."""
+
+UINT32 = 5
+"""MAV_PARAM_TYPE of a checksum."""
+
+_REAL = struct.Struct("<f")
+
+
+class ParameterService:
+    """Answers for one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, habits: ParameterPolicy) -> None:
+        self._vehicle = vehicle
+        self._kernel = vehicle.kernel
+        self._habits = habits
+
+    def unlisted(self, name: str) -> dict[str, Any] | None:
+        """The fields of a PARAM_VALUE that nobody listed; ``None`` if there is no such parameter."""
+        if name == self._habits.checksum and name:
+            return self._fields(self._checksum(), UNSOLICITED)
+        found = self._vehicle.parameters.find(name)
+        if found is None:
+            return None
+        keeps = self._habits.keeps_index
+        return self._fields(found, self._vehicle.parameters.index(name) if keeps else UNSOLICITED)
+
+    def _fields(self, parameter: Parameter, index: int) -> dict[str, Any]:
+        name, kind, value = parameter
+        return {
+            "param_id": name,
+            "param_value": as_bytes(kind, value) if self._habits.bytewise else value,
+            "param_type": kind,
+            "param_count": len(self._vehicle.parameters),
+            "param_index": index,
+        }
+
+    def _checksum(self) -> Parameter:
+        """Over names and values: it changes when any of them does."""
+        total = 0
+        for name, kind, value in self._vehicle.parameters:
+            total = crc32(name.encode() + _REAL.pack(as_bytes(kind, value)), total)
+        return Parameter(self._habits.checksum, UINT32, float(total))
+
+    def on_list(self, peer: Peer, _fields: dict[str, Any]) -> None:
+        """PARAM_REQUEST_LIST."""
+        if self._habits.checksum:
+            peer.channel.send("PARAM_VALUE", self._fields(self._checksum(), UNSOLICITED))
+        self._burst(peer.channel, 0)
+
+    def _burst(self, channel: MavlinkChannel, start: int) -> None:
+        parameters = self._vehicle.parameters
+        end = min(start + self._habits.burst, len(parameters))
+        for index in range(start, end):
+            channel.send("PARAM_VALUE", self._fields(parameters.at(index), index))
+        if end < len(parameters):
+            self._kernel.call_at(self._kernel.now() + self._habits.period, lambda: self._burst(channel, end))
+
+    def on_read(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """PARAM_REQUEST_READ, by name or by index. Silence if there is no such parameter."""
+        index = fields["param_index"]
+        if index >= len(self._vehicle.parameters):
+            return
+        name = fields["param_id"] if index < 0 else self._vehicle.parameters.at(index).name
+        self._kernel.call_at(
+            self._kernel.now() + self._habits.read_delay, lambda: self._tell(peer.channel, name, index)
+        )
+
+    def on_set(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """PARAM_SET. Every link learns the new value; silence if it cannot be set."""
+        name, kind, value = fields["param_id"], fields["param_type"], fields["param_value"]
+        found = self._vehicle.parameters.find(name)
+        if found is None or (self._habits.typed and kind != found.type):
+            return
+        self._vehicle.set_parameter(name, from_bytes(found.type, value) if self._habits.bytewise else value)
+
+    def _tell(self, channel: MavlinkChannel, name: str, index: int) -> None:
+        fields = self.unlisted(name)
+        if fields is not None:
+            channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
+
+
+MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE, CANCELLED = (
+    0,
+    1,
+    3,
+    4,
+    13,
+    15,
+)
+"""MAV_MISSION_RESULT."""
+
+MISSION, FENCE, RALLY = 0, 1, 2
+"""MAV_MISSION_TYPE."""
+
+MOST_ITEMS = 724
+ASK_AGAIN: Ns = 1 * S
+GIVE_UP: Ns = 8 * S
+REQUEST_INT = "MISSION_REQUEST_INT"
+GUIDED_ITEM = 2
+"""``current`` of an item that is no part of a mission: go there now."""
+
+
+@dataclass
+class _Upload:
+    peer: Peer
+    count: int
+    latest: Ns
+    items: list[MissionItem] = field(default_factory=list)
+    reminder: Handle | None = None
+    by_integers: bool = False
+    """Whether the peer refused to be asked otherwise."""
+
+
+class MissionService:
+    """Answers for one vehicle. One upload at a time; whoever starts another one replaces it."""
+
+    def __init__(self, vehicle: Vehicle, dialect: MavlinkDialect) -> None:
+        self._vehicle = vehicle
+        self._dialect = dialect
+        self._kernel = vehicle.kernel
+        self._upload: _Upload | None = None
+
+    # -- upload
+
+    def on_count(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_COUNT: an upload begins."""
+        self._drop_upload()
+        if fields["mission_type"] != MISSION:
+            self._acknowledge(peer, MISSION_UNSUPPORTED, fields["mission_type"])
+        elif fields["count"] > MOST_ITEMS:
+            self._acknowledge(peer, NO_SPACE)
+        elif fields["count"] == 0:
+            self._vehicle.plan.clear()
+            self._acknowledge(peer, MISSION_ACCEPTED)
+        else:
+            if not self._dialect.upload_habits.keeps_old:
+                self._vehicle.plan.clear()
+            self._upload = _Upload(peer, fields["count"], self._kernel.now())
+            self._ask()
+
+    def _ask(self) -> None:
+        upload = self._upload
+        if upload is None:
+            return
+        if self._kernel.now() - upload.latest >= GIVE_UP:
+            self._vehicle.say(4, "Mission upload timeout")
+            self._acknowledge(upload.peer, CANCELLED)
+            self._upload = None
+            return
+        asked = len(upload.items)
+        request = REQUEST_INT if upload.by_integers else self._dialect.upload_habits.asks_with(asked)
+        upload.peer.answer(request, seq=asked, mission_type=MISSION)
+        upload.reminder = self._kernel.call_at(self._kernel.now() + ASK_AGAIN, self._ask)
+
+    def _drop_upload(self) -> None:
+        if self._upload is not None and self._upload.reminder is not None:
+            self._upload.reminder.cancel()
+        self._upload = None
+
+    def on_item_int(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_ITEM_INT."""
+        self._on_item(peer, fields, fields["x"], fields["y"])
+
+    def on_item(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_ITEM: coordinates in degrees."""
+        self._on_item(peer, fields, round(finite(fields["x"]) * 1e7), round(finite(fields["y"]) * 1e7))
+
+    def _on_item(self, peer: Peer, fields: dict[str, Any], x: int, y: int) -> None:
+        item = MissionItem(
+            fields["command"],
+            fields["frame"],
+            fields["param1"],
+            fields["param2"],
+            fields["param3"],
+            fields["param4"],
+            x,
+            y,
+            fields["z"],
+            fields["autocontinue"],
+        )
+        if fields["current"] == GUIDED_ITEM:
+            self._acknowledge(
+                peer, MISSION_ACCEPTED if self._dialect.go_to_item(self._vehicle, item) else MISSION_ERROR
+            )
+        elif self._upload is None:
+            self._acknowledge(peer, MISSION_ERROR)
+        elif fields["seq"] != len(self._upload.items):
+            self._acknowledge(peer, INVALID_SEQUENCE)
+        else:
+            self._take(self._upload, item)
+
+    def _take(self, upload: _Upload, item: MissionItem) -> None:
+        stored = self._dialect.stored_item(item)
+        if isinstance(stored, int):
+            self._drop_upload()
+            self._acknowledge(upload.peer, stored)
+            return
+        upload.items.append(stored)
+        upload.latest = self._kernel.now()
+        if upload.reminder is not None:
+            upload.reminder.cancel()
+        if len(upload.items) < upload.count:
+            self._ask()
+        else:
+            self._upload = None
+            self._vehicle.plan.replace(upload.items)
+            self._acknowledge(upload.peer, MISSION_ACCEPTED)
+            if self._dialect.upload_habits.received:
+                self._vehicle.say(6, self._dialect.upload_habits.received)
+        self._dialect.mission_grew(self._vehicle, len(upload.items))
+
+    # -- download
+
+    def on_request_list(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_REQUEST_LIST."""
+        kind = fields["mission_type"]
+        count = len(self._vehicle.plan) if kind == MISSION else 0
+        peer.answer("MISSION_COUNT", count=count, mission_type=kind)
+
+    def on_request_int(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_REQUEST_INT."""
+        item = self._requested(peer, fields)
+        if item is not None:
+            self._send_item(peer, "MISSION_ITEM_INT", fields["seq"], item, (item.x, item.y))
+
+    def on_request(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_REQUEST: answered in degrees."""
+        item = self._requested(peer, fields)
+        if item is not None:
+            self._send_item(peer, "MISSION_ITEM", fields["seq"], item, (item.x / 1e7, item.y / 1e7))
+
+    def _requested(self, peer: Peer, fields: dict[str, Any]) -> MissionItem | None:
+        sequence, plan = fields["seq"], self._vehicle.plan
+        if fields["mission_type"] == MISSION:
+            home = self._dialect.home_item(self._vehicle)
+            if sequence == 0 and home is not None:
+                return home
+            if sequence < len(plan):
+                return plan[sequence]
+        self.on_request_list(peer, fields)
+        self._acknowledge(peer, INVALID_SEQUENCE, fields["mission_type"])
+        return None
+
+    def _send_item(
+        self, peer: Peer, name: str, sequence: int, item: MissionItem, place: tuple[float, float]
+    ) -> None:
+        x, y = place
+        peer.answer(
+            name,
+            seq=sequence,
+            frame=item.frame,
+            command=item.command,
+            current=int(sequence == self._vehicle.plan.current and sequence > 0),
+            autocontinue=item.autocontinue,
+            param1=item.param1,
+            param2=item.param2,
+            param3=item.param3,
+            param4=item.param4,
+            x=x,
+            y=y,
+            z=item.z,
+            mission_type=MISSION,
+        )
+
+    # -- the rest
+
+    def on_clear(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_CLEAR_ALL: not while the mission is flown."""
+        if self._dialect.mission_runs(self._vehicle):
+            self._acknowledge(peer, MISSION_ERROR, fields["mission_type"])
+            return
+        if fields["mission_type"] in (MISSION, 255):
+            self._drop_upload()
+            self._vehicle.plan.clear()
+        self._acknowledge(peer, MISSION_ACCEPTED, fields["mission_type"])
+        self._dialect.mission_grew(self._vehicle, 0)
+
+    def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_SET_CURRENT."""
+        if self._vehicle.choose_item(fields["seq"]):
+            peer.channel.send(
+                "MISSION_CURRENT", self._dialect.messages["MISSION_CURRENT"](self._vehicle) or {}
+            )
+
+    def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """MISSION_ACK: a download has ended, or the question for an item is not understood."""
+        upload = self._upload
+        refused = upload is not None and fields["type"] == MISSION_UNSUPPORTED and not upload.by_integers
+        if upload is not None and refused and self._dialect.upload_habits.turns_to_integers:
+            upload.by_integers = True
+            if upload.reminder is not None:
+                upload.reminder.cancel()
+            self._ask()
+
+    def _acknowledge(self, peer: Peer, result: int, kind: int = MISSION) -> None:
+        peer.answer("MISSION_ACK", type=result, mission_type=kind)

@@ -1,0 +1,89 @@
+"""The mission as it lies on board: items as they were uploaded, item 0 being home where the firmware has it
+so.
+
+Numbers and frames are MAVLink's. Coordinates stay the integers of the wire (degrees times 1e7), so that what
+is read back is what was sent.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+WAYPOINT, LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, RETURN, LAND, TAKEOFF = 16, 17, 18, 19, 20, 21, 22
+LOITER_TO_ALTITUDE, SPLINE_WAYPOINT, GUIDED_ENABLE, DELAY = 31, 82, 92, 93
+CONDITION_DELAY, CONDITION_DISTANCE, CONDITION_YAW, LAST_CONDITION = 112, 114, 115, 159
+JUMP, CHANGE_SPEED, SET_HOME, SET_YAW_SPEED = 177, 178, 179, 213
+LAST_NAVIGATION = 95
+
+GLOBAL, LOCAL_NED, GLOBAL_RELATIVE, GLOBAL_INT, GLOBAL_RELATIVE_INT = 0, 1, 3, 5, 6
+LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, GLOBAL_TERRAIN, GLOBAL_TERRAIN_INT = 7, 8, 9, 10, 11
+
+
+class MissionItem(NamedTuple):
+    """One mission item.
+
+    ``x`` and ``y`` are latitude and longitude in 1e-7 degrees, ``z`` metres in its frame.
+    """
+
+    command: int
+    frame: int = GLOBAL_RELATIVE
+    param1: float = 0.0
+    param2: float = 0.0
+    param3: float = 0.0
+    param4: float = 0.0
+    x: int = 0
+    y: int = 0
+    z: float = 0.0
+    autocontinue: int = 1
+
+    @property
+    def navigates(self) -> bool:
+        """Whether the vehicle goes somewhere or waits for it (as against an action that is done at once)."""
+        return self.command <= LAST_NAVIGATION or self.command == SET_YAW_SPEED
+
+    @property
+    def is_condition(self) -> bool:
+        """Whether it holds back the actions that follow it."""
+        return CONDITION_DELAY <= self.command <= LAST_CONDITION
+
+    @property
+    def has_place(self) -> bool:
+        """Whether it names a point; an item with no coordinates means: here."""
+        return bool(self.x or self.y)
+
+
+class OnboardMission:
+    """The items and the one that is flown next or now."""
+
+    def __init__(self) -> None:
+        self.items: list[MissionItem] = []
+        self.current = 0
+        self.complete = False
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __getitem__(self, index: int) -> MissionItem:
+        return self.items[index]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.replace([])
+
+    def replace(self, items: list[MissionItem]) -> None:
+        """Another mission, to be flown from its start."""
+        self.items = items
+        self.restart()
+
+    def restart(self) -> None:
+        """Fly from the start next time."""
+        self.current = 0
+        self.complete = False
+
+    def choose(self, index: int) -> bool:
+        """Fly that item next; False if there is none."""
+        if not 0 <= index < len(self.items):
+            return False
+        self.current = index
+        self.complete = False
+        return True

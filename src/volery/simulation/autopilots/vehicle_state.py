@@ -1,0 +1,305 @@
+"""A vehicle as its autopilot's software knows it: mode, arming, home, sticks, parameters, mission, failsafes.
+
+The one state that all parts of the flight stack share. It speaks through an ``VehicleOutput`` and knows no
+protocol; what differs between firmwares it asks its dialect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from volery.base.frames import Vector
+from volery.base.time import Ns, from_seconds
+from volery.kernel.api import Action, Kernel
+from volery.simulation.autopilots.autopilot_parameters import Parameters
+from volery.simulation.autopilots.flight_stack.flight import Estimate, Flight, Setpoint
+from volery.simulation.autopilots.manual_control import NEVER, RcChannels
+from volery.simulation.autopilots.mode import IDLE, OFF, Manoeuvre, Mode
+from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
+
+if TYPE_CHECKING:
+    from volery.simulation.autopilots.firmware import Dialect
+
+
+class VehicleOutput(Protocol):
+    """Through which a vehicle speaks to whoever listens."""
+
+    def say(self, severity: int, text: str) -> None:
+        """Words for people; severity as in syslog."""
+
+    def parameter(self, name: str) -> None:
+        """A parameter has another value."""
+
+    def mode_changed(self) -> None:
+        """It flies another mode."""
+
+    def home_changed(self) -> None:
+        """Home is elsewhere."""
+
+    def announce(self, message: str) -> None:
+        """Send that message of the firmware's protocol now, to everyone."""
+
+    def tell(self, message: str, fields: dict[str, Any]) -> None:
+        """Send an event with these fields, to everyone."""
+
+    def after_answer(self, action: Action) -> None:
+        """Do it once the frame that is being handled has been answered; at once if none is."""
+
+
+class Home(NamedTuple):
+    """Degrees and metres AMSL, and the same point north, east, down about the estimator's origin."""
+
+    latitude: float
+    longitude: float
+    amsl: float
+    ned: Vector
+
+
+class Vehicle:
+    """The shared state. Its parts change it through its methods."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        flight: Flight,
+        dialect: Dialect,
+        *,
+        system: int,
+        name: str,
+        overrides: Mapping[str, float] | None,
+    ) -> None:
+        self.kernel = kernel
+        self.flight = flight
+        self.dialect = dialect
+        self.system = system
+        self.name = name
+        self.outlet: VehicleOutput
+        self.restart: Action
+        """Switch the autopilot off and on again."""
+        self.parameters = Parameters(
+            dialect.parameters(), {**dialect.own_parameters(system, flight), **(overrides or {})}
+        )
+        self.tuning = dialect.tuning(self.parameters)
+        self.sticks = RcChannels(dialect.transmitter)
+        self.plan = OnboardMission()
+        self.memory: Any = dialect.memory(self)
+        """What only its firmware knows of."""
+        self.boot_at: Ns = kernel.now()
+        self.mode: Mode = dialect.boot_mode
+        self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
+        self._reset()
+
+    def _reset(self) -> None:
+        self.armed = False
+        self.armed_at: Ns = NEVER
+        self.disarmed_at: Ns = NEVER
+        self.refused_at: Ns = NEVER
+        """When arming was last refused."""
+        self.landed = False
+        self.landed_at: Ns = NEVER
+        self.idle_since: Ns = NEVER
+        self.home: Home | None = None
+        self.home_by_user = False
+        self.prearm_ok = False
+        self.failsafes: set[str] = set()
+        self.station_seen: Ns = NEVER
+        """When the ground station that counts was last heard."""
+        self._wanted_at: Ns = NEVER
+        self._lifted = False
+        self._resigned_at: Ns = NEVER
+        self.speed: float | None = None
+        """Speed in the plane that was commanded [m/s]; ``None``: the parameters'. Likewise up and down."""
+        self.speed_up: float | None = None
+        self.speed_down: float | None = None
+        self.yaw_target: float | None = None
+        """Heading that was commanded [rad]; ``None``: the mode's own."""
+        self.flight_time: Ns = 0
+        self.said: set[str] = set()
+        """Words that are said once after a boot."""
+        self.displayed_at: Ns = self.uptime()
+        """Uptime at which it was last said why it cannot be armed."""
+        self.counted_at: Ns = self.uptime()
+        """Uptime at which the counters of hours were last stored."""
+        self.sagging: dict[str, Ns] = {}
+        """Since when the battery has been below a voltage, by the parameter that holds it."""
+        self.contacts = 0
+        """How often it has hit the ground."""
+        self._setpoint: Setpoint = OFF
+        self.flight.drive(OFF)
+
+    # -- time and place
+
+    def uptime(self) -> Ns:
+        """Nanoseconds since boot."""
+        return self.kernel.now() - self.boot_at
+
+    def boot(self, age: Ns) -> None:
+        """Start anew, as if switched on *age* ago.
+
+        The mission and the parameters stay, as in memory that keeps.
+        """
+        self.boot_at = self.kernel.now() - age
+        self._reset()
+        self.sticks.release()
+        self.mode = self.dialect.boot_mode
+        self.manoeuvre = self.mode.manoeuvre(self)
+
+    @property
+    def estimate(self) -> Estimate:
+        """What the estimator believes now."""
+        return self.flight.look()
+
+    @property
+    def has_position(self) -> bool:
+        """Whether modes that need a position may fly."""
+        return self.uptime() >= self.dialect.position_after and self.estimate.position_ok
+
+    def set_home(self, latitude: float, longitude: float, amsl: float) -> None:
+        """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
+        north, east, _ = self.flight.to_ned(latitude, longitude, amsl)
+        self.home = Home(latitude, longitude, amsl, (north, east, self.estimate.origin[2] - amsl))
+        self.outlet.home_changed()
+
+    def home_is_here(self) -> None:
+        """Home is where the vehicle is."""
+        self.set_home(*self.estimate.geodetic)
+
+    def point(self, frame: int, latitude: float, longitude: float, altitude: float) -> Vector:
+        """A point of a MAVLink frame as north, east, down about the estimator's origin.
+
+        Altitudes above terrain are taken as above home: there is no terrain on board.
+        """
+        above_sea = frame in (GLOBAL, GLOBAL_INT)
+        amsl = altitude if above_sea or self.home is None else self.home.amsl + altitude
+        return self.flight.to_ned(latitude, longitude, amsl)
+
+    @property
+    def height(self) -> float:
+        """Metres above home; above the estimator's origin while there is no home."""
+        down = self.estimate.position[2]
+        return (self.home.ned[2] if self.home else 0.0) - down
+
+    # -- words
+
+    def say(self, severity: int, text: str) -> None:
+        """Words for people; severity as in syslog."""
+        self.outlet.say(severity, text)
+
+    def set_parameter(self, name: str, value: float) -> bool:
+        """Set it and tell everyone; False if it cannot be."""
+        changed = self.parameters.set(name, value)
+        if changed is None:
+            return False
+        self.tuning = self.dialect.tuning(self.parameters)
+        self.outlet.parameter(name)
+        return True
+
+    # -- modes
+
+    def enter(self, mode: Mode) -> None:
+        """Fly *mode* from now on. Whether it may was decided before."""
+        self.mode = mode
+        self.speed = self.speed_up = self.speed_down = None
+        self.yaw_target = None
+        self.manoeuvre = mode.manoeuvre(self)
+        self.manoeuvre.enter()
+        if self.armed:
+            self.act()
+        self.outlet.mode_changed()
+
+    def choose_item(self, index: int) -> bool:
+        """Fly that mission item next."""
+        chosen = self.plan.choose(index)
+        if chosen:
+            self.manoeuvre.item_chosen()
+        return chosen
+
+    # -- arming
+
+    def arm(self) -> None:
+        """Arm. Whether it may was decided before."""
+        self.armed = True
+        self.armed_at = self.idle_since = self.kernel.now()
+        self._wanted_at = NEVER
+        self.manoeuvre.enter()
+
+    def disarm(self) -> None:
+        """Disarm and stop the motors, wherever it is."""
+        self.armed = False
+        self.disarmed_at = self.kernel.now()
+        self.drive(OFF)
+
+    # -- motors
+
+    def drive(self, setpoint: Setpoint) -> None:
+        """Hand a set-point to the inner loops, unless they hold the same one already."""
+        if setpoint != self._setpoint:
+            self._setpoint = setpoint
+            self.flight.drive(setpoint)
+
+    @property
+    def setpoint(self) -> Setpoint:
+        """What the inner loops hold."""
+        return self._setpoint
+
+    def act(self) -> None:
+        """Let the manoeuvre decide what the motors do; called at every tick and when the sticks moved."""
+        if not self.armed:
+            self.drive(OFF)
+        elif self.dialect.stands and self.landed:
+            self._stand()
+        elif self.dialect.stands and not self._lifted and not self.manoeuvre.wants_to_fly():
+            self.drive(IDLE)  # the wish to fly went before it had left the ground
+        else:
+            self.manoeuvre.step()
+
+    def _stand(self) -> None:
+        """On the ground: motors rest, idle, and come up in the firmware's own time when the manoeuvre wants
+        to fly.
+        """
+        now, dialect = self.kernel.now(), self.dialect
+        if now - self.armed_at < dialect.motors_rest:
+            self.drive(OFF)
+            return
+        self.manoeuvre.on_ground()
+        if not self.armed:
+            return
+        if not self.manoeuvre.wants_to_fly():
+            self._wanted_at = NEVER
+            self.drive(IDLE)
+            return
+        if self._wanted_at == NEVER:
+            self._wanted_at = now
+        ready = self._wanted_at
+        if self.manoeuvre.slow_start:
+            idling = self.armed_at + dialect.motors_rest + dialect.spool_time
+            ready = max(ready, idling) + dialect.takeoff_slew
+        if now < ready:
+            self.drive(IDLE)
+            return
+        self.landed = self._lifted = False
+        self._resigned_at = now
+        self.manoeuvre.step()
+
+    def watch_ground(self) -> None:
+        """Notice that it has left the ground, come down, or given up the wish to fly."""
+        if not self.armed or self.landed or not self.dialect.stands:
+            return
+        now = self.kernel.now()
+        on_ground = self.estimate.landed
+        self._lifted = self._lifted or not on_ground
+        if not on_ground or self.manoeuvre.wants_to_fly():
+            self._resigned_at = now
+        if on_ground and (self._lifted or now - self._resigned_at >= self.dialect.resigns_after):
+            self.landed = True
+            self.landed_at = self.idle_since = now
+            self._wanted_at = NEVER
+
+    def seconds_parameter(self, name: str) -> Ns:
+        """A parameter in seconds as nanoseconds."""
+        return from_seconds(self.parameters[name])
+
+
+Rule = Callable[[Vehicle], None]
+"""Something that the stack does to a vehicle."""

@@ -1,0 +1,297 @@
+"""Bodies as frozen data, and how they become rows of parameters and first states for the compiled step.
+
+Defaults describe a quadrotor of 1.5 kg with 12-inch propellers on three lithium-polymer cells, and a rover
+the size of a large model car. Figures are estimated unless a file that makes one says otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi, radians, sqrt
+
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame, Vector
+from volery.simulation.world.arithmetic import exponential, sine_cosine
+from volery.simulation.world.body_step import STEP_S
+from volery.simulation.world.dynamics import CELL_FULL_VOLTS
+from volery.simulation.world.environment_models import GUST_EVERY, Terrain, Wind, magnetic_field
+from volery.simulation.world.sensors import SLOW_EVERY, SensorSet, sensor_set
+from volery.simulation.world.state_layout import (
+    MULTIROTOR,
+    P_CAPACITY,
+    P_CELLS,
+    P_DAMPING,
+    P_DRAG_LINEAR,
+    P_DRAG_QUADRATIC,
+    P_DRIVE_EFFICIENCY,
+    P_EFFICIENCY,
+    P_FEET,
+    P_FIELD,
+    P_FRICTION,
+    P_FULL_VOLTS,
+    P_GPS_FIX,
+    P_GPS_PERIOD,
+    P_GRAVITY,
+    P_GRIP,
+    P_GUST_DECAY,
+    P_GUST_KICK,
+    P_IDLE_POWER,
+    P_INERTIA,
+    P_KIND,
+    P_MASS,
+    P_PERFECT,
+    P_RANGE_TOP,
+    P_RESISTANCE,
+    P_ROLLING,
+    P_ROTOR_LAG,
+    P_ROTOR_SPIN,
+    P_ROTOR_TOP,
+    P_ROTOR_X,
+    P_ROTOR_Y,
+    P_SENSOR,
+    P_SKID,
+    P_SPEED_LAG,
+    P_SPEED_TOP,
+    P_SPIN_DAMPING,
+    P_STEER_LAG,
+    P_STEER_TOP,
+    P_STIFFNESS,
+    P_THRUST,
+    P_TORQUE,
+    P_TURN_TOP,
+    P_WHEELBASE,
+    ROVER,
+    S_ATTITUDE,
+    S_CHARGE,
+    S_GROUND,
+    S_ON_GROUND,
+    S_POSITION,
+    S_RESTING,
+    Array,
+)
+
+AIR_DENSITY = 1.225  # [kg/m^3], ISA at sea level
+STANDARD_GRAVITY = 9.80665  # [m/s^2], CGPM 1901
+
+
+_MULTIROTOR_POSITIVE = (
+    "mass",
+    "inertia",
+    "thrust_coefficient",
+    "propeller_diameter",
+    "figure_of_merit",
+    "efficiency",
+    "top_speed",
+    "rotor_lag",
+    "feet",
+)
+_ROVER_POSITIVE = (
+    "mass",
+    "wheelbase",
+    "steer_top_deg",
+    "steer_lag",
+    "speed_top",
+    "speed_lag",
+    "efficiency",
+    "grip",
+    "turn_top_deg",
+)
+
+
+def _above_zero(noun: str, spec: object, names: tuple[str, ...]) -> None:
+    """Refuse a body whose figures would divide by zero or turn a law round."""
+    for name in names:
+        value = getattr(spec, name)
+        if not all(figure > 0.0 for figure in (value if isinstance(value, tuple) else (value,))):
+            raise UsageError(f"{noun}: {name} is {value}; give more than 0")
+
+
+@dataclass(frozen=True)
+class Battery:
+    """A lithium-polymer pack: capacity in ampere-hours, cells in series, resistance of the pack, fraction
+    left.
+    """
+
+    capacity_ah: float = 5.0
+    cells: int = 3
+    resistance_ohm: float = 0.015
+    left: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.capacity_ah <= 0.0 or self.cells < 1 or self.resistance_ohm <= 0.0:
+            raise UsageError(f"battery: capacity, cells and resistance must be above zero, not {self}")
+        if not 0.0 < self.left <= 1.0:
+            raise UsageError(f"battery: the fraction left is {self.left}; give one above 0 and at most 1")
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """A rotor's place forward and left of the centre [m]; ``spin`` +1 if its reaction turns the body to the
+    left.
+    """
+
+    forward: float
+    left: float
+    spin: int
+
+
+def x_frame(arm: float) -> tuple[Rotor, Rotor, Rotor, Rotor]:
+    """Four rotors on arms at 45 degrees, *arm* metres from the centre, in ArduPilot's motor order for QUAD/X.
+
+    Front right and rear left turn anticlockwise seen from above (reaction to the right), the other two
+    clockwise.
+    """
+    side = arm * sqrt(0.5)
+    return Rotor(side, -side, -1), Rotor(-side, side, -1), Rotor(side, side, 1), Rotor(-side, -side, 1)
+
+
+@dataclass(frozen=True)
+class Multirotor:
+    """A body under four rotors. Masses kg, lengths m, inertia kg m^2 about forward, left, up."""
+
+    at: Vector = (0.0, 0.0, 0.0)
+    heading_deg: float = 0.0
+    sensors: str = "consumer"
+    battery: Battery = Battery()
+    mass: float = 1.5
+    inertia: Vector = (0.020, 0.020, 0.036)
+    rotors: tuple[Rotor, Rotor, Rotor, Rotor] = field(default_factory=lambda: x_frame(0.25))
+    thrust_coefficient: float = 2.0e-5
+    propeller_diameter: float = 0.3048
+    figure_of_merit: float = 0.6
+    efficiency: float = 0.8
+    top_speed: float = 760.0
+    rotor_lag: float = 0.04
+    drag_linear: float = 0.25
+    drag_quadratic: float = 0.03
+    spin_damping: float = 0.002
+    feet: Vector = (0.15, 0.15, 0.12)
+    friction: float = 0.6
+    idle_power: float = 3.0
+
+    def __post_init__(self) -> None:
+        _above_zero("multirotor", self, _MULTIROTOR_POSITIVE)
+
+    @property
+    def torque_coefficient(self) -> float:
+        """k_Q = k_T^1.5 / (FM sqrt(2 rho A)): see ``multirotor``."""
+        disc = pi * self.propeller_diameter**2 / 4.0
+        induced = sqrt(2.0 * AIR_DENSITY * disc)
+        coefficient: float = (
+            self.thrust_coefficient * sqrt(self.thrust_coefficient) / (self.figure_of_merit * induced)
+        )
+        return coefficient
+
+    @property
+    def hover_speed(self) -> float:
+        """Rotor speed at which four rotors carry the weight [rad/s]."""
+        return sqrt(self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient))
+
+
+@dataclass(frozen=True)
+class Rover:
+    """A car-like rover, or a skid-steered one. Speeds m/s, lags s, angles degrees."""
+
+    at: Vector = (0.0, 0.0, 0.0)
+    heading_deg: float = 0.0
+    sensors: str = "consumer"
+    battery: Battery = Battery(capacity_ah=10.0)
+    mass: float = 8.0
+    wheelbase: float = 0.4
+    steer_top_deg: float = 30.0
+    steer_lag: float = 0.12
+    speed_top: float = 20.0
+    speed_lag: float = 1.7
+    rolling: float = 0.03
+    efficiency: float = 0.6
+    drag_linear: float = 0.0
+    drag_quadratic: float = 0.3
+    grip: float = 4.0
+    skid: bool = False
+    turn_top_deg: float = 120.0
+    idle_power: float = 5.0
+
+    def __post_init__(self) -> None:
+        _above_zero("rover", self, _ROVER_POSITIVE)
+
+
+BodySpec = Multirotor | Rover
+
+
+def _fill_sensors(row: Array, sensors: SensorSet) -> None:
+    for index, noise in enumerate(sensors.noises):
+        decay = exponential(-SLOW_EVERY * STEP_S / noise.time)
+        at = P_SENSOR + 4 * index
+        row[at : at + 4] = noise.white, noise.slow, decay, noise.slow * sqrt(1.0 - decay * decay)
+    row[P_GPS_PERIOD] = round(1.0 / (sensors.gps_rate * STEP_S))
+    row[P_GPS_FIX] = sensors.gps_fix
+    row[P_RANGE_TOP] = sensors.range_top
+    row[P_PERFECT] = float(sensors.perfect)
+
+
+def _fill_multirotor(row: Array, spec: Multirotor) -> None:
+    weight = spec.mass * STANDARD_GRAVITY
+    row[P_KIND] = MULTIROTOR
+    row[P_INERTIA : P_INERTIA + 3] = spec.inertia
+    row[P_SPIN_DAMPING] = spec.spin_damping
+    row[P_FEET : P_FEET + 3] = spec.feet
+    row[P_STIFFNESS] = weight / 4.0 / 0.005  # stands 5 mm deep in its four springs
+    row[P_DAMPING] = sqrt(spec.mass * row[P_STIFFNESS]) * 0.8  # a little below critical for four feet
+    row[P_FRICTION] = spec.friction
+    for index, rotor in enumerate(spec.rotors):
+        row[P_ROTOR_X + index] = rotor.forward
+        row[P_ROTOR_Y + index] = rotor.left
+        row[P_ROTOR_SPIN + index] = rotor.spin
+    row[P_THRUST] = spec.thrust_coefficient
+    row[P_TORQUE] = spec.torque_coefficient
+    row[P_ROTOR_LAG] = spec.rotor_lag
+    row[P_ROTOR_TOP] = spec.top_speed
+    row[P_EFFICIENCY] = spec.efficiency
+
+
+def _fill_rover(row: Array, spec: Rover) -> None:
+    row[P_KIND] = ROVER
+    row[P_WHEELBASE] = spec.wheelbase
+    row[P_STEER_TOP] = radians(spec.steer_top_deg)
+    row[P_STEER_LAG] = spec.steer_lag
+    row[P_SPEED_TOP] = spec.speed_top
+    row[P_SPEED_LAG] = spec.speed_lag
+    row[P_ROLLING] = spec.rolling
+    row[P_DRIVE_EFFICIENCY] = spec.efficiency
+    row[P_SKID] = float(spec.skid)
+    row[P_TURN_TOP] = radians(spec.turn_top_deg)
+    row[P_GRIP] = spec.grip
+
+
+def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -> None:
+    """Write what the compiled step needs to know of *spec* into its row."""
+    row[P_MASS] = spec.mass
+    row[P_DRAG_LINEAR] = spec.drag_linear
+    row[P_DRAG_QUADRATIC] = spec.drag_quadratic
+    row[P_CAPACITY] = spec.battery.capacity_ah * 3600.0
+    row[P_CELLS] = spec.battery.cells
+    row[P_RESISTANCE] = spec.battery.resistance_ohm
+    row[P_FULL_VOLTS] = 0.0
+    row[P_IDLE_POWER] = spec.idle_power
+    decay = exponential(-GUST_EVERY * STEP_S / wind.gust_time)
+    row[P_GUST_DECAY], row[P_GUST_KICK] = decay, sqrt(1.0 - decay * decay)
+    row[P_GRAVITY] = STANDARD_GRAVITY
+    row[P_FIELD : P_FIELD + 3] = magnetic_field(frame)
+    if isinstance(spec, Multirotor):
+        _fill_multirotor(row, spec)
+        row[P_FULL_VOLTS] = spec.battery.cells * CELL_FULL_VOLTS
+    else:
+        _fill_rover(row, spec)
+    _fill_sensors(row, sensor_set(spec.sensors))
+
+
+def fill_state(row: Array, spec: BodySpec, terrain: Terrain) -> None:
+    """At rest on the ground at ``spec.at`` (its height is the ground's), heading where it says."""
+    ground = terrain.height(spec.at[0], spec.at[1])
+    depth = spec.feet[2] - 0.005 if isinstance(spec, Multirotor) else 0.0
+    row[S_POSITION : S_POSITION + 3] = spec.at[0], spec.at[1], ground + depth
+    half = (pi / 2.0 - radians(spec.heading_deg)) / 2.0
+    row[S_ATTITUDE + 3], row[S_ATTITUDE] = sine_cosine(half)
+    row[S_CHARGE] = (1.0 - spec.battery.left) * spec.battery.capacity_ah * 3600.0
+    row[S_GROUND] = ground
+    row[S_ON_GROUND] = row[S_RESTING] = 1.0

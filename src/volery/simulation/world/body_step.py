@@ -1,0 +1,275 @@
+"""How compiled code is cached, and why changing a law never leaves an old one in force.
+
+numba stamps a cached function with its own source file only: a function that calls one of another file would
+be kept although the other changed. So nothing here that calls across files is cached, except the few entry
+points that compile everything below them at once; those hold a digest of all sources as a constant, which
+numba makes part of the cache's key.
+
+One grid step of one body of either kind: law, ground, wind, sensors. Composed steps are made of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from volery.simulation.world.dynamics import (
+    S_SPEED,
+    drive_power,
+    electrical_power,
+    follow_ground,
+    multirotor_slope,
+    rotation_matrix,
+    rover_slope,
+    total_thrust,
+    volts_amps,
+)
+from volery.simulation.world.environment_models import GUST_EVERY, advance_gust, ground_height
+from volery.simulation.world.sensors import sample_sensors
+from volery.simulation.world.state_layout import (
+    INTEGRATED,
+    MULTIROTOR,
+    P_FEET,
+    P_GRAVITY,
+    P_IDLE_POWER,
+    P_KIND,
+    P_MASS,
+    S_AMPS,
+    S_ATTITUDE,
+    S_AWAKE,
+    S_CONTACT_SPEED,
+    S_CONTACTS,
+    S_DISTANCE,
+    S_FORCE,
+    S_GROUND,
+    S_GUST,
+    S_ON_GROUND,
+    S_PAYLOAD_ENERGY,
+    S_POSITION,
+    S_RATES,
+    S_RESTING,
+    S_VELOCITY,
+    S_VOLTS,
+    U_PAYLOAD,
+    U_THROTTLE,
+    U_WIND,
+    W_AIR,
+    W_BEFORE,
+    W_GROUND,
+    W_ROTATION,
+    W_SLOPE,
+    W_THROTTLE,
+    W_TOTAL,
+    W_Y,
+    Advance,
+    Array,
+    Bodies,
+)
+
+
+def digest_of(files: Iterable[Path]) -> str:
+    """A digest of the files' contents, in the order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(files, key=lambda file: file.name):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def world_sources() -> list[Path]:
+    """The source files of this room."""
+    return list(Path(__file__).parent.glob("*.py"))
+
+
+STEP_S = 0.002
+_STILL_SPEED = 0.02  # [m/s]
+_STILL_RATE = 0.05  # [rad/s]
+_LIGHT = 0.7  # of its weight: a body whose rotors lift less than this stays where it landed
+
+
+@njit(cache=False)
+def _slope(row: Array, flying: bool, resting: bool) -> None:
+    if flying:
+        multirotor_slope(row, resting)
+    else:
+        rover_slope(row, resting)
+
+
+@njit(cache=False)
+def _integrate(row: Array, flying: bool) -> None:
+    """The classical fourth-order Runge-Kutta step (Kutta 1901) of the integrated columns."""
+    resting = row[S_RESTING] > 0.5
+    for i in range(INTEGRATED):
+        row[W_Y + i] = row[i]
+    _slope(row, flying, resting)
+    for i in range(INTEGRATED):
+        row[W_TOTAL + i] = row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
+    for i in range(INTEGRATED):
+        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
+    for i in range(INTEGRATED):
+        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
+        row[W_Y + i] = row[i] + STEP_S * row[W_SLOPE + i]
+    _slope(row, flying, resting)
+    for i in range(INTEGRATED):
+        row[i] += STEP_S / 6.0 * (row[W_TOTAL + i] + row[W_SLOPE + i])
+
+
+@njit(cache=False)
+def _normalise(row: Array) -> None:
+    square = 0.0
+    for i in range(4):
+        square += row[S_ATTITUDE + i] * row[S_ATTITUDE + i]
+    norm = sqrt(square)
+    for i in range(4):
+        row[S_ATTITUDE + i] /= norm
+
+
+@njit(cache=False)
+def _touches(row: Array) -> bool:
+    lowest = (
+        row[P_FEET] * abs(row[W_ROTATION + 6])
+        + row[P_FEET + 1] * abs(row[W_ROTATION + 7])
+        + row[P_FEET + 2] * abs(row[W_ROTATION + 8])
+    )
+    touching: bool = row[S_POSITION + 2] - lowest < row[S_GROUND]
+    return touching
+
+
+@njit(cache=False)
+def _settle_flyer(row: Array) -> None:
+    """Contact, rest and power at the end of a multirotor's step."""
+    touching = _touches(row)
+    if touching and row[S_ON_GROUND] == 0.0:
+        row[S_CONTACT_SPEED] = max(0.0, -row[W_BEFORE + 2])
+        row[S_CONTACTS] += 1.0
+    row[S_ON_GROUND] = 1.0 if touching else 0.0
+    light = total_thrust(row) < _LIGHT * row[P_MASS] * row[P_GRAVITY]
+    speed = 0.0
+    spin = 0.0
+    for axis in range(3):
+        speed = max(speed, abs(row[S_VELOCITY + axis]))
+        spin = max(spin, abs(row[S_RATES + axis]))
+    still = row[S_RESTING] > 0.5 or (speed < _STILL_SPEED and spin < _STILL_RATE)
+    resting = touching and light and still
+    row[S_RESTING] = 1.0 if resting else 0.0
+    if resting:
+        for axis in range(3):
+            row[S_VELOCITY + axis] = 0.0
+            row[S_RATES + axis] = 0.0
+
+
+@njit(cache=False)
+def _settle_rover(row: Array, height_before: float) -> None:
+    """Height, velocity and rest at the end of a rover's step."""
+    climb = (row[S_GROUND] - height_before) / STEP_S
+    row[S_ON_GROUND] = 1.0
+    resting = row[W_THROTTLE + 1] == 0.0 and row[W_THROTTLE] == 0.0 and abs(row[S_SPEED]) < 0.01
+    row[S_RESTING] = 1.0 if resting else 0.0
+    if resting:
+        row[S_SPEED] = 0.0
+        climb = 0.0
+    follow_ground(row, row[S_GROUND], climb)
+
+
+@njit(cache=False)
+def _felt(row: Array) -> None:
+    """The step's mean specific force in body axes, and the way gone."""
+    ae = (row[S_VELOCITY] - row[W_BEFORE]) / STEP_S
+    an = (row[S_VELOCITY + 1] - row[W_BEFORE + 1]) / STEP_S
+    au = (row[S_VELOCITY + 2] - row[W_BEFORE + 2]) / STEP_S + row[P_GRAVITY]
+    for axis in range(3):
+        row[S_FORCE + axis] = (
+            row[W_ROTATION + axis] * ae + row[W_ROTATION + 3 + axis] * an + row[W_ROTATION + 6 + axis] * au
+        )
+    square = 0.0
+    for axis in range(3):
+        square += row[S_VELOCITY + axis] * row[S_VELOCITY + axis]
+    row[S_DISTANCE] += sqrt(square) * STEP_S
+
+
+@njit(cache=False)
+def _power(row: Array, flying: bool) -> None:
+    power = electrical_power(row, 0) if flying else electrical_rover(row)
+    volts, amps = volts_amps(row, 0, power)
+    row[S_VOLTS] = volts
+    row[S_AMPS] = amps
+    row[S_PAYLOAD_ENERGY] += row[U_PAYLOAD] * STEP_S
+
+
+@njit(cache=False)
+def electrical_rover(row: Array) -> float:
+    """Watts drawn at a rover's battery."""
+    drive = drive_power(row, row[S_SPEED], row[W_SLOPE + S_SPEED])
+    power: float = drive + row[P_IDLE_POWER] + row[U_PAYLOAD]
+    return power
+
+
+@njit(cache=False)
+def step_body(bodies: Bodies, body: int, row: Array) -> None:
+    """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples."""
+    key = bodies.keys[body]
+    flying = row[P_KIND] == MULTIROTOR
+    for axis in range(3):
+        row[W_BEFORE + axis] = row[S_VELOCITY + axis]
+        row[W_AIR + axis] = row[U_WIND + axis] + row[S_GUST + axis]
+    row[W_GROUND] = row[S_GROUND]
+    _integrate(row, flying)
+    height_before = row[S_POSITION + 2]
+    row[S_GROUND] = ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1])
+    if flying:
+        if row[S_RESTING] == 0.0:
+            _normalise(row)
+        rotation_matrix(row, S_ATTITUDE, W_ROTATION)
+        _settle_flyer(row)
+    else:
+        _settle_rover(row, height_before)
+        rotation_matrix(row, S_ATTITUDE, W_ROTATION)
+    _felt(row)
+    _power(row, flying)
+    k = bodies.reached[body] + 1
+    bodies.reached[body] = k
+    if k % GUST_EVERY == 0:
+        advance_gust(row, key, k)
+    sample_sensors(row, key, k)
+
+
+@njit(cache=False)
+def start_body(bodies: Bodies, body: int, row: Array) -> None:
+    """What the instruments show at the first grid step, before anything moved."""
+    rotation_matrix(row, S_ATTITUDE, W_ROTATION)
+    for axis in range(3):
+        row[S_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
+    _power(row, row[P_KIND] == MULTIROTOR)
+    sample_sensors(row, bodies.keys[body], bodies.reached[body])
+    row[S_AWAKE] = 1.0
+
+
+def _compose(sources: str) -> Advance:
+    @njit(cache=True)
+    def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
+        if not sources:  # never so: its being named here makes the digest part of the cache's key
+            return
+        for body in range(goals.shape[0]):
+            row = bodies.rows[body]
+            if row[S_AWAKE] == 0.0:
+                start_body(bodies, body, row)
+            while bodies.reached[body] < goals[body]:
+                for i in range(4):
+                    row[W_THROTTLE + i] = row[U_THROTTLE + i]
+                step_body(bodies, body, row)
+
+    compiled: Advance = advance_bodies
+    return compiled
+
+
+advance_bodies = _compose(digest_of(world_sources()))
+"""Advance each body to its goal step with the motor commands in its inputs: no autopilot at all."""

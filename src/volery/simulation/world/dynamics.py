@@ -1,0 +1,368 @@
+"""The battery: an open-circuit voltage that falls with the charge drawn, behind a constant resistance.
+
+* Law: V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R) (Thevenin's circuit without
+  its RC branch; Tremblay and Dessaint, World Electric Vehicle Journal 3 (2009), name it the static part).
+* OCV(s): piecewise linear through the usual rest voltages of a lithium-polymer cell at 25 degrees C, s =
+  fraction left.
+* Valid: 0 to 40 degrees C, currents up to about 20 C. Sag recovers at once; ageing and self-discharge are
+  left out.
+* Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
+
+The law of a multirotor: a rigid body under four rotors, drag, gravity and the ground.
+
+* Rigid body: m v' = m g + R F, q' = q (0, w) / 2, I w' = M - w x I w (Newton and Euler), I diagonal.
+* Rotor: w' = (u w_top V / V_full - w) / T, thrust k_T w^2, reaction torque k_Q w^2 with
+  k_Q = k_T^1.5 / (FM sqrt(2 rho A)): momentum theory's induced power at the figure of merit FM
+  (Leishman, Principles of Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3, electrical power that over the
+  efficiency of motor and controller. Valid: hover and slow flight; inflow of climb or fast flight is left
+  out, so are flapping, ground effect and the rotors' gyroscopic torque.
+* Drag: F = -(c_1 + c_2 |v|) v, v relative to the air; valid to about 20 m/s. Spinning is damped by -c_w w.
+* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down it
+  lies on four points as far above the centre.
+
+The law of a rover: a bicycle on the ground.
+
+* Speed: v' = (u v_top - v) / T_v, at most the tyres' grip a_max; steering angle d' = (s d_top - d) / T_d;
+  heading' = v tan(d) / L, held to the grip by limiting the turn rate to a_max / v (Rajamani, Vehicle
+  Dynamics and Control, 2.2: the kinematic bicycle). A skid-steered one turns at s r_top with the lag T_d, at
+  any speed.
+* Power: rolling resistance, drag and acceleration against the drive's efficiency; braking returns nothing.
+* Valid: firm ground, slopes below about 15 degrees, no slip angle; the body follows the ground, level in
+  attitude.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from numba import njit
+
+from volery.simulation.world.arithmetic import sine_cosine
+from volery.simulation.world.state_layout import (
+    INTEGRATED,
+    P_CAPACITY,
+    P_CELLS,
+    P_DAMPING,
+    P_DRAG_LINEAR,
+    P_DRAG_QUADRATIC,
+    P_DRIVE_EFFICIENCY,
+    P_EFFICIENCY,
+    P_FEET,
+    P_FRICTION,
+    P_FULL_VOLTS,
+    P_GRAVITY,
+    P_GRIP,
+    P_IDLE_POWER,
+    P_INERTIA,
+    P_MASS,
+    P_RESISTANCE,
+    P_ROLLING,
+    P_ROTOR_LAG,
+    P_ROTOR_SPIN,
+    P_ROTOR_TOP,
+    P_ROTOR_X,
+    P_ROTOR_Y,
+    P_SKID,
+    P_SPEED_LAG,
+    P_SPEED_TOP,
+    P_SPIN_DAMPING,
+    P_STEER_LAG,
+    P_STEER_TOP,
+    P_STIFFNESS,
+    P_THRUST,
+    P_TORQUE,
+    P_TURN_TOP,
+    P_WHEELBASE,
+    S_ATTITUDE,
+    S_CHARGE,
+    S_ENERGY,
+    S_POSITION,
+    S_RATES,
+    S_ROTORS,
+    S_VELOCITY,
+    U_MOTOR_HEALTH,
+    U_PAYLOAD,
+    W_AIR,
+    W_FORCE,
+    W_GROUND,
+    W_ROTATION,
+    W_SLOPE,
+    W_THROTTLE,
+    W_TORQUE,
+    W_Y,
+    Array,
+)
+
+CELL_FULL_VOLTS = 4.2
+
+
+@njit(cache=False)
+def cell_voltage(left: float) -> float:
+    """Open-circuit volts of one cell with the fraction *left* of its charge; past 0 it breaks down."""
+    if left >= 0.9:
+        return 4.06 + (min(left, 1.0) - 0.9) * 1.4
+    if left >= 0.5:
+        return 3.84 + (left - 0.5) * 0.55
+    if left >= 0.2:
+        return 3.73 + (left - 0.2) * (11.0 / 30.0)
+    if left >= 0.1:
+        return 3.61 + (left - 0.1) * 1.2
+    if left >= 0.0:
+        return 3.0 + left * 6.1
+    return max(0.0, 3.0 + left * 60.0)
+
+
+@njit(cache=False)
+def battery_current(open_volts: float, resistance: float, power: float) -> float:
+    """Amperes at which the terminals give *power* watts."""
+    room = open_volts * open_volts - 4.0 * resistance * power
+    if room <= 0.0:
+        return 0.5 * open_volts / resistance
+    return 2.0 * power / (open_volts + sqrt(room))
+
+
+_SLIP = 0.05  # [m/s] below which friction grows linearly with speed
+
+
+@njit(cache=False)
+def electrical_power(row: Array, at: int) -> float:
+    """Watts drawn at the battery by rotors, autopilot and payload, in the state from column *at*."""
+    cubes = 0.0
+    for i in range(4):
+        speed = row[at + S_ROTORS + i]
+        cubes += speed * speed * speed
+    shaft = row[P_TORQUE] * cubes
+    power: float = shaft / row[P_EFFICIENCY] + row[P_IDLE_POWER] + row[U_PAYLOAD]
+    return power
+
+
+@njit(cache=False)
+def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
+    """Terminal volts and amperes at a power, in the state from column *at*."""
+    left = 1.0 - row[at + S_CHARGE] / row[P_CAPACITY]
+    open_volts = cell_voltage(left) * row[P_CELLS]
+    amps = battery_current(open_volts, row[P_RESISTANCE], power)
+    return open_volts - row[P_RESISTANCE] * amps, amps
+
+
+@njit(cache=False)
+def rotation_matrix(row: Array, at: int, to: int) -> None:
+    """The quaternion from column *at* as a matrix, from column *to*: body axes to the axes of the world."""
+    w, x, y, z = row[at], row[at + 1], row[at + 2], row[at + 3]
+    row[to] = 1.0 - 2.0 * (y * y + z * z)
+    row[to + 1] = 2.0 * (x * y - w * z)
+    row[to + 2] = 2.0 * (x * z + w * y)
+    row[to + 3] = 2.0 * (x * y + w * z)
+    row[to + 4] = 1.0 - 2.0 * (x * x + z * z)
+    row[to + 5] = 2.0 * (y * z - w * x)
+    row[to + 6] = 2.0 * (x * z - w * y)
+    row[to + 7] = 2.0 * (y * z + w * x)
+    row[to + 8] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=False)
+def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector in body axes as east, north, up."""
+    return (
+        row[W_ROTATION] * x + row[W_ROTATION + 1] * y + row[W_ROTATION + 2] * z,
+        row[W_ROTATION + 3] * x + row[W_ROTATION + 4] * y + row[W_ROTATION + 5] * z,
+        row[W_ROTATION + 6] * x + row[W_ROTATION + 7] * y + row[W_ROTATION + 8] * z,
+    )
+
+
+@njit(cache=False)
+def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, float, float]:
+    """A vector east, north, up in body axes."""
+    return (
+        row[W_ROTATION] * east + row[W_ROTATION + 3] * north + row[W_ROTATION + 6] * up,
+        row[W_ROTATION + 1] * east + row[W_ROTATION + 4] * north + row[W_ROTATION + 7] * up,
+        row[W_ROTATION + 2] * east + row[W_ROTATION + 5] * north + row[W_ROTATION + 8] * up,
+    )
+
+
+@njit(cache=False)
+def _tread(row: Array, x: float, y: float, z: float) -> None:
+    """Add to force and torque what the ground does to a foot at x, y, z in body axes."""
+    _, _, height = _to_world(row, x, y, z)
+    depth = row[W_GROUND] - row[W_Y + S_POSITION + 2] - height
+    if depth <= 0.0:
+        return
+    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    east, north, up = _to_world(row, q * z - r * y, r * x - p * z, p * y - q * x)
+    east += row[W_Y + S_VELOCITY]
+    north += row[W_Y + S_VELOCITY + 1]
+    up += row[W_Y + S_VELOCITY + 2]
+    normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * up)
+    grip = row[P_FRICTION] * normal / max(sqrt(east * east + north * north), _SLIP)
+    row[W_FORCE] -= grip * east
+    row[W_FORCE + 1] -= grip * north
+    row[W_FORCE + 2] += normal
+    fx, fy, fz = _to_body(row, -grip * east, -grip * north, normal)
+    row[W_TORQUE] += y * fz - z * fy
+    row[W_TORQUE + 1] += z * fx - x * fz
+    row[W_TORQUE + 2] += x * fy - y * fx
+
+
+@njit(cache=False)
+def _stand(row: Array) -> None:
+    """Add what the ground does to the four feet, or to as many points above when upside down."""
+    depth = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
+    for foot in range(4):
+        x = row[P_FEET] if foot < 2 else -row[P_FEET]
+        y = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
+        _tread(row, x, y, depth)
+
+
+@njit(cache=False)
+def _spin_up(row: Array) -> None:
+    """Rotor speeds, charge and energy: what changes even in a body at rest."""
+    power = electrical_power(row, W_Y)
+    volts, amps = volts_amps(row, W_Y, power)
+    top = row[P_ROTOR_TOP] * volts / row[P_FULL_VOLTS]
+    for i in range(4):
+        row[W_SLOPE + S_ROTORS + i] = (row[W_THROTTLE + i] * top - row[W_Y + S_ROTORS + i]) / row[P_ROTOR_LAG]
+    row[W_SLOPE + S_CHARGE] = amps
+    row[W_SLOPE + S_ENERGY] = volts * amps
+
+
+@njit(cache=False)
+def _loads(row: Array) -> None:
+    """Rotor and air loads: force east, north, up without gravity; torque forward, left, up."""
+    lift = 0.0
+    for axis in range(3):
+        row[W_TORQUE + axis] = 0.0
+    for i in range(4):
+        square = row[W_Y + S_ROTORS + i] * row[W_Y + S_ROTORS + i]
+        thrust = row[P_THRUST] * square * row[U_MOTOR_HEALTH + i]
+        lift += thrust
+        row[W_TORQUE] += row[P_ROTOR_Y + i] * thrust
+        row[W_TORQUE + 1] -= row[P_ROTOR_X + i] * thrust
+        row[W_TORQUE + 2] += row[P_ROTOR_SPIN + i] * row[P_TORQUE] * square
+    ve = row[W_Y + S_VELOCITY] - row[W_AIR]
+    vn = row[W_Y + S_VELOCITY + 1] - row[W_AIR + 1]
+    vu = row[W_Y + S_VELOCITY + 2] - row[W_AIR + 2]
+    drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * sqrt(ve * ve + vn * vn + vu * vu)
+    row[W_FORCE] = row[W_ROTATION + 2] * lift - drag * ve
+    row[W_FORCE + 1] = row[W_ROTATION + 5] * lift - drag * vn
+    row[W_FORCE + 2] = row[W_ROTATION + 8] * lift - drag * vu
+    for axis in range(3):
+        row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_Y + S_RATES + axis]
+
+
+@njit(cache=False)
+def _turn(row: Array) -> None:
+    """Rates of change of the attitude quaternion and of the body rates, by Euler's equations."""
+    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    w, x = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 1]
+    y, z = row[W_Y + S_ATTITUDE + 2], row[W_Y + S_ATTITUDE + 3]
+    row[W_SLOPE + S_ATTITUDE] = 0.5 * (-x * p - y * q - z * r)
+    row[W_SLOPE + S_ATTITUDE + 1] = 0.5 * (w * p + y * r - z * q)
+    row[W_SLOPE + S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
+    row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * (w * r + x * q - y * p)
+    ix, iy, iz = row[P_INERTIA], row[P_INERTIA + 1], row[P_INERTIA + 2]
+    row[W_SLOPE + S_RATES] = (row[W_TORQUE] + (iy - iz) * q * r) / ix
+    row[W_SLOPE + S_RATES + 1] = (row[W_TORQUE + 1] + (iz - ix) * r * p) / iy
+    row[W_SLOPE + S_RATES + 2] = (row[W_TORQUE + 2] + (ix - iy) * p * q) / iz
+
+
+@njit(cache=False)
+def multirotor_slope(row: Array, resting: bool) -> None:
+    """The state's rate of change. A resting body keeps its place; its rotors may spin."""
+    _spin_up(row)
+    if resting:
+        for i in range(S_ROTORS):
+            row[W_SLOPE + i] = 0.0
+        return
+    rotation_matrix(row, W_Y + S_ATTITUDE, W_ROTATION)
+    _loads(row)
+    reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
+    if row[W_Y + S_POSITION + 2] - row[W_GROUND] < reach:
+        _stand(row)
+    for axis in range(3):
+        row[W_SLOPE + S_POSITION + axis] = row[W_Y + S_VELOCITY + axis]
+        row[W_SLOPE + S_VELOCITY + axis] = row[W_FORCE + axis] / row[P_MASS]
+    row[W_SLOPE + S_VELOCITY + 2] -= row[P_GRAVITY]
+    _turn(row)
+
+
+@njit(cache=False)
+def total_thrust(row: Array) -> float:
+    """The rotors' thrust together [N]."""
+    squares = 0.0
+    for i in range(4):
+        squares += row[S_ROTORS + i] * row[S_ROTORS + i]
+    thrust: float = row[P_THRUST] * squares
+    return thrust
+
+
+S_STEER = S_ROTORS
+S_SPEED = S_ROTORS + 1
+_STANDING = 0.001  # [m/s] below which rolling resistance has no sign
+
+
+@njit(cache=False)
+def drive_power(row: Array, speed: float, acceleration: float) -> float:
+    """Watts at the battery for the wheels at a speed [m/s] and an acceleration [m/s^2]."""
+    pace = abs(speed)
+    if pace < _STANDING:
+        return 0.0
+    drag = (row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * pace) * pace
+    resistance = row[P_ROLLING] * row[P_MASS] * row[P_GRAVITY] + drag
+    push = acceleration if speed > 0.0 else -acceleration
+    wheel = (resistance + row[P_MASS] * push) * pace
+    power: float = max(0.0, wheel) / row[P_DRIVE_EFFICIENCY]
+    return power
+
+
+@njit(cache=False)
+def turn_rate(row: Array, speed: float, steer: float) -> float:
+    """Heading's rate of change [rad/s, anticlockwise] at a speed and a steering angle (skid: a turn rate)."""
+    if row[P_SKID] > 0.5:
+        rate = steer
+    else:
+        s, c = sine_cosine(steer)
+        rate = speed * s / (c * row[P_WHEELBASE])
+    most = row[P_GRIP] / max(abs(speed), 0.1)
+    held: float = min(max(rate, -most), most)
+    return held
+
+
+@njit(cache=False)
+def rover_slope(row: Array, resting: bool) -> None:
+    """The state's rate of change; commands are steering (left positive) and throttle."""
+    for i in range(INTEGRATED):
+        row[W_SLOPE + i] = 0.0
+    speed = row[W_Y + S_SPEED]
+    skid = row[P_SKID] > 0.5
+    top = row[P_TURN_TOP] if skid else row[P_STEER_TOP]
+    power = row[P_IDLE_POWER] + row[U_PAYLOAD]
+    if not resting:
+        row[W_SLOPE + S_STEER] = (row[W_THROTTLE] * top - row[W_Y + S_STEER]) / row[P_STEER_LAG]
+        wanted = row[W_THROTTLE + 1] * row[P_SPEED_TOP]
+        push = (wanted - speed) / row[P_SPEED_LAG]
+        row[W_SLOPE + S_SPEED] = min(max(push, -row[P_GRIP]), row[P_GRIP])
+        rate = turn_rate(row, speed, row[W_Y + S_STEER])
+        w, z = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 3]
+        row[W_SLOPE + S_ATTITUDE] = -0.5 * z * rate
+        row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * w * rate
+        row[W_SLOPE + S_POSITION] = speed * (w * w - z * z)
+        row[W_SLOPE + S_POSITION + 1] = speed * 2.0 * w * z
+        power += drive_power(row, speed, row[W_SLOPE + S_SPEED])
+    volts, amps = volts_amps(row, W_Y, power)
+    row[W_SLOPE + S_CHARGE] = amps
+    row[W_SLOPE + S_ENERGY] = volts * amps
+
+
+@njit(cache=False)
+def follow_ground(row: Array, ground: float, climb: float) -> None:
+    """What the wheels dictate after a step: height, velocity and turn rate."""
+    speed = row[S_SPEED]
+    w, z = row[S_ATTITUDE], row[S_ATTITUDE + 3]
+    norm = sqrt(w * w + z * z)
+    w, z = w / norm, z / norm
+    row[S_ATTITUDE], row[S_ATTITUDE + 3] = w, z
+    row[S_POSITION + 2] = ground
+    row[S_VELOCITY] = speed * (w * w - z * z)
+    row[S_VELOCITY + 1] = speed * 2.0 * w * z
+    row[S_VELOCITY + 2] = climb
+    row[S_RATES + 2] = turn_rate(row, speed, row[S_STEER])
