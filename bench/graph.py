@@ -20,7 +20,7 @@ from volery.cost import catalogue
 from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import Graph, free
@@ -71,7 +71,7 @@ def serving(seconds: int) -> float:
     """CPU milliseconds per simulated second of a vehicle node with an autopilot that streams at 10 Hz."""
     kernel = VirtualKernel()
     graph = graph_on(kernel, priced=True, recorded=True)
-    ours, theirs = in_process(kernel)
+    ours, theirs = in_process_pair(kernel)
 
     def say(name: str, **fields: Any) -> None:
         theirs.send(Frame(name, fields, 1, 1))

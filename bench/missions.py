@@ -18,7 +18,7 @@ from statistics import median
 from time import process_time
 
 import volery
-from volery.links import in_process
+from volery.links import in_process_link
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from mission import HOME, mission
@@ -56,17 +56,19 @@ def flight(drones: int) -> tuple[float, float, float]:
         for k in range(drones)
     ]
 
-    def counted(self: in_process.InProcess, frame: object, send: object = in_process.InProcess.send) -> None:
+    def counted(
+        self: in_process_link.InProcess, frame: object, send: object = in_process_link.InProcess.send
+    ) -> None:
         stretch.frames += 1
         send(self, frame)
 
-    in_process.InProcess.send, original = counted, in_process.InProcess.send
+    in_process_link.InProcess.send, original = counted, in_process_link.InProcess.send
     try:
         with tempfile.TemporaryDirectory() as folder:
             run = volery.fly(stretch.fly, urls, volery.Options(seed=1, out=Path(folder)))
             size = (Path(folder) / "trace.mcap").stat().st_size / 1e6
     finally:
-        in_process.InProcess.send = original
+        in_process_link.InProcess.send = original
     assert run.completed, run.record.outcome.reason
     computing = max(stretch.computing) - min(stretch.computing)
     return stretch.factor(), stretch.frames / computing, size / run.record.sim_s * 3600

@@ -24,15 +24,21 @@ from statistics import mean, median
 from tempfile import TemporaryDirectory
 
 from volery.calibration.machine import this_machine
-from volery.calibration.processor.campaign import measure
-from volery.calibration.processor.entry import law_of
-from volery.calibration.processor.timing import isa
+from volery.calibration.processor.core_fit import core_law
+from volery.calibration.processor.microbenchmarks import isa, measure
 from volery.cost import catalogue
-from volery.cost.core import CoreLaw
-from volery.cost.native.costs import Costs, traced_costs
-from volery.cost.native.program import Program, compile_program
-from volery.cost.native.running import WINDOW, Wanted, build, build_timing, counts, timed, trace
-from volery.cost.native.toolchain import run_tool
+from volery.cost.code_laws import CoreLaw
+from volery.cost.native.block_costs import BlockCosts, traced_costs
+from volery.cost.native.compilation import Program, compile_program, run_tool
+from volery.cost.native.instrumented_run import (
+    WINDOW,
+    Invocation,
+    block_counts,
+    build_executable,
+    build_timing,
+    time_activations,
+    trace_blocks,
+)
 
 KERNELS = Path(__file__).parent / "kernels"
 CALIBRATING, JUDGING = 0, 3
@@ -73,14 +79,14 @@ class Judged:
     slowdown: float
 
 
-def wanted(given: int) -> Wanted:
-    return Wanted("kernel", (f"prepare({given})",))
+def wanted(given: int) -> Invocation:
+    return Invocation("kernel", (f"prepare({given})",))
 
 
-def costs_of(program: Program, folder: Path, run: Wanted) -> Costs:
+def costs_of(program: Program, folder: Path, run: Invocation) -> BlockCosts:
     program.traced_object(folder / "traced.o")
-    executable = build(program, run, folder / "traced.o", folder)
-    ran = trace(executable, run, folder, WINDOW, program.law.memory)
+    executable = build_executable(program, run, folder / "traced.o", folder)
+    ran = trace_blocks(executable, run, folder, WINDOW, program.law.memory)
     return traced_costs(program, ran.until(MOST_TRACED))[0]
 
 
@@ -94,7 +100,7 @@ def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
         place = folder / str(given)
         place.mkdir()
         run = wanted(given)
-        entered = counts(build(program, run, folder / "counted.o", place), run, place)
+        entered = block_counts(build_executable(program, run, folder / "counted.o", place), run, place)
         estimated[given] = costs.total(entered) + costs.waiting(entered) * law.greatest_mhz / 1000.0
         timers["plain", given] = build_timing(program, run, folder / "plain.o", place).rename(place / "plain")
         timers["counted", given] = build_timing(program, run, folder / "counted.o", place).rename(
@@ -103,7 +109,7 @@ def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
     took: dict[tuple[str, int], list[float]] = {key: [] for key in timers}
     for _ in range(rounds):  # in turns, so that whatever disturbs disturbs all
         for key, timer in timers.items():
-            took[key].append(median(timed(timer, ACTIVATIONS)))
+            took[key].append(median(time_activations(timer, ACTIVATIONS)))
     plain = {given: median(took["plain", given]) for given in (CALIBRATING, JUDGING)}
     factor = plain[CALIBRATING] / estimated[CALIBRATING]
     return Judged(
@@ -119,7 +125,7 @@ def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
 def on_this_machine(paths: list[Path], rounds: int) -> None:
     with TemporaryDirectory() as made:
         taken = measure(Path(made, "notes"), lambda name, done, whole: None)
-    law = law_of(this_machine("host"), isa(), taken)
+    law = core_law(this_machine("host"), isa(), taken)
     print(f"this machine at {law.greatest_mhz:g} MHz; cycles of one activation with the judging input")
     print(f"{'kernel':18}{'estimated':>12}{'measured':>12}{'error':>9}{'model':>9}{'slowdown':>10}")
     judged = []
@@ -182,7 +188,7 @@ def on_a72(paths: list[Path]) -> None:
             costs = costs_of(program, folder, wanted(CALIBRATING))
             program.counted_object(folder / "counted.o")
             run = wanted(JUDGING)
-            entered = counts(build(program, run, folder / "counted.o", folder), run, folder)
+            entered = block_counts(build_executable(program, run, folder / "counted.o", folder), run, folder)
             estimated, real = float(costs.instructions @ entered), executed(program, JUDGING, folder)
         errors.append(abs(estimated / real - 1.0))
         print(f"{path.stem:18}{estimated:12,.0f}{real:12,} {estimated / real - 1.0:+8.2%}", flush=True)
@@ -195,10 +201,12 @@ def anchors() -> None:
         folder = Path(made)
         source = folder / "primes.cpp"
         source.write_text(PRIMES, encoding="utf-8")
-        program, run = compile_program([source], law), Wanted("kernel")
+        program, run = compile_program([source], law), Invocation("kernel")
         costs = costs_of(program, folder, run)
         program.counted_object(folder / "counted.o")
-        cycles = costs.total(counts(build(program, run, folder / "counted.o", folder), run, folder))
+        cycles = costs.total(
+            block_counts(build_executable(program, run, folder / "counted.o", folder), run, folder)
+        )
     print("published for a Raspberry Pi 4, beside the model's figure (nothing fitted to either)")
     print(f"sysbench cpu, primes below 10,000, events/s at 1500 MHz: 1478, estimated {1.5e9 / cycles:.0f}")
     print("CoreMark/MHz: about 5.5, not estimated: its sources are not part of this project")

@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from volery.run.options import Options
+from volery.run.result import Options
 from volery.run.simulate import simulate
 
 SLEEPS = 2566

@@ -15,26 +15,26 @@ import sys
 from pathlib import Path
 from statistics import mean
 
-from volery.calibration.python.campaign import calibrate
-from volery.calibration.python.pieces import Rounds, Timed, program
-from volery.components.counting import Steps
-from volery.cost.interpreter import python_operations
+from volery.calibration.python.operation_costs import calibrate
+from volery.calibration.python.timed_code import Rounds, TimedCode, timed_program
+from volery.cost.instrumentation import StepCounter
+from volery.cost.python_operations import operation_table
 
 PROGRAMS = Path(__file__).with_name("python_programs")
 SEED = 5
 
 
-def counted(one: Timed) -> Timed:
+def counted(one: TimedCode) -> TimedCode:
     """The same with counters in it."""
-    return Timed(one.name, one.text, lambda _: one.load(Steps()))
+    return TimedCode(one.name, one.text, lambda _: one.load(StepCounter()))
 
 
 def main() -> None:
     rounds = Rounds(9, int(sys.argv[1]) if len(sys.argv) > 1 else 15)
-    plain = [program(file.stem, file.read_text(), SEED) for file in sorted(PROGRAMS.glob("*.py"))]
+    plain = [timed_program(file.stem, file.read_text(), SEED) for file in sorted(PROGRAMS.glob("*.py"))]
     with_counters = [counted(one) for one in plain]
     found = calibrate(rounds, beside=[*plain, *with_counters])
-    table = python_operations()
+    table = operation_table()
     print(f"this machine against that of the table: {found.slowdown:.2f} ± {found.slowdown_spread:.0%}")
     print(f"operations take {found.in_context:.2f} times as long in programs as in loops of one statement")
     print(

@@ -25,21 +25,18 @@ from typing import TypeVar
 from rich.console import Console
 
 from volery.base.errors import UsageError
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import this_machine
-from volery.calibration.measured.campaign import compare, estimated, prepared
-from volery.calibration.measured.comparison import Compared
-from volery.calibration.measured.runs import Run, running
-from volery.calibration.ros.campaign import Circumstances, Plan
-from volery.calibration.ros.entry import in_figures, law_of, write_entry
-from volery.calibration.ros.fitting import Cost, costs
-from volery.calibration.ros.samples import Round
-from volery.calibration.ros.stage import Pace, check_client, own_master, stage
+from volery.calibration.machine import put_law, this_machine
+from volery.calibration.ros.call_costs import CallCost, Round, call_costs
+from volery.calibration.ros.campaign import Conditions, Plan
+from volery.calibration.ros.probe_environment import Pace, check_client, own_master, probe_setup
+from volery.calibration.ros.results import format_line, ros_law, write_entry
+from volery.calibration.validation.comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
+from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
 from volery.cli.measure import tables
 from volery.cost import catalogue
 from volery.model.reader import load
 from volery.model.system import System
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 NODES = Path(__file__).parent / "ros_nodes"
 PACE = Pace(block_ms=400.0, sleeps_ms=(10.0, 20.0, 50.0, 100.0, 200.0))
@@ -56,17 +53,17 @@ class Campaign:
         self.machine = this_machine()
         self.catalogue = folder / f"{client}.yaml"
         self.rounds: list[Round] = []
-        self.runs: list[Run] = []
+        self.runs: list[MeasuredRun] = []
         self.plan = Plan(pace=PACE)
         self._stack = ExitStack()
 
     def open(self) -> None:
         """Compile, and start all that stays."""
         system = self.system()
-        nodes = prepared(system)
-        self.stage = self._stack.enter_context(stage(self.client))
+        nodes = prepare_nodes(system)
+        self.stage = self._stack.enter_context(probe_setup(self.client))
         master = self._stack.enter_context(own_master())
-        self._run = self._stack.enter_context(running(nodes, master, system.limits.duration_ns))
+        self._run = self._stack.enter_context(measurement_session(nodes, master, system.limits.duration_ns))
 
     def close(self) -> None:
         self._stack.close()
@@ -83,19 +80,19 @@ class Campaign:
             self.runs.append(self._run())
             self.rounds.append(probe.result())
 
-    def costs(self) -> dict[str, Cost]:
-        return costs(self.rounds)
+    def costs(self) -> dict[str, CallCost]:
+        return call_costs(self.rounds)
 
-    def result(self) -> tuple[System, tuple[Compared, ...]]:
+    def result(self) -> tuple[System, tuple[NodeComparison, ...]]:
         """Estimated with all rounds, beside all runs."""
         machine, mhz = self.machine, self.machine.frequency_mhz
-        under = Circumstances(self.client, machine.description, mhz)
-        write_entry(self.catalogue, machine, law_of(self.costs(), under))
+        under = Conditions(self.client, machine.description, mhz)
+        write_entry(self.catalogue, machine, ros_law(self.costs(), under))
         code = catalogue().processor("generic-host").code["python"]  # a thousandth of what the nodes take
         put_law(self.catalogue, machine, ("code", "python"), code, (mhz, mhz))
         host = f"{{is: {machine.name}, frequency: {mhz:g} MHz}}"
         system = self.system(f"platform.catalogues={self.catalogue}", f"platform.processors.host={host}")
-        return system, compare(system, estimated(system), self.runs)
+        return system, compare(system, estimate_nodes(system), self.runs)
 
 
 def together(campaigns: list[Campaign], what: Callable[[Campaign], Done]) -> list[Done]:
@@ -138,7 +135,7 @@ def show(console: Console, one: Campaign) -> None:
     )
     for call, cost in one.costs().items():
         sure = f"known to {cost.half_width:.0%}, quartiles ±{cost.spread / 2:.0%}"
-        console.print(f"  {call:<18}{in_figures(cost.whole, call):<20}{sure}", highlight=False)
+        console.print(f"  {call:<18}{format_line(cost.whole, call):<20}{sure}", highlight=False)
     system, found = one.result()
     console.print(*tables(found, system))
     off = median(abs(node.difference) for node in found)

@@ -32,11 +32,11 @@ from volery.base.time import MS, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
-from volery.links.parser import MAVLINK
-from volery.links.udp import UdpLink
-from volery.links.wire import Wire
-from volery.run.airfield import airfield_of
-from volery.run.simulated import link_to, simulated
+from volery.links.mavlink_codec import MAVLINK
+from volery.links.udp_link import UdpLink
+from volery.links.wire_faults import FaultyLink
+from volery.run.assembly.simulated_fleet import fleet_of
+from volery.run.assembly.simulated_vehicles import link_to, parse_simulated
 from volery.testing.hostile import Besieged
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
@@ -53,9 +53,9 @@ Chunks = list[tuple[int, bytes]]
 def telemetry(seconds: int, rate: int) -> Chunks:
     """What arrives of a simulated ArduPilot; *rate* of what a ground station asks for, 0 for nothing more."""
     kernel = VirtualKernel()
-    wanted = simulated(parse("sim:ardupilot?start=warm&wire=bytes"), "craft")
-    link = link_to(kernel, airfield_of(kernel, [wanted], 1), wanted, 1)
-    assert isinstance(link, Wire)
+    wanted = parse_simulated(parse("sim:ardupilot?start=warm&wire=bytes"), "craft")
+    link = link_to(kernel, fleet_of(kernel, [wanted], 1), wanted, 1)
+    assert isinstance(link, FaultyLink)
     chunks: Chunks = []
     arrived = link.arrived
 

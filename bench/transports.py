@@ -30,7 +30,7 @@ from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.client_libraries.importable import importable
+from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.graph import Graph
 from volery.ros.messages import message_class
 from volery.ros.transports.ros1 import Roscore, available
@@ -146,7 +146,7 @@ def embedded(library: str, recorded: bool, count: int) -> Taken:
     """Both as components of one run in virtual time, so that the talker's CPU time is that of both."""
     kernel = VirtualKernel()
     graph = Graph(kernel, unrecorded=not recorded)
-    face = importable(graph)[library]
+    face = importable_modules(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
     kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))
     used: list[float] = []

@@ -17,11 +17,11 @@ from typer.main import get_command
 
 from volery.cli.main import app
 from volery.cost import catalogue
-from volery.model.schema import schema
+from volery.model.document import schema
 from volery.requirements.observables import OBSERVABLES
 from volery.simulation.autopilots.ardupilot import DIALECT as ARDUPILOT
+from volery.simulation.autopilots.firmware import Family
 from volery.simulation.autopilots.px4 import DIALECT as PX4
-from volery.simulation.autopilots.simulated.dialect import Family
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
 from volery.testing.faults import FAULTS

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from volery.base.errors import VoleryError
     from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-    from volery.components.services import add_time, log, note, now, sleep
+    from volery.components.component_api import add_time, log, note, now, sleep
     from volery.run.connect import connect, connect_fleet
     from volery.run.fly import fly
-    from volery.run.options import Options
-    from volery.run.result import Run
+    from volery.run.result import Options, Run
     from volery.run.simulate import simulate
     from volery.vehicles import Drone, Fence, Fleet, Limits, Rover, Zone
 

@@ -12,7 +12,7 @@ from volery.bridge import serve_vehicle
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import Graph, QoS
@@ -86,7 +86,7 @@ def test_topics_and_services(kernel: Any, graph: Graph) -> None:
 
 
 def test_a_vehicle_is_served(kernel: Any, graph: Graph) -> None:
-    ours, theirs = in_process(kernel)
+    ours, theirs = in_process_pair(kernel)
     states: list[str] = []
 
     def answer(frame: Frame) -> None:

@@ -13,8 +13,8 @@ from volery.report.document import write_report
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.attachments import scenery_to_json
 from volery.trace.mcap_writer import Attachment, McapWriter
-from volery.trace.scenery import scenery_to_json
 
 pytestmark = pytest.mark.integration
 

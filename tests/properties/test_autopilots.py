@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame, Link
-from volery.links.mavlink import message_type
+from volery.links.mavlink_messages import message_type
 from volery.simulation.autopilots.ardupilot import DIALECT
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, REAL32, quantised
@@ -93,7 +93,7 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     place = LocalFrame(48.0, 11.0, 500.0)
     _, (flight,) = make_world(kernel.now, [Multirotor(sensors="perfect")], seed=1, frame=place)
     autopilot = Autopilot(kernel, flight, DIALECT, warm=True)
-    ours, theirs = in_process(kernel, MS, "station")
+    ours, theirs = in_process_pair(kernel, MS, "station")
     autopilot.connect(theirs)
     return kernel, autopilot, ours
 

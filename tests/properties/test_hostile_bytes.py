@@ -14,8 +14,8 @@ from volery.base.seeds import stream
 from volery.base.time import MS
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
-from volery.links.pprzlink import PPRZLINK
-from volery.links.pprzlink_definitions import DATALINK, TELEMETRY, message_type_of
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type_of
 from volery.testing.hostile import SEALS, Besieged, Mutator, besiege
 from volery.vehicles.driver import drivers
 

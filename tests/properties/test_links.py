@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.link import Frame
-from volery.links.mavlink import encode, quantised
-from volery.links.parser import Parser
+from volery.links.mavlink_codec import MavlinkParser
+from volery.links.mavlink_messages import encode, quantised
 
 RANGES = {
     "int8_t": (-(2**7), 2**7 - 1),
@@ -52,7 +52,7 @@ def frames(draw: st.DrawFn) -> Frame:
 @given(frames(), st.integers(0, 255))
 def test_the_wire_carries_every_message(frame: Frame, sequence: int) -> None:
     data = encode(frame, sequence)
-    (read,) = Parser().feed(data)
+    (read,) = MavlinkParser().feed(data)
     assert read == quantised(frame) == frame
 
 
@@ -69,7 +69,7 @@ def test_pymavlink_reads_the_same_values(frame: Frame) -> None:
 @given(st.lists(frames(), max_size=4), st.lists(TEXT, min_size=5, max_size=5), st.lists(st.integers(1, 40)))
 def test_text_between_frames_and_any_cutting(sent: list[Frame], texts: list[str], cuts: list[int]) -> None:
     data = b"".join(text.encode() + encode(frame, 0) for text, frame in zip(texts, sent, strict=False))
-    parser = Parser()
+    parser = MavlinkParser()
     read: list[Frame] = []
     for cut in cuts:
         read += parser.feed(data[:cut])
@@ -82,7 +82,7 @@ def test_text_between_frames_and_any_cutting(sent: list[Frame], texts: list[str]
 @given(st.binary(max_size=600))
 def test_noise_never_raises_and_what_follows_is_heard(noise: bytes) -> None:
     beat = Frame("HEARTBEAT", {"type": 2, "mavlink_version": 3}, 1, 1)
-    parser = Parser()
+    parser = MavlinkParser()
     parser.feed(noise)
     parser.problem()
     heard = parser.feed(encode(beat, 0) * 40)  # long enough to complete any frame that the noise pretends

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprzlink import PPRZLINK
-from volery.links.pprzlink_definitions import message_type
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzlink_messages import message_type
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import DIALECT
@@ -55,7 +55,7 @@ def test_no_message_upsets_it(sent: list[Frame], where: str) -> None:
     place = LocalFrame(48.0, 11.0, 500.0)
     _, (flight,) = make_world(kernel.now, [Multirotor(sensors="perfect")], seed=1, frame=place)
     autopilot = Autopilot(kernel, flight, DIALECT, system=AIRCRAFT, warm=True)
-    link, theirs = in_process(kernel, MS, "ground", PPRZLINK)
+    link, theirs = in_process_pair(kernel, MS, "ground", PPRZLINK)
     autopilot.connect(theirs)
     heard: list[Frame] = []
     link.receive(heard.append)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from volery.links.link import Frame
-from volery.links.pprzlink import PprzParser, encode, quantised
-from volery.links.pprzlink_definitions import Field, message_names, message_type
+from volery.links.pprzlink_codec import PprzlinkParser, encode, quantised
+from volery.links.pprzlink_messages import Field, message_names, message_type
 
 INTEGERS = {"b": (-128, 127), "B": (0, 255), "h": (-(2**15), 2**15 - 1), "H": (0, 2**16 - 1)}
 INTEGERS |= {"i": (-(2**31), 2**31 - 1), "I": (0, 2**32 - 1)}
@@ -36,14 +36,14 @@ def frames(draw: st.DrawFn) -> Frame:
 @settings(max_examples=300, deadline=None)
 @given(frames())
 def test_the_wire_carries_every_message(frame: Frame) -> None:
-    assert PprzParser().feed(encode(frame)) == [frame] == [quantised(frame)]
+    assert PprzlinkParser().feed(encode(frame)) == [frame] == [quantised(frame)]
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(frames(), min_size=1, max_size=4), st.lists(st.integers(1, 40), min_size=1))
 def test_cuts_change_nothing(sent: list[Frame], cuts: list[int]) -> None:
     data = b"".join(encode(frame) for frame in sent)
-    parser, heard, place = PprzParser(), [], 0
+    parser, heard, place = PprzlinkParser(), [], 0
     for number in range(len(data)):
         end = place + cuts[number % len(cuts)]
         heard += parser.feed(data[place:end])
@@ -54,7 +54,7 @@ def test_cuts_change_nothing(sent: list[Frame], cuts: list[int]) -> None:
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.one_of(st.binary(max_size=60), frames().map(encode)), max_size=6))
 def test_noise_never_raises_and_every_byte_is_accounted_for(parts: list[bytes]) -> None:
-    parser = PprzParser()
+    parser = PprzlinkParser()
     data = b"".join(parts)
     for frame in parser.feed(data):
         message_type(frame.name).pack(frame.fields)
@@ -66,7 +66,7 @@ def test_noise_never_raises_and_every_byte_is_accounted_for(parts: list[bytes]) 
 @given(st.binary(max_size=80), frames())
 def test_a_frame_after_noise_is_found_by_the_time_that_others_follow(noise: bytes, frame: Frame) -> None:
     """Noise can look like the head of a long frame; what follows shows that it was none."""
-    parser = PprzParser()
+    parser = PprzlinkParser()
     heard = parser.feed(noise + encode(frame) + bytes(300))
     if not parser.heard.unknown and not parser.heard.frames_v1:
         assert frame in heard

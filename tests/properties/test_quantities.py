@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from volery.base.errors import Location, VoleryError
 from volery.base.units import PLAIN, TIME, UNITS, NotAQuantity, parse, read, read_ns, unit
-from volery.model.changes import Change, apply, from_option, split
-from volery.model.problems import Problems
-from volery.model.text import Node, parse_value
+from volery.model.assembly import Change, apply_changes, change_from_option, split_path
+from volery.model.text import Node, Problems, parse_value
 from volery.model.text import parse as parse_text
 
 SYMBOLS = st.sampled_from(sorted(UNITS))
@@ -76,7 +75,7 @@ def test_what_is_set_is_there_and_nothing_else_changes(name, other, old, new):
     parameters = {name: old, other: old} if name != other else {name: old}
     root = tree({"components": {"c": {"language": "python", "parameters": parameters}}})
     problems = Problems(root.locate)
-    apply(root, [Change(("components", "c", "parameters", name), tree(new))], problems)
+    apply_changes(root, [Change(("components", "c", "parameters", name), tree(new))], problems)
     assert not problems
     found = root.plain()["components"]["c"]["parameters"]
     assert found[name] == tree(new).plain()
@@ -89,19 +88,19 @@ def test_what_is_set_is_there_and_nothing_else_changes(name, other, old, new):
 def test_setting_twice_is_setting_once(name, value):
     once, twice = tree({"run": {}}), tree({"run": {}})
     change = Change(("environment", "vehicles", name), tree(value))
-    apply(once, [change], Problems(once.locate))
-    apply(twice, [change, change], Problems(twice.locate))
+    apply_changes(once, [change], Problems(once.locate))
+    apply_changes(twice, [change, change], Problems(twice.locate))
     assert once.plain() == twice.plain()
 
 
 @given(st.text(string.ascii_letters + ".=_ '{}[]:,-0123456789", max_size=40))
 def test_any_option_is_read_or_refused_in_words(text):
-    assert text in refusal(lambda: from_option(text), VoleryError, text)
+    assert text in refusal(lambda: change_from_option(text), VoleryError, text)
 
 
 @given(NAMES, NAMES, VALUES)
 def test_a_right_option_is_read(first, second, value):
-    change = from_option(f"{first}.{second}={json.dumps(value)}")
+    change = change_from_option(f"{first}.{second}={json.dumps(value)}")
     assert change.path == (first, second)
     assert change.value.plain() == value
     assert str(change.where).startswith(f"--set {first}.{second}=")
@@ -114,8 +113,10 @@ def test_any_text_is_yaml_or_refused_with_a_line(text):
 
 def test_a_list_item_can_be_set():
     root = tree({"platform": {"networks": {"n": {"between": ["a", "b"]}}}})
-    apply(
-        root, [Change(split("platform.networks.n.between.1"), parse_value("c", HERE))], Problems(root.locate)
+    apply_changes(
+        root,
+        [Change(split_path("platform.networks.n.between.1"), parse_value("c", HERE))],
+        Problems(root.locate),
     )
     assert root.plain()["platform"]["networks"]["n"]["between"] == ["a", "c"]
 
@@ -123,5 +124,7 @@ def test_a_list_item_can_be_set():
 @pytest.mark.parametrize("value", ["", "null", "~"])
 def test_nothing_takes_away(value):
     root = tree({"scenarios": {"calm": {"set": {}}, "windy": {}}})
-    apply(root, [Change(split("scenarios.calm"), parse_value(value, HERE))], Problems(root.locate))
+    apply_changes(
+        root, [Change(split_path("scenarios.calm"), parse_value(value, HERE))], Problems(root.locate)
+    )
     assert root.plain() == {"scenarios": {"windy": {}}}

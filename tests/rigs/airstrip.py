@@ -12,9 +12,9 @@ from volery.base.registry import Registry
 from volery.base.seeds import stream
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame, Link
-from volery.links.wire import WireFaults, wire
+from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
@@ -54,7 +54,7 @@ class Airstrip:
             self.kernel, self.flight, dialect, warm=warm, name="craft_1", parameters=parameters
         )
         self.link = self._connect(faults)
-        self._pilot, theirs = in_process(self.kernel, name="pilot")
+        self._pilot, theirs = in_process_pair(self.kernel, name="pilot")
         self.autopilot.connect(theirs)
         self.kind = kind
         self.vehicle: Any = self.open()
@@ -63,9 +63,9 @@ class Airstrip:
         ours: Link
         theirs: Link
         if faults is None:
-            ours, theirs = in_process(self.kernel, 2 * MS)
+            ours, theirs = in_process_pair(self.kernel, 2 * MS)
         else:
-            ours, theirs = wire(self.kernel, "radio", faults, stream(7, "radio"))
+            ours, theirs = faulty_pair(self.kernel, "radio", faults, stream(7, "radio"))
         self.autopilot.connect(theirs)
         return ours
 

@@ -8,8 +8,8 @@ from typing import Any
 from rigs.missions import carried_out
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
-from volery.links.parser import MAVLINK
+from volery.links.in_process_link import in_process_pair
+from volery.links.mavlink_codec import MAVLINK
 from volery.vehicles import Drone, Vehicle
 
 
@@ -26,7 +26,7 @@ class Bench:
     ) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        self.link, theirs = in_process(self.kernel, name="radio", codec=self.codec)
+        self.link, theirs = in_process_pair(self.kernel, name="radio", codec=self.codec)
         self.autopilot = self.peer(self.kernel, theirs, 2 if kind is Drone else 10)
         self.craft = self.autopilot.craft
         if kind is not Drone:

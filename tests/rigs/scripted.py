@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame, Link
-from volery.links.mavlink import message_type
+from volery.links.mavlink_messages import message_type
 
 ACCEPTED = 0
 INTERVAL, ASK, GET_HOME = 511, 512, 410

@@ -13,7 +13,7 @@ from rigs.airstrip import FRAME, at, dialects
 from volery.base.time import HOUR
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
-from volery.links.coded import CodedLink
+from volery.links.coded_link import CodedLink
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.firmware import Family
@@ -58,7 +58,7 @@ class Station:
 
     def another_link(self, use: str = "") -> Any:
         """The station's end of one more link."""
-        ours, theirs = in_process(self.kernel, MS, "station")
+        ours, theirs = in_process_pair(self.kernel, MS, "station")
         self.autopilot.connect(theirs, use=use)
         return ours
 

@@ -6,18 +6,18 @@ the interpreter stands between it and the names that do. It must not know worlds
 one driver.
 """
 
-from volery.bridge.interpreter import Interpreter
-from volery.bridge.mavros import MAVROS
-from volery.bridge.offering import Names
-from volery.bridge.pprzros import PprzrosNode, serve_pprzros
-from volery.bridge.roscopter import ROSCOPTER
+from volery.bridge.mavlink_adapter import MavlinkAdapter
+from volery.bridge.mavros_names import MAVROS
+from volery.bridge.node_interface import NamingScheme
+from volery.bridge.pprzros_node import PprzrosNode, serve_pprzros
+from volery.bridge.roscopter_names import ROSCOPTER
 from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions, serve_vehicle
 
 __all__ = [
     "MAVROS",
     "ROSCOPTER",
-    "Interpreter",
-    "Names",
+    "MavlinkAdapter",
+    "NamingScheme",
     "PprzrosNode",
     "VehicleNode",
     "VehicleNodeOptions",

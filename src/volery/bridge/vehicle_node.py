@@ -21,11 +21,10 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
-from volery.bridge.mavros import MAVROS
-from volery.bridge.modes import AUTOPILOTS, mode_name
-from volery.bridge.offering import Names, Offering, Service, Subscription, Surroundings
-from volery.bridge.streams import Streams
-from volery.bridge.wire import Heard, Wire
+from volery.bridge.autopilot_link import AutopilotLink, ReceivedFrame, StreamRequests
+from volery.bridge.flight_modes import AUTOPILOTS, mode_name
+from volery.bridge.mavros_names import MAVROS
+from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Service, Subscription
 from volery.kernel.task import Place, Scope, Task
 from volery.links.link import Link
 from volery.ros.graph import Node, Publisher, RosGraph
@@ -51,7 +50,7 @@ class VehicleNodeOptions:
     autopilot's own unless given.
     """
 
-    names: Names = MAVROS
+    names: NamingScheme = MAVROS
     period: Ns | None = 100 * MS
     streams: Mapping[int, int] | None = None
     silent: Ns = 10 * S
@@ -74,9 +73,9 @@ class VehicleNode:
     ) -> None:
         self._graph, self._kernel = graph, graph.kernel
         self.namespace, self.options = namespace, options
-        self.wire = Wire(graph.kernel, link, options.system, options.component, options.vehicle)
+        self.wire = AutopilotLink(graph.kernel, link, options.system, options.component, options.vehicle)
         rates = options.names.streams if options.streams is None else options.streams
-        self._streams = Streams(self.wire, rates, home=options.names.home and bool(rates))
+        self._streams = StreamRequests(self.wire, rates, home=options.names.home and bool(rates))
         self._publishers: dict[str, Publisher] = {}
         self._on_demand: set[str] = set()
         self._warned: set[str] = set()
@@ -106,7 +105,7 @@ class VehicleNode:
         node = self._graph.node(options.names.node, self.namespace, place=place)
         aside = replace(place, deadline=None, on_release=None)
         offering = options.names.offer(
-            Surroundings(
+            InterfaceContext(
                 node,
                 self.wire,
                 self._publish,
@@ -123,7 +122,7 @@ class VehicleNode:
         self._serve(node, offering, aside, scope)
         self._go_round(node, offering)
 
-    def _go_round(self, node: Node, offering: Offering) -> None:
+    def _go_round(self, node: Node, offering: NodeInterface) -> None:
         period = self.options.period
         rate = None if period is None else node.rate(period)
         while not node.closed:
@@ -146,7 +145,7 @@ class VehicleNode:
         except UsageError as error:
             missing.append(str(error))
 
-    def _advertise(self, node: Node, offering: Offering) -> None:
+    def _advertise(self, node: Node, offering: NodeInterface) -> None:
         def advertise(name: str, kind: str, qos: Any) -> None:
             self._publishers[name] = node.advertise(name, kind, qos)
 
@@ -170,7 +169,7 @@ class VehicleNode:
         publisher = self._publishers.get(topic)
         return publisher is not None and (topic not in self._on_demand or publisher.subscribers() > 0)
 
-    def _subscribe(self, node: Node, offering: Offering, aside: Place, scope: Scope) -> None:
+    def _subscribe(self, node: Node, offering: NodeInterface, aside: Place, scope: Scope) -> None:
         group = node.group()
         missing: list[str] = []
         for one in offering.subscriptions:
@@ -188,7 +187,7 @@ class VehicleNode:
         except NONSENSE as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
 
-    def _serve(self, node: Node, offering: Offering, aside: Place, scope: Scope) -> None:
+    def _serve(self, node: Node, offering: NodeInterface, aside: Place, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
                 work.run()
@@ -209,7 +208,7 @@ class VehicleNode:
 
     # -- its loop
 
-    def _cycle(self, offering: Offering) -> None:
+    def _cycle(self, offering: NodeInterface) -> None:
         with self._kernel as kernel:
             now = kernel.now()
             heard = self.wire.take()
@@ -221,7 +220,7 @@ class VehicleNode:
             self._send_heartbeat()
         self._streams.look(now)
 
-    def _translate(self, offering: Offering, heard: Heard) -> None:
+    def _translate(self, offering: NodeInterface, heard: ReceivedFrame) -> None:
         """Publish what a frame says; of what makes no sense one is warned once for each kind of frame."""
         frame, at = heard
         for translate in offering.translators.get(frame.name, ()):
@@ -232,7 +231,7 @@ class VehicleNode:
                     self._warned.add(frame.name)
                     self._warn(f"{frame.name}: not published: {error}")
 
-    def _watch_connection(self, offering: Offering, now: Ns) -> None:
+    def _watch_connection(self, offering: NodeInterface, now: Ns) -> None:
         last = self.wire.last_heartbeat
         connected = last is not None and now - last < self.options.silent
         if self.connected and not connected:

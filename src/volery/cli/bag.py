@@ -17,7 +17,7 @@ from volery.ros.graph.playing import Playing, play
 from volery.ros.graph.recording import Recorder
 from volery.ros.messages.bag_writing import create_bag
 from volery.ros.messages.bags import Bag, open_bag
-from volery.run.graphs import on_graph
+from volery.run.assembly.ros_graphs import on_graph
 
 _TICK: Ns = from_seconds(0.5)
 

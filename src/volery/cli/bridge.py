@@ -7,7 +7,7 @@ import signal
 from volery.base.time import S, clock
 from volery.cli.console import Output
 from volery.cli.endings import OK
-from volery.run.bridging import Bridge, Bridging
+from volery.run.bridge import Bridge, BridgeOptions
 from volery.trace.events import Event, LinkState, Text
 
 
@@ -32,7 +32,7 @@ class Told:
             self._output.note(f"{clock(now)}  {text}")
 
 
-def bridge(output: Output, wanted: Bridging) -> int:
+def bridge(output: Output, wanted: BridgeOptions) -> int:
     """Bridge until told to stop; the exit status."""
     told = Told(output)
     made = Bridge(wanted, told.record)

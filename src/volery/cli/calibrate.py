@@ -12,20 +12,19 @@ from rich.table import Table
 
 from volery.base.errors import UsageError
 from volery.calibration.machine import at_frequency, this_machine
+from volery.calibration.ros.call_costs import CallCost, call_costs
 from volery.calibration.ros.campaign import (
     LEAST_ROUNDS,
-    Circumstances,
-    Notebook,
+    CampaignLog,
+    Conditions,
     Plan,
     Show,
-    loose_figures,
-    pursue,
+    run_campaign,
+    uncertain_costs,
 )
 from volery.calibration.ros.campaign import Progress as Rounds
-from volery.calibration.ros.entry import in_figures, law_of, write_entry
-from volery.calibration.ros.fitting import Cost, costs
-from volery.calibration.ros.plot import picture
-from volery.calibration.ros.stage import check_client, stage
+from volery.calibration.ros.probe_environment import check_client, probe_setup
+from volery.calibration.ros.results import format_line, plot_svg, ros_law, write_entry
 from volery.cli.console import Output, table
 from volery.cli.endings import FAILED, OK
 
@@ -52,8 +51,8 @@ def ros(output: Output, wanted: Wanted) -> int:
     machine = this_machine(wanted.name)
     rounds_file = wanted.out.with_name(f"{wanted.out.name}.{wanted.client}.rounds")
     with at_frequency(machine, wanted.frequency) as mhz:
-        under = Circumstances(wanted.client, machine.description, mhz)
-        notebook = Notebook(rounds_file, under)
+        under = Conditions(wanted.client, machine.description, mhz)
+        notebook = CampaignLog(rounds_file, under)
         if notebook.rounds:
             output.note(f"going on after {len(notebook.rounds)} rounds of {rounds_file}")
         whole = _measure(output, wanted, notebook)
@@ -62,11 +61,11 @@ def ros(output: Output, wanted: Wanted) -> int:
             f"{len(notebook.rounds)} rounds were measured, and {LEAST_ROUNDS} are the least: the same "
             f"command goes on from {rounds_file}"
         )
-    found = costs(notebook.rounds)
-    law = write_entry(wanted.out, machine, law_of(found, under))
+    found = call_costs(notebook.rounds)
+    law = write_entry(wanted.out, machine, ros_law(found, under))
     title = f"{wanted.client} on {machine.description}, {mhz:g} MHz: {len(notebook.rounds)} rounds"
     drawn = wanted.out.with_name(f"{wanted.out.stem}-{wanted.client}.svg")
-    drawn.write_text(picture(found, title), encoding="utf-8")
+    drawn.write_text(plot_svg(found, title), encoding="utf-8")
     if whole:
         notebook.forget()
     output.show(_table(found, title))
@@ -76,7 +75,7 @@ def ros(output: Output, wanted: Wanted) -> int:
         output.complain(
             f"broken off: these are the figures so far; the same command goes on from {rounds_file}"
         )
-    loose = loose_figures(notebook.rounds, plan.within)
+    loose = uncertain_costs(notebook.rounds, plan.within)
     for cost in loose:
         output.complain(
             f"{cost.call}: known to {cost.half_width:.0%} only after {len(notebook.rounds)} rounds, "
@@ -85,11 +84,11 @@ def ros(output: Output, wanted: Wanted) -> int:
     return OK if whole and not loose else FAILED
 
 
-def _measure(output: Output, wanted: Wanted, notebook: Notebook) -> bool:
+def _measure(output: Output, wanted: Wanted, notebook: CampaignLog) -> bool:
     """False if it was broken off by Ctrl-C."""
     try:
-        with _shown(output, wanted.client) as show, stage(wanted.client, wanted.python) as where:
-            pursue(where, wanted.plan, notebook, show)
+        with _shown(output, wanted.client) as show, probe_setup(wanted.client, wanted.python) as where:
+            run_campaign(where, wanted.plan, notebook, show)
     except KeyboardInterrupt:
         return False
     return True
@@ -111,15 +110,15 @@ def _shown(output: Output, client: str) -> Iterator[Show]:
         yield show
 
 
-def _table(found: Mapping[str, Cost], title: str) -> Table:
+def _table(found: Mapping[str, CallCost], title: str) -> Table:
     shown = table(title=title)
     for heading in ("call", "process µs", "caller µs", "known to", "quartiles", "residual"):
         shown.add_column(heading, justify="left" if heading == "call" else "right", no_wrap=True)
     for cost in found.values():
         shown.add_row(
             cost.call,
-            in_figures(cost.whole, cost.call),
-            in_figures(cost.caller, cost.call),
+            format_line(cost.whole, cost.call),
+            format_line(cost.caller, cost.call),
             f"±{cost.half_width:.0%}",
             f"±{cost.spread / 2.0:.0%}",
             f"{cost.residual:.0%}" if len(cost.points) > 1 else "",

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from rich.table import Table
 
+from volery.calibration.component_profile import ComponentProfile, profile_components
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.cli.progress import shown
 from volery.model.reader import load
-from volery.run.learning import Learnt, learn
-from volery.run.options import Options
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
+from volery.run.result import Options
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ def components(output: Output, wanted: Wanted) -> int:
     """Run the model, learn and show; the exit status, 1 if the run failed."""
     system = load(wanted.model, vocabulary(), wanted.scenario, wanted.allocation, wanted.overrides)
     with shown(output, f"{system.name}, traced") as show:
-        learnt, run = learn(system, Options(seed=wanted.seed, show=show, tell=output.note))
+        learnt, run = profile_components(system, Options(seed=wanted.seed, show=show, tell=output.note))
     output.show(_table(learnt))
     output.give([asdict(one) for one in learnt])
     if run.error is not None:
@@ -41,7 +41,7 @@ def components(output: Output, wanted: Wanted) -> int:
     return OK
 
 
-def _table(learnt: Sequence[Learnt]) -> Table:
+def _table(learnt: Sequence[ComponentProfile]) -> Table:
     listed = table("component", "on", figures("blocks"), figures("known now"), figures("followed"))
     for one in learnt:
         listed.add_row(

@@ -8,14 +8,12 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import this_machine
-from volery.calibration.processor.campaign import loose, measure
-from volery.calibration.processor.entry import law_of
-from volery.calibration.processor.timing import isa
+from volery.calibration.machine import put_law, this_machine
+from volery.calibration.processor.core_fit import core_law
+from volery.calibration.processor.microbenchmarks import isa, measure, noisy_snippets
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
-from volery.cost.core import CoreLaw
+from volery.cost.code_laws import CoreLaw
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ def processor(output: Output, wanted: Wanted) -> int:
         taken = measure(
             notes, lambda name, done, whole: bar.update(line, description=name, completed=done, total=whole)
         )
-    law = law_of(machine, here, taken)
+    law = core_law(machine, here, taken)
     put_law(
         wanted.out,
         machine,
@@ -49,7 +47,7 @@ def processor(output: Output, wanted: Wanted) -> int:
     output.show(_table(law))
     output.give(law.model_dump())
     output.note(f"{law.name} in {wanted.out}: volery cost FILE --on {law.name} --catalogue {wanted.out}")
-    noisy = loose(taken)
+    noisy = noisy_snippets(taken)
     if noisy:
         output.note(f"not tight, the machine was busy: {', '.join(noisy)}")
     return FAILED if noisy else OK

@@ -13,14 +13,12 @@ from rich.table import Table
 from ruamel.yaml import YAML
 
 from volery.base.errors import UsageError
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import at_frequency, this_machine
-from volery.calibration.python.campaign import Calibration, calibrate
-from volery.calibration.python.pieces import Rounds, Tell
+from volery.calibration.machine import at_frequency, put_law, this_machine
+from volery.calibration.python.operation_costs import Calibration, calibrate
+from volery.calibration.python.timed_code import Rounds, ShowRounds
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
-from volery.components.operations import OPERATIONS
-from volery.cost.interpreter import OperationTable, python_operations
+from volery.cost.python_operations import OPERATIONS, OperationTable, operation_table
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def python(output: Output, wanted: Wanted) -> int:
 
 
 @contextmanager
-def _shown(output: Output) -> Iterator[Tell]:
+def _shown(output: Output) -> Iterator[ShowRounds]:
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"))
     with Progress(
         *columns, TimeElapsedColumn(), console=output.notes, disable=not output.shows_progress
@@ -76,7 +74,7 @@ def _shown(output: Output) -> Iterator[Tell]:
 
 
 def _operations(found: Calibration) -> Table:
-    shipped = python_operations().nanoseconds
+    shipped = operation_table().nanoseconds
     title = "What CPython's operations take here"
     shown = table("operation", "is", figures("ns"), figures("in volery's table"), title=title)
     for name, what in OPERATIONS.items():

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from volery.vehicles.address import Address
-from volery.vehicles.carriers import SENDS_FROM
+from volery.vehicles.address import LOCAL_PORT, Address
 
 Lines = Callable[[Address, str], list[str]]
 """Where it is served, and the name of its driver."""
@@ -68,7 +67,7 @@ def pprzlink(address: Address, driver: str) -> list[str]:
         return [said, f"  volery          volery fly MISSION.py --on {driver}+{where}"]
     if not address.host:
         return [f"  bound to UDP port {address.port}; answers the first who speaks"]
-    down, up = address.port, address.options.get(SENDS_FROM, "any free one")
+    down, up = address.port, address.options.get(LOCAL_PORT, "any free one")
     return [
         f"  sending to UDP {address.host}:{down} from port {up}; aircraft {AIRCRAFT_SYSTEM}, pprzlink 2.0",
         "  Paparazzi       aircraft 1 with the stock flight plan rotorcraft_basic, then",

@@ -12,10 +12,10 @@ from volery.base.errors import EstimateError, UsageError
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
 from volery.cost.catalogue import Catalogue, catalogue
-from volery.cost.core import CoreLaw
-from volery.cost.native.estimate import Estimate, Place, estimate
-from volery.cost.native.program import compile_program
-from volery.cost.native.running import Wanted as Run
+from volery.cost.code_laws import CoreLaw
+from volery.cost.native.compilation import compile_program
+from volery.cost.native.instrumented_run import Invocation as Run
+from volery.cost.native.program_estimate import ProgramEstimate, SourceLineCost, estimate_program
 
 TOP = 8
 
@@ -36,7 +36,7 @@ def cost(output: Output, wanted: Wanted) -> int:
     """Estimate and show; the exit status."""
     law, mhz = _core(wanted)
     program = compile_program(wanted.sources, law, wanted.flags)
-    found = estimate(program, wanted.run)
+    found = estimate_program(program, wanted.run)
     seconds = found.seconds(mhz)
     joules = _joules(wanted, law, mhz, seconds)
     within = f", within {law.error:.0%}" if law.error else ""
@@ -90,7 +90,7 @@ def _joules(wanted: Wanted, law: CoreLaw, mhz: float, seconds: float) -> float |
         return None
 
 
-def _summary(law: CoreLaw, mhz: float, found: Estimate, joules: float | None) -> Table:
+def _summary(law: CoreLaw, mhz: float, found: ProgramEstimate, joules: float | None) -> Table:
     shown = table(show_header=False)
     shown.add_row("time", _si(found.seconds(mhz), "s"))
     shown.add_row("cycles", f"{found.cycles:,.0f}")
@@ -102,7 +102,7 @@ def _summary(law: CoreLaw, mhz: float, found: Estimate, joules: float | None) ->
     return shown
 
 
-def _lines(places: tuple[Place, ...]) -> Table:
+def _lines(places: tuple[SourceLineCost, ...]) -> Table:
     listed = table(figures("cycles"), Column("line", overflow="fold"), figures("entries"), title="where")
     for one in places:
         file, _, line = one.source.rpartition(":")
@@ -110,7 +110,7 @@ def _lines(places: tuple[Place, ...]) -> Table:
     return listed
 
 
-def _listing(source: Path, places: tuple[Place, ...]) -> Text:
+def _listing(source: Path, places: tuple[SourceLineCost, ...]) -> Text:
     """The file, with the share of the cycles before each line."""
     shares = {one.source: one.share for one in places}
     listed = Text(f"\n{source}\n", no_wrap=True, overflow="ignore")

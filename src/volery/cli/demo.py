@@ -13,8 +13,8 @@ from volery.model.reader import load
 from volery.report.comparison import write_comparison
 from volery.report.terminal import short_comparison
 from volery.requirements.record import RunRecord
+from volery.run.assembly.vocabulary import vocabulary
 from volery.run.recording import make_folder
-from volery.run.vocabulary import vocabulary
 
 MODEL = "delivery"
 

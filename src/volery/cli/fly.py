@@ -10,11 +10,11 @@ from volery.cli.console import Output
 from volery.cli.folders import next_folder
 from volery.cli.outcome import pace_of, tell
 from volery.cli.progress import shown
-from volery.run.fence_file import read_fence
+from volery.run.assembly.fences import read_fence
 from volery.run.fly import Restrictions
 from volery.run.fly import fly as run_flight
-from volery.run.options import Options
 from volery.run.recording import make_folder
+from volery.run.result import Options
 
 
 @dataclass(frozen=True)

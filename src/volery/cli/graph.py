@@ -14,7 +14,7 @@ from volery.cli.endings import OK
 from volery.report.graph_of_run import graph_of_run
 from volery.report.graph_picture import picture
 from volery.ros.graph.portrait import Portrait, portrait
-from volery.run.graphs import GRAPHS, on_graph
+from volery.run.assembly.ros_graphs import GRAPHS, on_graph
 
 
 @dataclass(frozen=True)

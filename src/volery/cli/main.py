@@ -64,7 +64,7 @@ for name, told, members in GROUPS:
 def version(wanted: bool) -> None:
     """Print the version and stop."""
     if wanted:
-        from volery.run.circumstances import own_version
+        from volery.run.recording import own_version
 
         typer.echo(f"volery {own_version()}")
         raise typer.Exit

@@ -13,13 +13,19 @@ from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
-from volery.calibration.measured.campaign import Show, compare, estimated, measured_runs, prepared
-from volery.calibration.measured.comparison import Compared
+from volery.calibration.validation.comparison import (
+    NodeComparison,
+    ShowRun,
+    compare,
+    estimate_nodes,
+    measure_runs,
+    prepare_nodes,
+)
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import FAILED, OK
 from volery.model.reader import load
 from volery.model.system import System
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 
 @dataclass(frozen=True)
@@ -46,9 +52,9 @@ def measure(output: Output, wanted: Wanted) -> int:
     system = _lasting(system, wanted.seconds)
     duration = system.limits.duration_ns
     with _shown(output, wanted.runs, to_seconds(duration)) as show:
-        estimate = estimated(system, wanted.fidelity)
-        nodes = prepared(system)
-        done, whole = measured_runs(nodes, wanted.runs, duration, show)
+        estimate = estimate_nodes(system, wanted.fidelity)
+        nodes = prepare_nodes(system)
+        done, whole = measure_runs(nodes, wanted.runs, duration, show)
     found = compare(system, estimate, done)
     output.show(*tables(found, system))
     output.give({"system": system.name, "nodes": [one.as_data() for one in found], "complete": whole})
@@ -71,7 +77,7 @@ def _lasting(system: System, seconds: float | None) -> System:
 
 
 @contextmanager
-def _shown(output: Output, runs: int, seconds: float) -> Iterator[Show]:
+def _shown(output: Output, runs: int, seconds: float) -> Iterator[ShowRun]:
     if not output.shows_progress:
         yield lambda done: None
         return
@@ -79,7 +85,7 @@ def _shown(output: Output, runs: int, seconds: float) -> Iterator[Show]:
         yield lambda done: status.update(f"run {done + 1} of {runs}, {seconds:g} s each")
 
 
-def tables(found: Sequence[Compared], system: System) -> Iterator[Table | Text]:
+def tables(found: Sequence[NodeComparison], system: System) -> Iterator[Table | Text]:
     """Table III, a line each node, and Table IV."""
     host = ", ".join(f"{one.kind} at {one.frequency_mhz:g} MHz" for one in system.processors)
     seconds = to_seconds(system.limits.duration_ns)
@@ -88,7 +94,7 @@ def tables(found: Sequence[Compared], system: System) -> Iterator[Table | Text]:
     yield _table_iv(found)
 
 
-def _table_iii(found: Sequence[Compared]) -> Table:
+def _table_iii(found: Sequence[NodeComparison]) -> Table:
     shown = _table(
         "node", "estimated ms", "of it ROS", "measured ms", "quartiles", "difference", "allowed", ""
     )
@@ -106,7 +112,7 @@ def _table_iii(found: Sequence[Compared]) -> Table:
     return shown
 
 
-def _table_iv(found: Sequence[Compared]) -> Table:
+def _table_iv(found: Sequence[NodeComparison]) -> Table:
     shown = _table("node", "total ms", "ROS", "its error costs", "no estimate costs", "improvement")
     for one in found:
         better = f"{1.0 - one.impact / one.ros_share:.1%}" if one.ros_share else ""

@@ -13,13 +13,12 @@ from volery.base.errors import choices
 from volery.cli.console import Output, table
 from volery.cli.endings import OK
 from volery.model.diagram import diagram
+from volery.model.document import schema
 from volery.model.reader import check as check_model
-from volery.model.reader import load
-from volery.model.readiness import gaps
-from volery.model.schema import schema
+from volery.model.reader import gaps, load
 from volery.model.system import Instance, System
 from volery.requirements.observables import OBSERVABLES
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 FIDELITIES = ("times", "code")
 

@@ -14,8 +14,8 @@ from rich.text import Text
 
 from volery.base.time import clock, to_seconds
 from volery.cli.console import Output
-from volery.run.circumstances import Stopwatch
 from volery.run.progress import Progress
+from volery.run.recording import Stopwatch
 
 BETWEEN_S = 0.1
 """Wall seconds between two pictures: drawing takes longer than a simulated second."""

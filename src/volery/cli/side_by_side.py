@@ -17,8 +17,8 @@ from typing import Any
 from volery.cli.console import Output
 from volery.cli.progress import Pictures, Seldom, drawn
 from volery.requirements.record import RunRecord
-from volery.run.options import Options
 from volery.run.progress import Progress
+from volery.run.result import Options
 from volery.run.simulate import simulate
 
 LOOK_S = 0.1

@@ -10,10 +10,10 @@ from volery.cli.folders import next_folder
 from volery.cli.outcome import pace_of, tell
 from volery.cli.progress import shown
 from volery.model.reader import load
-from volery.run.options import Options
+from volery.run.assembly.vocabulary import vocabulary
 from volery.run.recording import make_folder
+from volery.run.result import Options
 from volery.run.simulate import simulate as run_simulation
-from volery.run.vocabulary import vocabulary
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from volery.base.errors import UsageError
 from volery.cli.clients import CLIENTS
 from volery.cli.console import Output
 from volery.cli.endings import OK
-from volery.run.serve import NodeServer, Server, has_links
-from volery.run.simulated import Simulated, simulated
+from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simulated
+from volery.run.serve import VehicleNodeServer, VehicleServer, has_links
 from volery.vehicles.address import Address, parse, parse_listen
 
 
@@ -32,11 +32,11 @@ def vehicle(output: Output, wanted: Wanted) -> int:
     """Serve until told to stop; the exit status."""
     if not 0.0 < wanted.speed < float("inf"):
         raise UsageError(f"--speed {wanted.speed:g}: simulated seconds per second, above 0")
-    described = simulated(_address(wanted), wanted.autopilot)
+    described = parse_simulated(_address(wanted), wanted.autopilot)
     if wanted.graph or not has_links(wanted.autopilot):
         return _as_node(output, wanted, described)
     listen = None if wanted.listen is None else parse_listen(wanted.listen)
-    server = Server(described, listen, speed=wanted.speed, seed=wanted.seed)
+    server = VehicleServer(described, listen, speed=wanted.speed, seed=wanted.seed)
     try:
         server.run(lambda: output.show(*how_to_connect(server, wanted)))
     except KeyboardInterrupt:
@@ -44,7 +44,7 @@ def vehicle(output: Output, wanted: Wanted) -> int:
     return OK
 
 
-def _as_node(output: Output, wanted: Wanted, described: Simulated) -> int:
+def _as_node(output: Output, wanted: Wanted, described: SimulatedVehicle) -> int:
     """On a real ROS graph."""
     if not wanted.graph or wanted.listen is not None:
         name = wanted.autopilot
@@ -52,7 +52,7 @@ def _as_node(output: Output, wanted: Wanted, described: Simulated) -> int:
             f"{name}: a simulated {name} is reached over a graph, not over links: serve it on real ROS with "
             f"--graph ros1 (a roscore must run) or --graph ros2, or fly it right here: --on sim:{name}"
         )
-    server = NodeServer(described, wanted.graph, speed=wanted.speed, seed=wanted.seed)
+    server = VehicleNodeServer(described, wanted.graph, speed=wanted.speed, seed=wanted.seed)
     below = server.namespace
     said = [
         f"serving {wanted.autopilot} on {wanted.graph} at {wanted.speed:g}× real time; Ctrl-C stops it",
@@ -77,7 +77,7 @@ def _address(wanted: Wanted) -> Address:
     return parse(f"sim:{wanted.autopilot}?{query}")
 
 
-def how_to_connect(server: Server, wanted: Wanted) -> list[str]:
+def how_to_connect(server: VehicleServer, wanted: Wanted) -> list[str]:
     """What to type in the usual clients."""
     said = f"serving {wanted.autopilot} ({wanted.kind}) at {wanted.speed:g}× real time; Ctrl-C stops it"
     clients = CLIENTS.get(server.protocol)

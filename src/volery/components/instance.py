@@ -1,6 +1,6 @@
 """A component that exists in a run: its object, its place, what it costs, and one call at a time.
 
-Knows no model and no language: whoever builds the run says where it stands (``Seat``), what its computing
+Knows no model and no language: whoever builds the run says where it stands (``Allocation``), what its computing
 costs (``Pricing``) and hands it the object that a host made.
 """
 
@@ -13,24 +13,24 @@ from traceback import walk_tb
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
-from volery.components.pricing import FREE, Cost, Pricing
+from volery.cost.pricing import FREE, Cost, Pricing
 from volery.kernel.api import Kernel
 from volery.kernel.task import Place, Scope, Server, Task
 from volery.kernel.waiting import Lock, Signal, at
 from volery.trace.events import Charge, Failure
 
-MARK = "__volery_user__"
+COMPONENT_MARK = "__volery_user__"
 """A name that every module of a component has: it tells the user's part of a traceback from a library's."""
 
-Failed = Callable[[str, Exception], None]
+OnFailure = Callable[[str, Exception], None]
 """Told the name of a component whose flow of control has ended with an error, and the error."""
 
-StepCounter = Callable[[], int]
+ReadSteps = Callable[[], int]
 """Steps of Python code that were executed since it was last asked."""
 
 
 @dataclass(frozen=True)
-class Seat:
+class Allocation:
     """Where a component computes.
 
     ``processor`` ``None``: computing takes no simulated time. ``frequency_mhz`` is the processor's.
@@ -52,7 +52,7 @@ class Seat:
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentPlace(Place):
+class ComponentContext(Place):
     """A place that knows whose it is, so that services called by user code find their component."""
 
     instance: Instance = field(kw_only=True)
@@ -70,10 +70,10 @@ class Instance:
         self,
         kernel: Kernel,
         name: str,
-        seat: Seat = Seat(),
+        seat: Allocation = Allocation(),
         pricing: Pricing = FREE,
         operations: tuple[str, ...] = (),
-        counter: StepCounter | None = None,
+        counter: ReadSteps | None = None,
     ) -> None:
         self.kernel = kernel
         self.name = name
@@ -83,12 +83,12 @@ class Instance:
         self.object: object | None = None
         self.broken = ""  # why there will never be an object
         self.scope: Scope | None = None
-        self.failed: Failed = _forget
+        self.failed: OnFailure = _forget
         self._counter = counter
         self._uncharged: Ns = 0
         self._lock = Lock(kernel, f"{name} (busy)")
         self._made = Signal(kernel, f"{name} (being constructed)")
-        self.place = ComponentPlace(
+        self.place = ComponentContext(
             name,
             seat.processor,
             seat.priority,
@@ -202,7 +202,7 @@ def describe(error: BaseException) -> str:
     frames = [
         (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
     ]
-    theirs = [frame for frame in frames if MARK in frame[0]] or frames
+    theirs = [frame for frame in frames if COMPONENT_MARK in frame[0]] or frames
     if not theirs:
         return said
     _, file, line = theirs[-1]

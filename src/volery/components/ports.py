@@ -4,6 +4,11 @@ A call moves the caller's own task to the callee: what the caller owes is served
 arguments travel, the task waits its turn, computes at the callee's place (its processor, its priority if it
 states one), pays there before the result leaves, and travels back. A call between two processors carries
 *copies* of arguments and result; on one processor both sides see the same objects.
+
+A vehicle as what surrounds it sees it: where it really is. For components of the environment only.
+
+A component of the application that requires a vehicle commands it and knows its autopilot's estimate. One of
+the environment, such as a beacon, a judge or an obstacle, is given this instead.
 """
 
 from __future__ import annotations
@@ -15,12 +20,13 @@ from functools import partial
 from typing import Any, NoReturn, TypeVar, overload
 
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
+from volery.base.position import Position
 from volery.components.instance import Instance
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
 from volery.trace.events import Call
 
-Travel = Callable[[int], None]
+Transfer = Callable[[int], None]
 """Blocks the current task until so many bytes are at the other end; raises if they do not get there."""
 
 Sent = TypeVar("Sent")
@@ -37,7 +43,7 @@ class Port:
     """
 
     def __init__(
-        self, kernel: Kernel, caller: str, callee: Instance, there: Travel | None, back: Travel | None
+        self, kernel: Kernel, caller: str, callee: Instance, there: Transfer | None, back: Transfer | None
     ) -> None:
         self._kernel = kernel
         self._caller = caller
@@ -92,7 +98,7 @@ class Port:
             args, kwargs = self._copied((args, kwargs), f"the arguments of {callee.name}.{operation}")
         self._move(self._there, (args, kwargs))
         with callee.visited(task, operation) as thing:
-            result = execute(callee, thing, operation, args, kwargs)
+            result = invoke(callee, thing, operation, args, kwargs)
             if far:
                 result = self._copied(result, f"the result of {callee.name}.{operation}")
         self._move(self._back, result)
@@ -107,13 +113,13 @@ class Port:
         except Exception as error:
             raise UsageError(f"{what} cannot be copied to another processor: {error}") from error
 
-    def _move(self, travel: Travel | None, content: object) -> None:
+    def _move(self, travel: Transfer | None, content: object) -> None:
         if travel is not None:
             with self._kernel:
                 travel(HEADER_BYTES + size_of(content))
 
 
-def execute(
+def invoke(
     callee: Instance, thing: object, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
     """The result of an operation of *callee*, whose object is *thing*. Errors as ``Port`` says."""
@@ -181,3 +187,18 @@ def _parts(value: object) -> Iterable[object] | None:
         return [getattr(value, item.name) for item in fields(value)]
     state = getattr(value, "__dict__", None)
     return list(state.values()) if state else None
+
+
+class Body:
+    """The vehicle called ``name``, by truth."""
+
+    def __init__(self, kernel: Kernel, name: str, truth: Callable[[], Position]) -> None:
+        self.name = name
+        self._kernel = kernel
+        self._truth = truth
+
+    @property
+    def position(self) -> Position:
+        """Where it is, AMSL."""
+        with self._kernel:
+            return self._truth()

@@ -6,10 +6,9 @@ missing figure is an ``EstimateError``, never zero.
 """
 
 from volery.cost.catalogue import Catalogue, Figure, ProcessorEntry, catalogue
-from volery.cost.code import CodeLaw
-from volery.cost.energy import PowerLaw
-from volery.cost.operation import scale_energy, scale_time
-from volery.cost.ros import NOT_COUNTED, Price, RosLaw, Tariff
+from volery.cost.code_laws import CodeLaw
+from volery.cost.figures import PowerLaw, scale_energy, scale_time
+from volery.cost.ros_law import NOT_COUNTED, Price, RosLaw, Tariff
 
 __all__ = [
     "NOT_COUNTED",

@@ -11,18 +11,16 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
-from volery.cost.code import CodeLaw
-from volery.cost.core import CoreLaw
-from volery.cost.energy import PowerLaw
-from volery.cost.figure import Figure, Stated
-from volery.cost.ros import RosLaw
+from volery.cost.code_laws import CodeLaw, CoreLaw
+from volery.cost.figures import Figure, PowerLaw, WithProvenance
+from volery.cost.ros_law import RosLaw
 
 __all__ = ["Catalogue", "Figure", "ProcessorEntry", "Settings", "catalogue", "read"]
 
 ROSCPP = "roscpp"
 
 
-class Settings(Stated):
+class Settings(WithProvenance):
     """The frequencies that a processor can be set to (its DVFS set), in equal steps."""
 
     least_mhz: float = Field(gt=0)

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.codec import Heard
-from volery.links.link import Frame, Link, Receiver
-from volery.links.mavlink import encode
-from volery.links.parser import Parser, whole_frame
+from volery.links.link import Frame, Link, Receiver, ReceiveStatistics
+from volery.links.mavlink_codec import MavlinkParser, whole_frame
+from volery.links.mavlink_messages import encode
 
 _STAMP = struct.Struct(">Q")
 
@@ -34,9 +33,9 @@ class TlogTap:
         self._flushed: Ns = 0
 
     @property
-    def heard(self) -> Heard | None:
+    def heard(self) -> ReceiveStatistics | None:
         """What the link has heard so far, if it is one of bytes."""
-        heard: Heard | None = getattr(self._link, "heard", None)
+        heard: ReceiveStatistics | None = getattr(self._link, "heard", None)
         return heard
 
     def send(self, frame: Frame) -> None:
@@ -92,7 +91,7 @@ def read_tlog(path: Path) -> Iterator[Entry]:
             place += 1
             continue
         start = place + _STAMP.size
-        frames = Parser().feed(data[start : start + length])
+        frames = MavlinkParser().feed(data[start : start + length])
         if frames:
             yield Entry(_STAMP.unpack_from(data, place)[0], frames[0])
         place = start + length

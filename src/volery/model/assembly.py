@@ -1,21 +1,130 @@
-"""One tree out of a model's parts: the file, its world file, a scenario, an allocation, options.
+"""Changes to a model: what scenarios, allocations and options ``set``.
+
+A path is keys and list positions joined by dots. It must lead somewhere: the entry that is set may be new,
+what leads there must exist or be a part of every model (``environment.wind``). Setting nothing takes an entry
+away.
+
+One tree out of a model's parts: the file, its world file, a scenario, an allocation, options.
 
 In this order, later ones win: world file, model file, scenario, allocation, options.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 from volery.base.errors import Location, ModelError, UsageError
-from volery.model import changes
-from volery.model.changes import Change
-from volery.model.form_environment import WorldForm
-from volery.model.problems import Path, Problems, no_such, written
+from volery.model.document import WorldForm, keys_at, names_are_free, short_key
 from volery.model.system import Source
-from volery.model.text import Node, parse
+from volery.model.text import Node, Path, Problems, no_such, parse, parse_value, written
+
+
+@dataclass(frozen=True)
+class Change:
+    """Put *value* at *path*. ``said_at`` is the path in the model that says so, empty for an option."""
+
+    path: Path
+    value: Node
+    said_at: Path = ()
+
+    @property
+    def where(self) -> Location:
+        """The line or the option that says so."""
+        return self.value.where
+
+
+def split_path(path: str) -> Path:
+    """The path that a text such as ``platform.processors.onboard`` means."""
+    return tuple(path.split("."))
+
+
+def change_from_option(text: str) -> Change:
+    """What ``--set path=value`` means; the value is YAML."""
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip() or "" in path.strip().split("."):
+        raise UsageError(
+            f"--set {text}: a path and a value are expected, "
+            "such as platform.processors.onboard.frequency='600 MHz'"
+        )
+    return Change(split_path(path.strip()), parse_value(value, Location(f"--set {text}", 0)))
+
+
+def changes_from_mapping(node: Node | None, said_at: Path) -> list[Change]:
+    """What a ``set:`` mapping means, in its order."""
+    if node is None:
+        return []
+    return [Change(split_path(key), value, (*said_at, key)) for key, value in node.items.items()]
+
+
+def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> None:
+    """Change *root* in place; a path that leads nowhere is a problem."""
+    for change in changes:
+        complaint = _apply(root, change)
+        if complaint:
+            problems.add(change.said_at or change.path, complaint, change.where)
+
+
+def _apply(root: Node, change: Change) -> str:
+    node = root
+    for depth, step in enumerate(change.path[:-1]):
+        below = node.child(step)
+        if below is None:
+            complaint = _cannot_make(node, change.path[: depth + 1])
+            if complaint:
+                return complaint
+            below = Node({}, change.where)
+            node.items[str(step)] = below
+        _lengthen(below, change.path[: depth + 1])
+        node = below
+    return _put(node, change)
+
+
+def _lengthen(node: Node, path: Path) -> None:
+    """A single value becomes the mapping that is meant: ``battery: 5 Ah`` has a ``capacity``."""
+    if node.value is None:
+        node.value = {}
+    key = short_key(path)
+    if key is not None and not isinstance(node.value, dict | list):
+        node.value = {key: Node(node.value, node.where, node.quoted)}
+
+
+def _cannot_make(node: Node, path: Path) -> str:
+    """Why a mapping cannot be made at *path* on the way; empty if it can."""
+    known = keys_at(path[:-1]) or []
+    if path[-1] in known:
+        return ""
+    if isinstance(node.value, dict) and names_are_free(path[:-1]):
+        return no_such(path[-1], f"entry of {written(path[:-1])}", [*node.items, *known])
+    if isinstance(node.value, dict):
+        return no_such(path[-1], f"key of {written(path[:-1]) or 'a model'}", known)
+    return f"{written(path[:-1])} is {_shown(node)}: nothing below it can be set"
+
+
+def _put(node: Node, change: Change) -> str:
+    last = change.path[-1]
+    value = change.value.copy()
+    if isinstance(node.value, list):
+        if not str(last).isdigit() or int(last) >= len(node.value):
+            return f"{written(change.path[:-1])} has positions 0 to {len(node.value) - 1}"
+        node.value[int(last)] = value
+        return ""
+    if not isinstance(node.value, dict):
+        return f"{written(change.path[:-1])} is {_shown(node)}: set all of it, as {{key: value}}"
+    if value.value is None:
+        node.value.pop(str(last), None)
+        return ""
+    known = keys_at(change.path[:-1])
+    if known and last not in known and not names_are_free(change.path[:-1]):
+        return no_such(last, f"key of {written(change.path[:-1]) or 'a model'}", known)
+    node.value[str(last)] = value
+    return ""
+
+
+def _shown(node: Node) -> str:
+    return "a list" if isinstance(node.value, list) else repr(node.value)
+
 
 WORLD: Path = ("environment", "world")
 NOT_PLACES = ("extends", "set")
@@ -33,7 +142,7 @@ class Assembly:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Selection:
     """What is asked for: a scenario, an allocation (``None``: the model's choice), and options in order."""
 
     scenario: str | None = None
@@ -61,7 +170,7 @@ def _near(path: FilePath) -> str:
     return f"; in that folder there is {', '.join(models[:5])}" if models else ""
 
 
-def assemble(file: FilePath, wanted: Wanted) -> tuple[Assembly, Problems]:
+def assemble(file: FilePath, wanted: Selection) -> tuple[Assembly, Problems]:
     """Read *file* and what it names, and apply what is *wanted*. Problems of the paths are in the result."""
     text = read_text(file, str(file))
     root = parse(text, str(file))
@@ -70,14 +179,14 @@ def assemble(file: FilePath, wanted: Wanted) -> tuple[Assembly, Problems]:
     made = Assembly(root, (Source(file.name, text),))
     problems = Problems(root.locate)
     early, late = _parted(wanted.options)
-    changes.apply(root, early, problems)
+    apply_changes(root, early, problems)
     all_changes = [
         *_choose_scenario(made, wanted, problems),
         *_choose_allocation(made, wanted, problems),
         *late,
     ]
     _merge_world(made, file.parent, all_changes, problems)
-    changes.apply(root, all_changes, problems)
+    apply_changes(root, all_changes, problems)
     return made, problems
 
 
@@ -87,14 +196,14 @@ def _parted(options: Sequence[Change]) -> tuple[list[Change], list[Change]]:
     return early, [change for change in options if change not in early]
 
 
-def _choose_scenario(made: Assembly, wanted: Wanted, problems: Problems) -> list[Change]:
+def _choose_scenario(made: Assembly, wanted: Selection, problems: Problems) -> list[Change]:
     if wanted.scenario is None:
         return []
     found: list[Change] = []
     for name in _chain(made.root, "scenarios", wanted.scenario, problems):
         at = ("scenarios", name)
         node = made.root.at(at)
-        found += changes.from_mapping(made.root.at((*at, "set")), (*at, "set"))
+        found += changes_from_mapping(made.root.at((*at, "set")), (*at, "set"))
         for key in ("duration", "until"):
             below = node.child(key) if node else None
             if below is not None:
@@ -103,7 +212,7 @@ def _choose_scenario(made: Assembly, wanted: Wanted, problems: Problems) -> list
     return found
 
 
-def _choose_allocation(made: Assembly, wanted: Wanted, problems: Problems) -> list[Change]:
+def _choose_allocation(made: Assembly, wanted: Selection, problems: Problems) -> list[Change]:
     name = (
         wanted.allocation
         or _scenarios_allocation(made, problems)
@@ -115,7 +224,7 @@ def _choose_allocation(made: Assembly, wanted: Wanted, problems: Problems) -> li
     places: dict[str, Node] = {}
     for step in _chain(made.root, "allocations", name, problems):
         at = ("allocations", step)
-        found += changes.from_mapping(made.root.at((*at, "set")), (*at, "set"))
+        found += changes_from_mapping(made.root.at((*at, "set")), (*at, "set"))
         node = made.root.at(at)
         places |= {key: below for key, below in (node.items if node else {}).items() if key not in NOT_PLACES}
     made.allocation = name

@@ -1,36 +1,104 @@
-"""From a file to a checked ``System``: the door of this room.
+"""What a valid model still lacks for one fidelity: figures, code, languages that do not run yet.
+
+From a file to a checked ``System``: the door of this room.
 
 ``load`` gives one allocation and one scenario; ``check`` tries them all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from volery.base.errors import ModelError
-from volery.model import changes
-from volery.model.assembly import Assembly, Wanted, assemble
-from volery.model.context import Context
-from volery.model.form import ModelForm
-from volery.model.problems import CollectedModelError, Problems
-from volery.model.resolve_application import Surroundings, instances
-from volery.model.resolve_environment import environment
-from volery.model.resolve_library import components, interfaces
-from volery.model.resolve_platform import (
+from volery.base.errors import ModelError, choices
+from volery.model import assembly
+from volery.model.assembly import Assembly, Selection, assemble
+from volery.model.document import ModelForm, validate
+from volery.model.resolution import (
+    Context,
+    Surroundings,
     catalogues,
+    chains,
     check_all_variants,
     check_names,
     check_reach,
+    components,
+    environment,
+    instances,
+    interfaces,
+    limits,
     networks,
     places,
     processors,
+    requirements,
     with_catalogues,
 )
-from volery.model.resolve_requirements import chains, limits, requirements
-from volery.model.system import System, Vocabulary
-from volery.model.validation import validate
+from volery.model.system import Component, Figure, Instance, Interface, System, Vocabulary
+from volery.model.text import CollectedModelError, Problems
+
+FIDELITIES = ("times", "code", "firmware", "hardware")
+"""Constant times · real component code · real autopilot firmware in the loop · real vehicles."""
+
+
+def check_ready(system: System, fidelity: str, vocabulary: Vocabulary) -> None:
+    """Raise ``ModelError`` for whatever *system* lacks to run at *fidelity* (``times`` or ``code``)."""
+    found = list(gaps(system, fidelity, vocabulary))
+    if len(found) == 1:
+        raise found[0]
+    if found:
+        raise CollectedModelError(found)
+
+
+def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:
+    """What is missing, component by component, in the order of the model."""
+    for component in _used(system):
+        if fidelity == "code" and not component.path:
+            what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
+            yield ModelError(what, f"components.{component.name}", component.where)
+        if component.path and component.language not in vocabulary.languages:
+            what = f"{component.language} components do not run yet; {choices(vocabulary.languages)} do"
+            yield ModelError(what, f"components.{component.name}.language", component.where)
+    if fidelity == "times":
+        for instance in system.instances:
+            yield from _missing_figures(system, instance)
+
+
+def _used(system: System) -> list[Component]:
+    """The components that have instances."""
+    return list({instance.component.name: instance.component for instance in system.instances}.values())
+
+
+def _missing_figures(system: System, instance: Instance) -> Iterator[ModelError]:
+    if instance.processor is None:
+        return
+    kind = system.processor(instance.processor).kind
+    component = instance.component
+    for operation in _offered(component, dict(system.interfaces)):
+        figures = component.operations.get(operation, ())
+        yield from _missing(instance, f"operations.{operation}", figures, kind)
+    if instance.activity is not None:
+        yield from _missing(instance, "activation", component.activation, kind)
+
+
+def _offered(component: Component, interfaces: dict[str, Interface]) -> list[str]:
+    return [
+        operation
+        for interface in component.provides.values()
+        for operation in interfaces[interface].operations
+    ]
+
+
+def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: str) -> Iterator[ModelError]:
+    if any(figure.processor == kind for figure in figures):
+        return
+    stated = f" (there is one at {choices({figure.processor for figure in figures})})" if figures else ""
+    yield ModelError(
+        f"no time is stated at {kind}, where {instance.name} runs{stated}; fidelity `times` needs one",
+        f"components.{instance.component.name}.{what}",
+        instance.component.where,
+    )
+
 
 DEFAULT_FILE = "model.yaml"
 """What a folder stands for."""
@@ -51,7 +119,7 @@ def load(
     allocation it does not have.
     """
     options = tuple(overrides)
-    wanted = Wanted(scenario, allocation, tuple(changes.from_option(text) for text in options))
+    wanted = Selection(scenario, allocation, tuple(assembly.from_option(text) for text in options))
     file = _file(Path(path))
     made, problems = assemble(file, wanted)
     form = validate(ModelForm, made.root, problems)

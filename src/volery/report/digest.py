@@ -17,6 +17,7 @@ import numpy as np
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.report.thinning import Floats, thin_curve, thin_track
 from volery.requirements.accounts import PARCEL
+from volery.trace.attachments import RunSetup, Scenery
 from volery.trace.events import (
     NONE,
     Activation,
@@ -30,8 +31,6 @@ from volery.trace.events import (
     Text,
     VehicleState,
 )
-from volery.trace.scenery import Scenery
-from volery.trace.setup import RunSetup
 
 _BIN: Ns = 500 * MS  # holds as many activations of the usual periods each time
 _MOST_BINS = 300

@@ -38,14 +38,12 @@ from volery.report.grids import (
     widest_band,
 )
 from volery.requirements.accounts import Accounts
-from volery.requirements.observables import Observers, bounds_of
-from volery.requirements.observers import DELIVERED
+from volery.requirements.observables import DELIVERED, Observers, bounds_of
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record
+from volery.trace.attachments import WORLD_ATTACHMENT, scenery_from_json
 from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME
 from volery.trace.reader import Reading
-from volery.trace.scenery import scenery_from_json
-from volery.trace.setup import WORLD_ATTACHMENT
 
 TRACE_FILE = "trace.mcap"
 REPORT_FILE = "report.html"

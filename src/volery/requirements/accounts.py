@@ -13,9 +13,14 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
-from volery.requirements.chains import ChainLedger
-from volery.requirements.demand import Demands
-from volery.requirements.ledgers import ComponentLedger, EnergyLaw, VehicleLedger, known, linear_energy
+from volery.requirements.ledgers import (
+    ChainLedger,
+    ComponentLedger,
+    EnergyLaw,
+    VehicleLedger,
+    known,
+    linear_energy,
+)
 from volery.requirements.record import (
     ComponentRecord,
     FailureRecord,
@@ -29,6 +34,8 @@ from volery.requirements.record import (
     Status,
     StepRecord,
 )
+from volery.requirements.response_bounds import Demands
+from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
     Activation,
@@ -46,7 +53,6 @@ from volery.trace.events import (
     VehicleState,
     Verdict,
 )
-from volery.trace.setup import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 
 PARCEL = "parcel"
 """The kind of milestone that tells of parcels."""

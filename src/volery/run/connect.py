@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from volery.base.errors import UsageError, VoleryError
 from volery.kernel.wall import WallKernel
-from volery.run.opening import Opened, Stated, open_vehicles
+from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
 from volery.vehicles import Drone, Fence, Fleet, Limits, Vehicle
 from volery.vehicles.address import parse
 
@@ -36,7 +36,7 @@ def connect(
     autopilot is heard there, ``CapabilityError`` if what answers is of another kind.
     """
     name = parse(url).driver
-    with _opened({name: url}, {name: kind}, Stated(seed=seed, limits=limits, fence=fence)) as opened:
+    with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
         vehicle.wait_heard()
@@ -73,7 +73,7 @@ def connect_fleet(
     if not urls:
         raise UsageError("a fleet of no vehicles; give at least one name and its address")
     kinds = {name: kind if isinstance(kind, type) else kind.get(name, Drone) for name in urls}
-    with _opened(urls, kinds, Stated(seed=seed, limits=limits, fence=fence)) as opened:
+    with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_heard(), "be heard")
         try:
@@ -84,7 +84,9 @@ def connect_fleet(
 
 
 @contextmanager
-def _opened(urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: Stated) -> Iterator[Opened]:
+def _opened(
+    urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
+) -> Iterator[OpenedVehicles]:
     """Vehicles for the flow of control that calls this."""
     opened = open_vehicles(urls, kinds, stated)
     kernel = opened.kernel

@@ -32,7 +32,7 @@ FAREWELL_WITHIN: Ns = 5 * S
 """Of run time: what a component does last and has not done by then is cut off, and named."""
 
 
-class Lands(Protocol):
+class Landable(Protocol):
     """A vehicle, or whoever answers for some."""
 
     @property
@@ -50,7 +50,7 @@ class Ending:
         self._kernel = kernel
         self.users: Scope = kernel.root.child("components")
         self._safety: Scope = kernel.root.child("safety")
-        self.vehicles: Sequence[Lands] = ()
+        self.vehicles: Sequence[Landable] = ()
         self.status: Status = "completed"
         self.reason = ""
         self.error: VoleryError | None = None
@@ -107,7 +107,7 @@ class Ending:
         self._kernel.spawn(body, f"{who} (at the end)", replace(place, deadline=None, on_release=None), scope)
         self._kernel.call_at(self._kernel.now() + FAREWELL_WITHIN, cut_off)
 
-    def _bring_down(self, vehicle: Lands) -> None:
+    def _bring_down(self, vehicle: Landable) -> None:
         try:
             vehicle.come_to_rest()
         except VoleryError as error:

@@ -11,22 +11,20 @@ from typing import Any, TypeVar, get_type_hints
 
 from volery.base.errors import ComponentError, UsageError, VoleryError, choices
 from volery.base.position import AMSL, Position
+from volery.components.component_api import register_kernel
 from volery.components.instance import describe
-from volery.components.loading import Loader
-from volery.components.python import load_function
-from volery.components.services import serve
-from volery.components.stand_ins import stand_ins
+from volery.components.loader import Loader
+from volery.components.programs import load_function
+from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
+from volery.run.assembly.simulated_vehicles import HOME
+from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
-from volery.run.opening import Opened, Stated, open_vehicles
-from volery.run.options import AS_USUAL, Options
-from volery.run.progress import Reporter, Teller
+from volery.run.progress import LostLinkReporter, ProgressReporter
 from volery.run.recording import Recording
-from volery.run.result import Run
-from volery.run.setup import setup_of_flight
-from volery.run.simulated import HOME
-from volery.run.watched import Watched
+from volery.run.result import DEFAULT_OPTIONS, Options, Run
+from volery.run.trace_setup import setup_of_flight
 from volery.trace.events import Failure
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import parse
@@ -54,14 +52,14 @@ class Restrictions:
         return replace(limits or Limits(), **changed) if changed else limits
 
 
-NONE_STATED = Restrictions()
+NO_RESTRICTIONS = Restrictions()
 
 
 def fly(
     mission: Mission | str | Path,
     on: str | Sequence[str],
-    options: Options = AS_USUAL,
-    restrictions: Restrictions = NONE_STATED,
+    options: Options = DEFAULT_OPTIONS,
+    restrictions: Restrictions = NO_RESTRICTIONS,
 ) -> Run:
     """Fly *mission* (a function, or a file that defines ``mission``) on the vehicle at the address *on*.
 
@@ -91,7 +89,7 @@ class _Flight:
     ) -> None:
         self._path = None if callable(mission) else Path(mission)
         looked_at = mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION)
-        stated = Stated(
+        stated = VehicleSettings(
             seed=options.seed,
             pace=options.pace,
             home=home_of(looked_at),
@@ -99,7 +97,7 @@ class _Flight:
             fence=restrictions.fence or _beside(looked_at, "FENCE", Fence),
         )
         named = names_of(urls)
-        self._opened: Opened = open_vehicles(named, dict.fromkeys(named, kind_of(looked_at)), stated)
+        self._opened: OpenedVehicles = open_vehicles(named, dict.fromkeys(named, kind_of(looked_at)), stated)
         self._kernel = kernel = self._opened.kernel
         self._mission = self._load(mission, options.seed)
         self._ending = Ending(kernel)
@@ -108,25 +106,25 @@ class _Flight:
         self._recording = Recording(setup, options.out, attachments)
         kernel.record = self._recording.stream
         if options.tell is not None:
-            self._recording.stream.tap(Teller(options.tell))
-        self._states = self._opened.airfield or Watched(kernel, self._opened.vehicles)
+            self._recording.stream.tap(LostLinkReporter(options.tell))
+        self._states = self._opened.airfield or ObservedVehicles(kernel, self._opened.vehicles)
         self._states.sample()
         if options.show is not None:
-            self._recording.stream.tap(Reporter(kernel, 0, self._states.progress, options.show))
+            self._recording.stream.tap(ProgressReporter(kernel, 0, self._states.progress, options.show))
         self._under_way = len(self._opened.vehicles)
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
         """In virtual time a file gets stand-ins for ``time`` and ``random``, as a component's does."""
         if callable(mission):
             return mission
-        modules = stand_ins(self._kernel, seed) if isinstance(self._kernel, VirtualKernel) else {}
+        modules = virtual_modules(self._kernel, seed) if isinstance(self._kernel, VirtualKernel) else {}
         loaded: Mission = load_function(Loader(modules), Path(mission), FUNCTION)
         return loaded
 
     def run(self) -> Run:
         """Start, let time pass, end in order, close the books; also if the house itself has a fault."""
         kernel, ending = self._kernel, self._ending
-        serve(kernel)
+        register_kernel(kernel)
         for vehicle in self._opened.vehicles:
             name = f"mission of {vehicle.name}"
             kernel.spawn(partial(self._fly, vehicle), name, Place(FUNCTION), ending.users)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.trace.events import Event, Milestone, Text
-from volery.vehicles.heard import IF_SILENT
+from volery.vehicles.vehicle import ON_LINK_LOSS
 
 PERIOD: Ns = S
 
@@ -36,7 +36,7 @@ class Progress:
     parcels: dict[str, int]
 
 
-Look = Callable[[], tuple[VehicleProgress, ...]]
+ReadVehicles = Callable[[], tuple[VehicleProgress, ...]]
 """What vehicles do now."""
 
 Show = Callable[[Progress], None]
@@ -47,7 +47,7 @@ Tell = Callable[[str], None]
 """Called with a line that is worth reading at once. It must not block and changes nothing."""
 
 
-class Teller:
+class LostLinkReporter:
     """Passes on what vehicles are known to do if their commander falls silent. A tap of a run's stream."""
 
     def __init__(self, tell: Tell) -> None:
@@ -55,14 +55,14 @@ class Teller:
 
     def __call__(self, event: Event) -> None:
         """Follow texts."""
-        if isinstance(event, Text) and event.text.startswith(IF_SILENT):
+        if isinstance(event, Text) and event.text.startswith(ON_LINK_LOSS):
             self._tell(f"{event.source}: {event.text}")
 
 
-class Reporter:
+class ProgressReporter:
     """Tells *show* how a run goes; *look* says what its vehicles do. A tap of its stream."""
 
-    def __init__(self, kernel: Kernel, limit: Ns, look: Look, show: Show) -> None:
+    def __init__(self, kernel: Kernel, limit: Ns, look: ReadVehicles, show: Show) -> None:
         self._kernel = kernel
         self._limit = limit
         self._look = look

@@ -2,34 +2,71 @@
 
 A run without a folder keeps accounts and verdicts alone. With one it writes ``trace.mcap`` and
 ``timeline.json`` as it goes, and ``run.json`` and the reports at its end; see ``docs/run-folder.md``.
+
+What differs from one execution of the same run to the next: wall time and versions. They go to
+``run.json`` only.
 """
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterable
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from time import perf_counter
 
 from volery.base.errors import UsageError
 from volery.base.registry import Registry
 from volery.base.time import Ns
-from volery.requirements.accounts import Accounts
+from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
 from volery.ros.messages.store import definition
-from volery.run.circumstances import Stopwatch, circumstances
-from volery.trace.events import Verdict
+from volery.trace.attachments import RunSetup
+from volery.trace.events import Stream, Verdict
 from volery.trace.mcap_writer import Attachment, McapWriter
-from volery.trace.setup import RunSetup
-from volery.trace.stream import Stream
 from volery.trace.timeline import TimelineWriter
+
+_LIBRARIES = ("greenlet", "llvmlite", "numba", "numpy", "pymavlink", "rosbags", "mcap")
+
+
+class Stopwatch:
+    """Seconds of wall time since it was made."""
+
+    def __init__(self) -> None:
+        self._start = perf_counter()
+
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return perf_counter() - self._start
+
+
+def own_version() -> str:
+    """The version of this package; ``0`` if it is run without being installed."""
+    try:
+        return version("volery")
+    except PackageNotFoundError:
+        return "0"
+
+
+def circumstances(watch: Stopwatch) -> Circumstances:
+    """For the record of a run that *watch* was started with."""
+    versions = {name: version(name) for name in _LIBRARIES}
+    versions |= {
+        "volery": own_version(),
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+    return Circumstances(watch.seconds(), versions)
+
 
 TRACE_FILE = "trace.mcap"
 TIMELINE_FILE = "timeline.json"
 REPORT_FILE = "report.html"
 
-Reporter = Callable[[Path], Path]
+ReportWriter = Callable[[Path], Path]
 """Makes a document out of a finished run folder and says where it is."""
 
-reporters: Registry[Reporter] = Registry("volery.reporters", "report")
+reporters: Registry[ReportWriter] = Registry("volery.reporters", "report")
 
 
 def make_folder(out: Path) -> Path:

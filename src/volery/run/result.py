@@ -1,4 +1,7 @@
-"""What ``simulate`` and ``fly`` return."""
+"""What ``simulate`` and ``fly`` return.
+
+How to run, for what is flown as for what is simulated.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from volery.base.errors import VoleryError
+from volery.base.time import MS, Ns
 from volery.requirements.record import RunRecord
+from volery.run.progress import Show, Tell
 
 
 @dataclass(frozen=True)
@@ -33,3 +38,29 @@ class Run:
     def ok(self) -> bool:
         """True if it completed, every requirement was met and everything could be written."""
         return self.completed and self.record.outcome.requirements_met is not False and not self.problems
+
+
+SAMPLING_PERIOD: Ns = 200 * MS
+"""How often the state of every vehicle is recorded."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to run. ``pace``: virtual seconds per second on the wall, ``None``: as fast as it goes.
+
+    ``show`` is given pictures of how it goes, ``tell`` lines that are worth reading at once. ``graph``
+    (``ros1``, ``ros2``): with the components as processes on that graph, at a pace of 1 unless one is given.
+    ``traces``: a folder in which C++ components tell what they execute, instead of being charged for it.
+    """
+
+    fidelity: str = "times"
+    seed: int = 1
+    pace: float | None = None
+    out: Path | None = None
+    show: Show | None = None
+    tell: Tell | None = None
+    graph: str = ""
+    traces: Path | None = None
+
+
+DEFAULT_OPTIONS = Options()

@@ -8,14 +8,13 @@ from functools import partial
 from volery.base.errors import UsageError
 from volery.kernel.task import Place
 from volery.kernel.virtual import FOREVER, VirtualKernel
-from volery.links.coded import CodedLink
-from volery.run.airfield import Airfield, airfield_of
-from volery.run.graphs import open_graph
-from volery.run.serving import serving
-from volery.run.simulated import Simulated
+from volery.links.coded_link import CodedLink
+from volery.run.assembly.ros_graphs import open_graph
+from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
+from volery.run.assembly.simulated_vehicles import SimulatedVehicle
+from volery.run.assembly.vehicle_nodes import graph_access
 from volery.simulation.autopilots.firmware import dialects
-from volery.vehicles.address import Address, parse_listen
-from volery.vehicles.carriers import listen
+from volery.vehicles.address import Address, listen, parse_listen
 
 
 def has_links(autopilot: str) -> bool:
@@ -23,7 +22,7 @@ def has_links(autopilot: str) -> bool:
     return dialects.load(autopilot).codec is not None
 
 
-class Server:
+class VehicleServer:
     """One simulated vehicle, reachable at *address* in virtual time that passes *speed* times as fast as real
     time; ``None``: where those who fly its firmware usually listen.
 
@@ -32,10 +31,10 @@ class Server:
     """
 
     def __init__(
-        self, wanted: Simulated, address: Address | None, *, speed: float = 1.0, seed: int = 1
+        self, wanted: SimulatedVehicle, address: Address | None, *, speed: float = 1.0, seed: int = 1
     ) -> None:
         self.kernel = VirtualKernel(pace=speed)
-        self.airfield: Airfield = airfield_of(self.kernel, [wanted], seed)
+        self.airfield: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
         self._autopilot = self.airfield.autopilots[name]
         codec = self.airfield.codec(name)
@@ -65,7 +64,7 @@ class Server:
             self.kernel.close("the server was stopped")
 
 
-class NodeServer:
+class VehicleNodeServer:
     """One simulated vehicle as a node of a real ROS graph (``ros1``, ``ros2``), under *namespace*; by default
     as its own node is called on a real aircraft.
 
@@ -73,14 +72,14 @@ class NodeServer:
     """
 
     def __init__(
-        self, wanted: Simulated, graph: str, namespace: str = "", *, speed: float = 1.0, seed: int = 1
+        self, wanted: SimulatedVehicle, graph: str, namespace: str = "", *, speed: float = 1.0, seed: int = 1
     ) -> None:
         self.kernel = VirtualKernel(pace=speed)
-        self.airfield: Airfield = airfield_of(self.kernel, [wanted], seed)
+        self.airfield: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
         if self.airfield.family(name).codec is not None:
             raise UsageError(f"{name}: a simulated {wanted.vehicle.autopilot} is no node; it speaks on links")
-        usual = serving(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
+        usual = graph_access(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
         self.namespace = namespace or usual
         self.graph = open_graph(self.kernel, graph)
         self.airfield.autopilots[name].join(self.graph, self.namespace, Place(name))

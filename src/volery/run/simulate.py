@@ -9,29 +9,27 @@ from pathlib import Path
 
 from volery.base.errors import CapabilityError, UsageError, choices
 from volery.base.time import MS, Ns
-from volery.components.cpp.build import build_house
+from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
 from volery.model.reader import load
 from volery.model.system import System
 from volery.requirements.observables import Observers
-from volery.run.airfield import Airfield
-from volery.run.build import Builder, Built
-from volery.run.cpp import compile_all, has_cpp
-from volery.run.distributed import Apart, Host, Order, unallocated, without_computers
+from volery.run.assembly.components import Builder, BuiltComponents
+from volery.run.assembly.computers import Platform, PowerFeed
+from volery.run.assembly.cpp import compile_all, has_cpp
+from volery.run.assembly.faults import inject
+from volery.run.assembly.simulated_fleet import SimulatedFleet
+from volery.run.assembly.vocabulary import vocabulary
+from volery.run.distributed import DistributedRun, GraphSettings, HostPlatform, unallocated, without_computers
 from volery.run.ending import Ending
-from volery.run.faults import inject
-from volery.run.options import AS_USUAL, Options
-from volery.run.platform import Platform
-from volery.run.power import PowerFeed
-from volery.run.progress import Reporter
+from volery.run.progress import ProgressReporter
 from volery.run.recording import Recording
-from volery.run.result import Run
-from volery.run.salvage import salvage
-from volery.run.setup import attachments_of, setup_of
-from volery.run.supervised import Supervision, supervised
-from volery.run.vocabulary import vocabulary
+from volery.run.recovery import recover_run
+from volery.run.result import DEFAULT_OPTIONS, Options, Run
+from volery.run.supervision import Supervision, run_supervised
+from volery.run.trace_setup import attachments_of, setup_of
+from volery.trace.attachments import RunSetup
 from volery.trace.events import Text
-from volery.trace.setup import RunSetup
 
 FIDELITIES = ("times", "code")
 LATER = ("firmware", "hardware")
@@ -49,7 +47,7 @@ GOAL_PERIOD: Ns = 100 * MS
 
 def simulate(
     model: System | str | Path,
-    options: Options = AS_USUAL,
+    options: Options = DEFAULT_OPTIONS,
     *,
     scenario: str | None = None,
     allocation: str | None = None,
@@ -90,12 +88,12 @@ def _supervised(system: System, options: Options) -> Run:
     if not ready:
         return _simulated(system, options)
     libraries = {name: one.compiled.library for name, one in ready.items()}
-    supervision = Supervision(build_house(), libraries, PATIENCE_S)
-    return supervised(
+    supervision = Supervision(build_framework(), libraries, PATIENCE_S)
+    return run_supervised(
         lambda show: _simulated(system, replace(options, show=show, tell=None)),
         options.show,
         supervision,
-        partial(salvage, system, options.out, options.seed, options.fidelity),
+        partial(recover_run, system, options.out, options.seed, options.fidelity),
     )
 
 
@@ -124,7 +122,7 @@ class _Simulation:
     def _setup(self, platform: Platform) -> RunSetup:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
-    def _build(self, platform: Platform) -> Built:
+    def _build(self, platform: Platform) -> BuiltComponents:
         builder = Builder(self._system, self._kernel, platform, self._airfield, self._ending)
         return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
@@ -134,7 +132,7 @@ class _Simulation:
         platform = self._platform()
         setup = self._setup(platform)
         surroundings = system.environment
-        self._airfield = Airfield(
+        self._airfield = SimulatedFleet(
             kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed
         )
         self._built = self._build(platform)
@@ -147,7 +145,9 @@ class _Simulation:
             self._recording.stream.tap(self._goal)
             kernel.every(GOAL_PERIOD, self._look_at_goal)
         if options.show is not None:
-            reporter = Reporter(kernel, system.limits.duration_ns, self._airfield.progress, options.show)
+            reporter = ProgressReporter(
+                kernel, system.limits.duration_ns, self._airfield.progress, options.show
+            )
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._airfield)
         self._airfield.sample()
@@ -196,10 +196,12 @@ class _OnGraph(_Simulation):
         pace = options.pace or 1.0
         system, self._unjudged = without_computers(system)
         super().__init__(system, options, pace)
-        self._apart = Apart(system, self._kernel, self._ending, Order(options.graph, pace, options.seed))
+        self._apart = DistributedRun(
+            system, self._kernel, self._ending, GraphSettings(options.graph, pace, options.seed)
+        )
 
     def _platform(self) -> Platform:
-        host = Host(self._system, self._kernel, self._options.seed, self._options.fidelity)
+        host = HostPlatform(self._system, self._kernel, self._options.seed, self._options.fidelity)
         for name in self._unjudged:
             host.warnings[f"the requirement {name!r} is not judged: {NOT_MODELLED}"] = None
         return host
@@ -207,7 +209,7 @@ class _OnGraph(_Simulation):
     def _setup(self, platform: Platform) -> RunSetup:
         return setup_of(unallocated(self._system), platform, self._options.seed, self._options.fidelity)
 
-    def _build(self, platform: Platform) -> Built:
+    def _build(self, platform: Platform) -> BuiltComponents:
         return self._apart.build(platform, self._airfield)
 
     def _start(self) -> None:

@@ -11,12 +11,19 @@ from volery.base.seeds import stream
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import Place
 from volery.links.link import Link
-from volery.links.wire import Wire, WireFaults
+from volery.links.wire_faults import FaultyLink, WireFaults
 from volery.ros.graph.node import NodeId, Way
-from volery.run.airfield import Airfield
-from volery.run.graph_wire import GIVEN_UP, GraphWire, private_graph
-from volery.run.serving import SIMULATED, on_links, serve, serving
-from volery.run.simulated import Simulated, link_to
+from volery.run.assembly.simulated_fleet import SimulatedFleet
+from volery.run.assembly.simulated_vehicles import SimulatedVehicle, link_to
+from volery.run.assembly.vehicle_nodes import (
+    GIVE_UP_AFTER,
+    SIMULATED_LINK_OPTIONS,
+    GraphWire,
+    graph_access,
+    private_graph,
+    reached_over_links,
+    serve_on_graph,
+)
 from volery.testing.checks import ImpossibleError
 from volery.testing.tap import Tap
 from volery.vehicles.driver import Driver, drivers
@@ -59,7 +66,7 @@ class ByLink(Access):
     """Over links; what *sharing* says and hears is on the first program's link, too."""
 
     def __init__(
-        self, kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int, sharing: str = ""
+        self, kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
     ) -> None:
         self._kernel, self._airfield = kernel, airfield
         self._vehicle = wanted.vehicle.name
@@ -81,14 +88,14 @@ class ByLink(Access):
 
     def suffer(self, faults: WireFaults) -> None:
         """On a link through bytes."""
-        if not isinstance(self.link, Wire):
+        if not isinstance(self.link, FaultyLink):
             raise ImpossibleError("nothing can happen to values; add wire=bytes to the address")
         self.link.suffer(faults)
 
     def _open(self, link: Link, vehicle: str, options: dict[str, str]) -> Driver:
         open_driver = self._factory.on_link
         assert open_driver is not None, "seen by access_to"
-        return open_driver(self._kernel, link, vehicle, {**SIMULATED, **options})
+        return open_driver(self._kernel, link, vehicle, {**SIMULATED_LINK_OPTIONS, **options})
 
 
 class _HandOnNode(GraphWire):
@@ -114,7 +121,7 @@ class _HandOnNode(GraphWire):
         def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
             unheard = receiver.name == self.held and not self.hears
             if unheard or (sender.name == self.held and not self.speaks):
-                self._kernel.call_at(self._kernel.now() + GIVEN_UP, lost)
+                self._kernel.call_at(self._kernel.now() + GIVE_UP_AFTER, lost)
             else:
                 whole(size, reliable, deliver, lost)
 
@@ -127,7 +134,7 @@ class ByGraph(Access):
     protocol = "a graph"
 
     def __init__(
-        self, kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int, sharing: str = ""
+        self, kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
     ) -> None:
         self._kernel = kernel
         self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
@@ -136,7 +143,9 @@ class ByGraph(Access):
         self._graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
         self._numbers = count(1)
         for vehicle in filter(None, (self._vehicle, sharing)):
-            serve(self._graph, airfield, vehicle, serving(self._autopilot, vehicle), Place(vehicle))
+            serve_on_graph(
+                self._graph, airfield, vehicle, graph_access(self._autopilot, vehicle), Place(vehicle)
+            )
 
     def suffer(self, faults: WireFaults) -> None:
         """From now on this happens to what passes, in both directions."""
@@ -153,15 +162,17 @@ class ByGraph(Access):
         return self._commander(vehicle, options)[0], None
 
     def _commander(self, vehicle: str, options: dict[str, str]) -> tuple[Driver, str]:
-        how = serving(self._autopilot, vehicle)
+        how = graph_access(self._autopilot, vehicle)
         name = f"commander_{next(self._numbers)}"
         node = self._graph.node(name, f"/{vehicle}", place=Place(name))
         driver = how.open_driver(self._kernel, node, vehicle, {"namespace": how.namespace, **options})
         return driver, node.name
 
 
-def access_to(kernel: Kernel, airfield: Airfield, wanted: Simulated, seed: int, sharing: str = "") -> Access:
+def access_to(
+    kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
+) -> Access:
     """The way to a vehicle that its autopilot and driver have in common: links first."""
-    if on_links(airfield, wanted):
+    if reached_over_links(airfield, wanted):
         return ByLink(kernel, airfield, wanted, seed, sharing)
     return ByGraph(kernel, airfield, wanted, seed, sharing)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from volery.links.wire import WireFaults
+from volery.links.wire_faults import WireFaults
 from volery.simulation.world.environment_models import Wind
 from volery.testing.stage_simulated import SimulatedStage
 

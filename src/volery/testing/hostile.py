@@ -18,9 +18,9 @@ from volery.base.time import MS
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.coded import CodedLink
-from volery.links.mavlink import CHECKSUM, HEADER, message_type_of
-from volery.links.pprzlink import checksum as pprz_checksum
+from volery.links.coded_link import CodedLink
+from volery.links.mavlink_messages import CHECKSUM, HEADER, message_type_of
+from volery.links.pprzlink_codec import checksum as pprz_checksum
 from volery.vehicles import Drone
 from volery.vehicles.driver import drivers
 

@@ -15,6 +15,19 @@ from typing import NamedTuple
 
 from volery.base.seeds import stream
 from volery.base.time import MS, US, Ns, S, from_seconds
+from volery.trace.attachments import (
+    Area,
+    ChainSetup,
+    ComponentSetup,
+    LawSetup,
+    Origin,
+    Place,
+    ProcessorSetup,
+    RequirementSetup,
+    RunSetup,
+    Scenery,
+    VehicleSetup,
+)
 from volery.trace.events import (
     NONE,
     Activation,
@@ -32,16 +45,6 @@ from volery.trace.events import (
     Text,
     VehicleState,
     Verdict,
-)
-from volery.trace.scenery import Area, Origin, Place, Scenery
-from volery.trace.setup import (
-    ChainSetup,
-    ComponentSetup,
-    LawSetup,
-    ProcessorSetup,
-    RequirementSetup,
-    RunSetup,
-    VehicleSetup,
 )
 
 _PERIOD = 100 * MS

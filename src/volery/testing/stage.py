@@ -19,13 +19,13 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
 from volery.links.link import Frame, Link
-from volery.links.mavlink import constant
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.access import Hand
 from volery.testing.checks import ImpossibleError, demand
 from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.driver import Driver
-from volery.vehicles.perform import Performer
+from volery.vehicles.executor import StepExecutor
 from volery.vehicles.telemetry import Telemetry
 
 HEARD_WITHIN_S = 10.0
@@ -40,7 +40,7 @@ class Commander:
     def __init__(self, kernel: Kernel, driver: Driver, link: Link | None = None, protocol: str = "") -> None:
         self._driver = driver
         self._link, self._protocol = link, protocol
-        self._performer = Performer(kernel, driver)
+        self._performer = StepExecutor(kernel, driver)
         self.seen: Telemetry = driver.telemetry
 
     def waits_until_heard(self) -> None:

@@ -6,15 +6,14 @@ from typing import Any
 
 from volery.base.errors import CapabilityError, UsageError
 from volery.kernel.wall import WallKernel
-from volery.run.graphs import GRAPHS
-from volery.run.opening import EMBEDDED
+from volery.run.assembly.ros_graphs import GRAPHS
+from volery.run.assembly.vehicles import EMBEDDED
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.checks import ImpossibleError
 from volery.testing.stage import Commander, Stage
 from volery.testing.tap import Tap
 from volery.vehicles import Vehicle
-from volery.vehicles.address import Address, parse
-from volery.vehicles.carriers import open_link
+from volery.vehicles.address import Address, open_link, parse
 from volery.vehicles.driver import Driver, drivers
 
 

@@ -11,10 +11,10 @@ from volery.base.position import Position
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.wire import WireFaults
-from volery.run.airfield import airfield_of
-from volery.run.opening import KINDS
-from volery.run.simulated import simulated
+from volery.links.wire_faults import WireFaults
+from volery.run.assembly.simulated_fleet import fleet_of
+from volery.run.assembly.simulated_vehicles import parse_simulated
+from volery.run.assembly.vehicles import KINDS
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.access import Hand, access_to
@@ -72,9 +72,9 @@ class SimulatedStage(Stage):
         self.events: list[Event] = []
         self.kernel: VirtualKernel = VirtualKernel(record=self.events.append)
         options = {**address.options, "start": "cold" if cold else "warm"}
-        self._wanted = simulated(replace(address, options=options), address.driver, KINDS[kind])
+        self._wanted = parse_simulated(replace(address, options=options), address.driver, KINDS[kind])
         all_wanted = [self._wanted, _beside(self._wanted)] if neighbour else [self._wanted]
-        self.airfield = airfield_of(self.kernel, all_wanted, seed)
+        self.airfield = fleet_of(self.kernel, all_wanted, seed)
         self._kind = kind
         self._neighbour = all_wanted[1].vehicle.name if neighbour else ""
         self._access = access_to(self.kernel, self.airfield, self._wanted, seed, self._neighbour)

@@ -1,14 +1,21 @@
-"""A description that is attached to a trace, as the JSON of a frozen dataclass that names its schema."""
+"""The JSON descriptions that are attached to a trace: the run's set-up and the map of its world.
+
+Both are frozen dataclasses that carry the name of their schema. With the events, the set-up is all that is
+needed to account for a run and to report on it. It holds no wall time and no versions, so it is the same for
+the same run. The order of entries is significant: tables list things in this order.
+"""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.trace.events import NONE
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -31,3 +38,186 @@ def from_json(data: bytes, adapter: TypeAdapter[D], schema: str, what: str) -> D
         return adapter.validate_python(raw)
     except (ValueError, ValidationError) as error:
         raise UsageError(f"the trace's {what} cannot be read: {error}") from error
+
+
+SETUP_SCHEMA = "volery-setup/1"
+
+SETUP_ATTACHMENT = "run-setup.json"
+"""The attachment of a trace that holds a ``RunSetup``."""
+MODEL_ATTACHMENT = "model.yaml"
+"""The attachment that holds the text of the system model."""
+WORLD_ATTACHMENT = "world.json"
+"""The attachment that holds the map: see ``volery.trace.attachments``."""
+
+
+@dataclass(frozen=True)
+class ComponentSetup:
+    """A component instance and where it was allocated. ``processor`` is empty where its computing takes no
+    time.
+
+    ``period`` and ``deadline`` (relative to the release) are ``NONE`` where the model promises none.
+    """
+
+    name: str
+    type: str = ""
+    language: str = ""
+    processor: str = ""
+    active: bool = False
+    period: Ns = NONE
+    deadline: Ns = NONE
+    priority: int = 0
+
+
+@dataclass(frozen=True)
+class ProcessorSetup:
+    """A processor. ``idle_w`` and ``busy_w`` are watts of the whole of it, idle and with all cores busy.
+
+    They are ``None`` where nobody stated them: then its energy is not counted. ``power_error`` is their
+    relative band (0.2: within 20 per cent), ``None`` where it is unknown.
+    """
+
+    name: str
+    kind: str = ""
+    frequency_mhz: float = 0.0
+    scheduler: str = ""
+    cores: int = 1
+    idle_w: float | None = None
+    busy_w: float | None = None
+    power_error: float | None = None
+
+
+@dataclass(frozen=True)
+class VehicleSetup:
+    """A vehicle: ``kind`` is ``multirotor`` or ``rover``; ``autopilot`` the firmware that flies it."""
+
+    name: str
+    autopilot: str = ""
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class ChainSetup:
+    """A row of topics whose end-to-end latency is observed."""
+
+    name: str
+    topics: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RequirementSetup:
+    """A bound on an observed quantity; ``relation`` is ``max`` or ``min``."""
+
+    name: str
+    observable: str
+    relation: str
+    bound: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class LawSetup:
+    """A law of cost or physics that priced this run: its ``source``, provenance and what is to be warned of.
+
+    ``provenance`` is ``estimated``, ``measured``, ``calculated`` or ``required``; ``validity`` says in words
+    where the law holds; ``warning`` is empty unless the run used it outside that, or on a component it was
+    not measured for.
+    """
+
+    name: str
+    source: str = ""
+    provenance: str = ""
+    validity: str = ""
+    warning: str = ""
+
+
+@dataclass(frozen=True)
+class RunSetup:
+    """The circumstances of a run that belong to the run itself, not to the machine it ran on."""
+
+    system: str = ""
+    fidelity: str = ""
+    allocation: str = ""
+    scenario: str = ""
+    seed: int = 0
+    components: tuple[ComponentSetup, ...] = ()
+    processors: tuple[ProcessorSetup, ...] = ()
+    vehicles: tuple[VehicleSetup, ...] = ()
+    chains: tuple[ChainSetup, ...] = ()
+    requirements: tuple[RequirementSetup, ...] = ()
+    laws: tuple[LawSetup, ...] = ()
+    not_counted: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    schema: str = SETUP_SCHEMA
+
+
+_SETUP = TypeAdapter(RunSetup)
+
+
+def setup_to_json(setup: RunSetup) -> bytes:
+    """The setup as UTF-8 JSON, the same bytes for the same setup."""
+    return to_json(setup)
+
+
+def setup_from_json(data: bytes) -> RunSetup:
+    """The setup that ``setup_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
+    return from_json(data, _SETUP, SETUP_SCHEMA, SETUP_ATTACHMENT)
+
+
+Point = tuple[float, float]
+Line = tuple[Point, ...]
+"""At least two points, in order."""
+
+SCENERY_SCHEMA = "volery-scenery/1"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where x = y = z = 0 lies: WGS-84 degrees and metres AMSL."""
+
+    latitude: float
+    longitude: float
+    amsl: float = 0.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A named point. Of all kinds, ``hospital``, ``store``, ``port`` and ``home`` have symbols."""
+
+    name: str
+    x: float
+    y: float
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Area:
+    """A named polygon that closes itself: ``no-fly``, ``building``, ``water``, ``park`` or your own kind."""
+
+    name: str
+    outline: Line
+    kind: str = "no-fly"
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """All there is to draw. ``roads`` are for rovers, ``corridors`` are the air lanes of drones."""
+
+    origin: Origin
+    places: tuple[Place, ...] = ()
+    roads: tuple[Line, ...] = ()
+    corridors: tuple[Line, ...] = ()
+    areas: tuple[Area, ...] = ()
+    schema: str = SCENERY_SCHEMA
+
+
+_SCENERY = TypeAdapter(Scenery)
+
+
+def scenery_to_json(scenery: Scenery) -> bytes:
+    """The scenery as UTF-8 JSON, the same bytes for the same scenery."""
+    return to_json(scenery)
+
+
+def scenery_from_json(data: bytes) -> Scenery:
+    """The scenery that ``scenery_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
+    return from_json(data, _SCENERY, SCENERY_SCHEMA, "map")

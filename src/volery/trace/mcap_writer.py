@@ -24,10 +24,10 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
 from volery.base.time import Ns, S
+from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_to_json
 from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
 from volery.trace.events import NONE, Event, Message, Published, Record, VehicleState
 from volery.trace.output import Output
-from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_to_json
 
 MAGIC = b"\x89MCAP0\r\n"
 TRACE_SCHEMA = "volery-trace/1"

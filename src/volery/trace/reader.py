@@ -20,10 +20,10 @@ from mcap.opcode import Opcode
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, clock
+from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_from_json
 from volery.trace.encoding import OWN_EVENTS, Codec, type_name
 from volery.trace.events import Event, Published
 from volery.trace.mcap_writer import MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
-from volery.trace.setup import SETUP_ATTACHMENT, RunSetup, setup_from_json
 
 _Decoder = Callable[[Ns, bytes], Event | None]
 _MESSAGE = int(Opcode.MESSAGE)

@@ -6,7 +6,7 @@ from volery.vehicles.fleet import Fleet
 from volery.vehicles.limits import Fence, Limits, Zone
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.rover import Rover
-from volery.vehicles.telemetry import Attitude, Battery, Said, Velocity
+from volery.vehicles.telemetry import Attitude, Battery, StatusText, Velocity
 from volery.vehicles.vehicle import Vehicle
 
 __all__ = [
@@ -24,7 +24,7 @@ __all__ = [
     "MissionItem",
     "ReturnHome",
     "Rover",
-    "Said",
+    "StatusText",
     "TakeOff",
     "Vehicle",
     "Velocity",

@@ -16,8 +16,8 @@ from volery.base.position import Position
 from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
-from volery.links.codec import Codec
-from volery.links.parser import MAVLINK
+from volery.links.link import Codec
+from volery.links.mavlink_codec import MAVLINK
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
@@ -86,7 +86,7 @@ class Step:
     advice: str = ""
 
 
-class Sticks(NamedTuple):
+class ManualControl(NamedTuple):
     """The four sticks: pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1.
 
     In altitude hold a throttle of 0.5 keeps the altitude. A rover takes roll for steering and throttle from
@@ -166,7 +166,7 @@ class Driver(Protocol):
     def manual(self) -> Sequence[Step]:
         """The sticks command a rover's wheels."""
 
-    def sticks(self, sticks: Sticks | None) -> None:
+    def sticks(self, sticks: ManualControl | None) -> None:
         """Keep sending these until others come; ``None`` lets go of them."""
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:

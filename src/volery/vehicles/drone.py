@@ -8,13 +8,11 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, from_seconds
-from volery.vehicles.driver import Capability, Sticks
-from volery.vehicles.goals import NOWHERE, Goal
-from volery.vehicles.limits import too_high
-from volery.vehicles.manner import SAFE, STREAM, TRAVEL, TURN
-from volery.vehicles.perform import RESTARTS
+from volery.vehicles.driver import Capability, ManualControl
+from volery.vehicles.executor import RESTARTS
+from volery.vehicles.limits import height_violation
 from volery.vehicles.telemetry import Velocity
-from volery.vehicles.vehicle import Vehicle, travel_within
+from volery.vehicles.vehicle import NO_GOAL, STREAM, TO_SAFETY, TRAVEL, TURN, Goal, Vehicle, travel_within
 
 VELOCITY_LASTS_S = 3.0
 RETURN_CLIMB = 30.0
@@ -56,7 +54,7 @@ class Drone(Vehicle):
         if self.flying:
             where = f"it flies already, {self._driver.telemetry.above_home:.1f} m above home"
             raise Refused(self.name, asked, f"{where}; goto(position) changes its height")
-        found = too_high(height, self.limits, self._driver.telemetry.home)
+        found = height_violation(height, self.limits, self._driver.telemetry.home)
         if found:
             raise OutOfBounds(self.name, asked, found)
         if self.fence is not None:
@@ -111,7 +109,7 @@ class Drone(Vehicle):
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
-            manner=SAFE,
+            manner=TO_SAFETY,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
@@ -181,8 +179,8 @@ class Drone(Vehicle):
             "land",
             "land",
             lambda: self._driver.land(within),
-            manner=SAFE,
-            goal=lambda: NOWHERE if here is None else Goal(here.latitude, here.longitude, nan),
+            manner=TO_SAFETY,
+            goal=lambda: NO_GOAL if here is None else Goal(here.latitude, here.longitude, nan),
         )
 
     def manual_control(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
@@ -196,8 +194,8 @@ class Drone(Vehicle):
         Raises ``UsageError`` naming the stick that is out of range or no number.
         """
         self._require(Capability.STICKS)
-        sticks = Sticks(pitch, roll, throttle, yaw)
-        for name, value, low in zip(Sticks._fields, sticks, (-1.0, -1.0, 0.0, -1.0), strict=True):
+        sticks = ManualControl(pitch, roll, throttle, yaw)
+        for name, value, low in zip(ManualControl._fields, sticks, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from {low:g} to 1")
         self._move_sticks(sticks)
@@ -273,6 +271,6 @@ class Drone(Vehicle):
     def _above(self, here: Position | None, height: float) -> Goal:
         home = self._driver.telemetry.home
         if home is None:
-            return NOWHERE
+            return NO_GOAL
         over = here or home
         return self._goal(Position(over.latitude, over.longitude, AboveHome(height)))

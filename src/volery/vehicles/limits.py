@@ -2,21 +2,27 @@
 paths. ``bounds`` looks at them while it travels.
 
 Everything is judged in the local frame about home: metres east, north and up of it.
+
+Limits and fence while a vehicle travels: what it has strayed out of, by its own estimate.
+
+What counts is more than a stop may overshoot and an estimate may wander: ``TOLERANCE_M`` metres beyond.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, inf
+from math import hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from shapely import LineString, Point, Polygon, get_parts, make_valid
+from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
 
-from volery.base.errors import UsageError
+from volery.base.errors import LowBattery, OutOfBounds, UsageError, VehicleError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
+from volery.base.time import Ns, S
+from volery.vehicles.telemetry import Telemetry
 
 Corner = tuple[float, float]
 """Latitude and longitude in degrees."""
@@ -92,14 +98,14 @@ def _check_heights(what: str, low: Altitude | None, high: Altitude | None) -> No
         raise UsageError(f"{what}: its floor of {low} is not below its ceiling of {high}")
 
 
-class Home(NamedTuple):
+class HomeFrame(NamedTuple):
     """Home, and the local frame about it."""
 
     amsl: float
     frame: LocalFrame
 
     @classmethod
-    def at(cls, position: Position) -> Home:
+    def at(cls, position: Position) -> HomeFrame:
         """*position* has an AMSL altitude."""
         amsl = position.altitude.metres
         return cls(amsl, LocalFrame(position.latitude, position.longitude, amsl))
@@ -123,9 +129,11 @@ class Home(NamedTuple):
         return east, north, height
 
 
-def violation(start: Position, goal: Position, home: Position, limits: Limits, fence: Fence | None) -> str:
+def path_violation(
+    start: Position, goal: Position, home: Position, limits: Limits, fence: Fence | None
+) -> str:
     """Why one must not go straight from *start* to *goal*; empty if one may. *start*, *home* are AMSL."""
-    about = Home.at(home)
+    about = HomeFrame.at(home)
     there = about.local(goal)
     found = _beyond_limits(goal, there, about, limits)
     if not found and fence is not None:
@@ -133,12 +141,12 @@ def violation(start: Position, goal: Position, home: Position, limits: Limits, f
     return found
 
 
-def excludes_home(fence: Fence, home: Position) -> str:
+def home_violation(fence: Fence, home: Position) -> str:
     """Why nobody could start from *home* (AMSL) within the fence; empty if one can.
 
     The floor does not count: it is for the flight, and crossed on the way up and down.
     """
-    about = Home.at(home)
+    about = HomeFrame.at(home)
     if fence.polygon and not area_of(fence.polygon, about).covers(Point(0.0, 0.0)):
         return f"home ({home}) is outside the fence's polygon{_swapped(fence.polygon, about)}"
     if band_of(fence.floor, fence.ceiling, about)[1] <= 0.0:
@@ -150,7 +158,7 @@ def excludes_home(fence: Fence, home: Position) -> str:
     return ""
 
 
-def _swapped(corners: Sequence[Corner], home: Home) -> str:
+def _swapped(corners: Sequence[Corner], home: HomeFrame) -> str:
     """The usual reason: longitude before latitude."""
     if any(abs(longitude) > 90.0 for _, longitude in corners):
         return ""
@@ -159,7 +167,7 @@ def _swapped(corners: Sequence[Corner], home: Home) -> str:
     return "; corners are (latitude, longitude): are they swapped?" if inside else ""
 
 
-def too_high(height: float, limits: Limits, home: Position | None = None) -> str:
+def height_violation(height: float, limits: Limits, home: Position | None = None) -> str:
     """Why *height* metres above home is out of bounds; with the hint for one who meant AMSL. Else empty."""
     if height <= limits.highest:
         return ""
@@ -171,7 +179,7 @@ def too_high(height: float, limits: Limits, home: Position | None = None) -> str
     return f"{height:g} m above home asked, but the limit is {limits.highest:g} m (Limits.highest){hint}"
 
 
-def _beyond_limits(goal: Position, there: Vector, home: Home, limits: Limits) -> str:
+def _beyond_limits(goal: Position, there: Vector, home: HomeFrame, limits: Limits) -> str:
     far = hypot(there[0], there[1])
     if far > limits.farthest:
         return (
@@ -185,13 +193,15 @@ def _beyond_limits(goal: Position, there: Vector, home: Home, limits: Limits) ->
             f"{-limits.lowest:g} m below (Limits.lowest){_home_hint(goal, home, limits)}"
         )
     if isinstance(goal.altitude, AboveHome):
-        return too_high(up, limits, Position(home.frame.latitude, home.frame.longitude, AMSL(home.amsl)))
+        return height_violation(
+            up, limits, Position(home.frame.latitude, home.frame.longitude, AMSL(home.amsl))
+        )
     if up > limits.highest:
         return f"{goal} is {up:.1f} m above home, but the limit is {limits.highest:g} m (Limits.highest)"
     return ""
 
 
-def _home_hint(goal: Position, home: Home, limits: Limits) -> str:
+def _home_hint(goal: Position, home: HomeFrame, limits: Limits) -> str:
     if isinstance(goal.altitude, AMSL) and 0.0 <= goal.altitude.metres <= limits.highest:
         height = goal.altitude.metres
         return f"; did you mean AboveHome({height:g})? Home is {home.amsl:g} m AMSL"
@@ -203,7 +213,7 @@ def _home_hint(goal: Position, home: Home, limits: Limits) -> str:
 Segment = tuple[Vector, Vector]
 
 
-def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
+def _beyond_fence(path: Segment, home: HomeFrame, fence: Fence) -> str:
     if fence.polygon:
         area, (start, goal) = area_of(fence.polygon, home), path
         if not area.covers(Point(goal[:2])):
@@ -221,14 +231,14 @@ def _beyond_fence(path: Segment, home: Home, fence: Fence) -> str:
     return ""
 
 
-def band_of(floor: Altitude | None, ceiling: Altitude | None, home: Home) -> tuple[float, float]:
+def band_of(floor: Altitude | None, ceiling: Altitude | None, home: HomeFrame) -> tuple[float, float]:
     """Metres above home from, to; infinite where not stated."""
     low = None if floor is None else home.above(floor)
     high = None if ceiling is None else home.above(ceiling)
     return (-inf if low is None else low, inf if high is None else high)
 
 
-def area_of(corners: Sequence[Corner], home: Home) -> BaseGeometry:
+def area_of(corners: Sequence[Corner], home: HomeFrame) -> BaseGeometry:
     """What the corners enclose; both halves of an outline that crosses itself."""
     outline = Polygon([home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in corners])
     return make_valid(outline, method="structure", keep_collapsed=False)
@@ -240,7 +250,7 @@ def _track(path: Segment) -> BaseGeometry:
     return Point(start) if start == end else LineString([start, end])
 
 
-def _passes(path: Segment, zone: Zone, home: Home) -> bool:
+def _passes(path: Segment, zone: Zone, home: HomeFrame) -> bool:
     """The path leads through the zone. Straight out of one in which it starts, it may go."""
     part = _clipped(path, *band_of(zone.floor, zone.ceiling, home))
     if part is None:
@@ -273,3 +283,127 @@ def _along(path: Segment, share: float) -> Vector:
         return path[int(share)]
     (x0, y0, z0), (x1, y1, z1) = path
     return x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0)
+
+
+TOLERANCE_M = 3.0
+"""Metres: the error of a usual GPS receiver, and what a multirotor overshoots when it stops."""
+
+LOW_FOR: Ns = 3 * S
+"""So long it must be below the reserve: a voltage that sags when the motors pull comes back."""
+
+
+class Bounds:
+    """Limits and fence about one *home* (AMSL), made ready for being looked at often."""
+
+    def __init__(self, home: Position, limits: Limits, fence: Fence | None) -> None:
+        self.home = home
+        self._about = about = HomeFrame.at(home)
+        self._limits = limits
+        self._fence = fence = fence or Fence()
+        self._polygon = _prepared(area_of(fence.polygon, about)) if fence.polygon else None
+        self._band = band_of(fence.floor, fence.ceiling, about)
+        self._zones = [
+            (
+                zone.name,
+                _prepared(
+                    area_of(zone.corners, about).buffer(-_zone_tolerance(area_of(zone.corners, about)))
+                ),
+                band_of(zone.floor, zone.ceiling, about),
+            )
+            for zone in fence.no_fly
+        ]
+
+    def left(self, position: Position) -> Mapping[str, str]:
+        """What *position* (AMSL) is out of, by name, and in words. Empty: it is where it may be."""
+        east, north, up = self._about.local(position)
+        found: dict[str, str] = {}
+        self._beyond_limits(found, hypot(east, north), up)
+        self._beyond_fence(found, Point(east, north), up)
+        for name, area, (low, high) in self._zones:
+            if low <= up <= high and area.contains(Point(east, north)):
+                found[f"zone {name}"] = f"it is in the no-fly zone {name!r}"
+        return found
+
+    def _beyond_limits(self, found: dict[str, str], far: float, up: float) -> None:
+        limits = self._limits
+        if far > limits.farthest + TOLERANCE_M:
+            found["farthest"] = f"it is {far:.0f} m from home, beyond {limits.farthest:g} m (Limits.farthest)"
+        if up > limits.highest + TOLERANCE_M:
+            found["highest"] = f"it is {up:.1f} m above home, beyond {limits.highest:g} m (Limits.highest)"
+        if up < limits.lowest - TOLERANCE_M:
+            found["lowest"] = f"it is {-up:.1f} m below home, beyond {-limits.lowest:g} m (Limits.lowest)"
+
+    def _beyond_fence(self, found: dict[str, str], there: Point, up: float) -> None:
+        if self._polygon is not None and not self._polygon.contains(there):
+            off = float(self._polygon.distance(there))
+            if off > TOLERANCE_M:
+                found["polygon"] = f"it is {off:.0f} m outside the fence"
+        low, high = self._band
+        if up > high + TOLERANCE_M:
+            found["ceiling"] = f"it is {up - high:.1f} m above the fence's ceiling of {self._fence.ceiling}"
+        if up < low - TOLERANCE_M:
+            found[FLOOR] = f"it is {low - up:.1f} m below the fence's floor of {self._fence.floor}"
+
+
+FLOOR = "floor"
+"""What an operation that ends on the ground is excused from."""
+
+
+def _prepared(area: BaseGeometry) -> BaseGeometry:
+    prepare(area)
+    return area
+
+
+def _zone_tolerance(area: BaseGeometry) -> float:
+    """A zone is entered well inside it; a small one nearer to its edge."""
+    return min(TOLERANCE_M, sqrt(float(area.area)) / 4.0)
+
+
+class BoundsMonitor:
+    """One operation's eye on bounds and battery. What was wrong when it began is excused until it has been
+    right once: so a vehicle that is outside may come back in.
+    """
+
+    def __init__(
+        self, seen: Telemetry, bounds: Bounds | None, reserve: float, excused: frozenset[str] = frozenset()
+    ) -> None:
+        self._seen = seen
+        self._bounds = bounds
+        self._reserve = reserve
+        self._always = excused
+        self._looked_at: Position | None = None
+        self._low_since: Ns | None = None
+        here = seen.position
+        at_first = bounds.left(here) if bounds is not None and here is not None else {}
+        self._excused = set(at_first)
+
+    def look(self, asked: str, now: Ns) -> VehicleError | None:
+        """What ends the operation; ``None`` if nothing does."""
+        return self._strayed(asked) or self._exhausted(asked, now)
+
+    def _strayed(self, asked: str) -> OutOfBounds | None:
+        here = self._seen.position
+        if self._bounds is None or here is None or here is self._looked_at:
+            return None
+        self._looked_at = here
+        left = self._bounds.left(here)
+        self._excused.intersection_update(left)
+        wrong = [text for key, text in left.items() if key not in self._excused and key not in self._always]
+        return OutOfBounds(self._seen.name, asked, " and ".join(wrong)) if wrong else None
+
+    def _exhausted(self, asked: str, now: Ns) -> LowBattery | None:
+        remaining = self._seen.battery.remaining
+        if not isfinite(remaining) or remaining >= self._reserve:
+            self._low_since = None
+            return None
+        if self._low_since is None:
+            self._low_since = now
+        if now - self._low_since < LOW_FOR:
+            return None
+        return low_battery(self._seen.name, asked, remaining, self._reserve)
+
+
+def low_battery(vehicle: str, asked: str, remaining: float, reserve: float) -> LowBattery:
+    """The error, with what is still allowed."""
+    what = f"the battery is at {remaining:.0%}, below the reserve of {reserve:.0%} (Limits.battery_reserve)"
+    return LowBattery(vehicle, asked, f"{what}; return_home(), land() and hold() are still possible")

@@ -6,10 +6,8 @@ from math import nan
 
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
-from volery.vehicles.driver import Capability, Sticks
-from volery.vehicles.goals import Goal
-from volery.vehicles.manner import SAFE, TRAVEL
-from volery.vehicles.vehicle import Vehicle
+from volery.vehicles.driver import Capability, ManualControl
+from volery.vehicles.vehicle import TO_SAFETY, TRAVEL, Goal, Vehicle
 
 
 class Rover(Vehicle):
@@ -61,7 +59,7 @@ class Rover(Vehicle):
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
-            manner=SAFE,
+            manner=TO_SAFETY,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
@@ -82,7 +80,7 @@ class Rover(Vehicle):
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")
-        self._move_sticks(Sticks(roll=steering, throttle=throttle))
+        self._move_sticks(ManualControl(roll=steering, throttle=throttle))
 
     def come_to_rest(self) -> str:
         """Stop and disarm it if nobody else has it; says what was done. For the end of a program.

@@ -36,7 +36,7 @@ class Attitude(NamedTuple):
     heading: float
 
 
-class Said(NamedTuple):
+class StatusText(NamedTuple):
     """A text of the autopilot. ``severity`` as in syslog."""
 
     at: Ns
@@ -90,7 +90,7 @@ class Telemetry:
         self.mission_item = -1  # the item it flies to
         self.mission_reached = -1  # the item it reached last
         self.mission_ended = False
-        self.texts: deque[Said] = deque(maxlen=KEPT_TEXTS)
+        self.texts: deque[StatusText] = deque(maxlen=KEPT_TEXTS)
         self.answers: dict[str, Answer] = {}
         self.changed = Signal(kernel, f"telemetry of {name}")
 

@@ -6,7 +6,7 @@ import pytest
 
 from rigs.requirements import lacking
 from volery.base.errors import UsageError
-from volery.calibration.ros.stage import check_client
+from volery.calibration.ros.probe_environment import check_client
 
 
 @pytest.fixture(scope="session")

@@ -15,16 +15,16 @@ from typer.testing import CliRunner
 
 from volery.base.time import S
 from volery.calibration.machine import Machine
-from volery.calibration.measured.campaign import prepared
-from volery.calibration.measured.runs import running
-from volery.calibration.ros.campaign import Circumstances
-from volery.calibration.ros.entry import law_of, write_entry
-from volery.calibration.ros.fitting import Cost, costs
-from volery.calibration.ros.stage import Pace, own_master, stage
+from volery.calibration.ros.call_costs import CallCost, call_costs
+from volery.calibration.ros.campaign import Conditions
+from volery.calibration.ros.probe_environment import Pace, own_master, probe_setup
+from volery.calibration.ros.results import ros_law, write_entry
+from volery.calibration.validation.comparison import prepare_nodes
+from volery.calibration.validation.node_processes import measurement_session
 from volery.cli.main import app
 from volery.cost import catalogue
 from volery.model.reader import load
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 pytestmark = pytest.mark.integration
 
@@ -81,9 +81,9 @@ allocations:
 """
 
 
-def measured(client: str) -> dict[str, Cost]:
-    with stage(client) as here:
-        return costs([here.probe(PACE)])
+def measured(client: str) -> dict[str, CallCost]:
+    with probe_setup(client) as here:
+        return call_costs([here.probe(PACE)])
 
 
 def test_both_libraries_are_calibrated(ros: None, tmp_path: Path) -> None:
@@ -96,8 +96,8 @@ def test_both_libraries_are_calibrated(ros: None, tmp_path: Path) -> None:
         assert set(these["sleep"].points) == {5000.0, 20000.0}
         assert these["init"].typical > 0.0
         assert these["sleep"].typical > 0.0
-        under = Circumstances(client, MACHINE.description, MACHINE.frequency_mhz)
-        write_entry(tmp_path / "catalogue.yaml", MACHINE, law_of(these, under))
+        under = Conditions(client, MACHINE.description, MACHINE.frequency_mhz)
+        write_entry(tmp_path / "catalogue.yaml", MACHINE, ros_law(these, under))
     entry = catalogue(tmp_path / "catalogue.yaml").processor("here")
     assert entry.ros_law("rospy").warnings(2000.0) == ()
     assert entry.ros_law("rclpy").warnings(2000.0) != ()
@@ -123,7 +123,7 @@ def test_a_models_nodes_are_measured_and_estimated(ros: None, tmp_path: Path) ->
 def test_a_program_in_cpp_is_measured_from_its_main_on(ros: None, tmp_path: Path) -> None:
     in_cpp = MODEL.replace("{language: rospy, path: talker.py", "{language: roscpp, path: shouter.cpp")
     system = load(model(tmp_path, in_cpp), vocabulary())
-    with own_master() as master, running(prepared(system), master, S // 2) as run:
+    with own_master() as master, measurement_session(prepare_nodes(system), master, S // 2) as run:
         [(name, taken)] = run().items()
     assert name == "talker"
     assert 0 < taken < S // 2

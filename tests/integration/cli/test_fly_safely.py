@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from volery.base.position import AboveHome
 from volery.cli.main import app
-from volery.run.fence_file import read_fence
+from volery.run.assembly.fences import read_fence
 
 FAILED, BAD = 1, 2
 HOME = (46.0825, -103.8995)

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from rigs.requirements import lacking
-from volery.run.options import Options
-from volery.run.result import Run
+from volery.run.result import Options, Run
 from volery.run.simulate import simulate
 from volery.trace.events import Event
 from volery.trace.reader import read

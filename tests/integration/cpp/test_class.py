@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import Machine
+from volery.calibration.component_profile import profile_components
+from volery.calibration.machine import Machine, put_law
 from volery.cost import catalogue
 from volery.model.reader import load
-from volery.run.learning import learn
-from volery.run.options import Options
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
+from volery.run.result import Options
 from volery.trace.events import Charge, Milestone, Text
 
 pytestmark = pytest.mark.integration
@@ -138,7 +137,7 @@ def test_what_it_costs_is_learnt_from_a_run(run_model, tmp_path, monkeypatch):
     guessed = run_model(MODEL, "adder.cpp", fidelity="code", out="guessed", lister=LISTER, caller=CALLER)
     (tmp_path / "model.yaml").write_text(MODEL, encoding="utf-8")
     system = load(tmp_path / "model.yaml", vocabulary())
-    (kind,), run = learn(system, Options())
+    (kind,), run = profile_components(system, Options())
     assert run.completed
     assert (kind.component, kind.instances, kind.core) == ("Adder", ("one", "other"), "intel-i5-3470")
     assert 10 < kind.met < kind.blocks
@@ -161,7 +160,7 @@ def test_there_is_nothing_to_learn_of_python(tmp_path):
         (tmp_path / name).touch()
     (tmp_path / "model.yaml").write_text(MODEL.replace("language: c++", "language: python"), encoding="utf-8")
     with pytest.raises(UsageError, match="adders: no component of it is C\\+\\+"):
-        learn(load(tmp_path / "model.yaml", vocabulary()), Options())
+        profile_components(load(tmp_path / "model.yaml", vocabulary()), Options())
 
 
 @pytest.mark.usefixtures("llvm")

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from volery.base.errors import ComponentError, ModelError, UsageError
-from volery.components.cpp import toolchain
+from volery.components.cpp import compiler
 from volery.run import simulate
 from volery.trace.events import Failure, Text
 
@@ -92,7 +92,7 @@ def test_a_compilers_error_is_told_with_its_place(run_model, tmp_path):
 
 
 def test_no_compiler(run_model, monkeypatch):
-    toolchain.compiler.cache_clear()
+    compiler.compiler.cache_clear()
     monkeypatch.setenv("PATH", os.devnull)
     try:
         with pytest.raises(UsageError, match=r"need a compiler.*apt install g\+\+"):
@@ -101,4 +101,4 @@ def test_no_compiler(run_model, monkeypatch):
         assert outcome.run.ok
         assert any("no C++ compiler" in one.text for one in outcome.of(Text) if one.source == "volery")
     finally:
-        toolchain.compiler.cache_clear()
+        compiler.compiler.cache_clear()

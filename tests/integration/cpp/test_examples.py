@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.run.options import Options
+from volery.run.result import Options
 from volery.run.simulate import simulate
 
 pytestmark = pytest.mark.integration

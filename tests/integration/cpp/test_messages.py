@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from volery.components.cpp.build import CppComponent, Face, compile_component
-from volery.components.cpp.interfaces import operations
-from volery.components.cpp.program import CppObject, CppProgram
+from volery.components.cpp.bindings import operations
+from volery.components.cpp.build import ClientLibrary, CppComponent, compile_component
+from volery.components.cpp.cpp_program import CppObject, CppProgram
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Argument, Interface, Signature
 from volery.ros import messages
@@ -67,7 +67,7 @@ def echo(tmp_path: Path) -> Any:
     component = CppComponent(
         "Echo", tmp_path / "echo.cpp", "Echo", operations(ECHO), (), {"Echoing": ECHO}, ("-O0", "-g0")
     )
-    face = Face((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
+    face = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
     kernel = VirtualKernel()
     made = CppProgram(kernel, "echo", compile_component(component, face)).make({})
     assert isinstance(made, CppObject)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from volery.base.errors import LinkSilent, UsageError, VoleryError
-from volery.components.cpp.build import build_house
-from volery.run.supervised import Supervision, supervised
+from volery.components.cpp.build import build_framework
+from volery.run.supervision import Supervision, run_supervised
 
 pytestmark = pytest.mark.integration
 
@@ -21,7 +21,7 @@ def _supervised(work: Any, show: Any = None) -> tuple[Any, list[tuple[str, str]]
     def salvage(error: VoleryError, blamed: str) -> Any:
         mourned.append((blamed, str(error)))
 
-    return supervised(work, show, Supervision(build_house(), {}, 5.0), salvage), mourned
+    return run_supervised(work, show, Supervision(build_framework(), {}, 5.0), salvage), mourned
 
 
 def test_what_the_run_comes_to_arrives():

@@ -6,10 +6,9 @@ import pytest
 
 from rigs.sockets import HERE, PACE, flown, served
 from volery.kernel.wall import WallKernel
-from volery.links.tcp import TcpServer
-from volery.links.udp import UdpLink
-from volery.vehicles.address import parse
-from volery.vehicles.carriers import open_link
+from volery.links.tcp_link import TcpServer
+from volery.links.udp_link import UdpLink
+from volery.vehicles.address import open_link, parse
 
 pytestmark = pytest.mark.integration
 

@@ -12,13 +12,12 @@ from rigs.sockets import HERE, PACE, flown, served
 from volery.base.errors import LinkGarbled
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
-from volery.links.coded import CodedLink
-from volery.links.pprzlink import PPRZLINK
-from volery.links.serial_line import SerialLine
-from volery.links.udp import UdpLink
+from volery.links.coded_link import CodedLink
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.serial_link import SerialLink
+from volery.links.udp_link import UdpLink
 from volery.vehicles import Drone
-from volery.vehicles.address import parse
-from volery.vehicles.carriers import open_link
+from volery.vehicles.address import open_link, parse
 from volery.vehicles.drivers.paparazzi import open_driver
 
 pytestmark = pytest.mark.integration
@@ -60,7 +59,7 @@ def test_a_serial_line() -> None:
     tty.setraw(theirs)
     tty.setraw(ours)
 
-    class Line(SerialLine):
+    class Line(SerialLink):
         """The terminal's other end, which has no name."""
 
         def _open(self) -> Any:

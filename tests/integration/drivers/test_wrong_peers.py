@@ -14,8 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink_2
 from volery.base.errors import LinkError, LinkGarbled, LinkSilent, UsageError
 from volery.kernel.wall import WallKernel
 from volery.vehicles import Drone
-from volery.vehicles.address import parse
-from volery.vehicles.carriers import open_link
+from volery.vehicles.address import open_link, parse
 from volery.vehicles.drivers.ardupilot import open_driver
 
 pytestmark = pytest.mark.integration

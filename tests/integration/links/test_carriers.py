@@ -16,15 +16,14 @@ from volery.base.time import MINUTE, S
 from volery.kernel.task import Place
 from volery.kernel.waiting import Signal
 from volery.kernel.wall import WallKernel
-from volery.links.coded import CodedLink
+from volery.links.coded_link import CodedLink
 from volery.links.link import Frame
-from volery.links.mavlink import encode
-from volery.links.serial_line import SerialLine
-from volery.links.tcp import TcpClient, TcpServer
-from volery.links.udp import UdpLink
+from volery.links.mavlink_messages import encode
+from volery.links.serial_link import SerialLink
+from volery.links.tcp_link import TcpClient, TcpServer
+from volery.links.udp_link import UdpLink
 from volery.trace.events import LinkState
-from volery.vehicles.address import parse, parse_listen
-from volery.vehicles.carriers import listen, open_link
+from volery.vehicles.address import listen, open_link, parse, parse_listen
 
 pytestmark = pytest.mark.integration
 
@@ -201,7 +200,7 @@ def test_a_udp_port_that_is_taken(bench: Bench) -> None:
 def test_a_serial_line_both_ways_and_its_end(bench: Bench) -> None:
     ours, theirs = os.openpty()
     tty.setraw(theirs)
-    line = bench.add(SerialLine(bench.kernel, os.ttyname(theirs), 57600))
+    line = bench.add(SerialLink(bench.kernel, os.ttyname(theirs), 57600))
     bench.until(lambda: "nothing arrives" in line.problem())
     os.write(ours, encode(BEAT, 0))
     bench.until(lambda: bench.heard[line])
@@ -214,7 +213,7 @@ def test_a_serial_line_both_ways_and_its_end(bench: Bench) -> None:
 
 
 def test_a_serial_device_that_is_not_there(bench: Bench) -> None:
-    line = bench.add(SerialLine(bench.kernel, "/dev/ttyNONE0", 57600))
+    line = bench.add(SerialLink(bench.kernel, "/dev/ttyNONE0", 57600))
     bench.until(lambda: "no device /dev/ttyNONE0" in line.problem())
 
 

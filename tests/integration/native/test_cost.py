@@ -14,10 +14,10 @@ from rigs.requirements import lacking
 from volery.base.errors import UsageError
 from volery.cli.main import app
 from volery.cost import catalogue
-from volery.cost.native import CompilerError, compile_program, instrument
-from volery.cost.native.estimate import estimate
-from volery.cost.native.running import Wanted
-from volery.cost.native.toolchain import toolchain
+from volery.cost.native import CompilerError, block_costs, compile_program
+from volery.cost.native.compilation import llvm_toolchain
+from volery.cost.native.instrumented_run import Invocation
+from volery.cost.native.program_estimate import estimate_program
 
 pytestmark = pytest.mark.integration
 
@@ -38,7 +38,7 @@ int main() { work(100); }
 @pytest.fixture(scope="module", autouse=True)
 def _llvm(tmp_path_factory):
     try:
-        toolchain()
+        llvm_toolchain()
     except UsageError as error:
         lacking(str(error))
     os.environ["VOLERY_CACHE"] = str(tmp_path_factory.mktemp("cache"))
@@ -76,14 +76,16 @@ def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
     file = tmp_path / "choice.cpp"
     file.write_text(CHOICE, encoding="utf-8")
     program = compile_program([file], catalogue().processor("rpi4-cortex-a72").core_law())
-    seldom, often = (estimate(program, Wanted("count", (f"fill({percent})",))) for percent in (5, 25))
+    seldom, often = (
+        estimate_program(program, Invocation("count", (f"fill({percent})",))) for percent in (5, 25)
+    )
     assert seldom.costs.total(often.counts) == pytest.approx(often.cycles, rel=0.25)
     assert often.cycles > 1.6 * seldom.cycles  # which a mean over both ways would miss
 
 
 def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
     program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
-    once, twice = (estimate(program, Wanted(f"work({rounds})")) for rounds in (1000, 2000))
+    once, twice = (estimate_program(program, Invocation(f"work({rounds})")) for rounds in (1000, 2000))
     assert once.library_calls == {"sin": 1000}
     assert twice.cycles == pytest.approx(2 * once.cycles, rel=0.03)
     assert any("sin" in remark for remark in once.left_out)
@@ -92,16 +94,16 @@ def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
 
 def test_the_same_run_costs_the_same_each_time(source):
     program = compile_program([source], catalogue().processor("intel-i5-3470").core_law())
-    first, second = (estimate(program, Wanted("work(500)")) for _ in range(2))
+    first, second = (estimate_program(program, Invocation("work(500)")) for _ in range(2))
     assert (first.cycles, first.instructions) == (second.cycles, second.instructions)
     assert (first.counts == second.counts).all()
 
 
 def test_components_get_an_object_that_counts(source, tmp_path):
     law = catalogue().processor("rpi4-cortex-a72").core_law()
-    made = instrument([source], law, tmp_path / "work.o")
+    made = block_costs([source], law, tmp_path / "work.o")
     library = tmp_path / "libwork.so"
-    subprocess.run([toolchain().clang, "-shared", made.object_file, "-lm", "-o", library], check=True)
+    subprocess.run([llvm_toolchain().clang, "-shared", made.object_file, "-lm", "-o", library], check=True)
     loaded = ctypes.CDLL(str(library))
     length = ctypes.c_uint64.in_dll(loaded, "volery_counters_length").value
     counters = (ctypes.c_uint64 * length).in_dll(loaded, "volery_counters")
@@ -114,8 +116,8 @@ def test_components_get_an_object_that_counts(source, tmp_path):
 
 def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
     law = catalogue().processor("rpi4-cortex-a72").core_law()
-    estimate(compile_program([source], law), Wanted("work(50)"))
-    assert instrument([source], law, tmp_path / "work.o").estimated == ""
+    estimate_program(compile_program([source], law), Invocation("work(50)"))
+    assert block_costs([source], law, tmp_path / "work.o").estimated == ""
 
 
 def test_the_command_gives_time_and_energy(source):
@@ -145,22 +147,24 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
 def test_a_wrong_entry_is_told(source, entry, said):
     program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
     with pytest.raises(UsageError, match=said):
-        estimate(program, Wanted(entry))
+        estimate_program(program, Invocation(entry))
 
 
 def test_a_crash_is_told(tmp_path):
     crashing = tmp_path / "crash.cpp"
     crashing.write_text("int main() { volatile int *p = nullptr; return *p; }", encoding="utf-8")
     with pytest.raises(UsageError, match=r"SIGSEGV|SIGILL|SIGTRAP"):
-        estimate(compile_program([crashing], catalogue().processor("rpi4-cortex-a72").core_law()), Wanted())
+        estimate_program(
+            compile_program([crashing], catalogue().processor("rpi4-cortex-a72").core_law()), Invocation()
+        )
 
 
 def test_without_llvm_the_error_names_the_packages(monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
-    toolchain.cache_clear()
+    llvm_toolchain.cache_clear()
     with pytest.raises(UsageError, match="apt install clang-19 llvm-19"):
-        toolchain()
-    toolchain.cache_clear()
+        llvm_toolchain()
+    llvm_toolchain.cache_clear()
 
 
 MEMORY = """
@@ -192,7 +196,7 @@ def test_caches_cost_cycles_and_memory_costs_time(tmp_path):
     law = catalogue().processor("rpi4-cortex-a72").core_law()
     program = compile_program([file], law)
     first, second, behind = (
-        estimate(program, Wanted("chase(20000)", (f"fill({kib})",))) for kib in (16, 512, 8192)
+        estimate_program(program, Invocation("chase(20000)", (f"fill({kib})",))) for kib in (16, 512, 8192)
     )
     caches = law.memory.caches
     assert first.cycles / 20000 == pytest.approx(caches[0].latency, rel=0.05)

@@ -7,7 +7,7 @@ import pytest
 from volery import Options, simulate
 from volery.cost import catalogue
 from volery.run import simulate as simulation
-from volery.run.airfield import Airfield
+from volery.run.assembly.simulated_fleet import SimulatedFleet
 
 pytestmark = pytest.mark.integration
 
@@ -28,7 +28,7 @@ def flown(delivery):
     """The record of a run, and the true state of each vehicle at its end."""
     fleets = []
 
-    class Kept(Airfield):
+    class Kept(SimulatedFleet):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
             fleets.append(self)

@@ -23,8 +23,8 @@ from volery.base.errors import (
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.run.airfield import airfield_of
-from volery.run.simulated import simulated
+from volery.run.assembly.simulated_fleet import fleet_of
+from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.vehicles.address import parse
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
@@ -118,8 +118,8 @@ def test_drones_and_rovers_in_one_fleet() -> None:
 
 def test_each_has_a_system_id_of_its_own() -> None:
     stated = {"a": "sim:ardupilot", "b": "sim:ardupilot?system=1", "c": "sim:ardupilot"}
-    wanted = [simulated(parse(url), name) for name, url in stated.items()]
-    airfield = airfield_of(VirtualKernel(), wanted, 1)
+    wanted = [parse_simulated(parse(url), name) for name, url in stated.items()]
+    airfield = fleet_of(VirtualKernel(), wanted, 1)
     assert [one.vehicle.system for one in airfield.autopilots.values()] == [2, 1, 3]
 
 

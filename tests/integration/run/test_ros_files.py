@@ -8,7 +8,7 @@ import pytest
 
 from volery.base.errors import ModelError
 from volery.base.time import S
-from volery.run.options import Options
+from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Failure, Published, Text
 from volery.trace.reader import read

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.ros.messages import from_cdr
-from volery.run.options import Options
+from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Published
 from volery.trace.reader import read

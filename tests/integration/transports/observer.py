@@ -17,7 +17,7 @@ from volery.base.time import MS, S
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import BEST_AVAILABLE, QoS
 from volery.ros.messages import define_imported, to_cdr
-from volery.run.graphs import open_graph
+from volery.run.assembly.ros_graphs import open_graph
 
 EVERYTHING = QoS(None, BEST_AVAILABLE, BEST_AVAILABLE)
 

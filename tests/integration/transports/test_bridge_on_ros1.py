@@ -22,8 +22,8 @@ import pytest
 
 import volery
 from volery.links.link import Frame
-from volery.links.mavlink import encode
-from volery.links.parser import MAVLINK
+from volery.links.mavlink_codec import MAVLINK
+from volery.links.mavlink_messages import encode
 from volery.ros.transports.ros1 import Roscore
 from volery.ros.transports.ros1.packages import write_package
 

@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.simulation.autopilots.ardupilot import DIALECT
 from volery.simulation.autopilots.autopilot import Autopilot
@@ -33,7 +33,7 @@ class Yard:
         return Autopilot(self.kernel, self.flights[index], DIALECT, **options)
 
     def listen(self, autopilot: Autopilot) -> tuple[Any, list[Frame]]:
-        ours, theirs = in_process(self.kernel, MS, "station")
+        ours, theirs = in_process_pair(self.kernel, MS, "station")
         heard: list[Frame] = []
         ours.receive(heard.append)
         autopilot.connect(theirs)
@@ -86,7 +86,7 @@ def test_a_cold_vehicle_sleeps_until_it_is_connected(yard: Yard) -> None:
 
 def test_connecting_need_not_switch_it_on(yard: Yard) -> None:
     autopilot = yard.autopilot()
-    ours, theirs = in_process(yard.kernel, MS, "station")
+    ours, theirs = in_process_pair(yard.kernel, MS, "station")
     heard: list[Frame] = []
     ours.receive(heard.append)
     autopilot.connect(theirs, switch_on=False)
@@ -123,7 +123,7 @@ def _reading(system: int) -> dict[str, Any]:
 
 def test_a_link_that_is_disconnected_hears_nothing_more(yard: Yard) -> None:
     autopilot = yard.autopilot(warm=True)
-    ours, theirs = in_process(yard.kernel, MS, "station")
+    ours, theirs = in_process_pair(yard.kernel, MS, "station")
     heard: list[Frame] = []
     ours.receive(heard.append)
     autopilot.connect(theirs)

@@ -10,7 +10,7 @@ from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import Cost, Graph, free
@@ -25,7 +25,7 @@ class Aviary:
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
         self.graph = Graph(self.kernel, self._price)
-        ours, self._theirs = in_process(self.kernel, MS, name="drone_1")
+        ours, self._theirs = in_process_pair(self.kernel, MS, name="drone_1")
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
         self.answers: dict[str, Callable[[dict[str, Any]], None]] = {}

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
-from volery.links.parameter_values import as_bytes
+from volery.links.mavlink_conventions import to_bytewise
 
 REAL32, INT32 = 9, 6
 KEPT: dict[str, tuple[int, float]] = {
@@ -22,7 +22,7 @@ def serve(aviary: Any, bytewise: bool = False, lost: Callable[[str], bool] = lam
 
     def tell(name: str) -> None:
         kind, value = KEPT[name]
-        written = as_bytes(kind, value) if bytewise else value
+        written = to_bytewise(kind, value) if bytewise else value
         about = {"param_index": names.index(name), "param_count": len(names), "param_type": kind}
         aviary.say("PARAM_VALUE", param_id=name, param_value=written, **about)
 
@@ -53,7 +53,7 @@ def test_one_is_read(aviary: Any, autopilot: int, name: str, integer: int, real:
     assert (answer.success, answer.value.integer, answer.value.real) == (True, integer, real)
 
 
-@pytest.mark.parametrize(("autopilot", "sent"), [(3, 7.0), (12, as_bytes(INT32, 7.0))])
+@pytest.mark.parametrize(("autopilot", "sent"), [(3, 7.0), (12, to_bytewise(INT32, 7.0))])
 def test_one_is_set(aviary: Any, autopilot: int, sent: float) -> None:
     aviary.heartbeat(autopilot=autopilot)
     aviary.run(S)

@@ -11,10 +11,10 @@ from volery.base.time import MS, S
 from volery.bridge import serve_pprzros
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprz_message import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
-from volery.links.pprzlink import PPRZLINK
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzros_messages import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
 from volery.ros.graph import Graph
 from volery.ros.messages import new
 from volery.trace.events import Text
@@ -31,7 +31,7 @@ class Aviary:
     def __init__(self) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        link, self.aircraft = in_process(self.kernel, MS, "craft", PPRZLINK)
+        link, self.aircraft = in_process_pair(self.kernel, MS, "craft", PPRZLINK)
         self.told: list[Frame] = []
         self.aircraft.receive(self.told.append)
         self.heard: list[Any] = []

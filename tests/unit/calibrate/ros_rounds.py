@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.base.seeds import stream
-from volery.calibration.ros.samples import Round, Sample
+from volery.calibration.ros.call_costs import Round, Sample
 
 OWN, IDLE = 40_000.0, 0.001
 """ns that the probe's own looking takes; ns of the library's threads for each ns on the wall."""

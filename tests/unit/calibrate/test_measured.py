@@ -7,13 +7,11 @@ import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
-from volery.calibration.measured.campaign import compare
-from volery.calibration.measured.comparison import Compared, Estimate, compared
-from volery.calibration.measured.meters.rospy import imported
-from volery.calibration.measured.programs import programs
-from volery.calibration.measured.runs import process_cpu
+from volery.calibration.validation.comparison import NodeComparison, NodeEstimate, compare, compare_nodes
+from volery.calibration.validation.meters.rospy import imported
+from volery.calibration.validation.node_processes import node_programs, process_cpu
 from volery.model.reader import load
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 MODEL = """
 volery: 1
@@ -41,7 +39,7 @@ def nodes(folder: Path, other: str = "print()\n", language: str = "rospy") -> Pa
 
 
 def test_a_script_is_started_as_roslaunch_would(tmp_path: Path) -> None:
-    other, node = programs(load(nodes(tmp_path), vocabulary()))
+    other, node = node_programs(load(nodes(tmp_path), vocabulary()))
     assert (other.instance, other.measured, node.measured) == ("other", False, True)
     assert node.node == "/drone/node"
     assert node.command[2:] == (
@@ -56,13 +54,13 @@ def test_a_script_is_started_as_roslaunch_would(tmp_path: Path) -> None:
 
 def test_what_is_no_node_cannot_be_measured(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"model\.yaml:6.*other is python.*rospy and roscpp"):
-        programs(load(nodes(tmp_path, language="python"), vocabulary()))
+        node_programs(load(nodes(tmp_path, language="python"), vocabulary()))
     with pytest.raises(ModelError, match="other is a class"):
-        programs(load(nodes(tmp_path, "class Other:\n    def run(self): ...\n"), vocabulary()))
+        node_programs(load(nodes(tmp_path, "class Other:\n    def run(self): ...\n"), vocabulary()))
 
 
-ESTIMATE = Estimate(ros_s=0.110, code_s=0.010, calls={"publish": 100})
-NODE = Compared("n", "rospy", ESTIMATE, (0.100, 0.102, 0.098, 0.100))
+ESTIMATE = NodeEstimate(ros_s=0.110, code_s=0.010, calls={"publish": 100})
+NODE = NodeComparison("n", "rospy", ESTIMATE, (0.100, 0.102, 0.098, 0.100))
 
 
 def test_a_node_in_the_tables() -> None:
@@ -88,7 +86,7 @@ def test_one_run_has_no_spread() -> None:
 
 
 def test_runs_are_put_beside_estimates() -> None:
-    [one] = compared({"n": "rospy"}, {"n": ESTIMATE}, [{"n": S // 10}, {"n": S // 5}])
+    [one] = compare_nodes({"n": "rospy"}, {"n": ESTIMATE}, [{"n": S // 10}, {"n": S // 5}])
     assert one.runs_s == (0.1, 0.2)
     assert one.as_data()["measured_s"] == pytest.approx(0.15)
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import Machine
-from volery.calibration.python.campaign import evaluate
-from volery.calibration.python.nonnegative import explain
-from volery.calibration.python.pieces import Rounds, Timed, measure, program, programs, snippets
-from volery.components.operations import OPERATIONS
+from volery.calibration.machine import Machine, put_law
+from volery.calibration.python.operation_costs import evaluate, fit_costs
+from volery.calibration.python.timed_code import (
+    Rounds,
+    TimedCode,
+    measure,
+    timed_program,
+    timed_programs,
+    timed_statements,
+)
 from volery.cost import catalogue
-from volery.cost.interpreter import python_operations
+from volery.cost.python_operations import OPERATIONS, operation_table
 
 HERE = Machine("bench", "A Processor", 4, 2600.0)
 
@@ -22,21 +26,21 @@ def test_costs_are_found_again_from_the_times_they_make():
     counts = random.integers(0, 5, (60, 12)).astype(float)
     costs = random.uniform(1.0, 50.0, 12)
     costs[3] = 0.0
-    assert explain(counts, counts @ costs, np.ones(60), 1.0) == pytest.approx(costs, abs=0.05)
+    assert fit_costs(counts, counts @ costs, np.ones(60), 1.0) == pytest.approx(costs, abs=0.05)
 
 
 def test_no_cost_is_negative_and_one_odd_measurement_changes_little():
     counts = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [4.0, 1.0], [5.0, 0.0]])
     times = counts @ np.array([10.0, 3.0])
     times[2] *= 5.0
-    found = explain(counts, times, np.ones(6), 1.0)
+    found = fit_costs(counts, times, np.ones(6), 1.0)
     assert found == pytest.approx([10.0, 3.0], rel=0.1)
-    assert (explain(counts, counts @ np.array([10.0, -9.0]), np.ones(6), 1.0) >= 0.0).all()
+    assert (fit_costs(counts, counts @ np.array([10.0, -9.0]), np.ones(6), 1.0) >= 0.0).all()
 
 
 def test_a_calibration_whose_programs_run_slower_than_their_operations_finds_by_how_much():
     made_up = {name: 1.0 + number % 7 for number, name in enumerate(OPERATIONS)}
-    statements, whole = snippets()[::3], programs()[:3]
+    statements, whole = timed_statements()[::3], timed_programs()[:3]
     for one in statements:
         one.nanoseconds += [one.counted_ns(made_up)] * 4
     for one in whole:
@@ -45,20 +49,18 @@ def test_a_calibration_whose_programs_run_slower_than_their_operations_finds_by_
     assert found.in_context == pytest.approx(1.5, rel=0.1)
     assert sorted(abs(error) for error in found.statements.values())[60] < 0.05
     assert found.loose == {}
-    shipped = [one.median / one.counted_ns(python_operations().nanoseconds) for one in whole]
+    shipped = [one.median / one.counted_ns(operation_table().nanoseconds) for one in whole]
     assert found.slowdown == sorted(shipped)[1]
 
 
 def test_pieces_are_counted_the_same_each_time():
-    for one in programs():
-        assert one.counted_ns(python_operations().nanoseconds) == one.counted_ns(
-            python_operations().nanoseconds
-        )
+    for one in timed_programs():
+        assert one.counted_ns(operation_table().nanoseconds) == one.counted_ns(operation_table().nanoseconds)
 
 
 def test_only_what_is_not_known_well_enough_is_timed_more_than_the_least():
     text = "def prepare(seed):\n    return seed\ndef run(state):\n    return sum(range(2000))\n"
-    steady, loose = program("steady", text), program("loose", text)
+    steady, loose = timed_program("steady", text), timed_program("loose", text)
     steady.nanoseconds += [100.0] * 40
     loose.nanoseconds += [1.0, 1e6] * 100
     told = []
@@ -67,9 +69,9 @@ def test_only_what_is_not_known_well_enough_is_timed_more_than_the_least():
 
 
 def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):
-    statements, whole = snippets()[:40], programs()[:3]
+    statements, whole = timed_statements()[:40], timed_programs()[:3]
     for one in [*statements, *whole]:
-        one.nanoseconds += [3.0 * one.counted_ns(python_operations().nanoseconds)] * 4
+        one.nanoseconds += [3.0 * one.counted_ns(operation_table().nanoseconds)] * 4
     law = evaluate(statements, whole, Rounds(4, 4)).law("A Processor", 2600.0)
     file = tmp_path / "catalogue.yaml"
     put_law(file, HERE, ("code", "python"), law, (2600.0, 2600.0))
@@ -86,7 +88,7 @@ def test_a_piece_that_takes_long_to_load_is_still_run_often_enough_to_be_timed()
         loaded.append(sum(range(400_000)))  # more than what is worth timing
         return lambda times: [None for _ in range(times)]
 
-    piece = Timed("nothing much", "", load)
+    piece = TimedCode("nothing much", "", load)
     piece.warm_up()
     assert len(loaded) == 1
     assert piece.times > 1000

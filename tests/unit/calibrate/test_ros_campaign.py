@@ -4,12 +4,12 @@ from typing import Any
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibration.ros.campaign import Circumstances, Notebook, Plan, Progress, pursue
-from volery.calibration.ros.stage import Pace
+from volery.calibration.ros.campaign import CampaignLog, Conditions, Plan, Progress, run_campaign
+from volery.calibration.ros.probe_environment import Pace
 
 from .ros_rounds import Probe
 
-HERE = Circumstances("roscpp", "a processor", 2600.0)
+HERE = Conditions("roscpp", "a processor", 2600.0)
 
 
 class Stage:
@@ -26,14 +26,14 @@ class Stage:
         return Probe(len(self.paces), self.noise).round(pace.counts)
 
 
-def pursued(stage: Stage, plan: Plan, notebook: Notebook) -> list[Progress]:
+def pursued(stage: Stage, plan: Plan, notebook: CampaignLog) -> list[Progress]:
     shown: list[Progress] = []
-    pursue(stage, plan, notebook, shown.append)  # type: ignore[arg-type]
+    run_campaign(stage, plan, notebook, shown.append)  # type: ignore[arg-type]
     return shown
 
 
 def test_it_stops_as_soon_as_all_is_tight(tmp_path: Path) -> None:
-    notebook = Notebook(tmp_path / "rounds", HERE)
+    notebook = CampaignLog(tmp_path / "rounds", HERE)
     shown = pursued(Stage(), Plan(least=4, most=9), notebook)
     assert len(notebook.rounds) == 4
     assert [one.rounds for one in shown] == [0, 1, 2, 3, 4]
@@ -41,7 +41,7 @@ def test_it_stops_as_soon_as_all_is_tight(tmp_path: Path) -> None:
 
 
 def test_it_gives_up_after_enough_and_names_what_is_loose(tmp_path: Path) -> None:
-    notebook = Notebook(tmp_path / "rounds", HERE)
+    notebook = CampaignLog(tmp_path / "rounds", HERE)
     shown = pursued(Stage(noise=0.5), Plan(least=3, most=5, within=0.01), notebook)
     assert len(notebook.rounds) == 5
     assert "publish" in {cost.call for cost in shown[-1].loose}
@@ -50,31 +50,31 @@ def test_it_gives_up_after_enough_and_names_what_is_loose(tmp_path: Path) -> Non
 def test_what_was_measured_before_it_was_broken_off_is_kept(tmp_path: Path) -> None:
     file = tmp_path / "deeper" / "rounds"
     with pytest.raises(KeyboardInterrupt):
-        pursued(Stage(breaks_after=2), Plan(least=4), Notebook(file, HERE))
-    again = Notebook(file, HERE)
+        pursued(Stage(breaks_after=2), Plan(least=4), CampaignLog(file, HERE))
+    again = CampaignLog(file, HERE)
     assert len(again.rounds) == 2
     stage = Stage()
     pursued(stage, Plan(least=4), again)
     assert len(stage.paces) == 2
-    assert Notebook(file, HERE).rounds == again.rounds
+    assert CampaignLog(file, HERE).rounds == again.rounds
     again.forget()
     assert not file.exists()
 
 
 def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
     file = tmp_path / "rounds"
-    pursued(Stage(), Plan(least=3), Notebook(file, HERE))
+    pursued(Stage(), Plan(least=3), CampaignLog(file, HERE))
     file.write_text(file.read_text()[:-20])
-    assert len(Notebook(file, HERE).rounds) == 2
+    assert len(CampaignLog(file, HERE).rounds) == 2
 
 
 def test_rounds_of_another_machine_do_not_mix(tmp_path: Path) -> None:
-    Notebook(tmp_path / "rounds", HERE)
+    CampaignLog(tmp_path / "rounds", HERE)
     with pytest.raises(UsageError, match=r"2600.*not of.*1300.*remove it or move it away"):
-        Notebook(tmp_path / "rounds", Circumstances("roscpp", "a processor", 1300.0))
+        CampaignLog(tmp_path / "rounds", Conditions("roscpp", "a processor", 1300.0))
     (tmp_path / "other").write_text("a letter\n")
     with pytest.raises(UsageError, match="no rounds of a campaign"):
-        Notebook(tmp_path / "other", HERE)
+        CampaignLog(tmp_path / "other", HERE)
 
 
 def test_each_round_measures_the_ends_and_others_in_turn() -> None:

@@ -5,10 +5,9 @@ import pytest
 
 from volery.base.errors import EstimateError, ModelError
 from volery.calibration.machine import Machine
-from volery.calibration.ros.campaign import Circumstances
-from volery.calibration.ros.entry import in_figures, law_of, write_entry
-from volery.calibration.ros.fitting import costs
-from volery.calibration.ros.plot import picture
+from volery.calibration.ros.call_costs import call_costs
+from volery.calibration.ros.campaign import Conditions
+from volery.calibration.ros.results import format_line, plot_svg, ros_law, write_entry
 from volery.cost import RosLaw, catalogue
 
 from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe
@@ -18,7 +17,7 @@ MACHINE = Machine("my-computer", "A Processor of Mine", 2, 2600.0)
 
 def law(client: str = "roscpp", mhz: float = 2600.0, spins: bool = True) -> RosLaw:
     rounds = [Probe(spins=spins).round() for _ in range(3)]
-    return law_of(costs(rounds), Circumstances(client, MACHINE.description, mhz))
+    return ros_law(call_costs(rounds), Conditions(client, MACHINE.description, mhz))
 
 
 def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
@@ -91,12 +90,12 @@ def test_a_file_that_is_no_catalogue_is_not_touched(tmp_path: Path) -> None:
 
 
 def test_in_words_and_as_a_picture() -> None:
-    found = costs([Probe().round() for _ in range(3)])
-    assert in_figures(found["publish"].whole, "publish") == "75.0 + 18.0 n"
-    assert in_figures(found["sleep"].whole, "sleep") == "14.0 + 1.050 ms"
-    assert in_figures(found["wait"].whole, "wait") == "2.000 ms"
-    assert in_figures(found["receive"].whole, "receive") == "90.0"
-    drawn = picture(found, "roscpp <here>")
+    found = call_costs([Probe().round() for _ in range(3)])
+    assert format_line(found["publish"].whole, "publish") == "75.0 + 18.0 n"
+    assert format_line(found["sleep"].whole, "sleep") == "14.0 + 1.050 ms"
+    assert format_line(found["wait"].whole, "wait") == "2.000 ms"
+    assert format_line(found["receive"].whole, "receive") == "90.0"
+    drawn = plot_svg(found, "roscpp <here>")
     assert drawn.startswith("<svg")
     assert "roscpp &lt;here&gt;" in drawn
     assert drawn.count('class="point"') == sum(

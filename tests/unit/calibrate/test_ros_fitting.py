@@ -4,14 +4,13 @@ from math import isclose
 import pytest
 
 from volery.base.errors import LinkError
-from volery.calibration.ros.fitting import costs, fit
-from volery.calibration.ros.samples import points_of, read_round
+from volery.calibration.ros.call_costs import call_costs, fit, points_of, read_round
 
 from .ros_rounds import ACCEPT, AGAIN, ONCE, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, SPIN, Probe
 
 
 def test_an_exact_probe_gives_back_its_law() -> None:
-    found = costs([Probe().round() for _ in range(3)])
+    found = call_costs([Probe().round() for _ in range(3)])
     assert isclose(found["publish"].whole.constant, PUBLISH, rel_tol=1e-3)
     assert isclose(found["publish"].whole.per_x, PER_SUBSCRIBER, rel_tol=1e-3)
     assert isclose(found["sleep"].whole.constant, SLEEP, rel_tol=1e-3)
@@ -24,7 +23,7 @@ def test_an_exact_probe_gives_back_its_law() -> None:
 
 
 def test_exact_points_leave_no_residual_and_are_tight() -> None:
-    for cost in costs([Probe().round() for _ in range(3)]).values():
+    for cost in call_costs([Probe().round() for _ in range(3)]).values():
         assert cost.residual < 1e-3
         assert cost.spread < 1e-3
         assert cost.is_tight(0.01)
@@ -32,23 +31,23 @@ def test_exact_points_leave_no_residual_and_are_tight() -> None:
 
 def test_noise_widens_the_interval_and_more_rounds_narrow_it() -> None:
     def publish(rounds: int) -> float:
-        return costs([Probe(seed, noise=0.1).round() for seed in range(rounds)])["publish"].half_width
+        return call_costs([Probe(seed, noise=0.1).round() for seed in range(rounds)])["publish"].half_width
 
     assert publish(4) > publish(40) > 0.0
-    found = costs([Probe(seed, noise=0.1).round() for seed in range(40)])["publish"]
+    found = call_costs([Probe(seed, noise=0.1).round() for seed in range(40)])["publish"]
     assert found.low < PUBLISH + 4 * PER_SUBSCRIBER < found.high
-    assert not costs([Probe(seed, noise=0.3).round() for seed in range(4)])["publish"].is_tight(0.02)
+    assert not call_costs([Probe(seed, noise=0.3).round() for seed in range(4)])["publish"].is_tight(0.02)
 
 
 def test_the_same_rounds_give_the_same_figures() -> None:
     rounds = [Probe(seed, noise=0.2).round() for seed in range(5)]
-    assert costs(rounds) == costs(rounds)
+    assert call_costs(rounds) == call_costs(rounds)
 
 
 def test_one_wild_round_does_not_move_a_median() -> None:
     rounds = [Probe().round() for _ in range(4)]
     wild = tuple(one._replace(process_ns=one.process_ns * 7) for one in Probe().round())
-    assert costs([*rounds, wild])["publish"].whole.constant == pytest.approx(PUBLISH, rel=1e-3)
+    assert call_costs([*rounds, wild])["publish"].whole.constant == pytest.approx(PUBLISH, rel=1e-3)
 
 
 def test_the_callers_part_goes_by_its_own_clock() -> None:
@@ -57,7 +56,7 @@ def test_the_callers_part_goes_by_its_own_clock() -> None:
 
 
 def test_rospy_has_no_spin_once() -> None:
-    found = costs([Probe(spins=False).round() for _ in range(3)])
+    found = call_costs([Probe(spins=False).round() for _ in range(3)])
     assert not {"spin_once_first", "spin_once_next"} & set(found)
     assert found["receive"].typical == pytest.approx(RECEIVE, rel=1e-3)
 
@@ -89,7 +88,7 @@ def test_what_a_probe_prints_is_read() -> None:
 
 def test_what_takes_next_to_nothing_is_judged_by_what_is_negligible() -> None:
     rounds = [Probe(seed, noise=0.2).round() for seed in range(6)]
-    shy = costs(rounds)["service_client"]
+    shy = call_costs(rounds)["service_client"]
     assert shy.typical < 60_000.0
     assert 0.0 < shy.half_width < 10.0
     assert 0.0 < shy.spread < 20.0

@@ -7,15 +7,15 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
-from volery.calibration.ros import stage
-from volery.calibration.ros.stage import check_client, roscpp_flags
+from volery.calibration.ros import probe_environment
+from volery.calibration.ros.probe_environment import check_client, roscpp_flags
 from volery.cli.main import app
 
 
 @pytest.fixture
 def nothing_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(stage, "available", lambda: False)
+    monkeypatch.setattr(probe_environment, "available", lambda: False)
 
 
 def test_an_unknown_library() -> None:

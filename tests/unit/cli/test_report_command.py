@@ -10,8 +10,8 @@ from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.ros.messages.store import definition
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.attachments import scenery_to_json
 from volery.trace.mcap_writer import Attachment, McapWriter
-from volery.trace.scenery import scenery_to_json
 
 
 def make_run(folder, megahertz=1500.0):

@@ -13,7 +13,7 @@ import typer
 
 from volery.cli.main import app
 from volery.model.reader import load
-from volery.run.vocabulary import vocabulary
+from volery.run.assembly.vocabulary import vocabulary
 
 ROOT = Path(__file__).parents[3]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.components.counting import UNIFORM, Steps
-from volery.components.operations import OPERATIONS
-from volery.cost.interpreter import STEPS_PER_NS
+from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
+from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS
 
 
 def load(text, steps=None):
@@ -30,7 +29,7 @@ def load(text, steps=None):
 def count(operation, text, *arguments):
     """How often *operation* is counted while ``f`` of *text* runs."""
     nothing = dict.fromkeys(OPERATIONS, 0.0)
-    steps = Steps({**nothing, operation: 1.0 / STEPS_PER_NS})
+    steps = StepCounter({**nothing, operation: 1.0 / STEPS_PER_NS})
     function = load(text, steps)["f"]
     function(*arguments)
     return steps.take()
@@ -200,7 +199,7 @@ def drive(n, things):
     things=st.dictionaries(st.text("ab", max_size=2), st.lists(st.integers(0, 9), max_size=3)),
 )
 def test_counted_code_does_what_it_did(n, things):
-    steps = Steps(UNIFORM)
+    steps = StepCounter(UNIFORM_COSTS)
     plain, counted = load(EVERYTHING), load(EVERYTHING, steps)
     assert repr(counted["drive"](n, things)) == repr(plain["drive"](n, things))
     first = steps.take()
@@ -214,7 +213,7 @@ def test_counted_code_does_what_it_did(n, things):
 def test_lines_in_tracebacks_are_those_of_the_file():
     text = "def f(n):\n    if n:\n        n += 1\n    return [1 / i for i in range(n)]\n"
     lines = []
-    for steps in (None, Steps(UNIFORM)):
+    for steps in (None, StepCounter(UNIFORM_COSTS)):
         with pytest.raises(ZeroDivisionError) as caught:
             load(text, steps)["f"](3)
         lines.append([frame.lineno for frame in traceback.extract_tb(caught.value.__traceback__)][1:])

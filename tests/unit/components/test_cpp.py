@@ -10,14 +10,20 @@ import pytest
 
 from volery.base.errors import ModelError
 from volery.base.position import AboveHome, Position
-from volery.components.cpp import build, toolchain
+from volery.components.cpp import build, compiler
+from volery.components.cpp.bindings import (
+    RequiredPort,
+    cpp_type,
+    glue,
+    interfaces_header,
+    operation,
+    operations,
+)
+from volery.components.cpp.compiler import find_sources
 from volery.components.cpp.crash import Crash, read_crash
-from volery.components.cpp.interfaces import Required, glue, interfaces_header, operation, operations
-from volery.components.cpp.meter import Meter
-from volery.components.cpp.sources import find_sources
-from volery.components.cpp.types import kind_of
+from volery.components.cpp.framework import StepMeter
 from volery.model.system import Argument, Interface, Signature
-from volery.ros.client_libraries.wire import Reader, Writer
+from volery.ros.client_libraries.abi_codec import Reader, Writer
 
 ROUTING = Interface(
     "Routing",
@@ -37,7 +43,7 @@ def test_an_interface_becomes_an_abstract_class():
 
 
 def test_the_glue_constructs_from_ports_and_serves_operations():
-    requires = [Required("routes", "Routing"), Required("drones", "Drone", many=True)]
+    requires = [RequiredPort("routes", "Routing"), RequiredPort("drones", "Drone", many=True)]
     text = glue("Planner", Path("/there/planner.cpp"), requires, operations(ROUTING), {"Routing": ROUTING})
     assert '#include "/there/planner.cpp"' in text
     assert "class Routing_port final : public Routing, public volery::Port {" in text
@@ -61,7 +67,7 @@ def test_the_glue_constructs_from_ports_and_serves_operations():
     ],
 )
 def test_values_cross_the_border_unchanged(written, value):
-    kind = kind_of(written, "here")
+    kind = cpp_type(written, "here")
     out = Writer()
     kind.write(out, value)
     assert kind.read(Reader(out.done())) == value
@@ -124,7 +130,7 @@ def test_a_crash_in_words():
 
 def test_a_meter_gives_what_is_new():
     counters = (ctypes.c_uint64 * 2)(5, 0)
-    meter = Meter()
+    meter = StepMeter()
     assert meter() == 0
     meter.read_from(counters, lambda counts: 3 * counts[0] + counts[1])
     assert meter() == 0
@@ -135,11 +141,11 @@ def test_a_meter_gives_what_is_new():
 
 def test_a_make_rule_names_its_files():
     rule = "x.o: /a/b.cpp \\\n /usr/in\\ clude/c.h \\\n d.h\n"
-    assert toolchain._read_dependencies(rule) == ["/a/b.cpp", "/usr/in clude/c.h", "d.h"]
+    assert compiler._read_dependencies(rule) == ["/a/b.cpp", "/usr/in clude/c.h", "d.h"]
 
 
 def test_a_cache_that_cannot_be_made(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(Exception, match="set XDG_CACHE_HOME to a folder of yours"):
-        toolchain.cache_folder()
+        compiler.cache_folder()

@@ -10,14 +10,13 @@ import pytest
 
 from volery.base.errors import ComponentError, Location, ModelError, UsageError
 from volery.base.time import MS, S
-from volery.components import services
-from volery.components.counting import UNIFORM, Steps
-from volery.components.instance import Instance, Seat
-from volery.components.loading import Loader
-from volery.components.pricing import Counted
-from volery.components.python import load_class, load_function, load_program, start
-from volery.components.stand_ins import stand_ins
-from volery.components.stub import StubProgram, neutral
+from volery.components import component_api
+from volery.components.instance import Allocation, Instance
+from volery.components.loader import Loader
+from volery.components.programs import StubProgram, load_class, load_function, load_program, neutral, start
+from volery.components.virtual_stdlib import virtual_modules
+from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
+from volery.cost.pricing import CountedPricing
 from volery.kernel.processor import Processor
 from volery.kernel.virtual import VirtualKernel
 from volery.trace.events import Activation, Charge, Failure, Milestone, Slice, Text
@@ -31,11 +30,11 @@ class Desk:
         self.events = []
         self.kernel = VirtualKernel(self.events.append)
         self.processor = Processor(self.kernel, "onboard")
-        self.seat = Seat(self.processor, frequency_mhz=600.0, priority=1)
+        self.seat = Allocation(self.processor, frequency_mhz=600.0, priority=1)
         self.log = []
         log = ModuleType("log")
         log.tell = self.log.append
-        self.loader = Loader({**stand_ins(self.kernel, seed), "log": log})
+        self.loader = Loader({**virtual_modules(self.kernel, seed), "log": log})
         self.failures = []
 
     def write(self, name, text):
@@ -98,7 +97,7 @@ def test_a_script_runs_as_main(desk):
             main()
         """,
     )
-    desk.start(path, seat=Seat(priority=0))
+    desk.start(path, seat=Allocation(priority=0))
     desk.kernel.run(5 * S)
     assert desk.log == ["__main__"]
 
@@ -253,7 +252,7 @@ def test_services_find_the_run_and_the_component(desk):
     path = desk.write(
         "user.py",
         """
-        from volery.components.services import add_time, log, note, now, sleep
+        from volery.components.component_api import add_time, log, note, now, sleep
 
         class User:
             def run(self):
@@ -274,13 +273,13 @@ def test_services_find_the_run_and_the_component(desk):
 
 def test_services_outside_of_a_run_say_so():
     with pytest.raises(UsageError, match="works in a component or a mission of a run only"):
-        services.note("parcel", "p-1", "ordered")
+        component_api.note("parcel", "p-1", "ordered")
 
 
 def test_counted_code_is_charged_and_takes_its_time(tmp_path):
     desk = Desk(tmp_path)
-    steps = Steps(UNIFORM)
-    loader = Loader(stand_ins(desk.kernel, 1), steps)
+    steps = StepCounter(UNIFORM_COSTS)
+    loader = Loader(virtual_modules(desk.kernel, 1), steps)
     path = desk.write(
         "loop.py",
         """
@@ -295,7 +294,7 @@ def test_counted_code_is_charged_and_takes_its_time(tmp_path):
                     time.sleep(1)
         """,
     )
-    instance = Instance(desk.kernel, "loop", desk.seat, Counted(1000.0), counter=steps.take)
+    instance = Instance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), counter=steps.take)
     program = load_program(loader, "loop", path, "Loop")
     start(instance, program, {}, desk.kernel.root, lambda *told: desk.failures.append(told))
     desk.kernel.run(10 * S)

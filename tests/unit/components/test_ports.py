@@ -9,10 +9,10 @@ import pytest
 
 from volery.base.errors import ComponentError, EstimateError, UsageError
 from volery.base.time import MS, Ns, S
-from volery.components.instance import Instance, Seat
+from volery.components.instance import Allocation, Instance
 from volery.components.ports import HEADER_BYTES, Port, PortList, size_of
-from volery.components.pricing import FREE, Cost, Stated
-from volery.components.python import start
+from volery.components.programs import start
+from volery.cost.pricing import FREE, Cost, StatedPricing
 from volery.kernel import waiting
 from volery.kernel.processor import Processor
 from volery.kernel.task import Cancelled, Place
@@ -91,7 +91,7 @@ class Doing:
 
 
 def free(**operations):
-    return Stated({name: Cost(int(time * MS)) for name, time in operations.items()}, Cost(0))
+    return StatedPricing({name: Cost(int(time * MS)) for name, time in operations.items()}, Cost(0))
 
 
 def test_nested_calls_over_two_processors_under_preemption():
@@ -101,11 +101,11 @@ def test_nested_calls_over_two_processors_under_preemption():
     """
     house = House()
     kernel = house.kernel
-    c = house.instance("c", Doing(kernel, []), Seat(house.onboard), free(work=2), ("work",))
+    c = house.instance("c", Doing(kernel, []), Allocation(house.onboard), free(work=2), ("work",))
     to_c = Port(kernel, "b", c, house.travel(3 * MS), house.travel(3 * MS))
-    b = house.instance("b", Doing(kernel, [to_c.work, 1]), Seat(house.ground), free(work=3), ("work",))
+    b = house.instance("b", Doing(kernel, [to_c.work, 1]), Allocation(house.ground), free(work=3), ("work",))
     to_b = Port(kernel, "a", b, house.travel(3 * MS), house.travel(3 * MS))
-    house.instance("a", Doing(kernel, [4, to_b.work, 1]), Seat(house.onboard, priority=1), free())
+    house.instance("a", Doing(kernel, [4, to_b.work, 1]), Allocation(house.onboard, priority=1), free())
 
     def urgent(processor, at, amount):
         def body():
@@ -132,7 +132,7 @@ def test_nested_calls_over_two_processors_under_preemption():
 def test_one_visitor_at_a_time_the_urgent_first():
     house = House()
     kernel = house.kernel
-    shared = house.instance("shared", Doing(kernel, []), Seat(house.ground), free(work=10), ("work",))
+    shared = house.instance("shared", Doing(kernel, []), Allocation(house.ground), free(work=10), ("work",))
     ends = []
 
     def caller(name, priority, at):
@@ -145,7 +145,7 @@ def test_one_visitor_at_a_time_the_urgent_first():
                 lambda: ends.append((name, kernel.now() / MS)),
             ],
         )
-        house.instance(name, doing, Seat(None, priority=priority), free())
+        house.instance(name, doing, Allocation(None, priority=priority), free())
 
     caller("first", 1, 1)
     caller("second", 1, 2)
@@ -169,13 +169,13 @@ def test_a_visitor_has_the_callers_priority_unless_the_callee_states_its_own():
         def run(self):
             pass
 
-    passive = house.instance("passive", Looking("passive"), Seat(house.ground), free(look=0), ("look",))
+    passive = house.instance("passive", Looking("passive"), Allocation(house.ground), free(look=0), ("look",))
     active = house.instance(
-        "active", Looking("active"), Seat(house.ground, priority=3), free(look=0), ("look",)
+        "active", Looking("active"), Allocation(house.ground, priority=3), free(look=0), ("look",)
     )
     ports = [Port(kernel, "caller", callee, None, None) for callee in (passive, active)]
     house.instance(
-        "caller", Doing(kernel, [port.look for port in ports]), Seat(house.ground, priority=8), free()
+        "caller", Doing(kernel, [port.look for port in ports]), Allocation(house.ground, priority=8), free()
     )
     house.run()
     assert seen == {"passive": 8, "active": 3}
@@ -196,7 +196,7 @@ class Keeper:
 def test_arguments_and_results_are_copied_between_processors_only(far):
     house = House()
     keeper = Keeper()
-    kept = house.instance("keeper", keeper, Seat(house.ground), free(keep=0), ("keep",))
+    kept = house.instance("keeper", keeper, Allocation(house.ground), free(keep=0), ("keep",))
     port = Port(house.kernel, "caller", kept, None, None)
     mine = {"list": [1]}
     returned = []
@@ -204,7 +204,7 @@ def test_arguments_and_results_are_copied_between_processors_only(far):
     house.instance(
         "caller",
         Doing(house.kernel, [lambda: returned.append(port.keep(mine))]),
-        Seat(place, priority=0),
+        Allocation(place, priority=0),
         free(),
     )
     house.run()
@@ -216,7 +216,7 @@ def test_arguments_and_results_are_copied_between_processors_only(far):
 def test_what_cannot_be_copied_cannot_go_to_another_processor():
     house = House()
     kernel = house.kernel
-    keeper = house.instance("keeper", Keeper(), Seat(house.ground), free(keep=0), ("keep",))
+    keeper = house.instance("keeper", Keeper(), Allocation(house.ground), free(keep=0), ("keep",))
     port = Port(kernel, "caller", keeper, None, None)
     said = []
 
@@ -227,7 +227,7 @@ def test_what_cannot_be_copied_cannot_go_to_another_processor():
             said.append(str(error))
 
     steps = [lambda: attempt(threading.Lock()), lambda: attempt(port)]
-    house.instance("caller", Doing(kernel, steps), Seat(house.onboard, priority=0), free())
+    house.instance("caller", Doing(kernel, steps), Allocation(house.onboard, priority=0), free())
     house.run()
     assert said[0].startswith(
         "the arguments of keeper.keep cannot be copied to another processor: cannot pickle"
@@ -255,10 +255,10 @@ class Faulty:
 def test_what_a_callee_raises_names_it_and_leaves_it_usable():
     house = House()
     kernel = house.kernel
-    faulty = house.instance("faulty", Faulty(kernel), Seat(house.ground), free(boom=0), ("boom",))
+    faulty = house.instance("faulty", Faulty(kernel), Allocation(house.ground), free(boom=0), ("boom",))
     middle_port = Port(kernel, "middle", faulty, None, None)
     middle = house.instance(
-        "middle", Faulty(kernel, middle_port), Seat(house.ground), free(pass_on=0), ("pass_on",)
+        "middle", Faulty(kernel, middle_port), Allocation(house.ground), free(pass_on=0), ("pass_on",)
     )
     port = Port(kernel, "caller", middle, None, None)
     caught = []
@@ -269,7 +269,7 @@ def test_what_a_callee_raises_names_it_and_leaves_it_usable():
         except Exception as error:
             caught.append(error)
 
-    house.instance("caller", Doing(kernel, [attempt, attempt]), Seat(house.onboard, priority=0), free())
+    house.instance("caller", Doing(kernel, [attempt, attempt]), Allocation(house.onboard, priority=0), free())
     house.run()
     assert [type(error) for error in caught] == [ComponentError, ComponentError]
     assert caught[0].component == "faulty"
@@ -283,9 +283,9 @@ def test_what_a_callee_raises_names_it_and_leaves_it_usable():
 
 def test_an_error_nobody_catches_ends_the_caller_and_is_reported():
     house = House()
-    faulty = house.instance("faulty", Faulty(house.kernel), Seat(house.ground), free(boom=0), ("boom",))
+    faulty = house.instance("faulty", Faulty(house.kernel), Allocation(house.ground), free(boom=0), ("boom",))
     port = Port(house.kernel, "caller", faulty, None, None)
-    house.instance("caller", Doing(house.kernel, [port.boom]), Seat(house.onboard, priority=0), free())
+    house.instance("caller", Doing(house.kernel, [port.boom]), Allocation(house.onboard, priority=0), free())
     house.run()
     [(who, error)] = house.failures
     assert who == "caller"
@@ -298,7 +298,7 @@ def test_cancellation_passes_through_except_exception_and_frees_the_callee():
     kernel = house.kernel
     seen = []
     faulty = Faulty(kernel)
-    callee = house.instance("callee", faulty, Seat(house.ground), free(wait=0), ("wait",))
+    callee = house.instance("callee", faulty, Allocation(house.ground), free(wait=0), ("wait",))
     port = Port(kernel, "caller", callee, None, None)
 
     def body():
@@ -311,7 +311,7 @@ def test_cancellation_passes_through_except_exception_and_frees_the_callee():
             seen.append("cancelled")
             raise
 
-    house.instance("caller", Doing(kernel, [body]), Seat(house.onboard, priority=0), free())
+    house.instance("caller", Doing(kernel, [body]), Allocation(house.onboard, priority=0), free())
     kernel.call_at(5 * MS, lambda: kernel.cancel(kernel.root, "enough"))
     house.run()
     assert kernel.close() == []
@@ -321,10 +321,10 @@ def test_cancellation_passes_through_except_exception_and_frees_the_callee():
 
 def test_a_missing_figure_is_an_error_before_anything_starts():
     house = House()
-    instance = house.instance("planner", Keeper(), Seat(house.ground), Stated({}), ("keep",))
+    instance = house.instance("planner", Keeper(), Allocation(house.ground), StatedPricing({}), ("keep",))
     with pytest.raises(EstimateError, match="planner: no time is stated for its operation 'keep'"):
         start(instance, Given(Keeper()), {}, house.kernel.root, print)
-    active = house.instance("loop", Keeper(), Seat(house.ground, priority=1), Stated({}))
+    active = house.instance("loop", Keeper(), Allocation(house.ground, priority=1), StatedPricing({}))
     with pytest.raises(EstimateError, match="loop: it is active, but no time is stated for an activation"):
         start(active, Given(Keeper()), {}, house.kernel.root, print)
 
@@ -339,8 +339,8 @@ def test_an_activation_is_charged_at_each_release():
             while True:
                 rate.sleep()
 
-    pricing = Stated({}, Cost(7 * MS, 0.002))
-    house.instance("loop", Loop(), Seat(house.onboard, priority=1), pricing)
+    pricing = StatedPricing({}, Cost(7 * MS, 0.002))
+    house.instance("loop", Loop(), Allocation(house.onboard, priority=1), pricing)
     house.run(250 * MS)
     assert house.busy("onboard") == [(0, 7, "loop"), (107, 114, "loop"), (207, 214, "loop")]
     assert [(charge.kind, charge.energy) for charge in house.of(Charge)] == [("activation", 0.002)] * 3
@@ -356,12 +356,12 @@ def test_calls_wait_for_the_constructor():
             waiting.sleep(kernel, 50 * MS)
             return Keeper()
 
-    slow = Instance(kernel, "slow", Seat(house.ground), free(keep=0), ("keep",))
+    slow = Instance(kernel, "slow", Allocation(house.ground), free(keep=0), ("keep",))
     port = Port(kernel, "caller", slow, None, None)
     house.instance(
         "caller",
         Doing(kernel, [lambda: log.append((port.keep(1), kernel.now() / MS))]),
-        Seat(None, priority=0),
+        Allocation(None, priority=0),
     )
     house.things["slow"] = (slow, None)
     start(slow, Slow(None), {}, kernel.root, print)
@@ -379,10 +379,10 @@ def test_calling_what_could_not_be_constructed_names_it():
             raise RuntimeError("no camera")
 
     told = []
-    broken = Instance(kernel, "broken", Seat(house.ground), free(keep=0), ("keep",))
+    broken = Instance(kernel, "broken", Allocation(house.ground), free(keep=0), ("keep",))
     start(broken, Broken(None), {}, kernel.root, lambda *args: told.append(args))
     port = Port(kernel, "caller", broken, None, None)
-    house.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Seat(None, priority=0))
+    house.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Allocation(None, priority=0))
     house.run()
     assert "its constructor raised RuntimeError: no camera" in str(told[0][1])
     assert str(house.failures[0][1]) == "broken: cannot be called: its constructor has failed"
@@ -390,7 +390,7 @@ def test_calling_what_could_not_be_constructed_names_it():
 
 def test_an_unknown_operation_lists_the_valid_ones():
     house = House()
-    keeper = house.instance("keeper", Keeper(), Seat(), free(keep=0), ("keep",))
+    keeper = house.instance("keeper", Keeper(), Allocation(), free(keep=0), ("keep",))
     port = Port(house.kernel, "caller", keeper, None, None)
     with pytest.raises(
         AttributeError, match="keeper provides no operation 'kepp' \\(did you mean 'keep'\\?\\): keep"
@@ -404,7 +404,13 @@ def test_a_port_list_is_read_by_index_and_by_name():
     house = House()
     ports = PortList(
         [
-            Port(house.kernel, "caller", house.instance(name, Keeper(), Seat(), None, ("keep",)), None, None)
+            Port(
+                house.kernel,
+                "caller",
+                house.instance(name, Keeper(), Allocation(), None, ("keep",)),
+                None,
+                None,
+            )
             for name in ("one", "two")
         ]
     )
@@ -418,10 +424,13 @@ def test_a_port_list_is_read_by_index_and_by_name():
 def test_the_network_is_given_the_size_of_what_travels():
     house = House()
     sizes = []
-    keeper = house.instance("keeper", Keeper(), Seat(house.ground), free(keep=0), ("keep",))
+    keeper = house.instance("keeper", Keeper(), Allocation(house.ground), free(keep=0), ("keep",))
     port = Port(house.kernel, "caller", keeper, sizes.append, sizes.append)
     house.instance(
-        "caller", Doing(house.kernel, [lambda: port.keep("äb")]), Seat(house.onboard, priority=0), free()
+        "caller",
+        Doing(house.kernel, [lambda: port.keep("äb")]),
+        Allocation(house.onboard, priority=0),
+        free(),
     )
     house.run()
     text = 4 + 3
@@ -457,9 +466,9 @@ def test_on_the_wall_clock_calls_are_the_same():
     events, told = [], []
     kernel = WallKernel(record=events.append)
     keeper = Keeper()
-    callee = Instance(kernel, "keeper", Seat(), FREE, ("keep",))
-    caller = Instance(kernel, "caller", Seat(priority=0))
-    faulty = Instance(kernel, "faulty", Seat(), FREE, ("boom",))
+    callee = Instance(kernel, "keeper", Allocation(), FREE, ("keep",))
+    caller = Instance(kernel, "caller", Allocation(priority=0))
+    faulty = Instance(kernel, "faulty", Allocation(), FREE, ("boom",))
     port, broken = (Port(kernel, "caller", one, None, None) for one in (callee, faulty))
 
     class Body:

@@ -8,10 +8,10 @@ from types import ModuleType
 import pytest
 
 from volery.base.time import MS, S
-from volery.components.instance import Instance, Seat
-from volery.components.loading import Loader
-from volery.components.python import load_program, start
-from volery.components.stand_ins import EPOCH, stand_ins
+from volery.components.instance import Allocation, Instance
+from volery.components.loader import Loader
+from volery.components.programs import load_program, start
+from volery.components.virtual_stdlib import EPOCH, virtual_modules
 from volery.kernel.virtual import VirtualKernel
 from volery.trace.events import Activation, Failure
 
@@ -30,9 +30,9 @@ def run(tmp_path):
         kernel = VirtualKernel(events.append)
         log = ModuleType("log")
         log.tell = told.append
-        loader = Loader({**stand_ins(kernel, seed), "log": log})
+        loader = Loader({**virtual_modules(kernel, seed), "log": log})
         for name in names:
-            instance = Instance(kernel, name, Seat(priority=0))
+            instance = Instance(kernel, name, Allocation(priority=0))
             start(instance, load_program(loader, name, path, "User"), {}, kernel.root, lambda *failed: None)
         kernel.run(seconds * S)
         assert kernel.close() == []
@@ -245,8 +245,8 @@ def test_what_a_thread_raises_is_a_failure_of_the_component(tmp_path):
     )
     failed = []
     kernel = VirtualKernel()
-    instance = Instance(kernel, "user", Seat(priority=0))
-    program = load_program(Loader(stand_ins(kernel, 1)), "user", path, "User")
+    instance = Instance(kernel, "user", Allocation(priority=0))
+    program = load_program(Loader(virtual_modules(kernel, 1)), "user", path, "User")
     start(instance, program, {}, kernel.root, lambda *told: failed.append(told))
     kernel.run(S)
     assert str(failed[0][1]) == "user: thread w raised KeyError: 'x' (user.py:6)"

@@ -6,15 +6,15 @@ import pytest
 from volery.base.errors import EstimateError, ModelError
 from volery.cost import catalogue, scale_energy, scale_time
 from volery.cost.catalogue import read
-from volery.cost.figure import Stated
-from volery.cost.interpreter import STEPS_PER_NS, python_operations
+from volery.cost.figures import WithProvenance
+from volery.cost.python_operations import STEPS_PER_NS, operation_table
 
 INTEL, ARM, HOST = "intel-i5-3470", "rpi4-cortex-a72", "generic-host"
 
 
-def stated_in(value: object) -> list[Stated]:
+def stated_in(value: object) -> list[WithProvenance]:
     """Everything below *value* that says where it comes from."""
-    found = [value] if isinstance(value, Stated) else []
+    found = [value] if isinstance(value, WithProvenance) else []
     if isinstance(value, dict):
         children = list(value.values())
     else:
@@ -105,7 +105,7 @@ def test_counted_code_says_how_good_it_is() -> None:
     law = catalogue().processor(ARM).code_law()
     assert math.isclose(law.ns_per_step(1500), 6.1 / STEPS_PER_NS)
     assert math.isclose(law.ns_per_step(600), 2.5 * law.ns_per_step(1500))
-    table = python_operations()
+    table = operation_table()
     assert law.error == table.mean_error + 0.35
     [warning] = law.warnings()
     assert "rpi4-cortex-a72" in warning

@@ -1,8 +1,7 @@
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.calibration.catalogue_file import put_law
-from volery.calibration.machine import Machine
+from volery.calibration.machine import Machine, put_law
 from volery.cost import catalogue
 from volery.cost.catalogue import read
 

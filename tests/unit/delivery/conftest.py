@@ -8,10 +8,10 @@ import pytest
 
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.components.instance import Instance, Seat
-from volery.components.loading import Loader
-from volery.components.python import load_program, start
-from volery.components.stand_ins import stand_ins
+from volery.components.instance import Allocation, Instance
+from volery.components.loader import Loader
+from volery.components.programs import load_program, start
+from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.virtual import VirtualKernel
 from volery.model.environment import Environment, Place, Prism, Ways, Workload
 from volery.trace.events import Milestone, Text
@@ -67,12 +67,12 @@ class Bench:
     def __init__(self, seed=1, **modules):
         self.events = []
         self.kernel = VirtualKernel(self.events.append)
-        self.loader = Loader({**stand_ins(self.kernel, seed), **modules})
+        self.loader = Loader({**virtual_modules(self.kernel, seed), **modules})
         self.failures = []
 
     def start(self, file, class_name, operations=(), active=True, **given):
         instance = Instance(
-            self.kernel, class_name, Seat(priority=0 if active else None), operations=operations
+            self.kernel, class_name, Allocation(priority=0 if active else None), operations=operations
         )
         program = load_program(self.loader, class_name, COMPONENTS / file, class_name)
         start(instance, program, given, self.kernel.root, lambda *told: self.failures.append(told))

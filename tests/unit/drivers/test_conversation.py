@@ -11,11 +11,11 @@ from volery.base.errors import CapabilityError, LinkGarbled, UsageError
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.vehicles import Rover
 from volery.vehicles.drivers.ardupilot import open_driver
-from volery.vehicles.drivers.ardupilot.silence import if_silent
-from volery.vehicles.drivers.mavlink.inquiries import value_of
+from volery.vehicles.drivers.ardupilot.link_loss import on_link_loss
+from volery.vehicles.drivers.mavlink.client import value_of
 
 Make = Callable[..., Any]
 ARM = 400
@@ -70,13 +70,17 @@ def test_parameters_that_another_station_reads_are_nothing_to_us(bench: Make) ->
 
 
 def test_failsafes_in_words() -> None:
-    words = if_silent("drone", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "SYSID_MYGCS": 255, "FS_OPTIONS": 2})
+    words = on_link_loss(
+        "drone", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "SYSID_MYGCS": 255, "FS_OPTIONS": 2}
+    )
     assert words == "5 s after the last heartbeat it returns home (RTL); a mission goes on"
-    words = if_silent("rover", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "FS_ACTION": 2, "SYSID_MYGCS": 254})
+    words = on_link_loss(
+        "rover", {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5, "FS_ACTION": 2, "SYSID_MYGCS": 254}
+    )
     assert words == (
         "5 s after the last heartbeat it stops (HOLD) (it listens for system 254, not for this program)"
     )
-    assert if_silent("submarine", {}) == ""
+    assert on_link_loss("submarine", {}) == ""
 
 
 def test_whole_numbers_of_px4_lie_in_the_bytes_of_a_float() -> None:
@@ -103,7 +107,7 @@ def test_a_px4_is_named(bench: Make) -> None:
 
 def test_options_are_checked() -> None:
     kernel = VirtualKernel()
-    ours, _ = in_process(kernel)
+    ours, _ = in_process_pair(kernel)
     for options, wrong in (
         ({"rat": "5"}, "the ardupilot driver has no option 'rat'"),
         ({"rate": "fast"}, "rate='fast' is no rate"),

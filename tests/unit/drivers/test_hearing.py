@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded
-from volery.vehicles.drivers.ardupilot.hearing import Hearing
+from volery.vehicles.drivers.ardupilot.backend import ArduPilotDecoder
 
-RECORDED = Recorded("ardupilot_telemetry", Hearing)
+RECORDED = Recorded("ardupilot_telemetry", ArduPilotDecoder)
 replayed, changes = RECORDED.replayed, RECORDED.changes
 
 

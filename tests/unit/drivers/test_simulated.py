@@ -15,7 +15,7 @@ from volery.base.time import HOUR, MS, S
 from volery.bridge import serve_vehicle
 from volery.kernel.task import Place
 from volery.kernel.waiting import sleep
-from volery.links.wire import WireFaults
+from volery.links.wire_faults import WireFaults
 from volery.ros.graph import Graph
 from volery.trace.events import LinkState, Text
 from volery.vehicles import Drone, Land, Rover, TakeOff, Vehicle, Waypoint

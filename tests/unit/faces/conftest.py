@@ -11,8 +11,8 @@ import pytest
 from volery.base.time import S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.client_libraries.importable import importable
-from volery.ros.client_libraries.launch import Launch
+from volery.ros.client_libraries.importable_modules import importable_modules
+from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Cost, EmbeddedNode, Graph, free
 
 
@@ -26,7 +26,7 @@ class Stage:
         self.graph = Graph(self.kernel, self._price)
         self.launched: dict[str, Launch] = {}
         self.nodes: dict[str, EmbeddedNode] = {}
-        self.modules = importable(self.graph, self.launched, self.nodes)
+        self.modules = importable_modules(self.graph, self.launched, self.nodes)
         self.out: list[Any] = []
 
     def _price(self, node: Any, call: str, x: float) -> Cost:

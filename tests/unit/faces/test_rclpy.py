@@ -79,7 +79,7 @@ def test_the_component_names_the_node(stage: Stage) -> None:
 
 
 def stage_launch(**given: Any) -> Any:
-    from volery.ros.client_libraries.launch import Launch
+    from volery.ros.client_libraries.library_base import Launch
 
     return Launch(**given)
 

@@ -11,9 +11,9 @@ from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.kernel.task import Place
 from volery.ros.client_libraries import roscpp
-from volery.ros.client_libraries.launch import Launch
-from volery.ros.client_libraries.roscpp import values
-from volery.ros.client_libraries.wire import CppFlow, Reader, Writer
+from volery.ros.client_libraries.abi_codec import CppFlow, Reader, Writer
+from volery.ros.client_libraries.library_base import Launch
+from volery.ros.client_libraries.roscpp import node_requests
 from volery.ros.messages import new, to_cdr
 from volery.trace.events import Text
 
@@ -56,9 +56,9 @@ def test_what_ros_has_and_is_not_offered_says_so():
 @pytest.mark.parametrize("value", [True, -3, 2.5, "text", [1, 2.5, ["x"]], {"a": {"b": 1}, "c": []}])
 def test_parameters_cross_the_border_unchanged(value):
     out = Writer()
-    values.write(out, value)
-    assert values.read(Reader(out.done())) == value
-    assert type(values.read(Reader(out.done()))) is type(value)
+    node_requests.write(out, value)
+    assert node_requests.read(Reader(out.done())) == value
+    assert type(node_requests.read(Reader(out.done()))) is type(value)
 
 
 class Code:
@@ -132,7 +132,7 @@ def test_names_and_parameters(stage):
         assert code.ask("resolve", Writer().text("/robot").text("scan")).text() == "/laser"
         found = code.ask("param_get", Writer().text("/robot/node/rate"))
         assert found.flag()
-        assert values.read(found) == 5
+        assert node_requests.read(found) == 5
         assert not code.ask("param_get", Writer().text("/nothing")).flag()
         code.ask("log", Writer().integer(2).text("careful"))
 

@@ -8,9 +8,12 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
-from volery.ros.client_libraries.tf2.errors import ExtrapolationException, InvalidArgumentException
-from volery.ros.client_libraries.tf2.geometry import IDENTITY
-from volery.ros.client_libraries.tf2.tree import Tree
+from volery.ros.client_libraries.tf2.transform_tree import (
+    IDENTITY,
+    ExtrapolationException,
+    InvalidArgumentException,
+    TransformTree,
+)
 
 BROADCASTER = """
 import rospy
@@ -234,7 +237,7 @@ def test_a_library_that_is_not_there_is_named(stage: Any, line: str) -> None:
 
 
 def test_old_transforms_are_forgotten_and_wrong_ones_refused() -> None:
-    tree = Tree(cache=10 * S)
+    tree = TransformTree(cache=10 * S)
     for second in range(1, 30):
         tree.learn("base", "odom", second * S, IDENTITY)
     tree.learn("base", "odom", 5 * S, IDENTITY)  # too late to matter

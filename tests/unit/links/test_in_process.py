@@ -5,7 +5,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 
 
@@ -15,7 +15,7 @@ def text(words: str) -> Frame:
 
 def test_frames_arrive_after_the_delay_in_order() -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, 5 * MS, "radio")
+    ours, theirs = in_process_pair(kernel, 5 * MS, "radio")
     seen: list[tuple[int, str]] = []
     ours.receive(lambda frame: seen.append((kernel.now(), frame.fields["text"])))
     theirs.send(text("one"))
@@ -26,7 +26,7 @@ def test_frames_arrive_after_the_delay_in_order() -> None:
 
 def test_a_closed_end_neither_sends_nor_hears() -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, name="radio")
+    ours, theirs = in_process_pair(kernel, name="radio")
     seen: list[Frame] = []
     ours.receive(seen.append)
     theirs.send(text("under way"))
@@ -38,6 +38,6 @@ def test_a_closed_end_neither_sends_nor_hears() -> None:
 
 
 def test_a_field_that_does_not_fit_is_refused_where_it_is_sent() -> None:
-    ours, _ = in_process(VirtualKernel(), name="radio")
+    ours, _ = in_process_pair(VirtualKernel(), name="radio")
     with pytest.raises(UsageError, match="no field 'altitude'"):
         ours.send(Frame("HEARTBEAT", {"altitude": 1}, 1, 1))

@@ -6,9 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
 from volery.links.link import Frame
-from volery.links.mavlink import encode, message_type
-from volery.links.mavlink_newer import NEWER, Definition, Field
-from volery.links.parser import Parser
+from volery.links.mavlink_codec import MavlinkParser
+from volery.links.mavlink_messages import NEWER, Definition, NewerField, encode, message_type
 
 RECORDED = (
     ("EVENT", "fd1e00007903019a0100e093a80120080000f7ff000088000000100080000000c02b81ffc02b81ffc610"),
@@ -21,7 +20,7 @@ RECORDED = (
 @pytest.mark.parametrize(("name", "recorded"), RECORDED)
 def test_recorded_bytes_are_read_and_written_again(name: str, recorded: str) -> None:
     raw = bytes.fromhex(recorded)
-    parser = Parser()
+    parser = MavlinkParser()
     (frame,) = parser.feed(raw)
     assert (frame.name, parser.heard.corrupt) == (name, 0)
     assert encode(frame, raw[4]) == raw
@@ -33,28 +32,28 @@ def test_recorded_bytes_are_read_and_written_again(name: str, recorded: str) -> 
         Definition(
             30,
             "ATTITUDE",
-            Field("uint32_t", "time_boot_ms"),
+            NewerField("uint32_t", "time_boot_ms"),
             *(
-                Field("float", name)
+                NewerField("float", name)
                 for name in ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
             ),
         ),
         Definition(
             33,
             "GLOBAL_POSITION_INT",
-            Field("uint32_t", "time_boot_ms"),
-            *(Field("int32_t", name) for name in ("lat", "lon", "alt", "relative_alt")),
-            *(Field("int16_t", name) for name in ("vx", "vy", "vz")),
-            Field("uint16_t", "hdg"),
+            NewerField("uint32_t", "time_boot_ms"),
+            *(NewerField("int32_t", name) for name in ("lat", "lon", "alt", "relative_alt")),
+            *(NewerField("int16_t", name) for name in ("vx", "vy", "vz")),
+            NewerField("uint16_t", "hdg"),
         ),
         Definition(
             83,
             "ATTITUDE_TARGET",
-            Field("uint32_t", "time_boot_ms"),
-            Field("uint8_t", "type_mask"),
-            Field("float", "q", 4),
+            NewerField("uint32_t", "time_boot_ms"),
+            NewerField("uint8_t", "type_mask"),
+            NewerField("float", "q", 4),
             *(
-                Field("float", name)
+                NewerField("float", name)
                 for name in ("body_roll_rate", "body_pitch_rate", "body_yaw_rate", "thrust")
             ),
         ),
@@ -77,5 +76,5 @@ def test_they_are_messages_like_others() -> None:
     kind = message_type("EVENT")
     assert (kind.id, kind.size) == (410, 53)
     frame = Frame("EVENT", {"id": 5, "arguments": (1, 2)}, 1, 1)
-    (back,) = Parser().feed(encode(frame, 0))
+    (back,) = MavlinkParser().feed(encode(frame, 0))
     assert back.fields["arguments"][:3] == (1, 2, 0)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import ModelError, UsageError
-from volery.links.pprz_aircraft import read_aircraft, stock_aircraft
-from volery.links.pprzlink_definitions import entry_value, message_type
+from volery.links.paparazzi_aircraft import read_aircraft, stock_aircraft
+from volery.links.pprzlink_messages import entry_value, message_type
 
 SETTINGS = """<!DOCTYPE settings SYSTEM "settings.dtd">
 <settings target="ap">

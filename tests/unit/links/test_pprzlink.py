@@ -6,9 +6,9 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.links.link import Frame
-from volery.links.mavlink import encode as mavlink
-from volery.links.pprzlink import PPRZLINK, PprzParser, checksum, encode, quantised
-from volery.links.pprzlink_definitions import entry_name, entry_value, message_type, parse_definitions
+from volery.links.mavlink_messages import encode as mavlink
+from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser, checksum, encode, quantised
+from volery.links.pprzlink_messages import entry_name, entry_value, message_type, parse_definitions
 
 ALIVE = bytes.fromhex("99 0C 07 00 01 02 03 00 01 02 1C C4")
 """The example of the protocol's own documentation: ALIVE of aircraft 7 with md5sum [0, 1, 2]."""
@@ -33,7 +33,7 @@ def test_the_example_of_the_documentation_both_ways() -> None:
 def test_a_datalink_message_is_addressed_to_its_aircraft() -> None:
     data = encode(SETPOINT)
     assert data[:6] == bytes((0x99, 8 + 18, 0, 7, 2, 40))
-    (arrived,) = PprzParser().feed(data)
+    (arrived,) = PprzlinkParser().feed(data)
     assert arrived == Frame(
         "GUIDED_SETPOINT_NED", {"ac_id": 7, "flags": 0x60, "x": 1.5, "y": 0.0, "z": -0.5, "yaw": 0.25}, 0, 0
     )
@@ -48,11 +48,11 @@ def test_one_without_an_aircraft_goes_to_all() -> None:
 def test_the_component_travels_beside_the_class() -> None:
     data = encode(Frame("ALIVE", {}, 7, 3))
     assert data[4] == 0x31
-    assert PprzParser().feed(data)[0].component == 3
+    assert PprzlinkParser().feed(data)[0].component == 3
 
 
 def test_frames_come_whole_however_the_bytes_are_cut() -> None:
-    parser = PprzParser()
+    parser = PprzlinkParser()
     noise = b"boot\r\n\x99\x05\x00"
     frames = [frame for octet in noise + ALIVE + encode(SETPOINT) for frame in parser.feed(bytes([octet]))]
     assert [frame.name for frame in frames] == ["ALIVE", "GUIDED_SETPOINT_NED"]
@@ -63,7 +63,7 @@ def test_frames_come_whole_however_the_bytes_are_cut() -> None:
 def test_a_turned_bit_costs_one_frame() -> None:
     broken = bytearray(encode(SETPOINT))
     broken[9] ^= 4
-    parser = PprzParser()
+    parser = PprzlinkParser()
     assert [frame.name for frame in parser.feed(bytes(broken) + ALIVE + ALIVE)] == ["ALIVE", "ALIVE"]
     assert parser.heard.corrupt == 1
 
@@ -71,7 +71,7 @@ def test_a_turned_bit_costs_one_frame() -> None:
 def test_texts_and_arrays_arrive_as_they_were() -> None:
     text = Frame("INFO_MSG", {"msg": "Störung ä"}, 7, 0)
     channels = Frame("RC_UP", {"ac_id": 7, "channels": (-128, 0, 127)}, 0, 0)
-    assert PprzParser().feed(encode(text) + encode(channels)) == [text, channels]
+    assert PprzlinkParser().feed(encode(text) + encode(channels)) == [text, channels]
     assert quantised(channels) == channels
 
 
@@ -131,14 +131,14 @@ def test_what_cannot_be_written_is_refused_by_name(frame: Frame, says: str) -> N
     ],
 )
 def test_the_problem_in_words(data: bytes, says: str) -> None:
-    parser = PprzParser()
+    parser = PprzlinkParser()
     parser.feed(data)
     assert says in parser.problem()
     assert bool(says) == bool(parser.problem())
 
 
 def test_a_broken_connection_leaves_no_half_frame() -> None:
-    parser = PprzParser()
+    parser = PprzlinkParser()
     parser.feed(ALIVE[:7])
     parser.reset()
     assert len(parser.feed(ALIVE)) == 1

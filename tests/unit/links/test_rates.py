@@ -8,7 +8,7 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.rates import Streams
+from volery.links.mavlink_conventions import MessageStreams
 
 ORDER = ("A", "B", "C")
 
@@ -19,7 +19,7 @@ class Listener:
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
         self.bursts: list[tuple[int, tuple[str, ...]]] = []
-        self.streams = Streams(self.kernel, ORDER, self.burst)
+        self.streams = MessageStreams(self.kernel, ORDER, self.burst)
 
     def burst(self, names: Sequence[str]) -> None:
         self.bursts.append((self.kernel.now() // MS, tuple(names)))

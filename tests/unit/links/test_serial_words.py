@@ -7,7 +7,7 @@ import errno
 import pytest
 import serial
 
-from volery.links.serial_line import SerialLine
+from volery.links.serial_link import SerialLink
 
 
 @pytest.mark.parametrize(
@@ -26,6 +26,6 @@ from volery.links.serial_line import SerialLine
     ],
 )
 def test_why_it_cannot_be_opened(error: OSError, says: str) -> None:
-    line = SerialLine.__new__(SerialLine)  # without its reader's thread
+    line = SerialLink.__new__(SerialLink)  # without its reader's thread
     line._device = "/dev/ttyUSB0"
     assert says in line._explain(error)

@@ -7,9 +7,9 @@ from pymavlink import mavutil
 
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.mavlink import encode
+from volery.links.mavlink_messages import encode
 from volery.links.tlog import TlogTap, read_tlog
 
 BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
@@ -18,7 +18,7 @@ ARM = Frame("COMMAND_LONG", {"target_system": 1, "command": 400, "param1": 1.0},
 
 def record(path: Path) -> None:
     kernel = VirtualKernel()
-    ours, theirs = in_process(kernel, 5 * MS, "radio")
+    ours, theirs = in_process_pair(kernel, 5 * MS, "radio")
     tap = TlogTap(kernel, ours, path, epoch_us=1_700_000_000_000_000)
     tap.receive(lambda frame: None)
     theirs.send(BEAT)

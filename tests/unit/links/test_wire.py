@@ -9,7 +9,7 @@ from volery.base.seeds import stream
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
-from volery.links.wire import WireFaults, faults_of, wire
+from volery.links.wire_faults import WireFaults, faulty_pair, parse_wire_faults
 
 COUNT = 400
 
@@ -17,7 +17,7 @@ COUNT = 400
 def arrivals(faults: WireFaults, seed: int = 1) -> tuple[list[tuple[int, int]], object]:
     """(when, which) of those of 400 numbered frames, one each 10 ms, that came; what the end has heard."""
     kernel = VirtualKernel()
-    ours, theirs = wire(kernel, "radio", faults, stream(seed, "radio"))
+    ours, theirs = faulty_pair(kernel, "radio", faults, stream(seed, "radio"))
     seen: list[tuple[int, int]] = []
     ours.receive(lambda frame: seen.append((kernel.now(), frame.fields["seq"])))
     for number in range(COUNT):
@@ -87,7 +87,7 @@ def test_a_frame_that_ends_too_early_spoils_itself_and_at_most_its_neighbour() -
 
 def test_faults_that_begin_and_end_while_it_is_in_use() -> None:
     kernel = VirtualKernel()
-    ours, theirs = wire(kernel, "radio", WireFaults(), stream(1, "radio"))
+    ours, theirs = faulty_pair(kernel, "radio", WireFaults(), stream(1, "radio"))
     seen: list[int] = []
     ours.receive(lambda frame: seen.append(frame.fields["seq"]))
     for number, faults in enumerate((WireFaults(), WireFaults(drop=1.0), WireFaults())):
@@ -99,11 +99,11 @@ def test_faults_that_begin_and_end_while_it_is_in_use() -> None:
 
 def test_faults_as_an_address_states_them() -> None:
     stated = {"drop": "0.01", "flip": "1e-5", "burst": "0.001", "jitter": "0.05", "cut": "20-25,60-70"}
-    assert faults_of(stated) == WireFaults(
+    assert parse_wire_faults(stated) == WireFaults(
         drop=0.01, flip=1e-5, burst=0.001, jitter=50 * MS, cuts=((20 * S, 25 * S), (60 * S, 70 * S))
     )
     stated = {"duplicate": "0.1", "reorder": "0.2", "truncate": "0.3"}
-    assert faults_of(stated) == WireFaults(duplicate=0.1, reorder=0.2, truncate=0.3)
+    assert parse_wire_faults(stated) == WireFaults(duplicate=0.1, reorder=0.2, truncate=0.3)
 
 
 @pytest.mark.parametrize(
@@ -117,4 +117,4 @@ def test_faults_as_an_address_states_them() -> None:
 )
 def test_faults_that_make_no_sense(stated: dict[str, str], says: str) -> None:
     with pytest.raises(UsageError, match=says):
-        faults_of(stated)
+        parse_wire_faults(stated)

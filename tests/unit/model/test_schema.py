@@ -4,7 +4,7 @@ import json
 import os
 from pathlib import Path
 
-from volery.model.schema import keys_at, names_are_free, schema, short_key
+from volery.model.document import keys_at, names_are_free, schema, short_key
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "model-schema.json"
 

@@ -1,4 +1,11 @@
-from volery.cost.native.code import Block, blocks, counted, edges, retarget, traced
+from volery.cost.native.llvm_ir import (
+    BasicBlock,
+    basic_blocks,
+    critical_edges,
+    retarget,
+    with_counters,
+    with_trace_calls,
+)
 
 TEXT = """\
 target datalayout = "e-m:e"
@@ -27,17 +34,17 @@ attributes #0 = { "target-cpu"="x86-64" "tune-cpu"="generic" }
 
 
 def test_blocks_are_found_in_order_with_and_without_labels():
-    assert blocks(TEXT) == [
-        Block("step", "entry", True),
-        Block("step", "odd name"),
-        Block("step", "lpad"),
-        Block("step", "exit"),
-        Block("bare", "", True),
+    assert basic_blocks(TEXT) == [
+        BasicBlock("step", "entry", True),
+        BasicBlock("step", "odd name"),
+        BasicBlock("step", "lpad"),
+        BasicBlock("step", "exit"),
+        BasicBlock("bare", "", True),
     ]
 
 
 def test_a_counter_comes_after_what_must_stand_first_in_a_block():
-    lines = counted(TEXT).splitlines()
+    lines = with_counters(TEXT).splitlines()
     landing = lines.index("          cleanup, !dbg !3")
     assert lines[landing + 1].startswith("  %volery.seen.2 = load i64")
     phi = next(number for number, line in enumerate(lines) if line.startswith("  %r = phi"))
@@ -45,12 +52,14 @@ def test_a_counter_comes_after_what_must_stand_first_in_a_block():
 
 
 def test_the_array_has_one_counter_for_each_block():
-    assert "@volery_counters = alias [5 x i64]" in counted(TEXT)
-    assert "@volery_counters_length = constant i64 5" in counted(TEXT)
+    assert "@volery_counters = alias [5 x i64]" in with_counters(TEXT)
+    assert "@volery_counters_length = constant i64 5" in with_counters(TEXT)
 
 
 def test_a_trace_calls_with_the_number_of_each_block():
-    assert [f"@volery_trace(i32 {number})" in traced(TEXT) for number in range(6)] == [True] * 5 + [False]
+    assert [f"@volery_trace(i32 {number})" in with_trace_calls(TEXT) for number in range(6)] == [True] * 5 + [
+        False
+    ]
 
 
 def test_retargeted_code_leans_towards_no_processor():
@@ -76,7 +85,7 @@ end:
   ret void
 }
 """
-    lines = traced(text).splitlines()
+    lines = with_trace_calls(text).splitlines()
     for switch, told in (
         (
             "  switch i8 %small, label %next [",
@@ -109,4 +118,4 @@ end:
   ret void
 }
 """
-    assert edges(text) == {1: 0, 3: 2}
+    assert critical_edges(text) == {1: 0, 3: 2}

@@ -2,24 +2,27 @@ import numpy as np
 import pytest
 
 from volery.cost import catalogue
-from volery.cost.native.assembly import End, Instruction, Piece
-from volery.cost.native.costs import Ran, execute
-from volery.cost.native.encoding import encode
+from volery.cost.native.assembly import End, Instruction, MachineBlock
+from volery.cost.native.block_costs import ExecutionSequence, execute
+from volery.cost.native.instruction_tables import instruction_tables
 
 LAW = catalogue().processor("intel-i5-3470").core_law()
 REPEATS = 400
 
 
-def piece(*lines: str, end: End = End.FALLS) -> Piece:
+def piece(*lines: str, end: End = End.FALLS) -> MachineBlock:
     parts = [line.partition(" ") for line in lines]
     made = [Instruction(name, tuple(one.strip() for one in rest.split(",")), "") for name, _, rest in parts]
-    return Piece("f", "", None, made, end, ".LBB0_1" if end is End.JUMP else "")
+    return MachineBlock("f", "", None, made, end, ".LBB0_1" if end is End.JUMP else "")
 
 
 def cycles(*lines: str) -> float:
     """Cycles of one pass through a piece that runs again and again."""
     ran = np.zeros(REPEATS, dtype=np.int64)
-    took, _ = execute(encode([piece(*lines)], LAW, frozenset()), Ran(ran, np.zeros(REPEATS, dtype=np.int8)))
+    took, _ = execute(
+        instruction_tables([piece(*lines)], LAW, frozenset()),
+        ExecutionSequence(ran, np.zeros(REPEATS, dtype=np.int8)),
+    )
     return float(took.sum()) / REPEATS
 
 
@@ -28,7 +31,7 @@ def mispredicted(taken: list[int]) -> float:
     loop = [piece("test eax, eax", "jne .LBB0_1", end=End.BRANCH), piece("jmp .LBB0_1", end=End.JUMP)]
     ran = np.array([0, 1] * len(taken), dtype=np.int64)
     ways = np.array([way for one in taken for way in (one, 1)], dtype=np.int8)
-    took, stalled = execute(encode(loop, LAW, frozenset()), Ran(ran, ways))
+    took, stalled = execute(instruction_tables(loop, LAW, frozenset()), ExecutionSequence(ran, ways))
     assert np.all(stalled <= took)
     wrong = stalled > 0.0
     assert stalled.sum() >= wrong.sum() * (LAW.refill - 1)
@@ -69,8 +72,8 @@ def late(*lines: str, level: int, ahead: int = 0, memory: tuple[float, float] | 
     """Cycles of one pass through a piece whose first instruction is always served by that level."""
     ran = np.zeros(REPEATS, dtype=np.int64)
     rows = np.array([(step, 0, level, ahead) for step in range(REPEATS)])
-    encoded = encode([piece(*lines)], LAW, frozenset())
-    took, _ = execute(encoded, Ran(ran, np.zeros(REPEATS, dtype=np.int8), rows), memory)
+    encoded = instruction_tables([piece(*lines)], LAW, frozenset())
+    took, _ = execute(encoded, ExecutionSequence(ran, np.zeros(REPEATS, dtype=np.int8), rows), memory)
     return float(took.sum()) / REPEATS
 
 

@@ -1,9 +1,8 @@
 import pytest
 
 from volery.cost import catalogue
-from volery.cost.native import a64, x86
-from volery.cost.native.assembly import End, Instruction, pieces
-from volery.cost.native.instruction import OPERATIONS
+from volery.cost.native import isa_aarch64, isa_x86_64
+from volery.cost.native.assembly import OPERATION_CLASSES, End, Instruction, machine_blocks
 
 X86 = """\
 \t.file\t1 "/src" "step.cpp"
@@ -26,12 +25,12 @@ step:                                   # @step
 
 def read(text: str) -> Instruction:
     mnemonic, _, rest = text.partition(" ")
-    made = pieces(f"f:  # @f\n# %bb.0:\n\t{mnemonic}\t{rest}\n")
+    made = machine_blocks(f"f:  # @f\n# %bb.0:\n\t{mnemonic}\t{rest}\n")
     return made[0].instructions[0]
 
 
 def test_pieces_end_in_calls_branches_jumps_and_returns():
-    found = pieces(X86)
+    found = machine_blocks(X86)
     assert [(piece.end, piece.target) for piece in found] == [
         (End.CALL, "sin"),
         (End.BRANCH, ".LBB0_2"),
@@ -61,12 +60,12 @@ def test_pieces_end_in_calls_branches_jumps_and_returns():
     ],
 )
 def test_x86(text, operation, reads, writes):
-    found = x86.effect(read(text))
+    found = isa_x86_64.effect(read(text))
     assert (found.operation, set(found.reads), set(found.writes)) == (operation, reads, writes)
 
 
 def test_x86_reads_and_writes_memory_at_once():
-    found = x86.effect(read("add qword ptr [rbx + 8*rcx - 16], rax"))
+    found = isa_x86_64.effect(read("add qword ptr [rbx + 8*rcx - 16], rax"))
     assert (found.load, found.operation, found.store) == ("load", "alu", True)
     assert (found.memory.registers, found.memory.displacement, found.memory.size) == (("rbx", "rcx"), -16, 8)
 
@@ -89,12 +88,12 @@ def test_x86_reads_and_writes_memory_at_once():
     ],
 )
 def test_a64(text, operation, reads, writes):
-    found = a64.effect(read(text))
+    found = isa_aarch64.effect(read(text))
     assert (found.operation, set(found.reads), set(found.writes)) == (operation, reads, writes)
 
 
 def test_a64_moves_two_registers_and_steps_its_address():
-    found = a64.effect(read("ldp x0, x1, [x2], #16"))
+    found = isa_aarch64.effect(read("ldp x0, x1, [x2], #16"))
     assert (found.load, set(found.writes), found.bumps, found.memory.size) == (
         "load",
         {"x0", "x1"},
@@ -107,11 +106,11 @@ def test_every_operation_has_figures_on_every_core():
 
     known = [one.core_law() for one in catalogue().processors.values() if one.core_model is not None]
     assert len(known) == 2
-    assert all(set(law.operations) == set(OPERATIONS) for law in known)
+    assert all(set(law.operations) == set(OPERATION_CLASSES) for law in known)
 
 
 def test_instructions_that_align_a_loop_are_run_through():
     begin = "f:  // @f\n// %bb.0:  // %entry\n\tnop\n\tnop\n\tb.eq\t.LBB0_1\n"
     text = begin + "\t.p2align\t4, , 8\n.LBB0_1:  // %exit\n\tret\n"
-    assert [len(piece.instructions) for piece in pieces(text, bytes_each=4)] == [3, 1, 1]
-    assert [len(piece.instructions) for piece in pieces(text)] == [3, 1]
+    assert [len(piece.instructions) for piece in machine_blocks(text, bytes_each=4)] == [3, 1, 1]
+    assert [len(piece.instructions) for piece in machine_blocks(text)] == [3, 1]

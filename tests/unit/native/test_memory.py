@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from volery.cost import catalogue
-from volery.cost.native.accesses import is_access, told
-from volery.cost.native.assembly import pieces
-from volery.cost.native.code import Block, accesses_of
-from volery.cost.native.encoding import encode
-from volery.cost.native.memory import served_late
-from volery.cost.native.trace import Access, Trace
-from volery.cost.native.walk import Machine, walk
+from volery.cost.native.assembly import machine_blocks
+from volery.cost.native.cache_misses import cache_misses
+from volery.cost.native.instruction_tables import instruction_tables
+from volery.cost.native.instrumented_run import Access, BlockTrace
+from volery.cost.native.llvm_ir import BasicBlock, access_counts, is_access, with_access_calls
+from volery.cost.native.path_reconstruction import MachineCode, reconstruct_path
 
 TEXT = """\
 define void @mix(ptr %p, i64 %n) {
@@ -31,7 +30,9 @@ end:
 def test_every_access_is_told_before_it_is_made() -> None:
     lines = TEXT.splitlines(keepends=True)
     said = [
-        line.strip() for line in told(iter(lines), lambda line: line.startswith("end")) if line not in lines
+        line.strip()
+        for line in with_access_calls(iter(lines), lambda line: line.startswith("end"))
+        if line not in lines
     ]
     assert said == [
         "call void @volery_access(ptr %p, i32 0)",
@@ -46,7 +47,7 @@ def test_every_access_is_told_before_it_is_made() -> None:
 
 
 def test_what_counts_as_an_access() -> None:
-    assert accesses_of(TEXT) == [4, 1]
+    assert access_counts(TEXT) == [4, 1]
     assert not is_access("  call void @store(ptr %p)")
 
 
@@ -65,16 +66,16 @@ f:                                      # @f
 
 
 def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None:
-    made = pieces(ASSEMBLY)
-    machine = Machine([Block("f", "entry", True)], made)
-    encoded = encode(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
+    made = machine_blocks(ASSEMBLY)
+    machine = MachineCode([BasicBlock("f", "entry", True)], made)
+    encoded = instruction_tables(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
     told = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
-    late = served_late(walk(machine, Trace([0], accesses={0: told})), encoded, [4])
+    late = cache_misses(reconstruct_path(machine, BlockTrace([0], accesses={0: told})), encoded, [4])
     assert late.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
 
 
 def test_nothing_is_late_where_nothing_was_told() -> None:
-    made = pieces(ASSEMBLY)
-    machine = Machine([Block("f", "entry", True)], made)
-    encoded = encode(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
-    assert served_late(walk(machine, Trace([0])), encoded, [4]).shape == (0, 4)
+    made = machine_blocks(ASSEMBLY)
+    machine = MachineCode([BasicBlock("f", "entry", True)], made)
+    encoded = instruction_tables(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
+    assert cache_misses(reconstruct_path(machine, BlockTrace([0])), encoded, [4]).shape == (0, 4)

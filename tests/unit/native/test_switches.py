@@ -2,15 +2,15 @@
 
 import pytest
 
-from volery.cost.native.assembly import pieces
-from volery.cost.native.switches import Switch
+from volery.cost.native.assembly import machine_blocks
+from volery.cost.native.switch_resolution import SwitchResolver
 
 
 def taken(value: int, *lines: str) -> list[bool | None]:
     """Whether the branch of each piece is taken, shown one after the other."""
     text = "scan: # @scan\n# %bb.0: # %entry\n" + "".join(f"\t{line}\n" for line in lines)
-    switch = Switch(value)
-    return [switch.taken(piece) for piece in pieces(text)]
+    switch = SwitchResolver(value)
+    return [switch.taken(piece) for piece in machine_blocks(text)]
 
 
 @pytest.mark.parametrize(
@@ -63,6 +63,6 @@ def test_what_does_not_depend_on_it_is_not_known() -> None:
 
 def test_a_chain_comes_by_a_comparison_once() -> None:
     """Who comes by twice is in a loop, and the value another one."""
-    (piece,) = pieces("scan: # @scan\n# %bb.0: # %entry\n\tcmp\tw8, #5\n\tb.eq\tthere\n")
-    switch = Switch(5)
+    (piece,) = machine_blocks("scan: # @scan\n# %bb.0: # %entry\n\tcmp\tw8, #5\n\tb.eq\tthere\n")
+    switch = SwitchResolver(5)
     assert [switch.taken(piece), switch.taken(piece)] == [True, None]

@@ -1,9 +1,9 @@
 import pytest
 
-from volery.cost.native.assembly import pieces
-from volery.cost.native.code import Block
-from volery.cost.native.trace import Trace
-from volery.cost.native.walk import Machine, walk
+from volery.cost.native.assembly import machine_blocks
+from volery.cost.native.instrumented_run import BlockTrace
+from volery.cost.native.llvm_ir import BasicBlock
+from volery.cost.native.path_reconstruction import MachineCode, reconstruct_path
 
 # a loop whose exit edge has a block of its own, and a callee
 TEXT = """\
@@ -26,17 +26,17 @@ step:                                   # @step
 .Lfunc_end1:
 """
 BLOCKS = [
-    Block("leaf", "entry", True),
-    Block("step", "entry", True),
-    Block("step", "body"),
-    Block("step", "exit"),
+    BasicBlock("leaf", "entry", True),
+    BasicBlock("step", "entry", True),
+    BasicBlock("step", "body"),
+    BasicBlock("step", "exit"),
 ]
 LEAF, ENTRY, BODY, EXIT = range(4)
 
 
 def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
-    machine = Machine(BLOCKS, pieces(TEXT))
-    walked = walk(machine, Trace([ENTRY, BODY, LEAF, BODY, LEAF, EXIT]))
+    machine = MachineCode(BLOCKS, machine_blocks(TEXT))
+    walked = reconstruct_path(machine, BlockTrace([ENTRY, BODY, LEAF, BODY, LEAF, EXIT]))
     names = [machine.pieces[number].instructions[0].mnemonic for number in walked.pieces]
     assert names == ["test", "call", "ret", "dec", "call", "ret", "dec", "xor", "ret"]
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, EXIT]
@@ -46,13 +46,15 @@ def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
 
 
 def test_what_the_code_generator_left_out_is_skipped():
-    blocks = [*BLOCKS, Block("step", "merged")]
-    walked = walk(Machine(blocks, pieces(TEXT)), Trace([ENTRY, 4, BODY, LEAF, EXIT]))
+    blocks = [*BLOCKS, BasicBlock("step", "merged")]
+    walked = reconstruct_path(
+        MachineCode(blocks, machine_blocks(TEXT)), BlockTrace([ENTRY, 4, BODY, LEAF, EXIT])
+    )
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, EXIT]
 
 
 def test_a_window_that_begins_in_the_middle_is_taken_up():
-    walked = walk(Machine(BLOCKS, pieces(TEXT)), Trace([LEAF, BODY, LEAF, EXIT]))
+    walked = reconstruct_path(MachineCode(BLOCKS, machine_blocks(TEXT)), BlockTrace([LEAF, BODY, LEAF, EXIT]))
     assert walked.owners[:2] == [LEAF, BODY]
 
 
@@ -83,19 +85,19 @@ caller:                                 # @caller
 \tret
 .Lfunc_end1:
 """
-CALLEE = [Block("callee", "entry", True), Block("callee", "then"), Block("callee", "exit")]
-CALLER = [Block("caller", name, name == "entry") for name in ("entry", "then", "exit", "rest", "last")]
+CALLEE = [BasicBlock("callee", "entry", True), BasicBlock("callee", "then"), BasicBlock("callee", "exit")]
+CALLER = [BasicBlock("caller", name, name == "entry") for name in ("entry", "then", "exit", "rest", "last")]
 
 
 def test_a_call_is_followed_though_blocks_of_the_callee_before_it_were_merged():
-    machine = Machine([*CALLEE, *CALLER], pieces(AFTER_CALLS))
-    walked = walk(machine, Trace([3, 0, 1, 2, 0, 2, 7]))
+    machine = MachineCode([*CALLEE, *CALLER], machine_blocks(AFTER_CALLS))
+    walked = reconstruct_path(machine, BlockTrace([3, 0, 1, 2, 0, 2, 7]))
     assert walked.owners == [3, 0, 1, 3, 0, 2, 3, 3, 7]
 
 
 def test_the_block_after_the_call_of_a_library_is_entered():
-    machine = Machine([*CALLEE, *CALLER], pieces(AFTER_CALLS))
-    walked = walk(machine, Trace([3, 0, 2, 0, 2, 4, 5, 7]))
+    machine = MachineCode([*CALLEE, *CALLER], machine_blocks(AFTER_CALLS))
+    walked = reconstruct_path(machine, BlockTrace([3, 0, 2, 0, 2, 4, 5, 7]))
     assert walked.owners[-3:] == [4, 5, 7]
     assert walked.lost == 0
 
@@ -129,16 +131,19 @@ scan:                                   // @scan
     [(9, 1, 2), (10, 1, 2), (11, 2, 2), (32, 1, 2), (65, 2, 3), (123, 1, 3)],
 )
 def test_the_value_of_a_switch_decides_where_blocks_do_not(value: int, to: int, compared: int):
-    machine = Machine(
-        [Block("scan", "entry", True), Block("scan", "blank"), Block("scan", "other")], pieces(SWITCH, 4)
+    machine = MachineCode(
+        [BasicBlock("scan", "entry", True), BasicBlock("scan", "blank"), BasicBlock("scan", "other")],
+        machine_blocks(SWITCH, 4),
     )
-    walked = walk(machine, Trace([0, to], {1: value}))
+    walked = reconstruct_path(machine, BlockTrace([0, to], {1: value}))
     assert walked.owners == [0] * compared + [to]
 
 
 def test_a_wait_belongs_to_the_way_that_was_taken():
     """Of the block that stands between the loop and its exit there is nothing in the machine code."""
-    blocks = [*BLOCKS, Block("step", "body.exit_crit_edge")]
-    walked = walk(Machine(blocks, pieces(TEXT)), Trace([ENTRY, BODY, LEAF, BODY, LEAF, 4, EXIT]))
+    blocks = [*BLOCKS, BasicBlock("step", "body.exit_crit_edge")]
+    walked = reconstruct_path(
+        MachineCode(blocks, machine_blocks(TEXT)), BlockTrace([ENTRY, BODY, LEAF, BODY, LEAF, 4, EXIT])
+    )
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, EXIT]
     assert walked.reached == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, 4]

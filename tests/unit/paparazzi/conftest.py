@@ -11,10 +11,10 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprz_aircraft import stock_aircraft
-from volery.links.wire import WireFaults, wire
+from volery.links.paparazzi_aircraft import stock_aircraft
+from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.autopilots.paparazzi import DIALECT
@@ -48,10 +48,10 @@ class Craft:
         assert codec is not None
         theirs: Any
         if through_bytes:
-            ours, theirs = wire(self.kernel, "ground", WireFaults(), Random(1), delay=MS, codec=codec)
+            ours, theirs = faulty_pair(self.kernel, "ground", WireFaults(), Random(1), delay=MS, codec=codec)
             self.link: Any = ours
         else:
-            self.link, theirs = in_process(self.kernel, MS, "ground", codec)
+            self.link, theirs = in_process_pair(self.kernel, MS, "ground", codec)
         self.heard: list[Frame] = []
         self.link.receive(self.heard.append)
         self.autopilot.connect(theirs)

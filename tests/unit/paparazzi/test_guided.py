@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from volery.links.pprz_aircraft import stock_aircraft
+from volery.links.paparazzi_aircraft import stock_aircraft
 
 Make = Callable[..., Any]
 

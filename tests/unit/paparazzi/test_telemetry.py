@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from volery.base.frames import LocalFrame, ecef_to_geodetic
-from volery.links.pprz_aircraft import stock_aircraft
-from volery.links.pprzlink import PPRZLINK
+from volery.links.paparazzi_aircraft import stock_aircraft
+from volery.links.pprzlink_codec import PPRZLINK
 from volery.simulation.world.body_specs import Battery
 
 Make = Callable[..., Any]

@@ -18,10 +18,9 @@ from volery.report.terminal import comparison_table, cost_table, short_compariso
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.attachments import RunSetup, scenery_to_json
 from volery.trace.events import Event, Failure, Message, Milestone, Text, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
-from volery.trace.scenery import scenery_to_json
-from volery.trace.setup import RunSetup
 
 _MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
 

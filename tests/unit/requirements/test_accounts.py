@@ -12,6 +12,7 @@ from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.ledgers import linear_energy
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_setup
+from volery.trace.attachments import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
     Activation,
@@ -28,7 +29,6 @@ from volery.trace.events import (
 )
 from volery.trace.mcap_writer import McapWriter
 from volery.trace.reader import read
-from volery.trace.setup import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
 
 SETUP = RunSetup(
     components=(ComponentSetup("control", "Control", "rospy", "onboard", active=True),),

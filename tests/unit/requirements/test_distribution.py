@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.requirements.distribution import Distribution
+from volery.requirements.ledgers import Distribution
 
 
 def spread(durations: list[int]) -> Distribution:

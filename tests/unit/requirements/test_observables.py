@@ -8,7 +8,15 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.base.units import unit
 from volery.model.system import Bound
-from volery.requirements.observables import OBSERVABLES, Observers, bounds_of, judge, observer
+from volery.requirements.observables import OBSERVABLES, Observers, bounds_of, judge, make_observer
+from volery.trace.attachments import (
+    ChainSetup,
+    ComponentSetup,
+    ProcessorSetup,
+    RequirementSetup,
+    RunSetup,
+    VehicleSetup,
+)
 from volery.trace.events import (
     NONE,
     Activation,
@@ -19,14 +27,6 @@ from volery.trace.events import (
     Operation,
     Slice,
     VehicleState,
-)
-from volery.trace.setup import (
-    ChainSetup,
-    ComponentSetup,
-    ProcessorSetup,
-    RequirementSetup,
-    RunSetup,
-    VehicleSetup,
 )
 
 SETUP = RunSetup(
@@ -39,7 +39,7 @@ SETUP = RunSetup(
 
 
 def observed(expression, events, at=10 * S):
-    watching = observer(expression, SETUP)
+    watching = make_observer(expression, SETUP)
     for event in events:
         watching(event)
     return watching.value(at)
@@ -176,7 +176,7 @@ def test_everything_published_can_be_observed(published):
     subject = {"component": "loop", "processor": "onboard", "vehicle": "drone_1", "chain": "chain"}.get(
         published.subject, "application"
     )
-    watching = observer(f"{subject}.{published.quantity}", SETUP)
+    watching = make_observer(f"{subject}.{published.quantity}", SETUP)
     assert isinstance(watching.value(1 * S), float)
     assert published.description
     unit(published.unit)
@@ -201,7 +201,7 @@ def test_latency_goes_back_to_what_a_node_had_heard_when_it_spoke():
 
 def test_an_unknown_quantity_is_refused_with_the_choices():
     with pytest.raises(UsageError, match=r"a vehicle has no quantity 'speed'.*airborne_time, battery_min"):
-        observer("drone_1.speed", SETUP)
+        make_observer("drone_1.speed", SETUP)
 
 
 def test_verdicts():

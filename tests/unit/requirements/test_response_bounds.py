@@ -12,10 +12,9 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Rate, current_task, end_activation
-from volery.requirements.demand import Demands
-from volery.requirements.response_bounds import Demand, Load, response_bounds
+from volery.requirements.response_bounds import Demand, Demands, Load, response_bounds
+from volery.trace.attachments import ComponentSetup, ProcessorSetup
 from volery.trace.events import NONE, Activation, Slice
-from volery.trace.setup import ComponentSetup, ProcessorSetup
 
 
 def bounds(*tasks, loads=(), cores=1):

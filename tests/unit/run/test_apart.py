@@ -13,12 +13,12 @@ import pytest
 
 from volery.base.errors import CapabilityError, UsageError
 from volery.base.position import AMSL, Position
-from volery.components.loading import Loader
+from volery.components.loader import Loader
 from volery.model.reader import load
 from volery.model.system import System
+from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import pipe, plan
-from volery.run.distributed.values import Values
-from volery.run.vocabulary import vocabulary
+from volery.run.distributed.remote_ports import ValueCodec
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 TYPES = """
@@ -78,16 +78,16 @@ def test_an_operation_is_a_service_below_its_components_node(delivery: System) -
 
 
 @pytest.fixture
-def shared(tmp_path: Path) -> tuple[ModuleType, Values]:
+def shared(tmp_path: Path) -> tuple[ModuleType, ValueCodec]:
     """A module beside the components' files, and the values of a process that knows it."""
     (tmp_path / "station_types.py").write_text(TYPES)
     loader = Loader()
     module = loader.sibling("station_types", tmp_path)
     assert module is not None
-    return module, Values(lambda name: loader.sibling(name, tmp_path))
+    return module, ValueCodec(lambda name: loader.sibling(name, tmp_path))
 
 
-def test_values_arrive_as_they_were(shared: tuple[ModuleType, Values]) -> None:
+def test_values_arrive_as_they_were(shared: tuple[ModuleType, ValueCodec]) -> None:
     module, values = shared
     where = Position(43.47, -3.83, AMSL(25.5))
     status = module.Status(where, module.Stage.LOADING, (1, "a", None), {"!": [2.5, True], "b": {3: ()}})
@@ -109,7 +109,7 @@ class Ours:
 
 
 @pytest.mark.parametrize("value", [Unknown(), {1, 2}, b"bytes", Ours(1), Colour.RED, Position, print])
-def test_what_cannot_leave_its_process_is_named(value: Any, shared: tuple[ModuleType, Values]) -> None:
+def test_what_cannot_leave_its_process_is_named(value: Any, shared: tuple[ModuleType, ValueCodec]) -> None:
     with pytest.raises(UsageError, match=r"the result of a\.b: a \w+ cannot be sent to another process"):
         shared[1].to_text([value], "the result of a.b")
 
@@ -127,7 +127,7 @@ def test_what_cannot_leave_its_process_is_named(value: Any, shared: tuple[Module
         '{"!": "volery.base.errors:UsageError", "value": {}}',
     ],
 )
-def test_nothing_is_made_of_what_makes_no_sense(text: str, shared: tuple[ModuleType, Values]) -> None:
+def test_nothing_is_made_of_what_makes_no_sense(text: str, shared: tuple[ModuleType, ValueCodec]) -> None:
     with pytest.raises(UsageError, match="not the value of a port"):
         shared[1].from_text(text)
 

@@ -9,7 +9,7 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Processor as ProcessorModel
-from volery.run.background import load_name, occupy
+from volery.run.assembly.computers import load_name, start_background_load
 from volery.trace.events import Slice
 
 
@@ -17,7 +17,7 @@ def loaded(share, cores=2, seed=1, work=0):
     events = []
     kernel = VirtualKernel(events.append)
     processor = Processor(kernel, "onboard", cores=cores)
-    occupy(kernel, processor, ProcessorModel("onboard", "any", 1e9, cores, load=share), seed)
+    start_background_load(kernel, processor, ProcessorModel("onboard", "any", 1e9, cores, load=share), seed)
     kernel.spawn(lambda: kernel.pay(work), "loop", Place("loop", processor, 99))
     kernel.run(1 * S)
     kernel.close()

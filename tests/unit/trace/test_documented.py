@@ -7,10 +7,15 @@ import pytest
 from pydantic import BaseModel
 
 from volery.requirements import record
+from volery.trace.attachments import (
+    MODEL_ATTACHMENT,
+    SCENERY_SCHEMA,
+    SETUP_ATTACHMENT,
+    SETUP_SCHEMA,
+    WORLD_ATTACHMENT,
+)
 from volery.trace.encoding import OWN_EVENTS
 from volery.trace.mcap_writer import TRACE_SCHEMA
-from volery.trace.scenery import SCENERY_SCHEMA
-from volery.trace.setup import MODEL_ATTACHMENT, SETUP_ATTACHMENT, SETUP_SCHEMA, WORLD_ATTACHMENT
 
 PAGE = Path(__file__).parents[3] / "docs" / "run-folder.md"
 

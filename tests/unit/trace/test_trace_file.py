@@ -11,11 +11,16 @@ from rosbags.highlevel import AnyReader
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.attachments import (
+    RunSetup,
+    scenery_from_json,
+    scenery_to_json,
+    setup_from_json,
+    setup_to_json,
+)
 from volery.trace.events import Event, Failure, Published, Slice, Text
 from volery.trace.mcap_writer import Attachment, McapWriter
 from volery.trace.reader import Reading, read
-from volery.trace.scenery import scenery_from_json, scenery_to_json
-from volery.trace.setup import RunSetup, setup_from_json, setup_to_json
 
 _MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
 

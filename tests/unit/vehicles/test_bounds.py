@@ -12,8 +12,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.vehicles import Battery, Fence, Limits, Zone
-from volery.vehicles.bounds import FLOOR, Bounds, Watch
-from volery.vehicles.limits import excludes_home
+from volery.vehicles.limits import FLOOR, Bounds, BoundsMonitor, home_violation
 from volery.vehicles.telemetry import Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
@@ -67,7 +66,7 @@ def telemetry(where: Position, remaining: float = 1.0) -> Telemetry:
 
 def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
     seen = telemetry(place(0, 80))
-    watch = Watch(seen, Bounds(HOME, Limits(), FENCED), 0.0)
+    watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0)
     for north in (70, 60, 10):
         seen.position = place(0, north)
         assert watch.look("go", 0) is None
@@ -80,7 +79,7 @@ def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
 def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
     for excused, expected in ((frozenset[str](), True), (frozenset({FLOOR}), False)):
         seen = telemetry(place(0, 0, 0))
-        watch = Watch(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
+        watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
         for up in (0.5, 20.0):
             seen.position = place(0, 0, up)
             assert watch.look("up", 0) is None
@@ -90,7 +89,7 @@ def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
 
 def test_a_battery_that_sags_for_a_moment_is_not_empty() -> None:
     seen = telemetry(place(0, 0), 0.19)
-    watch = Watch(seen, None, 0.2)
+    watch = BoundsMonitor(seen, None, 0.2)
     assert watch.look("go", 0) is None
     assert watch.look("go", 2 * S) is None
     seen.battery = Battery(0.21, 12.0, 10.0)
@@ -103,7 +102,7 @@ def test_a_battery_that_sags_for_a_moment_is_not_empty() -> None:
 
 
 def test_a_battery_that_is_not_measured_ends_nothing() -> None:
-    watch = Watch(telemetry(place(0, 0), float("nan")), None, 0.2)
+    watch = BoundsMonitor(telemetry(place(0, 0), float("nan")), None, 0.2)
     assert watch.look("go", 0) is None
     assert watch.look("go", 10 * S) is None
 
@@ -119,14 +118,14 @@ def test_a_battery_that_is_not_measured_ends_nothing() -> None:
     ],
 )
 def test_a_fence_that_excludes_home(fence: Fence, says: str) -> None:
-    found = excludes_home(fence, HOME)
+    found = home_violation(fence, HOME)
     assert (says in found) if says else found == ""
 
 
 def test_swapped_corners_are_recognised() -> None:
     home = Position(46.0, 7.0, AMSL(900.0))
     turned = ((6.9, 45.9), (7.1, 45.9), (7.1, 46.1), (6.9, 46.1))
-    assert "are they swapped?" in excludes_home(Fence(turned), home)
+    assert "are they swapped?" in home_violation(Fence(turned), home)
 
 
 @pytest.mark.parametrize(

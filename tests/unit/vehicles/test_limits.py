@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.vehicles.limits import Fence, Home, Limits, Zone, too_high, violation
+from volery.vehicles.limits import Fence, HomeFrame, Limits, Zone, height_violation, path_violation
 
 HOME = Position(46.0828, -103.8990, AMSL(900.0))
 FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
@@ -26,7 +26,7 @@ SQUARE = corners((-50, 20), (50, 20), (50, 120), (-50, 120))
 
 
 def check(start: Position, goal: Position, fence: Fence | None = None, limits: Limits | None = None) -> str:
-    return violation(start, goal, HOME, limits or Limits(), fence)
+    return path_violation(start, goal, HOME, limits or Limits(), fence)
 
 
 def test_within_everything() -> None:
@@ -46,8 +46,8 @@ def test_hints_for_who_mixed_up_altitudes() -> None:
     mixed = Position(46.083, -103.899, AboveHome(940))
     assert "did you mean AMSL(940)? Home is 900 m AMSL" in check(at(0, 0), mixed)
     assert "did you mean AboveHome(40)?" in check(at(0, 0), Position(46.083, -103.899, AMSL(40)))
-    assert "did you mean" not in too_high(5000.0, Limits(), HOME)
-    assert "did you mean" not in too_high(940.0, Limits())
+    assert "did you mean" not in height_violation(5000.0, Limits(), HOME)
+    assert "did you mean" not in height_violation(940.0, Limits())
 
 
 def test_a_fence_is_not_left_by_the_goal_nor_on_the_way() -> None:
@@ -134,7 +134,7 @@ def test_against_a_path_taken_in_small_steps(x0: float, y0: float, x1: float, y1
 
 @given(metres, metres)
 def test_home_is_where_the_local_frame_begins(east: float, north: float) -> None:
-    local = Home.at(HOME).local(at(east, north, 25.0))
+    local = HomeFrame.at(HOME).local(at(east, north, 25.0))
     assert local[0] == pytest.approx(east, abs=0.01)
     assert local[1] == pytest.approx(north, abs=0.01)
     assert local[2] == pytest.approx(25.0)

@@ -12,9 +12,8 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.base.seeds import stream
-from volery.calibration.ros.fitting import Cost, costs
-from volery.calibration.ros.samples import Round, Sample
-from volery.calibration.ros.stage import Pace, Stage
+from volery.calibration.ros.call_costs import CallCost, Round, Sample, call_costs
+from volery.calibration.ros.probe_environment import Pace, ProbeSetup
 
 PERIODS_MS = (20.0, 50.0)
 """Of the cycles that calls are measured in, one a round: what has slept longer finds its caches colder."""
@@ -24,7 +23,7 @@ LEAST_ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Circumstances:
+class Conditions:
     """What a campaign was measured under: rounds of another one do not mix with it."""
 
     client: str
@@ -61,16 +60,16 @@ class Progress:
 
     rounds: int
     most: int
-    loose: tuple[Cost, ...]
+    loose: tuple[CallCost, ...]
 
 
 Show = Callable[[Progress], None]
 
 
-class Notebook:
+class CampaignLog:
     """The file that rounds are kept in. ``UsageError`` if it holds those of other circumstances."""
 
-    def __init__(self, file: Path, under: Circumstances) -> None:
+    def __init__(self, file: Path, under: Conditions) -> None:
         self._file = file
         self.rounds: list[Round] = []
         header = vars(under)
@@ -105,17 +104,19 @@ def _whole(lines: list[str]) -> Iterator[str]:
             yield line
 
 
-def pursue(stage: Stage, plan: Plan, notebook: Notebook, show: Show = lambda progress: None) -> None:
+def run_campaign(
+    stage: ProbeSetup, plan: Plan, notebook: CampaignLog, show: Show = lambda progress: None
+) -> None:
     """Measure rounds until all figures are tight or there are enough of them."""
     while True:
         done = len(notebook.rounds)
-        loose = loose_figures(notebook.rounds, plan.within) if done >= plan.least else ()
+        loose = uncertain_costs(notebook.rounds, plan.within) if done >= plan.least else ()
         show(Progress(done, plan.most, loose))
         if done >= plan.most or (done >= plan.least and not loose):
             return
         notebook.keep(stage.probe(plan.pace_of(done)))
 
 
-def loose_figures(rounds: Iterable[Round], within: float) -> tuple[Cost, ...]:
+def uncertain_costs(rounds: Iterable[Round], within: float) -> tuple[CallCost, ...]:
     """The calls whose cost is not known to *within*."""
-    return tuple(cost for cost in costs(list(rounds)).values() if not cost.is_tight(within))
+    return tuple(cost for cost in call_costs(list(rounds)).values() if not cost.is_tight(within))

@@ -63,7 +63,7 @@ def cost(
     clang-19 and llvm-19).
     """
     from volery.cli import cost as command
-    from volery.cost.native.running import Wanted as Run
+    from volery.cost.native.instrumented_run import Invocation as Run
 
     output = Output(quiet, as_json, debug)
     run = Run(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
@@ -157,7 +157,7 @@ def python(
     estimated factor by a measured one. Exit status: 0 if every time is known as well as asked for, 2 for
     bad input, 1 otherwise.
     """
-    from volery.calibration.python.pieces import Rounds
+    from volery.calibration.python.timed_code import Rounds
     from volery.cli import calibrate_python as command
 
     output = Output(quiet, as_json, debug)

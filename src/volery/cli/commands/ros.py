@@ -44,7 +44,6 @@ def bridge(
     breaks is opened again.
     """
     from volery.cli import bridge as command
-    from volery.run.bridging import Bridging
 
     output = Output(quiet, False, debug)
     wanted = Bridging(

@@ -8,25 +8,24 @@ from hashlib import sha256
 from pathlib import Path
 
 from volery.base.errors import Location, ModelError
-from volery.components.cpp import interfaces as generated
-from volery.components.cpp.interfaces import Operation, Required
-from volery.components.cpp.sources import Sources, find_sources
-from volery.components.cpp.toolchain import Tell, Toolchain, cache_folder
+from volery.components.cpp import bindings as generated
+from volery.components.cpp.bindings import CppOperation, RequiredPort
+from volery.components.cpp.compiler import CppToolchain, ReportProgress, Sources, cache_folder, find_sources
 from volery.model.system import Interface
 
 RUNTIME = Path(__file__).parent / "runtime"
 INCLUDE = RUNTIME / "include"
 
-Compile = Callable[[Toolchain, Sequence[Path], Sequence[Path], Sequence[str]], Sequence[Path]]
+CompileSources = Callable[[CppToolchain, Sequence[Path], Sequence[Path], Sequence[str]], Sequence[Path]]
 """Compiles the user's sources, given include folders and options; returns object files. Whoever counts what
 code computes gives another one than the compiler's own."""
 
-Generate = Callable[[Sequence[str], Path], Mapping[str, str]]
+GenerateHeaders = Callable[[Sequence[str], Path], Mapping[str, str]]
 """Texts of headers by their names, for what the files in a folder include."""
 
 
-def one_by_one(
-    tools: Toolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
+def compile_each(
+    tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
 ) -> list[Path]:
     """The compiler's own way: an object for each source."""
     return [tools.object_file(source, include, flags) for source in sources]
@@ -42,8 +41,8 @@ class CppComponent:
     name: str
     path: Path
     class_name: str = ""
-    provided: tuple[Operation, ...] = ()
-    requires: tuple[Required, ...] = ()
+    provided: tuple[CppOperation, ...] = ()
+    requires: tuple[RequiredPort, ...] = ()
     interfaces: Mapping[str, Interface] | None = None
     flags: tuple[str, ...] = ()
     libraries: tuple[str, ...] = ()
@@ -51,7 +50,7 @@ class CppComponent:
 
 
 @dataclass(frozen=True)
-class Face:
+class ClientLibrary:
     """What a client library adds: folders of headers, and headers that are generated for what is included.
 
     *fallback* folders are searched after the system's.
@@ -59,11 +58,11 @@ class Face:
 
     include: tuple[Path, ...] = ()
     fallback: tuple[Path, ...] = ()
-    generate: Generate = lambda includes, folder: {}
+    generate: GenerateHeaders = lambda includes, folder: {}
 
 
 @dataclass(frozen=True)
-class Compiled:
+class CompiledComponent:
     """A component that is ready to be loaded: its library, and the runtime that all of them share."""
 
     component: CppComponent
@@ -73,36 +72,36 @@ class Compiled:
 
 def compile_component(
     component: CppComponent,
-    face: Face = Face(),
-    tell: Tell | None = None,
-    compiled_by: Compile = one_by_one,
-) -> Compiled:
+    face: ClientLibrary = ClientLibrary(),
+    tell: ReportProgress | None = None,
+    compiled_by: CompileSources = compile_each,
+) -> CompiledComponent:
     """Compile and link, as far as that was not done before.
 
     ``ModelError`` with the compiler's words if it does not compile, ``UsageError`` if there is no compiler.
     """
     sources = find_sources(component.path, component.where)
-    tools = Toolchain(component.name, tell)
-    house = build_house()
+    tools = CppToolchain(component.name, tell)
+    house = build_framework()
     include = (sources.folder, _headers(component, face, sources), *face.include, INCLUDE)
     flags = (*component.flags, *(option for path in face.fallback for option in ("-idirafter", str(path))))
     units = compiled_by(tools, _units(component, sources), include, flags)
     ours = ["component.cpp", "stand_ins.cpp", *(["main.cpp"] if not component.class_name else [])]
     objects = [*units, *(_own(name) for name in ours)]
     options = [str(house), *(f"-l{library}" for library in component.libraries)]
-    return Compiled(component, tools.library(objects, options), house)
+    return CompiledComponent(component, tools.library(objects, options), house)
 
 
-def build_house() -> Path:
+def build_framework() -> Path:
     """The runtime that all components share."""
-    return Toolchain("volery").library([_own("house.cpp")], ["-Wl,-soname,libvolery_house.so", "-pthread"])
+    return CppToolchain("volery").library([_own("house.cpp")], ["-Wl,-soname,libvolery_house.so", "-pthread"])
 
 
 def _own(name: str) -> Path:
-    return Toolchain("volery").object_file(RUNTIME / name, [INCLUDE])
+    return CppToolchain("volery").object_file(RUNTIME / name, [INCLUDE])
 
 
-def _headers(component: CppComponent, face: Face, sources: Sources) -> Path:
+def _headers(component: CppComponent, face: ClientLibrary, sources: Sources) -> Path:
     """A folder with all headers that are generated for a component, named by their content."""
     known = (component.interfaces or {}).values()
     texts = {generated.HEADER: generated.interfaces_header(_usable(component, known))}

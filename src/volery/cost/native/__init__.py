@@ -8,14 +8,12 @@ Imports ``cost`` and ``base``. It must not know components, the kernel or models
 into costs.
 """
 
-from volery.cost.native.costs import Costs, static_costs, traced_costs
-from volery.cost.native.instrument import Instrumented, instrument
-from volery.cost.native.program import Program, compile_program
-from volery.cost.native.toolchain import CompilerError
+from volery.cost.native.block_costs import BlockCosts, Instrumented, instrument, static_costs, traced_costs
+from volery.cost.native.compilation import CompilerError, Program, compile_program
 
 __all__ = [
     "CompilerError",
-    "Costs",
+    "BlockCosts",
     "Instrumented",
     "Program",
     "compile_program",

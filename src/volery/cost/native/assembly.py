@@ -1,4 +1,8 @@
-"""Assembly text as pieces: straight runs of instructions that end in one jump, call or return.
+"""Operands of an instruction, in assembly as in LLVM's intermediate code.
+
+What an instruction does to a processor: which operations it takes, what it reads, writes and remembers.
+
+Assembly text as pieces: straight runs of instructions that end in one jump, call or return.
 
 LLVM writes beside each label of which block of its intermediate code it comes (``# %for.body``). Where the
 code generator made blocks of its own, split edges for instance, there is no such name.
@@ -7,10 +11,74 @@ code generator made blocks of its own, split edges for instance, there is no suc
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
-from volery.cost.native.operands import operands
+_OPEN, _SHUT = frozenset("([{"), frozenset(")]}")
+
+
+def split_operands(text: str) -> Iterator[str]:
+    """What stands between commas that are in no brackets; nothing for an empty text."""
+    depth, start = 0, 0
+    for at, sign in enumerate(text):
+        if sign in _OPEN:
+            depth += 1
+        elif sign in _SHUT:
+            depth -= 1
+        elif sign == "," and depth == 0:
+            yield text[start:at].strip()
+            start = at + 1
+    if text[start:].strip():
+        yield text[start:].strip()
+
+
+OPERATION_CLASSES = (
+    "alu", "move", "increment", "shift", "shifted_alu", "multiply", "divide32", "divide64",
+    "load", "load_vector", "store", "branch",
+    "fp_add", "fp_compare", "fp_multiply", "fp_fma", "fp_divide32", "fp_divide64", "fp_root32", "fp_root64",
+    "convert", "transfer", "vector", "vector_move", "vector_multiply", "shuffle",
+)  # fmt: skip
+"""The classes of operations that a core has figures for (``volery.cost.code_laws``)."""
+
+
+@dataclass(frozen=True)
+class MemoryOperand:
+    """What an instruction loads from or stores to, as far as its text tells.
+
+    The ``registers`` of the address; ``place`` is its text without the ``displacement``, empty where it says
+    nothing; ``size`` in bytes.
+    """
+
+    registers: tuple[str, ...] = ()
+    place: str = ""
+    displacement: int = 0
+    size: int = 8
+
+
+NO_MEMORY = MemoryOperand()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An instruction, for a core model.
+
+    ``slots`` of the front end; ``loads`` loads of the class ``load`` before the ``operation`` (``times`` of
+    it), and a store after it; registers by one name each: ``reads`` for the operation, ``writes`` when it is
+    done, ``bumps`` an address register at once.
+    """
+
+    slots: float = 1.0
+    load: str = ""
+    loads: int = 1
+    operation: str = ""
+    times: int = 1
+    store: bool = False
+    memory: MemoryOperand = NO_MEMORY
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+    bumps: tuple[str, ...] = ()
+
 
 _FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
 _LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
@@ -47,7 +115,7 @@ class Instruction:
 
 
 @dataclass
-class Piece:
+class MachineBlock:
     """A straight run. ``came_from`` is a block's name or ``None``; ``target``: a label or symbol."""
 
     function: str
@@ -58,12 +126,12 @@ class Piece:
     target: str = ""
 
 
-def pieces(text: str, bytes_each: int = 0) -> list[Piece]:
+def machine_blocks(text: str, bytes_each: int = 0) -> list[MachineBlock]:
     """All pieces of a file of assembly, in its order: what falls through goes on in the next.
 
     Where all instructions are *bytes_each* long, those that pad the code to an alignment are entered, too.
     """
-    found: list[Piece] = []
+    found: list[MachineBlock] = []
     files: dict[str, str] = {}
     function, source, offset = "", "", 0
     for line in text.splitlines():
@@ -79,7 +147,7 @@ def pieces(text: str, bytes_each: int = 0) -> list[Piece]:
             continue
         elif label := _LABEL.match(line):
             came = _CAME_FROM.search(label[2])
-            found.append(Piece(function, label[1] or "", came[1].strip('"') if came else None))
+            found.append(MachineBlock(function, label[1] or "", came[1].strip('"') if came else None))
         elif place := _PLACE.match(line):
             source = f"{files.get(place[1], '?')}:{place[2]}" if place[2] != "0" else ""
         elif bytes_each and (aligned := _ALIGN.match(line)):
@@ -90,7 +158,7 @@ def pieces(text: str, bytes_each: int = 0) -> list[Piece]:
     return found
 
 
-def _pad(found: list[Piece], aligned: re.Match[str], offset: int, bytes_each: int) -> int:
+def _pad(found: list[MachineBlock], aligned: re.Match[str], offset: int, bytes_each: int) -> int:
     """Enter what pads from *offset* on, where it is run through; how many bytes that is."""
     padding = -offset % (1 << int(aligned[1]))
     if padding > int(aligned[2] or padding):
@@ -101,10 +169,10 @@ def _pad(found: list[Piece], aligned: re.Match[str], offset: int, bytes_each: in
     return padding
 
 
-def _enter(found: list[Piece], one: Instruction) -> None:
+def _enter(found: list[MachineBlock], one: Instruction) -> None:
     last = found[-1]
     if last.end is not End.FALLS:
-        last = Piece(last.function, "", last.came_from)
+        last = MachineBlock(last.function, "", last.came_from)
         found.append(last)
     last.instructions.append(one)
     last.end, last.target = _ending(one)
@@ -117,7 +185,7 @@ def _instruction(line: str, source: str) -> Instruction:
     prefix, _, after = mnemonic.partition(" ")
     if prefix in ("lock", "rep", "notrack", "data16"):
         mnemonic = after
-    return Instruction(mnemonic.strip(), tuple(operands(rest)), source)
+    return Instruction(mnemonic.strip(), tuple(split_operands(rest)), source)
 
 
 def _ending(one: Instruction) -> tuple[End, str]:

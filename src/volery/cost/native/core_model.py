@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from volery.cost.native.prediction import foresees, fresh, remember
+from volery.cost.native.branch_prediction import new_predictor, predict_branch, record_taken
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -196,13 +196,13 @@ def _foreseen(
     """Whether the core enters the right piece after a branch; it learns from what was right."""
     right = True
     if kind == CONDITIONAL:
-        right = foresees(predictor, lengths, row, taken)
+        right = predict_branch(predictor, lengths, row, taken)
     elif kind == COMPUTED:
         seen = (row ^ predictor[3][len(lengths) // 2, 0]) % PLACES
         right = targets[seen] == target
         targets[seen] = target
     if kind != CONDITIONAL or taken:
-        remember(predictor, lengths, row, target)
+        record_taken(predictor, lengths, row, target)
     return right
 
 
@@ -229,7 +229,7 @@ def run(
     leaves = np.zeros(window)
     stored_key = np.zeros((PLACES, 2), dtype=np.int64)
     stored = np.zeros((PLACES, 2))
-    predictor = fresh(len(lengths))
+    predictor = new_predictor(len(lengths))
     targets = np.full(PLACES, -1, dtype=np.int64)
     enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
     next_late, free = 0, 0.0

@@ -11,7 +11,7 @@ Computing takes the time that it takes on this machine and is not accounted for:
 what of a model means nothing then.
 """
 
-from volery.run.distributed.plan import NODE, Host, unallocated, without_computers
-from volery.run.distributed.processes import Apart, Order
+from volery.run.distributed.plan import NODE, HostPlatform, unallocated, without_computers
+from volery.run.distributed.processes import DistributedRun, GraphSettings
 
-__all__ = ["NODE", "Apart", "Host", "Order", "unallocated", "without_computers"]
+__all__ = ["NODE", "DistributedRun", "HostPlatform", "GraphSettings", "unallocated", "without_computers"]

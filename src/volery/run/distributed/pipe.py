@@ -12,7 +12,7 @@ from volery.base.position import Position
 from volery.model.system import System
 
 
-class Order(NamedTuple):
+class WorkerOrder(NamedTuple):
     """The first thing that a component's process hears: who it is, and on which graph."""
 
     system: System
@@ -21,23 +21,23 @@ class Order(NamedTuple):
     seed: int
 
 
-class Go(NamedTuple):
+class Begin(NamedTuple):
     """All are ready: begin."""
 
 
-class End(NamedTuple):
+class Stop(NamedTuple):
     """Come to an end, and bring down the vehicles that you command."""
 
     why: str
 
 
-class Where(NamedTuple):
+class TruthRequest(NamedTuple):
     """Where is that vehicle really? For the judgement of an operation that has ended."""
 
     vehicle: str
 
 
-class There(NamedTuple):
+class TruthReply(NamedTuple):
     """The answer."""
 
     position: Position
@@ -47,13 +47,13 @@ class Ready(NamedTuple):
     """It is on the graph and can be called."""
 
 
-class Unfit(NamedTuple):
+class StartFailed(NamedTuple):
     """It cannot begin."""
 
     why: str
 
 
-class Ending(NamedTuple):
+class EndingBegun(NamedTuple):
     """It has begun to end, by itself (``failed``) or since it was told so."""
 
     status: str

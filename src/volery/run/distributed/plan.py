@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from volery.base.errors import CapabilityError, choices
-from volery.components.instance import Seat
-from volery.components.pricing import FREE, Pricing
+from volery.components.instance import Allocation
+from volery.cost.pricing import FREE, Pricing
 from volery.model.system import Bound, Instance, System
 from volery.ros.graph import names
-from volery.run.platform import Platform
+from volery.run.assembly.computers import Platform
 
 if TYPE_CHECKING:
     from volery.kernel.api import Kernel
@@ -37,7 +37,7 @@ COMPUTING = frozenset(
 """Quantities of what the model's processors do."""
 
 
-def apart(system: System) -> tuple[Instance, ...]:
+def worker_instances(system: System) -> tuple[Instance, ...]:
     """The instances that are processes of their own: the application's.
 
     Raises ``CapabilityError`` for a component in a language that cannot be one.
@@ -74,7 +74,7 @@ def unallocated(system: System) -> System:
     return replace(system, instances=tuple(replace(one, processor=None) for one in system.instances))
 
 
-class Host(Platform):
+class HostPlatform(Platform):
     """This machine: computing takes the time that it takes, and costs nothing beside."""
 
     def __init__(self, system: System, kernel: Kernel, seed: int, fidelity: str) -> None:
@@ -84,7 +84,7 @@ class Host(Platform):
     def foresee(self) -> None:
         """Nothing is priced."""
 
-    def seat(self, instance: Instance) -> Seat:
+    def seat(self, instance: Instance) -> Allocation:
         """On no processor of the model's."""
         return super().seat(replace(instance, processor=None))
 
@@ -100,14 +100,14 @@ def _is_about_computing(bound: Bound) -> bool:
     return bound.observe.rpartition(".")[2] in COMPUTING
 
 
-def label(instance: Instance) -> str:
+def node_label(instance: Instance) -> str:
     """The name of its node, without the namespace."""
     return re.sub(r"\W", "_", instance.name)
 
 
 def service_name(callee: Instance, operation: str) -> str:
     """The service that *operation* of *callee* is."""
-    return f"{names.node_name(label(callee), callee.namespace)}/{operation}"
+    return f"{names.node_name(node_label(callee), callee.namespace)}/{operation}"
 
 
 def operations(system: System, instance: Instance) -> tuple[str, ...]:

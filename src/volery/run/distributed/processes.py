@@ -20,31 +20,30 @@ from volery.kernel.waiting import Signal
 from volery.model.system import System
 from volery.ros.graph.clock import CLOCK_PERIOD
 from volery.ros.transports.abroad import under_way
-from volery.run.build import Builder, Built, Part, Truth
+from volery.run.assembly.components import Builder, BuiltComponents, ProcessPart, Truth
+from volery.run.assembly.computers import Platform
+from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
-from volery.run.distributed.calls import Desk, Reach
 from volery.run.distributed.pipe import Pipe
-from volery.run.distributed.values import Values
+from volery.run.distributed.remote_ports import PortClients, PortServer, ValueCodec
 from volery.run.ending import Ending
-from volery.run.graphs import open_graph
-from volery.run.platform import Platform
 
 if TYPE_CHECKING:
-    from volery.run.airfield import Airfield
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
 
 READY_S, GONE_S, GLANCE_S = 60.0, 5.0, 0.05
 STDERR = 2
 """What a component prints goes there: the run's own output may be read by a program."""
 
 
-class ComponentProcess:
+class WorkerProcess:
     """One component's process. What it says arrives in a thread and is handed to the kernel.
 
     To the end of a run it is what a vehicle is: ``come_to_rest`` lets it bring down those that it commands.
     """
 
     def __init__(
-        self, kernel: VirtualKernel, ending: Ending, order: pipe.Order, truth: Callable[[str], Truth]
+        self, kernel: VirtualKernel, ending: Ending, order: pipe.WorkerOrder, truth: Callable[[str], Truth]
     ) -> None:
         self.name = order.name
         self.ready = False
@@ -53,7 +52,7 @@ class ComponentProcess:
         self._gone = Signal(kernel, f"the process of {order.name}")
         self._pipe, theirs = Pipe.pair()
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "volery.run.distributed.hosted", *map(str, theirs)],
+            [sys.executable, "-m", "volery.run.distributed.worker", *map(str, theirs)],
             pass_fds=theirs,
             stdin=subprocess.DEVNULL,
             stdout=STDERR,
@@ -94,21 +93,21 @@ class ComponentProcess:
     def _hear(self, said: object) -> None:
         if isinstance(said, pipe.Ready):
             self.ready = True
-        elif isinstance(said, pipe.Unfit):
+        elif isinstance(said, pipe.StartFailed):
             self.unfit = said.why
-        elif isinstance(said, pipe.Ending):
+        elif isinstance(said, pipe.EndingBegun):
             self._kernel.post(partial(self._ends, said))
-        elif isinstance(said, pipe.Where):
+        elif isinstance(said, pipe.TruthRequest):
             self._kernel.post(partial(self._tell_truth, said.vehicle))
         else:
             self._kernel.post(partial(self._kernel.record, said))
 
-    def _ends(self, said: pipe.Ending) -> None:
+    def _ends(self, said: pipe.EndingBegun) -> None:
         if said.status == "failed":
             self._fail(said.why.removeprefix(f"{self.name}: "))
 
     def _tell_truth(self, vehicle: str) -> None:
-        self._pipe.say(pipe.There(self._truth(vehicle)()))
+        self._pipe.say(pipe.TruthReply(self._truth(vehicle)()))
 
     def _went(self) -> None:
         self._gone.notify()
@@ -120,11 +119,11 @@ class ComponentProcess:
 
     def go(self) -> None:
         """All are ready."""
-        self._pipe.say(pipe.Go())
+        self._pipe.say(pipe.Begin())
 
     def come_to_rest(self) -> None:
         """Let it end, and wait until it has."""
-        self._pipe.say(pipe.End("its run has ended"))
+        self._pipe.say(pipe.Stop("its run has ended"))
         self._gone.wait_for(lambda: self.over)
 
     def stop(self) -> bool:
@@ -146,7 +145,7 @@ def _how(code: int) -> str:
     return f"ended with status {code}"
 
 
-class Order(NamedTuple):
+class GraphSettings(NamedTuple):
     """On which graph components are to be, at which pace, with which seed."""
 
     graph: str
@@ -154,30 +153,30 @@ class Order(NamedTuple):
     seed: int
 
 
-class Apart:
+class DistributedRun:
     """A run's components on a real graph, each of the application's in a process of its own.
 
     Raises what ``open_graph`` raises; a ROS 1 master is started where none answers. ``build`` what stays in
     this process, ``start``, and in any case ``close``.
     """
 
-    def __init__(self, system: System, kernel: VirtualKernel, ending: Ending, order: Order) -> None:
-        self._apart = plan.apart(system)
+    def __init__(self, system: System, kernel: VirtualKernel, ending: Ending, order: GraphSettings) -> None:
+        self._apart = plan.worker_instances(system)
         self._kernel, self._ending, self._system, self._order = kernel, ending, system, order
-        self._processes: list[ComponentProcess] = []
+        self._processes: list[WorkerProcess] = []
         self._closed = False
-        self._built: Built
+        self._built: BuiltComponents
         self._truth: Callable[[str], Truth]
         self.graph = open_graph(kernel, order.graph, start_master=True, epoch=0)
 
-    def build(self, platform: Platform, airfield: Airfield) -> Built:
+    def build(self, platform: Platform, airfield: SimulatedFleet) -> BuiltComponents:
         """The components of the environment. Raises what is wrong with them, or with the graph."""
         kernel, system = self._kernel, self._system
         self._node = node = self.graph.node(plan.NODE)
         self._truth = airfield.truth
-        self._values = Values(self._beside)
+        self._values = ValueCodec(self._beside)
         self._here = tuple(one for one in system.instances if one.is_environment)
-        part = Part(self.graph, self._here, Reach(kernel, system, node, self._values))
+        part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._values))
         builder = Builder(system, kernel, platform, airfield, self._ending, part=part)
         self._built = builder.build("times", self._order.seed)
         return self._built
@@ -193,14 +192,14 @@ class Apart:
 
         Raises ``ComponentError`` for one that cannot begin, ``LinkSilent`` if they take too long.
         """
-        desk = Desk(self._kernel, self._node, self._values, self._kernel.root)
+        desk = PortServer(self._kernel, self._node, self._values, self._kernel.root)
         for model in self._here:
             desk.serve(model, self._built.instances[model.name])
         period = round(CLOCK_PERIOD * max(1.0, self._order.pace))  # on the wall as often, whatever the pace
         self.graph.tell_clock(self._node, period)
         for model in self._apart:
-            order = pipe.Order(self._system, model.name, self._order.graph, self._order.seed)
-            self._processes.append(ComponentProcess(self._kernel, self._ending, order, self._truth))
+            order = pipe.WorkerOrder(self._system, model.name, self._order.graph, self._order.seed)
+            self._processes.append(WorkerProcess(self._kernel, self._ending, order, self._truth))
         self._ending.vehicles = self._processes
         end = time.monotonic() + READY_S
         while late := [one for one in self._processes if not one.ready]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from volery.base.registry import Registry
 from volery.base.time import MS, Ns, S
-from volery.links.codec import Codec
-from volery.links.parser import MAVLINK
+from volery.links.link import Codec
+from volery.links.mavlink_codec import MAVLINK
 from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mode import Mode

@@ -9,10 +9,10 @@ from volery.base.time import to_seconds
 from volery.testing.checks import check, demand, raising
 from volery.testing.stage import Stage
 from volery.vehicles import Capability
-from volery.vehicles.perform import SILENCE
+from volery.vehicles.executor import LINK_TIMEOUT
 
 GO = (Capability.TAKEOFF, Capability.GOTO)
-NOTICED_S = to_seconds(SILENCE) + 1.5
+NOTICED_S = to_seconds(LINK_TIMEOUT) + 1.5
 
 
 @check(needs=GO, flies=True)

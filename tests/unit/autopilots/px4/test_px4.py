@@ -10,10 +10,9 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.parameter_values import as_bytes, from_bytes
-from volery.links.status_texts import chunks
+from volery.links.mavlink_conventions import from_bytewise, status_text_chunks, to_bytewise
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
@@ -85,7 +84,7 @@ def test_an_attitude_without_a_thrust_is_no_setpoint() -> None:
 
 @pytest.mark.parametrize("number", [0, 4, -1, 2_147_483_647, -737_578_370])
 def test_an_integer_survives_as_bytes(number: int) -> None:
-    assert from_bytes(6, as_bytes(6, float(number))) == number
+    assert from_bytewise(6, to_bytewise(6, float(number))) == number
 
 
 def test_all_checks_passed_leaves_two_summaries() -> None:
@@ -111,7 +110,7 @@ def test_texts_wait_for_a_station_keep_their_distance_and_the_newest_four() -> N
         lambda fields: sent.append((kernel.now(), fields)),
     )
     for number in range(6):
-        line.put(chunks(6, f"text {number}", number))
+        line.put(status_text_chunks(6, f"text {number}", number))
     kernel.run(S)
     assert sent == []
     line.on_heartbeat(18)
@@ -129,7 +128,7 @@ def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
     spec = Multirotor() if kind == "multirotor" else Rover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
     autopilot = Autopilot(kernel, flights[0], DIALECT, warm=True)
-    ours, theirs = in_process(kernel, MS, "station")
+    ours, theirs = in_process_pair(kernel, MS, "station")
     heard: list[tuple[Any, ...]] = []
     ours.receive(lambda frame: heard.append((kernel.now(), frame.name, repr(frame.fields))))
     autopilot.connect(theirs)

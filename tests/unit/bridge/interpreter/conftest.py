@@ -10,15 +10,15 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.geoid import LevelGeoid
 from volery.base.time import S
-from volery.bridge import MAVROS, Interpreter, VehicleNode, VehicleNodeOptions
+from volery.bridge import MAVROS, MavlinkAdapter, VehicleNode, VehicleNodeOptions
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import Graph
-from volery.run.airfield import airfield_of
-from volery.run.serving import open_simulated
-from volery.run.simulated import simulated
+from volery.run.assembly.simulated_fleet import fleet_of
+from volery.run.assembly.simulated_vehicles import parse_simulated
+from volery.run.assembly.vehicle_nodes import open_simulated_driver
 from volery.trace.events import Operation, Text
 from volery.vehicles.address import parse
 
@@ -32,11 +32,11 @@ class Flown:
     def __init__(self, url: str, **options: Any) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
-        wanted = simulated(parse(url), "d")
-        self.airfield = airfield_of(self.kernel, [wanted], 1)
-        self.driver = open_simulated(self.kernel, self.airfield, wanted, 1)
+        wanted = parse_simulated(parse(url), "d")
+        self.airfield = fleet_of(self.kernel, [wanted], 1)
+        self.driver = open_simulated_driver(self.kernel, self.airfield, wanted, 1)
         self.graph = Graph(self.kernel)
-        self.interpreter = Interpreter(self.kernel, self.driver, Place("bridge"))
+        self.interpreter = MavlinkAdapter(self.kernel, self.driver, Place("bridge"))
         names = options.setdefault("names", MAVROS)
         rates = {"streams": dict.fromkeys(names.streams, 10), "period": None}
         stated = VehicleNodeOptions(geoid=LevelGeoid(GEOID_M), **{**rates, **options})

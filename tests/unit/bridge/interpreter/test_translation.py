@@ -11,12 +11,19 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Position
 from volery.base.time import S
-from volery.bridge.interpreter.aims import Channels, Motion, Place, axes, global_aim, local_aim
-from volery.bridge.interpreter.telling import Telling
+from volery.bridge.mavlink_adapter.drone_commands import (
+    PositionTarget,
+    RcChannels,
+    VelocityTarget,
+    global_target,
+    local_target,
+    manual_control_axes,
+)
+from volery.bridge.mavlink_adapter.telemetry_encoder import TelemetryEncoder
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
-from volery.links.mavlink import quantised
-from volery.vehicles.driver import Sticks
+from volery.links.mavlink_messages import quantised
+from volery.vehicles.driver import ManualControl
 from volery.vehicles.telemetry import Attitude, Battery, Telemetry, Velocity
 
 HOME = Position(46.0, -103.0, AMSL(900.0))
@@ -30,7 +37,7 @@ class Bird:
         self.kernel = VirtualKernel()
         self.telemetry = Telemetry(self.kernel, "bird")
         self.handover = "GUIDED"
-        self.telling = Telling(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
+        self.telling = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
 
     def hear(self, at: int = 5 * S, **facts: Any) -> None:
         for name, value in {"heard": at, "kind": "drone", "autopilot": "Paparazzi", **facts}.items():
@@ -160,8 +167,8 @@ def local(frame: int, mask: int, **fields: float) -> dict[str, Any]:
     [(1, 3.0, 2.0, 1.0), (7, 13.0, 2.0, 5.0), (8, 8.0, 3.0, 5.0), (9, 8.0, 3.0, 5.0), (12, 8.0, 3.0, 5.0)],
 )
 def test_a_place_by_its_frame(seen: Telemetry, frame: int, north: float, east: float, up: float) -> None:
-    aim = local_aim(local(frame, POSITION, x=3.0, y=2.0, z=-1.0), seen)
-    assert isinstance(aim, Place)
+    aim = local_target(local(frame, POSITION, x=3.0, y=2.0, z=-1.0), seen)
+    assert isinstance(aim, PositionTarget)
     assert aim.goal.altitude == AboveHome(up)
     assert aim.heading is None
     there = FRAME.to_enu(aim.goal.latitude, aim.goal.longitude, 900.0)
@@ -170,17 +177,17 @@ def test_a_place_by_its_frame(seen: Telemetry, frame: int, north: float, east: f
 
 @pytest.mark.parametrize(("frame", "heading"), [(1, 30.0), (9, 120.0)])
 def test_a_heading_counts_from_north_or_from_its_own(seen: Telemetry, frame: int, heading: float) -> None:
-    aim = local_aim(local(frame, POSITION & ~0x400, yaw=pi / 6), seen)
-    assert isinstance(aim, Place)
+    aim = local_target(local(frame, POSITION & ~0x400, yaw=pi / 6), seen)
+    assert isinstance(aim, PositionTarget)
     assert aim.heading == pytest.approx(heading)
 
 
 def test_velocities_by_their_frame(seen: Telemetry) -> None:
     moving = {"vx": 3.0, "vy": 2.0, "vz": -1.0, "yaw_rate": pi / 2}
-    aim = local_aim(local(1, VELOCITY, **moving), seen)
-    assert aim == Motion(Velocity(3.0, 2.0, 1.0), 90.0)
-    turned = local_aim(local(8, VELOCITY | 0x800, **moving), seen)
-    assert isinstance(turned, Motion)
+    aim = local_target(local(1, VELOCITY, **moving), seen)
+    assert aim == VelocityTarget(Velocity(3.0, 2.0, 1.0), 90.0)
+    turned = local_target(local(8, VELOCITY | 0x800, **moving), seen)
+    assert isinstance(turned, VelocityTarget)
     assert turned.velocity == pytest.approx((-2.0, 3.0, 1.0))
     assert turned.yaw_rate == 0.0
 
@@ -188,18 +195,18 @@ def test_velocities_by_their_frame(seen: Telemetry) -> None:
 @pytest.mark.parametrize(("frame", "kind"), [(0, AMSL), (5, AMSL), (6, AboveHome), (11, AboveGround)])
 def test_altitudes_by_their_frame(seen: Telemetry, frame: int, kind: type) -> None:
     fields = {**local(frame, POSITION), "lat_int": 460_000_000, "lon_int": -1_030_000_000, "alt": 12.0}
-    assert global_aim(fields, seen) == Place(Position(46.0, -103.0, kind(12.0)), None)
+    assert global_target(fields, seen) == PositionTarget(Position(46.0, -103.0, kind(12.0)), None)
 
 
 @pytest.mark.parametrize("mask", [0x0FFF, POSITION | 1, VELOCITY | 8])
 def test_half_a_set_point_is_none(seen: Telemetry, mask: int) -> None:
     with pytest.raises(UsageError, match="neither a whole position nor a whole velocity"):
-        local_aim(local(1, mask), seen)
+        local_target(local(1, mask), seen)
 
 
 def test_before_it_knows_where_it_is_there_is_no_place(bird: Bird) -> None:
     with pytest.raises(UsageError, match="not known yet"):
-        local_aim(local(1, POSITION), bird.telemetry)
+        local_target(local(1, POSITION), bird.telemetry)
 
 
 # -- sticks
@@ -210,13 +217,19 @@ def channels(*pulses: int) -> dict[str, int]:
 
 
 def test_channels_as_sticks() -> None:
-    held = Channels()
-    assert held.take(channels(1600, 1250, 1000, 1400)) == Sticks(0.5, 0.2, 0.0, -0.2)  # low pitch: forward
-    assert held.take(channels(0, 65_535, 65_535, 65_535)) == Sticks(0.5, 0.0, 0.0, -0.2)
-    assert held.take(channels(65_535, 2_400, 0, 0)) == Sticks(-1.0, 0.0, 0.5, 0.0)
+    held = RcChannels()
+    assert held.take(channels(1600, 1250, 1000, 1400)) == ManualControl(
+        0.5, 0.2, 0.0, -0.2
+    )  # low pitch: forward
+    assert held.take(channels(0, 65_535, 65_535, 65_535)) == ManualControl(0.5, 0.0, 0.0, -0.2)
+    assert held.take(channels(65_535, 2_400, 0, 0)) == ManualControl(-1.0, 0.0, 0.5, 0.0)
     assert held.take(channels(0, 0, 0, 0)) is None
 
 
 def test_axes_as_sticks() -> None:
-    assert axes({"x": 500, "y": -250, "z": 750, "r": 2_000}) == Sticks(0.5, -0.25, 0.75, 1.0)
-    assert axes({"x": 32_767, "y": 0, "z": 32_767, "r": 0}) == Sticks(0.0, 0.0, 0.5, 0.0)
+    assert manual_control_axes({"x": 500, "y": -250, "z": 750, "r": 2_000}) == ManualControl(
+        0.5, -0.25, 0.75, 1.0
+    )
+    assert manual_control_axes({"x": 32_767, "y": 0, "z": 32_767, "r": 0}) == ManualControl(
+        0.0, 0.0, 0.5, 0.0
+    )

@@ -25,7 +25,7 @@ from volery.kernel.task import Place
 from volery.vehicles import Drone
 from volery.vehicles.driver import Capability
 from volery.vehicles.drivers.dji import DRIVER, open_driver
-from volery.vehicles.telemetry import Said
+from volery.vehicles.telemetry import StatusText
 
 HOME = (46.0, -103.0, 900.0)
 METRES = 111_195.0
@@ -416,7 +416,7 @@ def test_anomalies_are_texts(bench: Make) -> None:
         made.wait(0.1)
         made.node.say("flight_anomaly", data=128)
         made.wait(0.1)
-        said: list[Said] = made.drone.texts
+        said: list[StatusText] = made.drone.texts
         assert [one.text for one in said] == ["esc disconnected", "strong wind level2"]
 
     made.run(body)

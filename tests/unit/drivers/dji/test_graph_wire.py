@@ -10,10 +10,10 @@ import pytest
 from volery.base.time import MS, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.links.wire import WireFaults
+from volery.links.wire_faults import WireFaults
 from volery.ros.graph import ServiceError
 from volery.ros.messages import message_class, new, request
-from volery.run.graph_wire import GraphWire, private_graph
+from volery.run.assembly.vehicle_nodes import GraphWire, private_graph
 
 
 class Pair:

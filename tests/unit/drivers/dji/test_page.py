@@ -9,7 +9,7 @@ import pytest
 
 from volery.simulation.autopilots.dji import assumed as simulated
 from volery.simulation.autopilots.dji.parameters import HONOURED, parameters
-from volery.vehicles.drivers.dji import assumed as driver
+from volery.vehicles.drivers.dji import driver as driver
 
 PAGE = Path(__file__).parents[4] / "docs" / "dji.md"
 

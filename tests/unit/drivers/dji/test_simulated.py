@@ -15,7 +15,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, S
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
-from volery.run.opening import Stated, open_vehicles
+from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
 from volery.trace.events import Operation
 from volery.vehicles import Drone, Land, TakeOff, Vehicle, Waypoint
 
@@ -28,7 +28,9 @@ class Flown:
     """One vehicle at an address, and all that was recorded of it."""
 
     def __init__(self, options: str = "", seed: int = 1) -> None:
-        opened = open_vehicles({"d": f"sim:dji?start=warm{options}"}, {"d": Drone}, Stated(seed=seed))
+        opened = open_vehicles(
+            {"d": f"sim:dji?start=warm{options}"}, {"d": Drone}, VehicleSettings(seed=seed)
+        )
         assert isinstance(opened.kernel, VirtualKernel)
         assert opened.airfield is not None
         self.kernel, self.airfield = opened.kernel, opened.airfield
@@ -212,7 +214,7 @@ def test_a_cut_link_ends_in_a_hover_and_then_the_way_goes_on() -> None:
 
 def test_two_in_one_world_do_not_hear_each_other() -> None:
     urls = {"one": "sim:dji?start=warm", "two": "sim:dji?start=warm"}
-    opened = open_vehicles(urls, dict.fromkeys(urls, Drone), Stated(seed=1))
+    opened = open_vehicles(urls, dict.fromkeys(urls, Drone), VehicleSettings(seed=1))
     ended: list[str] = []
 
     def flow(vehicle: Vehicle, height: float) -> None:

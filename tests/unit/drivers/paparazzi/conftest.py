@@ -17,8 +17,8 @@ from volery.base.frames import geodetic_to_ecef
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame, Link
-from volery.links.pprzlink import PPRZLINK
-from volery.links.pprzlink_definitions import entry_value
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzlink_messages import entry_value
 from volery.vehicles.drivers.paparazzi import open_driver
 from volery.vehicles.drivers.paparazzi.modes import NUMBERS
 

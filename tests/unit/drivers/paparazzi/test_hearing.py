@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprzlink import PPRZLINK
-from volery.links.pprzlink_definitions import TELEMETRY, Field, message_names, message_type
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzlink_messages import TELEMETRY, Field, message_names, message_type
 from volery.vehicles.drivers.paparazzi import open_driver
 
 ORIGIN = {"lat0": 434622222, "lon0": 12733333, "alt0": 233_500, "hmsl0": 185_000}
@@ -28,7 +28,7 @@ class Listener:
 
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
-        ours, self.theirs = in_process(self.kernel, codec=PPRZLINK)
+        ours, self.theirs = in_process_pair(self.kernel, codec=PPRZLINK)
         self.driver = open_driver(self.kernel, ours, "craft_1", {})
         self.seen = self.driver.telemetry
 

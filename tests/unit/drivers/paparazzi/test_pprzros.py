@@ -15,10 +15,10 @@ from volery.bridge import serve_pprzros
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprz_message import TYPE, to_message
-from volery.links.pprzlink import PPRZLINK
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzros_messages import TYPE, to_message
 from volery.ros.graph import Graph
 from volery.ros.messages import new
 from volery.trace.events import Operation
@@ -35,7 +35,7 @@ class OnGraph:
     def __init__(self, peer: Any, *, bridged: bool = True) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        link, theirs = in_process(self.kernel, MS, "radio", PPRZLINK)
+        link, theirs = in_process_pair(self.kernel, MS, "radio", PPRZLINK)
         self.aircraft = peer(self.kernel, theirs)
         self.graph = Graph(self.kernel, between=self._between)
         if bridged:

@@ -17,8 +17,8 @@ from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
 from volery.base.time import MS, S
 from volery.links.link import Frame
 from volery.vehicles.drivers.px4 import open_driver
-from volery.vehicles.drivers.px4.events import event_id
-from volery.vehicles.drivers.px4.modes import BY_STICKS, HOLD, LAND, MODES, OFFBOARD, RTL, TAKEOFF
+from volery.vehicles.drivers.px4.decoder import event_id
+from volery.vehicles.drivers.px4.modes import HOLD, LAND, MANUAL_MODES, MODES, OFFBOARD, RTL, TAKEOFF
 
 HOME = (454671168, -737578362, 32_575)  # degE7, degE7, mm AMSL
 REJECTED, UNSUPPORTED = 1, 3
@@ -86,7 +86,7 @@ class FakePx4(Scripted):
 
     def _sys_status(self) -> None:
         can_arm = self.craft.healthy and (
-            self.craft.mode not in BY_STICKS | {OFFBOARD} or self._sticks_come()
+            self.craft.mode not in MANUAL_MODES | {OFFBOARD} or self._sticks_come()
         )
         health = HEALTHY if can_arm else UNHEALTHY
         self.say(
@@ -189,7 +189,7 @@ class FakePx4(Scripted):
         if mode == OFFBOARD and flying and not self._streamed():
             self.text("Switching to OFFBOARD is currently not available", 2)
             return REJECTED
-        if mode in BY_STICKS and flying and not self._sticks_come():
+        if mode in MANUAL_MODES and flying and not self._sticks_come():
             return REJECTED
         if mode is not None:
             self.enter(mode)
@@ -203,7 +203,7 @@ class FakePx4(Scripted):
                 return REJECTED
             craft.armed, craft.status = False, 3
             return ACCEPTED
-        if not craft.healthy or (craft.mode in BY_STICKS and not self._sticks_come()):
+        if not craft.healthy or (craft.mode in MANUAL_MODES and not self._sticks_come()):
             return REJECTED
         craft.armed, craft.status = True, 4
         return ACCEPTED

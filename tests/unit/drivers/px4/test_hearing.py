@@ -6,10 +6,9 @@ import pytest
 
 from rigs.recorded import Recorded, extract
 from volery.links.link import Frame
-from volery.links.mavlink import encode
-from volery.links.parser import Parser
-from volery.vehicles.drivers.px4.events import SAID, event_id, words_of
-from volery.vehicles.drivers.px4.hearing import Hearing
+from volery.links.mavlink_codec import MavlinkParser
+from volery.links.mavlink_messages import encode
+from volery.vehicles.drivers.px4.decoder import KNOWN_EVENTS, PX4Decoder, event_id, event_text
 
 ARM, REJECTED = 400, 1
 FOLDER = "px4_telemetry"
@@ -18,14 +17,14 @@ FOLDER = "px4_telemetry"
 class RecordedPx4(Recorded):
     """An answer that refuses to arm has the checks that fail said; other answers are not telemetry."""
 
-    def hear(self, hearing: Hearing, frame: Frame) -> None:
+    def hear(self, hearing: PX4Decoder, frame: Frame) -> None:
         if frame.name != "COMMAND_ACK":
             super().hear(hearing, frame)
         elif frame.fields["command"] == ARM and frame.fields["result"] == REJECTED:
             hearing.say_failing_checks()
 
 
-RECORDED = RecordedPx4(FOLDER, Hearing)
+RECORDED = RecordedPx4(FOLDER, PX4Decoder)
 replayed, changes = RECORDED.replayed, RECORDED.changes
 
 
@@ -106,7 +105,7 @@ def test_numbers_of_events_are_made_of_their_names() -> None:
         for _, kind, fields in extract(FOLDER, name)
         if kind == "EVENT"
     }
-    known = {number for number in recorded if not words_of(number).startswith("event")}
+    known = {number for number in recorded if not event_text(number).startswith("event")}
     assert event_id("commander_armed_by") == 0x0190CAF3
     assert event_id("check_modes_attitude") == 0x019F748F
     assert {f"{number:#010x}" for number in recorded - known} == {
@@ -114,12 +113,12 @@ def test_numbers_of_events_are_made_of_their_names() -> None:
         "0x011d3727",  # ends it
         "0x01125bef",  # beside the logger's text
     }
-    assert len(known & SAID.keys()) >= 15
+    assert len(known & KNOWN_EVENTS.keys()) >= 15
 
 
 def test_events_as_they_came_over_the_wire() -> None:
     raw = bytes.fromhex("fd1200007a03019a01008f749f0120080000f8ff0000223ed07e00146911")
-    (frame,) = Parser().feed(raw)
+    (frame,) = MavlinkParser().feed(raw)
     assert frame.name == "EVENT"
     assert (frame.fields["id"], frame.fields["sequence"], frame.fields["log_levels"]) == (
         0x019F748F,
@@ -128,5 +127,5 @@ def test_events_as_they_came_over_the_wire() -> None:
     )
     assert frame.fields["arguments"][:5] == (0x3E, 0xD0, 0x7E, 0, 20)
     assert encode(frame, 0x7A) == raw
-    (sequence,) = Parser().feed(bytes.fromhex("fd0300002503019b0100f6ff01ee37"))
+    (sequence,) = MavlinkParser().feed(bytes.fromhex("fd0300002503019b0100f6ff01ee37"))
     assert (sequence.name, sequence.fields["sequence"]) == ("CURRENT_EVENT_SEQUENCE", 65526)

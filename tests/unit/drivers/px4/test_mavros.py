@@ -15,7 +15,7 @@ from volery.bridge import serve_vehicle
 from volery.kernel.task import Place
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
-from volery.links.in_process import in_process
+from volery.links.in_process_link import in_process_pair
 from volery.ros.graph import Graph
 from volery.vehicles import Drone
 from volery.vehicles.drivers.mavros import MAVROS
@@ -29,7 +29,7 @@ SETPOINT, STICKS = "SET_POSITION_TARGET_LOCAL_NED", "MANUAL_CONTROL"
 def flown(at: Any, mission: Callable[[Any], Any]) -> Any:
     """What *mission* returns, flown over the graph."""
     kernel = at.kernel = VirtualKernel()
-    link, theirs = in_process(kernel, name="radio")
+    link, theirs = in_process_pair(kernel, name="radio")
     at.autopilot = type(at.autopilot)(kernel, theirs)
     at.craft = at.autopilot.craft
     graph = Graph(kernel)

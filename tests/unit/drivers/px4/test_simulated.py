@@ -10,7 +10,7 @@ from rigs.airstrip import FRAME, Airstrip, at
 from volery.base.errors import Failsafe, LinkLost, Overridden, Refused
 from volery.base.time import MS, S
 from volery.kernel.waiting import sleep
-from volery.links.wire import WireFaults
+from volery.links.wire_faults import WireFaults
 from volery.trace.events import Operation, Text
 from volery.vehicles import ChangeSpeed, Drone, Land, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.drivers.px4 import open_driver

@@ -10,7 +10,7 @@ cannot be a coroutine. Arrays of numbers are numpy's. A node joins ``/rosout`` w
 somebody listens for. The threads of a ``MultiThreadedExecutor`` take turns: one goes on where another waits.
 """
 
-from volery.ros.client_libraries.launch import Launch
+from volery.ros.client_libraries.library_base import Launch
 from volery.ros.client_libraries.rclpy.module import modules
 
 __all__ = ["Launch", "modules"]

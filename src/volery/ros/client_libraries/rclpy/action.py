@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from volery.kernel.waiting import Signal
-from volery.ros.client_libraries.rclpy.callback_groups import CallbackGroup
+from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Future
 from volery.ros.client_libraries.rclpy.qos import qos_profile_action_status_default
-from volery.ros.client_libraries.rclpy.task import Future
 from volery.ros.messages import message_class, new
 
 if TYPE_CHECKING:

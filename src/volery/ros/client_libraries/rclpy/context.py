@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.launch import AtEnd, Launch, Launched, never
+from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, ignore_end
 from volery.ros.client_libraries.rclpy.errors import NameValidationException, NotInitializedException
 from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
@@ -33,7 +33,7 @@ class Context:
         self._given = node
         self._nodes: list[Node] = []
         self._started = self._asked = False
-        self.at_end: AtEnd = never
+        self.at_end: AtEnd = ignore_end
         self._hooks: list[Callable[[], Any]] = []
         self.kernel = graph.kernel
         self.changed = Signal(graph.kernel, f"{component} (rclpy)")
@@ -133,7 +133,7 @@ class Context:
 
 
 @dataclass(eq=False)
-class Contexts(Launched):
+class Contexts(LaunchedComponents):
     """All components of one run that import rclpy."""
 
     levels: dict[str, int] = field(default_factory=dict, init=False)

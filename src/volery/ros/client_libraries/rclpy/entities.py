@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.waiting import Signal
 from volery.ros.client_libraries.rclpy.errors import InvalidHandle
+from volery.ros.client_libraries.rclpy.executors import Future
 from volery.ros.client_libraries.rclpy.qos import graph_qos
-from volery.ros.client_libraries.rclpy.task import Future
 from volery.ros.graph import ServiceError
 from volery.ros.graph.group import Work
 from volery.ros.messages import Message
 
 if TYPE_CHECKING:
-    from volery.ros.client_libraries.rclpy.callback_groups import CallbackGroup, Queue
-    from volery.ros.client_libraries.rclpy.executors import Executor
+    from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Executor, Queue
     from volery.ros.client_libraries.rclpy.node import Node
 
 

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any, ClassVar
 
 from volery.base.time import Ns, S, from_seconds
+from volery.ros.client_libraries.library_base import Caller, Rosout, caller
 from volery.ros.client_libraries.rclpy.context import Contexts
-from volery.ros.client_libraries.rosout import Caller, Rosout, caller
 
 
 class LoggingSeverity(IntEnum):

@@ -8,11 +8,9 @@ from types import ModuleType
 from typing import Any
 
 from volery.ros import messages
-from volery.ros.client_libraries.launch import AtEnd, Launch, never
-from volery.ros.client_libraries.module import face_module
+from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, library_module
 from volery.ros.client_libraries.rclpy import (
     action,
-    callback_groups,
     entities,
     errors,
     executors,
@@ -21,12 +19,12 @@ from volery.ros.client_libraries.rclpy import (
     parameters,
     qos,
 )
-from volery.ros.client_libraries.rclpy import task as tasks
+from volery.ros.client_libraries.rclpy import executors as callback_groups
+from volery.ros.client_libraries.rclpy import executors as tasks
 from volery.ros.client_libraries.rclpy import time as times
 from volery.ros.client_libraries.rclpy.context import Context, Contexts
-from volery.ros.client_libraries.rclpy.executors import Executor
+from volery.ros.client_libraries.rclpy.executors import Executor, Future
 from volery.ros.client_libraries.rclpy.node import Node
-from volery.ros.client_libraries.rclpy.task import Future
 from volery.ros.graph import Node as GraphNode
 from volery.ros.graph import RosGraph
 
@@ -35,7 +33,7 @@ def modules(
     graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
     nodes: Mapping[str, GraphNode] | None = None,
-    at_end: AtEnd = never,
+    at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rclpy``, ``rclpy.node``, ``std_msgs.msg`` and so on, by name.
 
@@ -45,8 +43,8 @@ def modules(
     bound = _bound(contexts)
     parts = _parts(bound)
     names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": parameters.Parameter}
-    found = {f"rclpy.{part}": face_module(f"rclpy.{part}", inside) for part, inside in parts.items()}
-    rclpy = face_module("rclpy", {**names, **{part: found[f"rclpy.{part}"] for part in parts}})
+    found = {f"rclpy.{part}": library_module(f"rclpy.{part}", inside) for part, inside in parts.items()}
+    rclpy = library_module("rclpy", {**names, **{part: found[f"rclpy.{part}"] for part in parts}})
     return {**messages.modules(), "rclpy": rclpy, **found}
 
 

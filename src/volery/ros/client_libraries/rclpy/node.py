@@ -7,11 +7,7 @@ from inspect import iscoroutinefunction
 from typing import Any, ClassVar
 
 from volery.base.time import S
-from volery.ros.client_libraries.rclpy.callback_groups import (
-    CallbackGroup,
-    MutuallyExclusiveCallbackGroup,
-    Queue,
-)
+from volery.ros.client_libraries.library_base import Rosout
 from volery.ros.client_libraries.rclpy.context import Context, Contexts
 from volery.ros.client_libraries.rclpy.entities import (
     Client,
@@ -21,14 +17,21 @@ from volery.ros.client_libraries.rclpy.entities import (
     Timer,
     period_of,
 )
-from volery.ros.client_libraries.rclpy.executors import Executor
+from volery.ros.client_libraries.rclpy.executors import (
+    CallbackGroup,
+    Executor,
+    MutuallyExclusiveCallbackGroup,
+    Queue,
+    Task,
+)
 from volery.ros.client_libraries.rclpy.logging import Logger
-from volery.ros.client_libraries.rclpy.node_parameters import NodeParameters
-from volery.ros.client_libraries.rclpy.parameter_services import serve_parameters
-from volery.ros.client_libraries.rclpy.parameters import Declared, Parameter
-from volery.ros.client_libraries.rclpy.task import Task
+from volery.ros.client_libraries.rclpy.parameters import (
+    DeclaredParameters,
+    NodeParameters,
+    Parameter,
+    serve_parameters,
+)
 from volery.ros.client_libraries.rclpy.time import Clock, ClockType, Rate
-from volery.ros.client_libraries.rosout import Rosout
 from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, Graph, QoS
 from volery.ros.graph.group import Work
 
@@ -68,7 +71,9 @@ class Node(NodeParameters):
         told = rosout if services.get("enable_rosout", True) else None
         self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."), told)
         self._clock = self.clocks(clock_type=ClockType.ROS_TIME)
-        self._declared = Declared(self.graph_node, parameter_overrides or (), allow_undeclared_parameters)
+        self._declared = DeclaredParameters(
+            self.graph_node, parameter_overrides or (), allow_undeclared_parameters
+        )
         if automatically_declare_parameters_from_overrides:
             for override in parameter_overrides or ():
                 self._declared.declare(override.name, override.value)

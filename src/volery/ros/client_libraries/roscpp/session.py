@@ -11,8 +11,8 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.task import Task
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.launch import Launch
-from volery.ros.client_libraries.wire import CppFlow
+from volery.ros.client_libraries.abi_codec import CppFlow
+from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph, ServiceError
 
 Thing = TypeVar("Thing")

@@ -11,7 +11,7 @@ Python code; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternio
 ends, shutdown hooks are called, but what a file does behind ``spin`` is not.
 """
 
-from volery.ros.client_libraries.launch import Launch
+from volery.ros.client_libraries.library_base import Launch
 from volery.ros.client_libraries.rospy.module import modules
 
 __all__ = ["Launch", "modules"]

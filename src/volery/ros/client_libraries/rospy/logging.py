@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.waiting import current_task
-from volery.ros.client_libraries.rosout import Caller, caller
+from volery.ros.client_libraries.library_base import Caller, caller
 from volery.ros.client_libraries.rospy.session import Sessions
 from volery.trace.events import Text
 

@@ -1,4 +1,7 @@
-"""The ``rospy`` module of one run, and the message packages beside it."""
+"""rospy's functions of parameters. They work before ``init_node``, as there.
+
+The ``rospy`` module of one run, and the message packages beside it.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,84 @@ from functools import partial
 from types import ModuleType
 from typing import Any
 
+from volery.base.errors import UsageError
 from volery.ros import messages
-from volery.ros.client_libraries.launch import AtEnd, Launch, never
-from volery.ros.client_libraries.module import face_module
-from volery.ros.client_libraries.rospy import parameters, services, time, topics
-from volery.ros.client_libraries.rospy.anymsg import AnyMsg
-from volery.ros.client_libraries.rospy.errors import EXCEPTIONS
+from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, library_module
+from volery.ros.client_libraries.rospy import services, time, topics
 from volery.ros.client_libraries.rospy.logging import LEVELS, loggers
-from volery.ros.client_libraries.rospy.session import Sessions
-from volery.ros.graph import Node, RosGraph
+from volery.ros.client_libraries.rospy.session import EXCEPTIONS, Sessions
+from volery.ros.client_libraries.rospy.topics import AnyMsg
+from volery.ros.graph import Graph, Node, RosGraph
+
+_NO_DEFAULT = object()
+
+
+def get_param(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
+    """A parameter; ``KeyError`` if there is none and no default."""
+    node = sessions.early().node
+    if default is not _NO_DEFAULT:
+        return node.get_parameter(param_name, default)
+    try:
+        return node.get_parameter(param_name)
+    except UsageError as error:
+        raise KeyError(str(error)) from error
+
+
+def get_param_cached(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
+    """``get_param``: what was asked for before is not older here."""
+    return get_param(sessions, param_name, default)
+
+
+def set_param(sessions: Sessions, param_name: str, param_value: Any) -> None:
+    """Set a parameter."""
+    sessions.early().node.set_parameter(param_name, param_value)
+
+
+def has_param(sessions: Sessions, param_name: str) -> bool:
+    """Whether there is such a parameter."""
+    return sessions.early().node.has_parameter(param_name)
+
+
+def delete_param(sessions: Sessions, param_name: str) -> None:
+    """Remove a parameter; ``KeyError`` if there is none."""
+    try:
+        sessions.early().node.delete_parameter(param_name)
+    except UsageError as error:
+        raise KeyError(str(error)) from error
+
+
+def get_param_names(sessions: Sessions) -> list[str]:
+    """All parameters, where the graph is embedded: what others keep is not listed."""
+    graph = sessions.graph
+    if not isinstance(graph, Graph):
+        raise UsageError("rospy.get_param_names() works on the embedded graph only")
+    with sessions.kernel:
+        return graph.parameters.names()
+
+
+def search_param(sessions: Sessions, param_name: str) -> str | None:
+    """The full name of the nearest parameter so called: of this node, of its namespace, of those above.
+
+    Of a name with several parts, only the first is looked for. ``None`` if there is none.
+    """
+    node = sessions.early().node
+    if param_name.startswith(("/", "~")):
+        full = node.resolve(param_name)
+        return full if node.has_parameter(full) else None
+    first = param_name.partition("/")[0]
+    above = node.name
+    while True:
+        if node.has_parameter(f"{above}/{first}"):
+            return f"{above}/{param_name}"
+        if not above:
+            return None
+        above = above.rpartition("/")[0]
+
+
+FUNCTIONS = (
+    get_param, get_param_cached, set_param, has_param, delete_param, get_param_names, search_param
+)  # fmt: skip
+
 
 _BOUND = (
     topics.Publisher,
@@ -32,7 +104,7 @@ def modules(
     graph: RosGraph,
     launched: Mapping[str, Launch] | None = None,
     nodes: Mapping[str, Node] | None = None,
-    at_end: AtEnd = never,
+    at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
     """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
 
@@ -55,8 +127,8 @@ def modules(
         "numpy_msg": {"numpy_msg": numpy_msg},
         "rostime": {one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
     }
-    found = {f"rospy.{part}": face_module(f"rospy.{part}", inside) for part, inside in parts.items()}
-    rospy = face_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
+    found = {f"rospy.{part}": library_module(f"rospy.{part}", inside) for part, inside in parts.items()}
+    rospy = library_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
     return {**messages.modules(), "rospy": rospy, **found}
 
 
@@ -70,7 +142,7 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
         get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics,
-        *parameters.FUNCTIONS,
+        *FUNCTIONS,
     )  # fmt: skip
     bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
     return {

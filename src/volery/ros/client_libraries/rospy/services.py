@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.ros.client_libraries.rospy.errors import ROSException, ServiceException
-from volery.ros.client_libraries.rospy.session import Session, Sessions
+from volery.ros.client_libraries.rospy.session import ROSException, ServiceException, Session, Sessions
 from volery.ros.graph import ServiceError
 from volery.ros.messages import Message
 

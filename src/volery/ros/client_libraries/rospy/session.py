@@ -1,4 +1,7 @@
-"""What one component is to rospy: its node, its helping tasks, whether it is shutting down."""
+"""rospy's exceptions, under its own names.
+
+What one component is to rospy: its node, its helping tasks, whether it is shutting down.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,47 @@ from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.launch import AtEnd, Launch, Launched
-from volery.ros.client_libraries.rosout import Rosout
-from volery.ros.client_libraries.rospy.errors import ROSInitException, ROSInterruptException
+from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.trace.events import Failure, Text
+
+
+class ROSException(Exception):  # noqa: N818 - rospy's name
+    """What rospy raises for time-outs and misuse."""
+
+
+class ROSInitException(ROSException):
+    """A call before ``init_node``."""
+
+
+class ROSSerializationException(ROSException):
+    """A value that does not fit its message's field."""
+
+
+class ROSInterruptException(ROSException, KeyboardInterrupt):
+    """The node is shutting down while it sleeps."""
+
+
+class ROSTimeMovedBackwardsException(ROSInterruptException):
+    """Never raised: time does not move backwards here."""
+
+
+class ServiceException(Exception):  # noqa: N818 - rospy's name
+    """A service call did not succeed."""
+
+
+EXCEPTIONS = {
+    kind.__name__: kind
+    for kind in (
+        ROSException,
+        ROSInitException,
+        ROSSerializationException,
+        ROSInterruptException,
+        ROSTimeMovedBackwardsException,
+        ServiceException,
+    )
+}
+
 
 ERROR = 3
 """Severity, as in syslog."""
@@ -118,7 +157,7 @@ def _in_words(error: Exception) -> str:
 
 
 @dataclass(eq=False)
-class Sessions(Launched):
+class Sessions(LaunchedComponents):
     """All components of one run that are nodes."""
 
     _open: dict[str, Session] = field(default_factory=dict, init=False)

@@ -1,4 +1,7 @@
-"""rospy's ``Publisher``, ``Subscriber`` and ``wait_for_message``."""
+"""``rospy.AnyMsg``: messages of whatever type a topic carries, as ROS 1's bytes.
+
+rospy's ``Publisher``, ``Subscriber`` and ``wait_for_message``.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,67 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns
+from volery.base.time import MS, Ns
 from volery.kernel.waiting import Signal
-from volery.ros.client_libraries.rospy.anymsg import AnyMsg, AnySubscription
-from volery.ros.client_libraries.rospy.errors import ROSException, ROSSerializationException
-from volery.ros.client_libraries.rospy.session import Session, Sessions
+from volery.ros.client_libraries.rospy.session import (
+    ROSException,
+    ROSSerializationException,
+    Session,
+    Sessions,
+)
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, Subscription
-from volery.ros.messages import Message
+from volery.ros.messages import Message, ros1_type, to_ros1
+
+_LOOK: Ns = 100 * MS
+"""How often a topic is looked for that nobody publishes yet."""
+
+
+class AnyMsg:
+    """A message as its bytes, ``_buff``; ``_connection_header`` says of which type and topic."""
+
+    _type = "*"
+    _md5sum = "*"
+
+    def __init__(self, message: Message, topic: str) -> None:
+        kind = ros1_type(message.__msgtype__)
+        self._buff = to_ros1(message)
+        self._connection_header = {
+            "topic": topic, "type": kind.name, "md5sum": kind.md5, "message_definition": kind.text
+        }  # fmt: skip
+
+
+class AnySubscription:
+    """Subscribes once the type of *topic* is known: at once, or when somebody else has stated it."""
+
+    def __init__(self, session: Session, topic: str, callback: Callable[[Any], None], qos: QoS) -> None:
+        self._session, self.topic, self._qos = session, topic, qos
+        self._callback = callback
+        self._made: Subscription | None = None
+        self._open = True
+        session.beside(self._look, f"type of {topic}")
+
+    def _look(self) -> None:
+        node = self._session.node
+        while self._open and not node.closed:
+            kind = next((one.type for one in self._session.graph.topics() if one.name == self.topic), "")
+            if kind:
+                group = self._session.spin_beside(self.topic, f"callback of {self.topic}")
+                self._made = node.subscribe(self.topic, kind, self._hear, self._qos, group)
+                return
+            node.sleep(_LOOK)
+
+    def _hear(self, message: Any) -> None:
+        self._callback(AnyMsg(message, self.topic))
+
+    def publishers(self) -> int:
+        """How many publishers it is connected to."""
+        return 0 if self._made is None else self._made.publishers()
+
+    def close(self) -> None:
+        """Receive no longer."""
+        self._open = False
+        if self._made is not None:
+            self._made.close()
 
 
 def type_name(what: str, data_class: Any) -> str:

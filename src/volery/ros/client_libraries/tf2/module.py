@@ -6,14 +6,19 @@ from types import ModuleType
 from typing import Any
 
 from volery.kernel.api import Kernel
-from volery.ros.client_libraries.module import face_module
-from volery.ros.client_libraries.tf2 import ends, tf
-from volery.ros.client_libraries.tf2.buffer import Buffer
-from volery.ros.client_libraries.tf2.errors import EXCEPTIONS, TransformException
-from volery.ros.client_libraries.tf2.stamped import STAMPED
-from volery.ros.client_libraries.tf2.transformations import TRANSFORMATIONS
+from volery.ros.client_libraries.library_base import library_module
+from volery.ros.client_libraries.tf2 import tf
+from volery.ros.client_libraries.tf2.tf import TRANSFORMATIONS
+from volery.ros.client_libraries.tf2.tf2_ros import (
+    STAMPED,
+    Buffer,
+    StaticTransformBroadcaster,
+    TransformBroadcaster,
+    TransformListener,
+)
+from volery.ros.client_libraries.tf2.transform_tree import EXCEPTIONS, TransformException
 
-_ENDS = (ends.TransformBroadcaster, ends.StaticTransformBroadcaster, ends.TransformListener)
+_ENDS = (TransformBroadcaster, StaticTransformBroadcaster, TransformListener)
 _PARTS = {
     "buffer": "Buffer",
     "transform_broadcaster": "TransformBroadcaster",
@@ -30,12 +35,12 @@ def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[st
         "Buffer": type("Buffer", (Buffer,), {"kernel": kernel}),
         **{kind.__name__: type(kind.__name__, (kind,), members) for kind in _ENDS},
     }
-    tf2_ros = face_module("tf2_ros", names)
+    tf2_ros = library_module("tf2_ros", names)
     parts = {
-        f"tf2_ros.{part}": face_module(f"tf2_ros.{part}", {name: names[name]})
+        f"tf2_ros.{part}": library_module(f"tf2_ros.{part}", {name: names[name]})
         for part, name in _PARTS.items()
     }
-    transformations = face_module("tf.transformations", TRANSFORMATIONS)
+    transformations = library_module("tf.transformations", TRANSFORMATIONS)
     old: dict[str, Any] = {
         **EXCEPTIONS,
         "Exception": TransformException,
@@ -48,8 +53,8 @@ def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[st
     return {
         "tf2_ros": tf2_ros,
         **parts,
-        "tf2_geometry_msgs": face_module("tf2_geometry_msgs", STAMPED),
-        "tf": face_module("tf", old),
+        "tf2_geometry_msgs": library_module("tf2_geometry_msgs", STAMPED),
+        "tf": library_module("tf", old),
         "tf.transformations": transformations,
-        "tf_transformations": face_module("tf_transformations", TRANSFORMATIONS),
+        "tf_transformations": library_module("tf_transformations", TRANSFORMATIONS),
     }

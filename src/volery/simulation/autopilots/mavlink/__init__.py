@@ -1,1 +1,1 @@
-"""The MAVLink face of a simulated autopilot. Message definitions are those of ``volery.links.mavlink``."""
+"""The MAVLink face of a simulated autopilot. Message definitions are those of ``volery.links.mavlink_messages``."""

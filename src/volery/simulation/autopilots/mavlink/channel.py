@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.link import ByteLink, Frame, Link
-from volery.links.rates import Streams
+from volery.links.mavlink_conventions import MessageStreams
 from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 
@@ -93,7 +93,7 @@ class MavlinkChannel:
         self.link = link
         self.index = index
         self.usual = usual
-        self.streams: Streams
+        self.streams: MessageStreams
         self.texts: StatusTextQueue
         self.open = True
         self._system = system

@@ -15,8 +15,7 @@ from typing import Any
 from volery.base.time import S
 from volery.kernel.api import Action, Handle
 from volery.links.link import Frame, Link
-from volery.links.rates import Streams
-from volery.links.status_texts import chunks
+from volery.links.mavlink_conventions import MessageStreams, status_text_chunks
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import MavlinkDialect
 from volery.simulation.autopilots.mavlink.microservices import (
@@ -83,7 +82,7 @@ class MavlinkEndpoint:
         taken = {channel.index for channel in self.channels}
         index = next(index for index in count() if index not in taken)
         channel = MavlinkChannel(link, index, vehicle.system, uses[use] if use else next(iter(uses.values())))
-        channel.streams = Streams(
+        channel.streams = MessageStreams(
             self._kernel,
             self.dialect.message_order,
             lambda names: self._burst(channel, names),
@@ -179,10 +178,10 @@ class MavlinkEndpoint:
     def say(self, severity: int, text: str) -> None:
         """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text.strip()))
-        numbered = self.dialect.texts.numbered or len(chunks(severity, text, 0)) > 1
+        numbered = self.dialect.texts.numbered or len(status_text_chunks(severity, text, 0)) > 1
         if numbered:
             self._text_id = self._text_id % 65_535 + 1
-        pieces = chunks(severity, text, self._text_id if numbered else 0)
+        pieces = status_text_chunks(severity, text, self._text_id if numbered else 0)
 
         def tell() -> None:
             for channel in self.channels:

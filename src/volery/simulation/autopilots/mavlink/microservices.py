@@ -17,8 +17,8 @@ from zlib import crc32
 
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Handle
-from volery.links.mavlink import message_type_of
-from volery.links.parameter_values import as_bytes, from_bytes
+from volery.links.mavlink_conventions import from_bytewise, to_bytewise
+from volery.links.mavlink_messages import message_type_of
 from volery.simulation.autopilots.autopilot_parameters import Parameter
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
 from volery.simulation.autopilots.mavlink.command import (
@@ -154,7 +154,7 @@ class ParameterService:
         name, kind, value = parameter
         return {
             "param_id": name,
-            "param_value": as_bytes(kind, value) if self._habits.bytewise else value,
+            "param_value": to_bytewise(kind, value) if self._habits.bytewise else value,
             "param_type": kind,
             "param_count": len(self._vehicle.parameters),
             "param_index": index,
@@ -164,7 +164,7 @@ class ParameterService:
         """Over names and values: it changes when any of them does."""
         total = 0
         for name, kind, value in self._vehicle.parameters:
-            total = crc32(name.encode() + _REAL.pack(as_bytes(kind, value)), total)
+            total = crc32(name.encode() + _REAL.pack(to_bytewise(kind, value)), total)
         return Parameter(self._habits.checksum, UINT32, float(total))
 
     def on_list(self, peer: Peer, _fields: dict[str, Any]) -> None:
@@ -197,7 +197,9 @@ class ParameterService:
         found = self._vehicle.parameters.find(name)
         if found is None or (self._habits.typed and kind != found.type):
             return
-        self._vehicle.set_parameter(name, from_bytes(found.type, value) if self._habits.bytewise else value)
+        self._vehicle.set_parameter(
+            name, from_bytewise(found.type, value) if self._habits.bytewise else value
+        )
 
     def _tell(self, channel: MavlinkChannel, name: str, index: int) -> None:
         fields = self.unlisted(name)

@@ -3,7 +3,7 @@
 The protocol and the firmware's rules are from public definitions; none of it was compared with a flight.
 """
 
-from volery.links.pprzlink import PPRZLINK
+from volery.links.pprzlink_codec import PPRZLINK
 from volery.simulation.autopilots.firmware import Family, Station
 from volery.simulation.autopilots.paparazzi.rotorcraft import ROTORCRAFT
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from math import radians
 from typing import NamedTuple
 
-from volery.links.pprz_aircraft import stock_aircraft
+from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manual_control import ChannelRange, StickMap

@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import partial
 
 from volery.base.frames import Vector
-from volery.links.pprz_aircraft import stock_aircraft
+from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi.flight_plan import (
     Block,
     Circle,

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
-from volery.links.pprz_aircraft import stock_aircraft
+from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi.airframe import AUTO2_SWITCH
 from volery.simulation.autopilots.paparazzi.modes import set_mode_by_datalink, set_motors
 from volery.simulation.autopilots.vehicle_state import Vehicle

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from volery.vehicles.driver import DriverFactory
+from volery.vehicles.drivers.ardupilot.backend import ArduPilotMavlink, ArduPilotMavros
 from volery.vehicles.drivers.ardupilot.driver import ArduPilot
-from volery.vehicles.drivers.ardupilot.mavlink import MavlinkCommands
-from volery.vehicles.drivers.ardupilot.mavros import MavrosCommands
-from volery.vehicles.drivers.mavlink.opening import Opening
+from volery.vehicles.drivers.mavlink.driver import DriverOpeners
 
 __all__ = ["DRIVER", "ArduPilot", "open_driver", "open_mavros"]
 
-_OPENING = Opening("ardupilot", ArduPilot, MavlinkCommands, MavrosCommands)
+_OPENING = DriverOpeners("ardupilot", ArduPilot, ArduPilotMavlink, ArduPilotMavros)
 
 open_driver = _OPENING.on_link
 open_mavros = _OPENING.on_graph

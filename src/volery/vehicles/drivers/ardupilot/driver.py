@@ -1,6 +1,8 @@
-"""ArduPilot's sequences, written once: what its Copter and Rover want to be asked, and how one sees it done.
+"""Missions as ArduPilot wants them: item 0 is home, which it fills in itself.
 
-They reach it over ``Commands``. Facts behind them, observed on ArduCopter and ArduRover 4.5: a change of mode
+ArduPilot's sequences, written once: what its Copter and Rover want to be asked, and how one sees it done.
+
+They reach it over ``ArduPilotBackend``. Facts behind them, observed on ArduCopter and ArduRover 4.5: a change of mode
 is accepted on the ground without a position, arming in GUIDED is not; so it waits until the vehicle is ready.
 An accepted command is acknowledged before the heartbeat shows it. A target in GUIDED has no acknowledgement
 and never expires; a velocity stands for 3 s. Sticks fall back on the transmitter after 3 s.
@@ -10,52 +12,80 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, isnan
 
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
-from volery.vehicles.driver import Step, Sticks
-from volery.vehicles.drivers.aim import Aim
-from volery.vehicles.drivers.ardupilot.commands import Commands
-from volery.vehicles.drivers.ardupilot.items import items_of
+from volery.vehicles.driver import ManualControl, Step
+from volery.vehicles.drivers.ardupilot.backend import ArduPilotBackend
+from volery.vehicles.drivers.ardupilot.link_loss import on_link_loss
 from volery.vehicles.drivers.ardupilot.modes import GUIDED
-from volery.vehicles.drivers.ardupilot.setpoints import Setpoints
-from volery.vehicles.drivers.ardupilot.silence import if_silent
-from volery.vehicles.drivers.arrival import DRONE_KIND, risen, standing
-from volery.vehicles.drivers.mavlink import commands as key
-from volery.vehicles.drivers.mavlink.commands import Item
-from volery.vehicles.drivers.mavlink.sequences import Sequences
+from volery.vehicles.drivers.ardupilot.setpoints import ArduPilotSetpoints
+from volery.vehicles.drivers.mavlink import backend as key
+from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Item, item
+from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
+    DRONE_KIND,
     READY_WITHIN,
     STOPPED_WITHIN,
     TURNED_WITHIN,
-    at_once,
-    check_not_idle,
-    heads,
-    nothing,
-    until_disarmed,
+    at_rest,
+    check_throttle,
+    climbed_to,
+    disarmed_step,
+    heading_reached,
+    immediate_step,
+    send_nothing,
 )
-from volery.vehicles.mission import MissionItem, Waypoint
+from volery.vehicles.drivers.takeover import TargetMonitor
+from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Velocity
 
 
-class ArduPilot(Sequences):
+def items_of(mission: Sequence[MissionItem]) -> list[Item]:
+    """The items on the wire, home first."""
+    items = [item("MAV_CMD_NAV_WAYPOINT")]
+    for one in mission:
+        items += _translated(one)
+    return items
+
+
+def _translated(one: MissionItem) -> list[Item]:
+    if isinstance(one, TakeOff):
+        return [item("MAV_CMD_NAV_TAKEOFF", z=one.height)]
+    if isinstance(one, ChangeSpeed):
+        return [item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED)]
+    if isinstance(one, ReturnHome):
+        return [item("MAV_CMD_NAV_RETURN_TO_LAUNCH")]
+    if isinstance(one, Land):
+        return [item("MAV_CMD_NAV_LAND", at=one.position)]
+    return _waypoint(one)
+
+
+def _waypoint(one: Waypoint) -> list[Item]:
+    point = item("MAV_CMD_NAV_WAYPOINT", one.stay_s, at=one.position)
+    if isnan(one.heading):
+        return [point]
+    return [item("MAV_CMD_CONDITION_YAW", one.heading), point]
+
+
+class ArduPilot(MavlinkDriver):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     obeys = GUIDED
     comes_down = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
 
-    def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
+    def __init__(self, kernel: Kernel, name: str, commands: ArduPilotBackend) -> None:
         super().__init__(kernel, name, commands)
         self._commands = commands
-        self._setpoints = Setpoints(kernel, commands)
+        self._setpoints = ArduPilotSetpoints(kernel, commands)
 
     def if_silent(self) -> str:
         """From its failsafe for ground stations."""
         parameters = self._commands.parameters
-        return if_silent(self.telemetry.kind, parameters) if parameters is not None else ""
+        return on_link_loss(self.telemetry.kind, parameters) if parameters is not None else ""
 
     # -- from the ground
 
@@ -64,7 +94,7 @@ class ArduPilot(Sequences):
         climb = Step(
             ask=f"climb to {height:g} m",
             send=lambda: self._commands.takeoff(height),
-            done=risen(height),
+            done=climbed_to(height),
             within=within,
             answer=key.TAKEOFF,
             again=2 * S,
@@ -89,21 +119,21 @@ class ArduPilot(Sequences):
             self._commands.target(goal)
             self._commands.watch_target()
 
-        target = Aim(self.telemetry, self._eviction).reach(goal, send, GUIDED, within, rover=rover)
+        target = TargetMonitor(self.telemetry, self._eviction).reach(goal, send, GUIDED, within, rover=rover)
         return (*start, *(self._at_speed(speed, GUIDED) if speed is not None else ()), target)
 
     def hold(self) -> Sequence[Step]:
         """A rover in HOLD; a drone in GUIDED, first without velocity, then where it has stopped."""
         if self.telemetry.kind != DRONE_KIND:
-            stand = Step(ask="stand", send=nothing, done=standing, within=STOPPED_WITHIN, mode="HOLD")
+            stand = Step(ask="stand", send=send_nothing, done=at_rest, within=STOPPED_WITHIN, mode="HOLD")
             return (*self._change("HOLD"), stand)
-        return (*self._guided(), self._setpoints.braking(), at_once("stay", self._stay))
+        return (*self._guided(), self._setpoints.braking(), immediate_step("stay", self._stay))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """GUIDED, then repeated until it has lasted long enough; then it stops."""
         return (
             *self._guided(),
-            at_once("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
+            immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
         )
 
     def heading(self, degrees: float) -> Sequence[Step]:
@@ -112,7 +142,7 @@ class ArduPilot(Sequences):
         turn = Step(
             ask=f"turn to {degrees:g} degrees",
             send=lambda: self._commands.turn(degrees),
-            done=heads(degrees),
+            done=heading_reached(degrees),
             within=TURNED_WITHIN,
             answer=key.HEADING,
             again=2 * S,
@@ -127,7 +157,7 @@ class ArduPilot(Sequences):
             return self._until_disarmed("RTL", "return home and land", within)
 
         come = self._comes_home("RTL", "HOLD", within)
-        return (*self._change("RTL"), at_once("let go of the sticks", self._setpoints.release), come)
+        return (*self._change("RTL"), immediate_step("let go of the sticks", self._setpoints.release), come)
 
     def land(self, within: Ns) -> Sequence[Step]:
         """LAND, until it has disarmed itself."""
@@ -138,7 +168,7 @@ class ArduPilot(Sequences):
     def stabilize(self) -> Sequence[Step]:
         """STABILIZE, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._setpoints.hold_any()
-        check_not_idle(self.telemetry, self._setpoints.held)
+        check_throttle(self.telemetry, self._setpoints.held)
         return self._change("STABILIZE")
 
     def altitude_hold(self) -> Sequence[Step]:
@@ -149,10 +179,10 @@ class ArduPilot(Sequences):
     def manual(self) -> Sequence[Step]:
         """MANUAL, with the sticks held."""
         if self._setpoints.held is None:
-            self._setpoints.hold(Sticks(throttle=0.0))
+            self._setpoints.hold(ManualControl(throttle=0.0))
         return self._change("MANUAL")
 
-    def sticks(self, sticks: Sticks | None) -> None:
+    def sticks(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         self._setpoints.take(sticks)
 
@@ -182,7 +212,7 @@ class ArduPilot(Sequences):
             armed=True,
         )
         go_on = self._finish_mission("AUTO", ("HOLD", "RTL"), within)
-        prepare = at_once("prepare the mission", self._forget_progress)
+        prepare = immediate_step("prepare the mission", self._forget_progress)
         armed = (*self.ready(READY_WITHIN), *self._guided(), *self.arm())
         return (*armed, prepare, *self._change("AUTO"), begin, go_on)
 
@@ -197,15 +227,15 @@ class ArduPilot(Sequences):
 
     def _guided(self) -> Sequence[Step]:
         """GUIDED first; only then are the sticks let go."""
-        return (*self._change(GUIDED), at_once("let go of the sticks", self._setpoints.release))
+        return (*self._change(GUIDED), immediate_step("let go of the sticks", self._setpoints.release))
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
         return (
             *self._change(mode),
-            at_once("let go of the sticks", self._setpoints.release),
-            until_disarmed(ask, mode, within),
+            immediate_step("let go of the sticks", self._setpoints.release),
+            disarmed_step(ask, mode, within),
         )
 
     def _stay(self) -> None:

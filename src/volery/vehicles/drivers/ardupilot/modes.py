@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from volery.vehicles.drivers.arrival import DRONE_KIND, ROVER_KIND
+from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 
 GUIDED = "GUIDED"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.vehicles.driver import Sticks
-from volery.vehicles.drivers import setpoints
-from volery.vehicles.drivers.ardupilot.commands import RELEASED, Commands
+from volery.vehicles.driver import ManualControl
+from volery.vehicles.drivers import setpoint_repeater
+from volery.vehicles.drivers.ardupilot.backend import RELEASED, ArduPilotBackend
 from volery.vehicles.drivers.ardupilot.modes import GUIDED
-from volery.vehicles.drivers.arrival import DRONE_KIND
+from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Velocity
 
 STICKS_PERIOD: Ns = 200 * MS
@@ -17,13 +17,13 @@ VELOCITY_PERIOD: Ns = 200 * MS
 STILL = Velocity(0.0, 0.0, 0.0)
 
 
-class Setpoints(setpoints.Setpoints):
+class ArduPilotSetpoints(setpoint_repeater.SetpointRepeater):
     """In GUIDED, and in the mode that was asked for last.
 
     Where the carrier has a cycle nothing is repeated here: the node's own loop does that.
     """
 
-    def __init__(self, kernel: Kernel, commands: Commands) -> None:
+    def __init__(self, kernel: Kernel, commands: ArduPilotBackend) -> None:
         super().__init__(
             kernel,
             commands.telemetry,
@@ -53,7 +53,7 @@ class Setpoints(setpoints.Setpoints):
 
     # -- sticks
 
-    def hold(self, sticks: Sticks) -> None:
+    def hold(self, sticks: ManualControl) -> None:
         """Keep sending these, the first at once."""
         self.held = sticks
         self._send_sticks()
@@ -71,12 +71,12 @@ class Setpoints(setpoints.Setpoints):
         """The last one."""
         return mode == self.asked_mode
 
-    def send(self, sticks: Sticks) -> None:
+    def send(self, sticks: ManualControl) -> None:
         """As pulses of its channels."""
         self._commands.override(channels(sticks, self._seen.kind))
 
 
-def channels(sticks: Sticks, kind: str) -> list[int | None]:
+def channels(sticks: ManualControl, kind: str) -> list[int | None]:
     """Pulse widths in microseconds of channels 1 to 4: roll, pitch, throttle, yaw; forward is a low pitch."""
     if kind == DRONE_KIND:
         return [

@@ -12,16 +12,19 @@ from volery.base.errors import UsageError, choices
 from volery.kernel.api import Kernel
 from volery.ros.graph import Node
 from volery.ros.messages.dji import NEW_NAMES, OLD_NAMES
+from volery.vehicles.address import check_options, records_texts
 from volery.vehicles.driver import DriverFactory
-from volery.vehicles.drivers.dji.carrier import Carrier
+from volery.vehicles.drivers.dji.backend import DjiBackend
 from volery.vehicles.drivers.dji.driver import Dji
-from volery.vehicles.drivers.dji.names import Names, NewNames, OldNames
-from volery.vehicles.drivers.options import check_options, recorded
+from volery.vehicles.drivers.dji.node_interfaces import DjiSdkInterface, NodeInterface, OsdkRosInterface
 
 __all__ = ["DRIVER", "Dji", "open_driver"]
 
 OPTIONS = ("names", "namespace", "texts")
-NAMES: Mapping[str, Callable[[Node, str], Names]] = {OLD_NAMES: OldNames, NEW_NAMES: NewNames}
+NAMES: Mapping[str, Callable[[Node, str], NodeInterface]] = {
+    OLD_NAMES: DjiSdkInterface,
+    NEW_NAMES: OsdkRosInterface,
+}
 
 
 def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Dji:
@@ -37,7 +40,7 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
     names = options.get("names", last if last in NAMES else OLD_NAMES)
     if names not in NAMES:
         raise UsageError(f"names={names!r}; there is {choices(NAMES)}")
-    carrier = Carrier(kernel, node, name, NAMES[names](node, namespace), record=recorded(options))
+    carrier = DjiBackend(kernel, node, name, NAMES[names](node, namespace), record=records_texts(options))
     return Dji(kernel, name, carrier)
 
 

@@ -3,34 +3,47 @@
 What shapes them: tasks (take-off, landing, going home) need no authority, everything else does; a take-off
 goes to a fixed height of its own, the rest is climbed by set-points; a position is a stream of remaining
 offsets; and the authority is the pilot's to take at any time.
+
+What the driver takes for granted of a DJI aircraft beyond the public definitions: one table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import radians
 
 from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.frames import heading_to_yaw
 from volery.base.position import Position
-from volery.base.time import Ns
+from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.ros.messages.dji import DisplayMode
-from volery.vehicles.driver import Capability, Step, Sticks
-from volery.vehicles.drivers.arrival import at, standing
-from volery.vehicles.drivers.dji.carrier import Carrier
-from volery.vehicles.drivers.dji.mission_flight import MissionFlight
-from volery.vehicles.drivers.dji.missions import above_home
-from volery.vehicles.drivers.dji.pieces import DESCENDS, SDK, STARTS, WAITS, Pieces
-from volery.vehicles.drivers.dji.stream import STILL, ByHand, Moving, Point, yaw_of
-from volery.vehicles.drivers.dji.tasks import Tasks
+from volery.ros.messages.dji import HEALTHY_GPS, DisplayMode
+from volery.vehicles.driver import Capability, ManualControl, Step
+from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
+from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, TAKEN_OVER_FOR
+from volery.vehicles.drivers.dji.missions import MissionRunner, above_home
+from volery.vehicles.drivers.dji.sequences import LANDING_MODES, SDK, STARTS, WAITS, DjiSteps, DjiTasks
+from volery.vehicles.drivers.dji.setpoints import (
+    BRAKES_M_S2,
+    DOWN_M_S,
+    OBEYED_WITHIN,
+    STALE,
+    STILL,
+    UP_M_S,
+    Manual,
+    Moving,
+    Point,
+    yaw_of,
+)
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     STOPPED_WITHIN,
     TURNED_WITHIN,
-    at_once,
-    check_not_idle,
-    heads,
+    arrived_at,
+    at_rest,
+    check_throttle,
+    heading_reached,
+    immediate_step,
 )
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
@@ -38,25 +51,25 @@ from volery.vehicles.telemetry import Velocity
 LOW_THROTTLE = 0.3
 """Below it, in the air, thrust by the sticks would let it fall."""
 
-CAN = frozenset(Capability) - {Capability.TERRAIN}
-_NOTHING: frozenset[Capability] = frozenset()
+CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN}
+_NONE: frozenset[Capability] = frozenset()
 
 
 class Dji:
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
-    comes_down = DESCENDS
+    comes_down = LANDING_MODES
     cycle: Action | None = None
 
-    def __init__(self, kernel: Kernel, name: str, carrier: Carrier) -> None:
+    def __init__(self, kernel: Kernel, name: str, carrier: DjiBackend) -> None:
         self.name = name
         self.telemetry = carrier.telemetry
         self._kernel = kernel
         self._carrier = carrier
         self._stream = carrier.stream
-        self._pieces = Pieces(name, carrier)
-        self._tasks = Tasks(self._pieces)
-        self._mission = MissionFlight(self._pieces, self._tasks)
+        self._pieces = DjiSteps(name, carrier)
+        self._tasks = DjiTasks(self._pieces)
+        self._mission = MissionRunner(self._pieces, self._tasks)
 
     @property
     def handover(self) -> str:
@@ -71,7 +84,7 @@ class Dji:
     @property
     def capabilities(self) -> frozenset[Capability]:
         """All but terrain; none until it has been heard."""
-        return CAN if self.telemetry.kind else _NOTHING
+        return CAPABILITIES if self.telemetry.kind else _NONE
 
     def look(self) -> None:
         """What arrives is taken in by itself."""
@@ -130,7 +143,7 @@ class Dji:
         def there() -> Point:
             return Point(goal.latitude, goal.longitude, height, yaw_of(self.telemetry), speed)
 
-        return self._pieces.to_point(f"reach {goal}", there, at(goal, False), within)
+        return self._pieces.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
 
     def hold(self) -> Sequence[Step]:
         """Zero velocity until it stands; then it hovers by itself. Without a position it cannot."""
@@ -139,7 +152,7 @@ class Dji:
         brake = Step(
             ask="stop",
             send=lambda: self._follow(STILL, 0.0, STOPPED_WITHIN),
-            done=lambda seen: standing(seen) and not self._stream.fresh,
+            done=lambda seen: at_rest(seen) and not self._stream.fresh,
             within=STOPPED_WITHIN,
             enters=SDK,
             leads_to=(WAITS,),
@@ -149,7 +162,7 @@ class Dji:
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Streamed for as long as it lasts; then it stops."""
-        follow = at_once("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
+        follow = immediate_step("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
         return (*self._pieces.free(), self._pieces.authority(), follow)
 
     def _follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
@@ -162,23 +175,25 @@ class Dji:
             here = self._pieces.over_here(self.telemetry.above_home)
             return here._replace(yaw=heading_to_yaw(radians(degrees))) if here is not None else None
 
-        return self._pieces.to_point(f"turn to {degrees:g} degrees", turn, heads(degrees), TURNED_WITHIN)
+        return self._pieces.to_point(
+            f"turn to {degrees:g} degrees", turn, heading_reached(degrees), TURNED_WITHIN
+        )
 
     # -- by sticks
 
     def stabilize(self) -> Sequence[Step]:
         """Lean angles, turn rate and thrust."""
-        check_not_idle(self.telemetry, self._stream.held or Sticks(), LOW_THROTTLE)
-        return self._by_hand("fly stabilized", ByHand(keeps_height=False))
+        check_throttle(self.telemetry, self._stream.held or ManualControl(), LOW_THROTTLE)
+        return self._by_hand("fly stabilized", Manual(keeps_height=False))
 
     def altitude_hold(self) -> Sequence[Step]:
         """Lean angles, turn rate and climb rate."""
-        return self._by_hand("hold the altitude", ByHand(keeps_height=True))
+        return self._by_hand("hold the altitude", Manual(keeps_height=True))
 
-    def _by_hand(self, ask: str, aim: ByHand) -> Sequence[Step]:
+    def _by_hand(self, ask: str, aim: Manual) -> Sequence[Step]:
         def send() -> None:
             if self._stream.held is None:
-                self._stream.held = Sticks() if self.telemetry.flying else Sticks(throttle=0.0)
+                self._stream.held = ManualControl() if self.telemetry.flying else ManualControl(throttle=0.0)
             self._pieces.aim(aim)
 
         step = Step(
@@ -195,7 +210,7 @@ class Dji:
         """There are no DJI rovers."""
         raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
 
-    def sticks(self, sticks: Sticks | None) -> None:
+    def sticks(self, sticks: ManualControl | None) -> None:
         """They are sent while it is flown by them."""
         if sticks is None:
             if self._stream.by_hand:
@@ -220,3 +235,28 @@ class Dji:
     def start_mission(self, within: Ns) -> Sequence[Step]:
         """Take off, start it; to its end: down, or standing at the last point."""
         return self._mission.start(within)
+
+
+ASSUMED: Mapping[str, str] = {
+    "`gps_position`": "its altitude is above the sea",
+    "home": "is where the motors started, and `height_above_takeoff` counts from there",
+    "`gps_health`": f"from {HEALTHY_GPS} on positions are to be trusted, and it can arm and go by position",
+    "`rc`": "the fifth axis is the mode switch: any move of it takes the authority, and its return hands "
+    "the aircraft back",
+    "`battery_state`": f"percent; a voltage above {MOST_VOLTS:g} is in millivolts; the current is negative "
+    "when it is drawn",
+    "set-points": f"without effect for {to_seconds(OBEYED_WITHIN):g} s mean that another program has the "
+    f"authority, for {to_seconds(TAKEN_OVER_FOR):g} s at least",
+    "a position": f"older than {to_seconds(STALE):g} s is not reckoned from: no offset is sent",
+    "a set-point on its way": f"has come after {to_seconds(QUIET):g} s; it would end a landing or a way home "
+    "that a program has asked for",
+    "a stated speed": f"is flown as a velocity until it has to brake with {BRAKES_M_S2:g} m/s² for its goal, "
+    f"with at most {UP_M_S:g} m/s up and {DOWN_M_S:g} m/s down",
+    "a mode after a way down": f"counts once it has shown for {to_seconds(SETTLED):g} s: the news that the "
+    "motors stand may come later",
+    "task 6 (land) and task 1 (go home)": "stop the motors at the end by themselves",
+    "leaving a landing or a way home": "takes a set-point with `dji_sdk`, a task of its own with "
+    "`dji_osdk_ros`",
+    "silence of the program": "makes it brake and hover; landing, going home and missions go on",
+}
+"""What, and what is taken for true."""

@@ -10,16 +10,16 @@ from pathlib import Path
 
 from volery.kernel.api import Kernel
 from volery.links.link import Link
-from volery.links.pprz_aircraft import Aircraft, read_aircraft, stock_aircraft
-from volery.links.pprzlink import PPRZLINK
+from volery.links.paparazzi_aircraft import Aircraft, read_aircraft, stock_aircraft
+from volery.links.pprzlink_codec import PPRZLINK
 from volery.ros.graph import Node
+from volery.vehicles.address import check_options
 from volery.vehicles.driver import DriverFactory
-from volery.vehicles.drivers.options import check_options
+from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.driver import Paparazzi
-from volery.vehicles.drivers.paparazzi.ground import Blocks
 from volery.vehicles.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
-from volery.vehicles.drivers.paparazzi.pprzros import PprzrosLink
-from volery.vehicles.drivers.paparazzi.uplink import Uplink
+from volery.vehicles.drivers.paparazzi.pprzros_link import PprzrosLink
+from volery.vehicles.drivers.paparazzi.sequences import Blocks
 
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 
@@ -36,7 +36,7 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
     blocks of its flight plan; ``texts=unrecorded`` where it records its texts itself, as a simulated one.
     """
     check_options("paparazzi", options, *OPTIONS, *CARRIERS)
-    uplink = Uplink(kernel, link, name, _aircraft(options), options)
+    uplink = PaparazziBackend(kernel, link, name, _aircraft(options), options)
     return Paparazzi(kernel, uplink, _blocks(options))
 
 
@@ -49,7 +49,7 @@ def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, st
     check_options("paparazzi", options, *OPTIONS, "namespace")
     aircraft, blocks = _aircraft(options), _blocks(options)
     link = PprzrosLink(kernel, node, options.get("namespace", "/"))
-    return Paparazzi(kernel, Uplink(kernel, link, name, aircraft, options), blocks)
+    return Paparazzi(kernel, PaparazziBackend(kernel, link, name, aircraft, options), blocks)
 
 
 def _aircraft(options: Mapping[str, str]) -> Aircraft:

@@ -1,4 +1,9 @@
-"""Paparazzi's sequences: what its rotorcraft firmware wants to be told, and how one sees it done.
+"""What a Paparazzi rotorcraft will do if its commander falls silent, in words, from its flight plan.
+
+Facts: in GUIDED nothing is missed: neither ground nor transmitter nor, so the sources, a fence. In NAV the
+plan's own rules hold. Modes that sticks fly become FAILSAFE when the sticks stop.
+
+Paparazzi's sequences: what its rotorcraft firmware wants to be told, and how one sees it done.
 
 Facts behind them, from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors
 start and stop by a setting or by a block of the flight plan. Blocks take off and land; in between it goes by
@@ -16,27 +21,36 @@ from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, Step, Sticks
-from volery.vehicles.drivers.aim import Aim
-from volery.vehicles.drivers.arrival import DRONE_KIND
-from volery.vehicles.drivers.eviction import Eviction
-from volery.vehicles.drivers.paparazzi.ground import LIFTED_M, Blocks, Ground
-from volery.vehicles.drivers.paparazzi.if_silent import if_silent
-from volery.vehicles.drivers.paparazzi.modes import BY_ATTITUDE, BY_HEIGHT, FAILSAFE, GUIDED
-from volery.vehicles.drivers.paparazzi.pieces import Pieces
-from volery.vehicles.drivers.paparazzi.uplink import Uplink
+from volery.links.paparazzi_aircraft import Aircraft
+from volery.vehicles.driver import Capability, ManualControl, Step
+from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
+from volery.vehicles.drivers.paparazzi.modes import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
+from volery.vehicles.drivers.paparazzi.sequences import LIFTED_M, Blocks, PaparazziSteps, TakeoffAndLanding
 from volery.vehicles.drivers.steps import (
+    DRONE_KIND,
     READY_WITHIN,
     TURNED_WITHIN,
-    at_once,
-    check_not_idle,
-    heads,
-    until_ready,
+    check_throttle,
+    heading_reached,
+    immediate_step,
+    ready_step,
 )
+from volery.vehicles.drivers.takeover import Takeover, TargetMonitor
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
-CAN = frozenset(
+
+def on_link_loss(aircraft: Aircraft) -> str:
+    """One line."""
+    far = f", further than {aircraft.farthest:g} m from home it turns back" if aircraft.farthest else ""
+    return (
+        "in GUIDED it misses nobody: it goes to its last set-point and stays there, and a velocity goes on "
+        f"without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by sticks it comes "
+        "down (FAILSAFE)"
+    )
+
+
+CAPABILITIES = frozenset(
     {
         Capability.TAKEOFF,
         Capability.GOTO,
@@ -51,7 +65,7 @@ CAN = frozenset(
     }
 )
 """No speed: GUIDED flies at the aircraft's own. No missions: a flight plan is built into the aircraft."""
-_NOTHING: frozenset[Capability] = frozenset()
+_NONE: frozenset[Capability] = frozenset()
 
 
 class Paparazzi:
@@ -63,14 +77,14 @@ class Paparazzi:
     comes_down = frozenset({FAILSAFE})
     cycle: Action | None = None
 
-    def __init__(self, kernel: Kernel, uplink: Uplink, blocks: Blocks) -> None:
+    def __init__(self, kernel: Kernel, uplink: PaparazziBackend, blocks: Blocks) -> None:
         self.name = uplink.telemetry.name
         self.telemetry = uplink.telemetry
         self._uplink = uplink
-        self._pieces = Pieces(kernel, uplink)
+        self._pieces = PaparazziSteps(kernel, uplink)
         self._setpoints = self._pieces.setpoints
-        self._ground = Ground(self._pieces, blocks)
-        self._eviction = Eviction(kernel, uplink.telemetry, GUIDED)
+        self._ground = TakeoffAndLanding(self._pieces, blocks)
+        self._eviction = Takeover(kernel, uplink.telemetry, GUIDED)
 
     @property
     def handover(self) -> str:
@@ -80,14 +94,14 @@ class Paparazzi:
     @property
     def capabilities(self) -> frozenset[Capability]:
         """Those of a rotorcraft; none until it has been heard."""
-        return CAN if self.telemetry.kind == DRONE_KIND else _NOTHING
+        return CAPABILITIES if self.telemetry.kind == DRONE_KIND else _NONE
 
     def look(self) -> None:
         """What arrives is taken in by itself."""
 
     def if_silent(self) -> str:
         """From its flight plan, as far as that says it."""
-        return if_silent(self._uplink.aircraft) if self.telemetry.kind == DRONE_KIND else ""
+        return on_link_loss(self._uplink.aircraft) if self.telemetry.kind == DRONE_KIND else ""
 
     def problem(self) -> LinkError | CapabilityError | None:
         """What is wrong with the way to the aircraft, or with what is there."""
@@ -107,7 +121,7 @@ class Paparazzi:
             "it needs a 3D fix, an origin (blocks 'Wait GPS' and 'Geo init' done, INS_REF sent), an aligned "
             "attitude, and to answer GET_SETTING"
         )
-        return (until_ready(within, advice),)
+        return (ready_step(within, advice),)
 
     def arm(self) -> Sequence[Step]:
         """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""
@@ -132,19 +146,19 @@ class Paparazzi:
         return (*self._pieces.guided(), self._reach(goal, within))
 
     def _reach(self, goal: Position, within: Ns) -> Step:
-        aim = Aim(self.telemetry, self._eviction)
+        aim = TargetMonitor(self.telemetry, self._eviction)
         return aim.reach(goal, lambda: self._uplink.setpoint(self._pieces.at(goal)), GUIDED, within)
 
     def hold(self) -> Sequence[Step]:
         """In GUIDED, first without velocity, then where it has stopped."""
-        return (*self._pieces.guided(), self._setpoints.braking(), at_once("stay", self._pieces.stay))
+        return (*self._pieces.guided(), self._setpoints.braking(), immediate_step("stay", self._pieces.stay))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """GUIDED, then repeated until it has lasted long enough; then it stops."""
         self._pieces.yaw = None
         return (
             *self._pieces.guided(),
-            at_once("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
+            immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
         )
 
     def heading(self, degrees: float) -> Sequence[Step]:
@@ -157,7 +171,7 @@ class Paparazzi:
         step = Step(
             ask=f"turn to {degrees:g} degrees",
             send=turn,
-            done=heads(degrees),
+            done=heading_reached(degrees),
             within=TURNED_WITHIN,
             again=4 * S,
             mode=GUIDED,
@@ -186,19 +200,19 @@ class Paparazzi:
     def stabilize(self) -> Sequence[Step]:
         """ATTITUDE_DIRECT, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._setpoints.hold_any()
-        check_not_idle(self.telemetry, self._setpoints.held)
-        return (self._pieces.change(BY_ATTITUDE),)
+        check_throttle(self.telemetry, self._setpoints.held)
+        return (self._pieces.change(ATTITUDE_MODE),)
 
     def altitude_hold(self) -> Sequence[Step]:
         """ATTITUDE_RC_CLIMB, with the sticks held."""
         self._setpoints.hold_any()
-        return (self._pieces.change(BY_HEIGHT),)
+        return (self._pieces.change(HEIGHT_MODE),)
 
     def manual(self) -> Sequence[Step]:
         """Rovers only."""
         raise CapabilityError(f"{self.name}: a rotorcraft has no wheels to steer by hand")
 
-    def sticks(self, sticks: Sticks | None) -> None:
+    def sticks(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         self._setpoints.take(sticks)
 

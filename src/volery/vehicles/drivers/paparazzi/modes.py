@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from volery.links.pprzlink_definitions import entry_value, message_type
+from volery.links.pprzlink_messages import entry_value, message_type
 
 STATUS = "ROTORCRAFT_STATUS"
 
 KILL, FAILSAFE, HOME = "KILL", "FAILSAFE", "HOME"
 NAV, GUIDED = "NAV", "GUIDED"
-BY_ATTITUDE, BY_HEIGHT = "ATTITUDE_DIRECT", "ATTITUDE_RC_CLIMB"
+ATTITUDE_MODE, HEIGHT_MODE = "ATTITUDE_DIRECT", "ATTITUDE_RC_CLIMB"
 
 NUMBERS: Mapping[str, int] = {
     word: number for number, word in enumerate(message_type(STATUS).words("ap_mode"))
@@ -23,7 +23,7 @@ GOOD_FIX = entry_value(STATUS, "gps_status", "3D")
 NEEDS_CARE = message_type(STATUS).words("arming_status")[8:]
 """Words of ``arming_status`` that say why it does not arm."""
 
-CANNOT_ARM = frozenset({"AHRS_NOT_ALLIGNED", "OUT_OF_GEOFENCE", "LOW_BATTERY"})
+PREVENTS_ARMING = frozenset({"AHRS_NOT_ALLIGNED", "OUT_OF_GEOFENCE", "LOW_BATTERY"})
 """Those that last until something is put right. The others are about a pilot's sticks."""
 
 START = "start of the motors"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from volery.vehicles.driver import DriverFactory
-from volery.vehicles.drivers.mavlink.opening import Opening
+from volery.vehicles.drivers.mavlink.driver import DriverOpeners
+from volery.vehicles.drivers.px4.backend import PX4Mavlink, PX4Mavros
 from volery.vehicles.drivers.px4.driver import PX4
-from volery.vehicles.drivers.px4.mavlink import MavlinkCommands
-from volery.vehicles.drivers.px4.mavros import MavrosCommands
 
 __all__ = ["DRIVER", "PX4", "open_driver", "open_mavros"]
 
-_OPENING = Opening("px4", PX4, MavlinkCommands, MavrosCommands)
+_OPENING = DriverOpeners("px4", PX4, PX4Mavlink, PX4Mavros)
 
 open_driver = _OPENING.on_link
 open_mavros = _OPENING.on_graph

@@ -1,6 +1,11 @@
-"""PX4's sequences, written once: what it wants to be asked, and how one sees it done.
+"""Missions as PX4 wants them: no item for home; what has no place is in MAVLink's mission frame.
 
-They reach it over ``Commands``. Facts behind them, observed on PX4 1.14: a heartbeat comes once a second, so
+As recorded of PX4 1.14, which refuses commands without a place in a global frame, and flies to latitude and
+longitude 0 of an item that does not state them.
+
+PX4's sequences, written once: what it wants to be asked, and how one sees it done.
+
+They reach it over ``PX4Backend``. Facts behind them, observed on PX4 1.14: a heartbeat comes once a second, so
 a mode is acknowledged in milliseconds and seen up to a second later; on the ground every mode is accepted,
 even one that does not come to pass, so the heartbeat is believed. Arming checks are those of the mode it is
 in.
@@ -22,38 +27,72 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 
 from volery.base.errors import UsageError, VehicleError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.vehicles.driver import Repeat, Step, Sticks
-from volery.vehicles.drivers.aim import Aim
-from volery.vehicles.drivers.arrival import DRONE_KIND, ROVER_KIND, at, standing
-from volery.vehicles.drivers.mavlink import commands as key
-from volery.vehicles.drivers.mavlink.commands import Item
-from volery.vehicles.drivers.mavlink.sequences import Sequences
-from volery.vehicles.drivers.mavlink.vocabulary import OWN_SPEED
+from volery.links.mavlink_messages import constant
+from volery.vehicles.driver import ManualControl, Repeat, Step
+from volery.vehicles.drivers.mavlink import backend as key
+from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, OWN_SPEED, UNCHANGED, Item, item
+from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
-from volery.vehicles.drivers.px4.commands import Commands, Setpoint
-from volery.vehicles.drivers.px4.items import items_of
+from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
+from volery.vehicles.drivers.px4.link_loss import on_link_loss
 from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD
-from volery.vehicles.drivers.px4.offboard import PERIOD, STILL, Offboard
-from volery.vehicles.drivers.px4.silence import if_silent
-from volery.vehicles.drivers.px4.stick_stream import StickStream
+from volery.vehicles.drivers.px4.setpoints import SETPOINT_PERIOD, STILL, ManualControlStream, OffboardStream
 from volery.vehicles.drivers.steps import (
+    DRONE_KIND,
     READY_WITHIN,
+    ROVER_KIND,
     STOPPED_WITHIN,
     TURNED_WITHIN,
-    at_once,
-    check_not_idle,
-    heads,
-    nothing,
-    until_disarmed,
+    arrived_at,
+    at_rest,
+    check_throttle,
+    disarmed_step,
+    heading_reached,
+    immediate_step,
+    send_nothing,
 )
-from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint
+from volery.vehicles.drivers.takeover import TargetMonitor
+from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
+
+NO_PLACE = constant("MAV_FRAME_MISSION")
+WITHIN_M = 2.0
+"""A waypoint counts as reached so near; PX4's own NAV_ACC_RAD is the same."""
+
+
+def items_of(mission: Sequence[MissionItem], here: Position) -> list[Item]:
+    """The items on the wire for a mission that begins at *here*."""
+    items: list[Item] = []
+    at = here
+    for one in mission:
+        items.append(_translated(one, at))
+        at = getattr(one, "position", None) or at
+    return items
+
+
+def _translated(one: MissionItem, at: Position) -> Item:
+    if isinstance(one, TakeOff):
+        up = Position(at.latitude, at.longitude, AboveHome(one.height))
+        return item("MAV_CMD_NAV_TAKEOFF", 0.0, 0.0, 0.0, nan, at=up)
+    if isinstance(one, ChangeSpeed):
+        return item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED, frame=NO_PLACE)
+    if isinstance(one, ReturnHome):
+        return item("MAV_CMD_NAV_RETURN_TO_LAUNCH", frame=NO_PLACE)
+    if isinstance(one, Land):
+        down = one.position or Position(at.latitude, at.longitude, AboveHome(0.0))
+        return item("MAV_CMD_NAV_LAND", 0.0, 0.0, 0.0, nan, at=down)
+    return _waypoint(one)
+
+
+def _waypoint(one: Waypoint) -> Item:
+    return item("MAV_CMD_NAV_WAYPOINT", one.stay_s, WITHIN_M, 0.0, one.heading, at=one.position)
+
 
 TAKEOFF_SHORT_M = 1.5
 """NAV_TAKEOFF ended up to 1.03 m below its altitude."""
@@ -62,21 +101,21 @@ REPEATED_FOR: Ns = 1500 * MS
 """MISSION_ITEM_REACHED was repeated eleven times, for a second."""
 
 
-class PX4(Sequences):
+class PX4(MavlinkDriver):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     obeys = HOLD
     comes_down = frozenset({modes.LAND, modes.RTL, "AUTO.PRECLAND"})
 
-    def __init__(self, kernel: Kernel, name: str, commands: Commands) -> None:
+    def __init__(self, kernel: Kernel, name: str, commands: PX4Backend) -> None:
         super().__init__(kernel, name, commands)
         self._kernel = kernel
         self._commands = commands
-        self._offboard = Offboard(kernel, commands, self._eviction)
-        self._sticks = StickStream(kernel, commands)
+        self._offboard = OffboardStream(kernel, commands, self._eviction)
+        self._sticks = ManualControlStream(kernel, commands)
         self._at_own_speed = True
         self._lifted_at: Position | None = None
-        self._stream = Repeat(PERIOD, self._offboard.repeat)
+        self._stream = Repeat(SETPOINT_PERIOD, self._offboard.repeat)
 
     @property
     def handover(self) -> str:
@@ -87,7 +126,7 @@ class PX4(Sequences):
     def if_silent(self) -> str:
         """From its failsafes for the ground station, for OFFBOARD and for sticks."""
         parameters = self._commands.parameters
-        return if_silent(parameters) if parameters is not None else ""
+        return on_link_loss(parameters) if parameters is not None else ""
 
     # -- from the ground
 
@@ -159,7 +198,7 @@ class PX4(Sequences):
     def _target(self, goal: Callable[[], Position], within: Ns) -> Step:
         """DO_REPOSITION to *goal*, until it is there."""
         rover = self.telemetry.kind == ROVER_KIND
-        aim = Aim(self.telemetry, self._eviction)
+        aim = TargetMonitor(self.telemetry, self._eviction)
 
         def send() -> None:
             aim.set(self._reposition(goal()))
@@ -168,7 +207,7 @@ class PX4(Sequences):
         return Step(
             ask="reach it",
             send=send,
-            done=lambda seen: seen.mode == HOLD and at(goal(), rover)(seen),
+            done=lambda seen: seen.mode == HOLD and arrived_at(goal(), rover)(seen),
             within=within,
             answer=key.TARGET,
             again=2 * S,
@@ -214,7 +253,7 @@ class PX4(Sequences):
         return Step(
             ask=ask,
             send=self._stay,
-            done=lambda seen: seen.mode == HOLD and standing(seen),
+            done=lambda seen: seen.mode == HOLD and at_rest(seen),
             within=STOPPED_WITHIN,
             answer=key.TARGET,
             again=2 * S,
@@ -233,8 +272,8 @@ class PX4(Sequences):
         """In OFFBOARD, on the spot; then AUTO.LOITER, which keeps the heading."""
         turn = Step(
             ask=f"turn to {degrees:g} degrees",
-            send=nothing,
-            done=heads(degrees),
+            send=send_nothing,
+            done=heading_reached(degrees),
             within=TURNED_WITHIN,
             mode=OFFBOARD,
             armed=True,
@@ -246,7 +285,7 @@ class PX4(Sequences):
         """The stream first: without it PX4 does not enter. Over a failsafe one must first get to Hold."""
         seen = self.telemetry
         first = self._change(HOLD) if seen.failsafe and seen.mode not in {HOLD, OFFBOARD} else ()
-        begin = at_once("stream set-points", lambda: self._offboard.begin(setpoint, lasting))
+        begin = immediate_step("stream set-points", lambda: self._offboard.begin(setpoint, lasting))
         if self._offboard.holds:
             return (begin,)
         enter = replace(
@@ -275,7 +314,7 @@ class PX4(Sequences):
     def stabilize(self) -> Sequence[Step]:
         """STABILIZED, with the sticks held. In the air not with an idle throttle: it would fall."""
         self._sticks.hold_any()
-        check_not_idle(self.telemetry, self._sticks.held)
+        check_throttle(self.telemetry, self._sticks.held)
         return self._change(modes.STABILIZED)
 
     def altitude_hold(self) -> Sequence[Step]:
@@ -288,7 +327,7 @@ class PX4(Sequences):
         self._sticks.hold_any()
         return self._change(modes.MANUAL)
 
-    def sticks(self, sticks: Sticks | None) -> None:
+    def sticks(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         if sticks is None:
             self._sticks.centre()
@@ -304,7 +343,7 @@ class PX4(Sequences):
             send=self._sticks.centre,
             done=lambda _: self._sticks.settled(),
             within=5 * S,
-            keep=Repeat(PERIOD, self._centring),
+            keep=Repeat(SETPOINT_PERIOD, self._centring),
         )
         return (centre,)
 
@@ -340,7 +379,7 @@ class PX4(Sequences):
             done=lambda _: not repeats or self._kernel.now() - began >= REPEATED_FOR,
             within=5 * S,
         )
-        forget = at_once("begin anew", self._forget_progress)
+        forget = immediate_step("begin anew", self._forget_progress)
         armed = (replace(step, mode=modes.MISSION) for step in self.arm())
         go_on = self._finish_mission(modes.MISSION, (modes.RTL,), within)
         return (*self._let_go(), *ready, quiet, forget, *self._change(modes.MISSION), *armed, go_on)
@@ -357,4 +396,4 @@ class PX4(Sequences):
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        return (*self._let_go(), *self._change(mode), until_disarmed(ask, mode, within))
+        return (*self._let_go(), *self._change(mode), disarmed_step(ask, mode, within))

@@ -44,7 +44,7 @@ MODES: Mapping[str, Mode] = {
 }
 """By name."""
 
-BY_STICKS = frozenset({MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO, "POSCTL.ORBIT", "RATTITUDE"})
+MANUAL_MODES = frozenset({MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO, "POSCTL.ORBIT", "RATTITUDE"})
 """Modes in which the sticks steer it."""
 
 _NAMES = {mode.number: name for name, mode in MODES.items()}

@@ -1,0 +1,299 @@
+"""Instructions whose time is taken, for each class of operations: dependent ones and independent ones.
+
+A snippet is assembly for GCC's and clang's ``asm``. ``chain`` is a link of a dependent chain, of ``links``
+operations; what it has beside them is named in ``less`` and taken off again. ``free`` is an independent one,
+with ``{0}`` for the number of one of eight registers.
+
+Builds the program of snippets, runs it, and gives each snippet's time in cycles with its spread.
+
+The whole calibration: every snippet in turn, kept after each, so that a broken-off one goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+from statistics import median, quantiles
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from volery.base.errors import UsageError
+from volery.cost.native.compilation import llvm_toolchain, run_tool
+
+
+@dataclass(frozen=True)
+class Snippet:
+    """One class: see the module."""
+
+    chain: str
+    free: str
+    links: int = 1
+    less: tuple[str, ...] = ()
+
+
+X86_64 = {
+    "alu": Snippet("add %%rbx, %%rax", "add %%rbx, %%r{0}"),
+    "increment": Snippet("add $1, %%rax", "add $1, %%r{0}"),
+    "move": Snippet("mov %%rax, %%rcx; mov %%rcx, %%rax", "mov %%rbx, %%r{0}", links=2),
+    "shift": Snippet("shl $3, %%rax", "shl $3, %%r{0}"),
+    "shifted_alu": Snippet("lea 1(%%rax,%%rax,4), %%rax", "lea 1(%%rbx,%%rbx,4), %%r{0}"),
+    "multiply": Snippet("imul %%rax, %%rax", "imul %%rbx, %%r{0}"),
+    "divide32": Snippet("xor %%edx, %%edx; div %%ebx", "mov %%r{0}d, %%eax; xor %%edx, %%edx; div %%ebx"),
+    "divide64": Snippet("xor %%edx, %%edx; div %%rbx", "mov %%r{0}, %%rax; xor %%edx, %%edx; div %%rbx"),
+    "load": Snippet("mov 16(%%rsi,%%rcx), %%rcx", "mov 16+8*{0}(%%rsi), %%r{0}"),
+    "transfer": Snippet("movq %%xmm0, %%rcx; movq %%rcx, %%xmm0", "movq %%rbx, %%xmm{0}", links=2),
+    "load_vector": Snippet(
+        "movsd 16(%%rsi,%%rcx), %%xmm0; movq %%xmm0, %%rcx",
+        "movsd 16+8*{0}(%%rsi), %%xmm{0}",
+        less=("transfer",),
+    ),
+    "store": Snippet("mov %%rbx, 256(%%rsi)", "mov %%rbx, 256+8*{0}(%%rsi)"),
+    "branch": Snippet("jo 1f; 1:", "jo 1f; 1:"),
+    "vector": Snippet("paddd %%xmm2, %%xmm3", "paddd %%xmm2, %%xmm{0}"),
+    "vector_move": Snippet(
+        "movaps %%xmm0, %%xmm4; movaps %%xmm4, %%xmm0", "movaps %%xmm0, %%xmm{0}", links=2
+    ),
+    "shuffle": Snippet("unpcklps %%xmm1, %%xmm0", "unpcklpd %%xmm0, %%xmm{0}"),
+    "vector_multiply": Snippet("pmuludq %%xmm2, %%xmm3", "pmuludq %%xmm2, %%xmm{0}"),
+    "fp_add": Snippet(
+        "andpd %%xmm0, %%xmm0; addsd %%xmm1, %%xmm0", "addsd %%xmm0, %%xmm{0}", less=("vector",)
+    ),
+    "fp_multiply": Snippet("mulsd %%xmm1, %%xmm0", "mulsd %%xmm0, %%xmm{0}"),
+    "fp_compare": Snippet("maxsd %%xmm1, %%xmm0", "maxsd %%xmm0, %%xmm{0}"),
+    "fp_divide32": Snippet("divss %%xmm1, %%xmm0", "divss %%xmm0, %%xmm{0}"),
+    "fp_divide64": Snippet("divsd %%xmm1, %%xmm0", "divsd %%xmm0, %%xmm{0}"),
+    "fp_root32": Snippet("sqrtss %%xmm0, %%xmm0", "sqrtss %%xmm0, %%xmm{0}"),
+    "fp_root64": Snippet("sqrtsd %%xmm0, %%xmm0", "sqrtsd %%xmm0, %%xmm{0}"),
+    "convert": Snippet(
+        "cvtps2pd %%xmm0, %%xmm0; cvtpd2ps %%xmm0, %%xmm0", "cvttsd2si %%xmm{0}, %%rax", links=2
+    ),
+}
+"""``rbx`` holds 3, ``rsi`` points to two numbers and zeros, ``rcx`` is 0, ``xmm1`` is a little above 1."""
+
+SNIPPETS = {"x86_64": X86_64}
+
+FORWARD = {"x86_64": "addsd %%xmm1, %%xmm0; movsd %%xmm0, 256(%%rsi); movsd 256(%%rsi), %%xmm0"}
+"""A sum that goes through memory: what is more than the sum is the way from a store to a load."""
+
+NOTHING = {"x86_64": "nop"}
+
+_CHANGED = ("rax", "rbx", "rcx", "rdx", *(f"r{n}" for n in range(8, 16)), *(f"xmm{n}" for n in range(16)))
+PROLOGUE = {
+    "x86_64": (
+        "mov $3, %%ebx; mov $1, %%eax; mov $1, %%edx; movsd 8(%%rsi), %%xmm0; movsd (%%rsi), %%xmm1;"
+        "xor %%ecx, %%ecx; movd %%ebx, %%xmm2; movd %%ebx, %%xmm3; .balign 64; 2:",
+        "dec %%rdi; jnz 2b",
+        ('"+S"', '"+D"'),
+        ", ".join(f'"{name}"' for name in (*_CHANGED, "cc", "memory")),
+    )
+}
+"""What stands before a loop and at its end, where the pointer and the passes are, and what it changes."""
+
+IF_ODD = {
+    "x86_64": '__asm__ volatile("test $1, %b1; je 1f; add $1, %0; 1:" : "+r"(taken) : "r"(bits) : "cc")',
+}
+"""A branch by the lowest bit of a number that is there at once."""
+
+
+CHAIN, FREE, LIBRARY, MEMORY = "chain_", "free_", "library_", "memory_"
+RANDOM, NEVER, WIDTH, FORWARDED = "branches_random", "branches_never", "width", "forward"
+SECOND, THIRD, BEHIND, ROW = "memory_second", "memory_third", "memory_behind", "memory_row"
+LARGEST_THIRD = 32 << 20
+"""A third cache that is larger is shared by many, and counts as memory."""
+UNROLLED, PASSES = 48, 20
+BRANCHES = CALLS = LOADS = 64
+"""How many branches, calls and lines of memory a pass of ``measure.c`` has."""
+
+ROUNDS, MOST_ROUNDS = 15, 150
+MAX_SPREAD = 0.01
+"""A median is tight if half its quartiles' distance, over the root of the rounds, is less, relatively."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """``cycles`` of one operation: a median; ``spread``: its relative error; the frequency meanwhile."""
+
+    cycles: float
+    spread: float
+    rounds: int
+    mhz: float
+
+    @property
+    def tight(self) -> bool:
+        """False if the machine was too noisy."""
+        return self.spread <= MAX_SPREAD
+
+
+def isa() -> str:
+    """The instruction set of this machine. ``UsageError`` if there are no snippets for it."""
+    here = platform.machine()
+    if here not in SNIPPETS:
+        raise UsageError(f"no snippets for {here} yet: code is calibrated on {' and '.join(SNIPPETS)} only")
+    return here
+
+
+def build(folder: Path) -> Path:
+    """Compile the program; ``UsageError`` says which package brings the compiler."""
+    here = files("volery.calibration.processor")
+    measure = _generated(isa()) + here.joinpath("measure.c").read_text(encoding="utf-8")
+    (folder / "measure.c").write_text(measure, encoding="utf-8")
+    (folder / "library.h").write_text(_library(), encoding="utf-8")
+    out = folder / "measure"
+    options = ["-x", "c", "-O1", "-fno-builtin", "-fno-math-errno", "-w"]
+    run_tool([llvm_toolchain().clang, *options, str(folder / "measure.c"), "-lm", "-o", str(out)])
+    return out
+
+
+def snippet_names() -> tuple[str, ...]:
+    """All that is timed."""
+    library = tuple(LIBRARY + name for name in _calls())
+    memory = (SECOND, THIRD, BEHIND, ROW)
+    return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *memory, *library)
+
+
+def time_snippet(program: Path, name: str) -> Timing:
+    """Time one snippet until its median is tight, or has been taken from ``MOST_ROUNDS`` rounds."""
+    each = {RANDOM: BRANCHES, NEVER: BRANCHES}.get(name, UNROLLED * PASSES)
+    each = CALLS if name.startswith((LIBRARY, MEMORY)) else each
+    cycles: list[float] = []
+    ticks: list[float] = []
+    while True:
+        for took, tick in _rounds(program, name):
+            cycles.append(took / tick * UNROLLED * PASSES / each)
+            ticks.append(tick)
+        spread = _spread(cycles)
+        if spread <= MAX_SPREAD or len(cycles) >= MOST_ROUNDS:
+            mhz = 1000.0 * UNROLLED * PASSES / median(ticks)
+            return Timing(median(cycles), spread, len(cycles), mhz)
+
+
+def _rounds(program: Path, name: str) -> Iterator[tuple[float, float]]:
+    for line in run_tool([str(program), name, str(ROUNDS)]).splitlines():
+        _, took, tick = line.split()
+        yield float(took), float(tick)
+
+
+def _spread(values: list[float]) -> float:
+    low, _, high = quantiles(values, n=4)
+    return float((high - low) / 2.0 / math.sqrt(len(values)) / max(median(values), 1e-12))
+
+
+def _loops(machine: str) -> list[tuple[str, str, int]]:
+    """Every loop: its name, its snippet, how often the snippet stands in it."""
+    loops = [("tick", SNIPPETS[machine]["alu"].chain, UNROLLED)]
+    for name, snippet in SNIPPETS[machine].items():
+        loops.append((CHAIN + name, snippet.chain, UNROLLED))
+        eight = ";".join(snippet.free.format(number) for number in range(8, 16))
+        loops.append((FREE + name, eight, UNROLLED // 8))
+    loops.append((FORWARDED, FORWARD[machine], UNROLLED))
+    loops.append((WIDTH, NOTHING[machine], UNROLLED))
+    return loops
+
+
+class CacheGeometry(NamedTuple):
+    """A cache of this machine."""
+
+    bytes: int
+    ways: int
+
+
+def caches() -> tuple[CacheGeometry, CacheGeometry, CacheGeometry]:
+    """The caches for data of this machine, from the first on. One that the system says nothing of is taken to
+    be as usual; where there is no third one that counts, it is as the second.
+    """
+    found = dict(_found())
+    first, second = found.get(1, CacheGeometry(32 << 10, 8)), found.get(2, CacheGeometry(512 << 10, 8))
+    third = found.get(3, second)
+    return first, second, third if third.bytes <= LARGEST_THIRD else second
+
+
+def memory_bytes() -> int:
+    """So many bytes do not fit into the caches, and are not so many that finding their pages takes longer
+    than memory does.
+    """
+    _, second, third = caches()
+    return 2 * third.bytes if third != second else 8 * second.bytes
+
+
+def _found() -> Iterator[tuple[int, CacheGeometry]]:
+    """What Linux says, by level."""
+    for one in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        with suppress(OSError, ValueError):
+            size, ways, level, kind = (
+                (one / name).read_text(encoding="ascii").strip()
+                for name in ("size", "ways_of_associativity", "level", "type")
+            )
+            if kind != "Instruction" and int(ways) > 0:
+                yield int(level), CacheGeometry(int(size.removesuffix("K")) << 10, int(ways))
+
+
+def _library() -> str:
+    return files("volery.calibration.processor").joinpath("library.h").read_text(encoding="utf-8")
+
+
+def _calls() -> list[str]:
+    return re.findall(r"^LIBRARY\((\w+),", _library(), re.MULTILINE)
+
+
+def _generated(machine: str) -> str:
+    """What stands before ``measure.c``: the loops, and the table of cases."""
+    begin, end, (numbers, passes), changed = PROLOGUE[machine]
+    first, second, third = caches()
+    out = [
+        f"#define IN_SECOND {min(4 * first.bytes, second.bytes // 2)}\n",
+        f"#define IN_THIRD {third.bytes // 2}\n",
+        f"#define BEHIND {memory_bytes()}\n",
+        "static double numbers[64] = {1.0000137, 1.3719};\n",
+        f"#define BRANCH_IF_ODD(bits, taken) {IF_ODD[machine]}\n",
+    ]
+    for name, snippet, times in _loops(machine):
+        out.append(
+            f"static void {name}(long passes) {{\n    for (; passes > 0; --passes) {{\n"
+            f"        double *at = numbers;\n        long left = {PASSES};\n"
+            f'        __asm__ volatile("{begin}; .rept {times}; {snippet}; .endr; {end}"\n'
+            f"                         : {numbers}(at), {passes}(left) :: {changed});\n    }}\n}}\n"
+        )
+    out += [f"static void {LIBRARY}{name}(long);\n" for name in _calls()]
+    cases = [name for name, _, _ in _loops(machine)] + [LIBRARY + name for name in _calls()]
+    return "".join(out) + "#define CASES " + ", ".join(f'{{"{name}", {name}}}' for name in cases) + ",\n"
+
+
+ShowSnippet = Callable[[str, int, int], None]
+"""Told after each snippet: its name, how many are done, of how many."""
+
+
+def measure(notes: Path, show: ShowSnippet) -> dict[str, Timing]:
+    """Time every snippet that *notes* does not have yet, and write it there."""
+    taken = read_notes(notes)
+    wanted = snippet_names()
+    with TemporaryDirectory(prefix="volery-processor-") as folder:
+        program = build(Path(folder))
+        for number, name in enumerate(wanted, 1):
+            if name not in taken:
+                taken[name] = time_snippet(program, name)
+                notes.write_text(
+                    json.dumps({one: asdict(told) for one, told in taken.items()}), encoding="utf-8"
+                )
+            show(name, number, len(wanted))
+    return {name: taken[name] for name in wanted}
+
+
+def read_notes(notes: Path) -> dict[str, Timing]:
+    """What an earlier run took; nothing if there was none or its notes cannot be read."""
+    try:
+        told = json.loads(notes.read_text(encoding="utf-8"))
+        return {name: Timing(**one) for name, one in told.items()}
+    except (OSError, ValueError, TypeError):
+        return {}
+
+
+def noisy_snippets(taken: dict[str, Timing]) -> list[str]:
+    """What is not known tightly."""
+    return [name for name, one in taken.items() if not one.tight]

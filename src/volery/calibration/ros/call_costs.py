@@ -1,0 +1,286 @@
+"""What a probe says, and what follows from it for each call: points to fit a law to.
+
+From points to laws: straight lines, how far the points lie from them, and how sure they are.
+
+A line goes through the medians at each x, with weights that make *relative* residuals least: a call that is
+cheap is to be estimated as well as one that is dear. How sure it is: the same from rounds drawn with
+repetition (bootstrap over whole rounds, since what one probe measures hangs together).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Literal, NamedTuple
+
+from volery.base.errors import LinkError
+from volery.base.seeds import stream
+from volery.base.time import S
+
+Clock = Literal["process_ns", "caller_ns"]
+"""CPU time of the whole process, or of the calling thread alone."""
+
+Points = dict[str, dict[float, list[float]]]
+"""Call -> x -> what one of them took, ns, once for each time it was measured."""
+
+ONCE = ("init", "node_handle", "advertise", "subscribe", "service_client", "advertise_service")
+"""Calls that are made once by a fresh process."""
+
+
+SECOND_US = 1e6
+
+
+class Sample(NamedTuple):
+    """One line of a probe: so many cycles of something took so much CPU time and time on the wall."""
+
+    what: str
+    x: float
+    cycles: int
+    waited_ns: int
+    process_ns: int
+    caller_ns: int
+
+    def each(self, clock: Clock) -> float:
+        """CPU time of one cycle, ns."""
+        return float(getattr(self, clock)) / self.cycles
+
+
+Round = tuple[Sample, ...]
+
+
+def read_round(lines: Iterable[str]) -> Round:
+    """What a probe has printed. ``LinkError`` if that is something else."""
+    try:
+        return tuple(Sample(**json.loads(line)) for line in lines if line.startswith("{"))
+    except (ValueError, TypeError) as error:
+        raise LinkError(f"a probe said what is no measurement: {error}") from error
+
+
+def points_of(one: Round, clock: Clock) -> Points:
+    """What each call took in one round."""
+    taken = _RoundAnalysis(one, clock)
+    points: Points = {}
+    for call, x, value in [*taken.once(), *taken.loops(), *taken.publishing(), *taken.hearing()]:
+        points.setdefault(call, {}).setdefault(x, []).append(value)
+    return points
+
+
+def merged(several: Sequence[Points]) -> Points:
+    """The points of several rounds together."""
+    found: Points = {}
+    for points in several:
+        for call, by_x in points.items():
+            for x, values in by_x.items():
+                found.setdefault(call, {}).setdefault(x, []).extend(values)
+    return found
+
+
+Point = tuple[str, float, float]
+
+
+class _RoundAnalysis:
+    """One round by one clock. Idle cycles and the probe's own waiting are taken off everything."""
+
+    def __init__(self, samples: Round, clock: Clock) -> None:
+        self._clock: Clock = clock
+        self._by_name: Mapping[str, list[Sample]] = _grouped(samples)
+        nothing = self._by_name.get("nothing", [])
+        self._own = median([one.each(clock) for one in nothing]) if nothing else 0.0
+        settling = self._by_name.get("settle", [])
+        waited = sum(one.waited_ns for one in settling)
+        spent = sum(one.each(clock) - self._own for one in settling)
+        self._idle = max(0.0, spent / waited) if waited else 0.0
+
+    def _alone(self, one: Sample) -> float:
+        """Of a single call, without what the process would have spent anyway."""
+        return one.each(self._clock) - self._own - self._idle * one.waited_ns
+
+    def _single(self, what: str) -> float | None:
+        found = self._by_name.get(what, [])
+        return median([self._alone(one) for one in found]) if found else None
+
+    def once(self) -> Iterable[Point]:
+        """Registrations, and connections: what they take beyond the same without a peer."""
+        for call in ONCE:
+            value = self._single(call)
+            if value is not None:
+                yield call, 0.0, value
+        for one in self._by_name.get("spin_once_first", []):
+            yield "spin_once_first", 0.0, one.each(self._clock)
+        connect, subscribe = self._single("connect"), self._single("subscribe")
+        if connect is not None and subscribe is not None:
+            yield "connect", 0.0, connect - subscribe
+        advertise = self._single("advertise") or 0.0
+        for one in self._by_name.get("accept", []):
+            yield "accept", 0.0, (self._alone(one) - advertise) / one.x
+
+    def loops(self) -> Iterable[Point]:
+        """Sleeps, and waiting in ``spin``."""
+        for one in self._by_name.get("sleep", []):
+            yield "sleep", one.x, one.each(self._clock)
+        for one in self._by_name.get("wait", []):
+            yield "wait", SECOND_US, one.each(self._clock) * S / one.waited_ns
+
+    def publishing(self) -> Iterable[Point]:
+        """Whole cycles minus the idle cycles before them."""
+        idle, publish = self._by_name.get("idle", []), self._by_name.get("publish", [])
+        for without, whole in zip(idle, publish, strict=False):
+            yield "publish", whole.x, whole.each(self._clock) - without.each(self._clock)
+        alone, both = self._by_name.get("publish_alone", []), self._by_name.get("publish_both", [])
+        for without, whole in zip(alone, both, strict=False):
+            yield "publish_next", whole.x, whole.each(self._clock) - without.each(self._clock)
+
+    def hearing(self) -> Iterable[Point]:
+        """Cycles that publish and spin, minus those that publish; waiting with messages, minus without."""
+        both, spinning = self._by_name.get("publish_both", []), self._by_name.get("spin_once", [])
+        for without, one in zip(both, spinning, strict=False):
+            yield "spin_once_next", 0.0, one.each(self._clock) - without.each(self._clock)
+        waiting, receiving = self._by_name.get("wait", []), self._by_name.get("receive", [])
+        for quiet, one in zip(waiting, receiving, strict=False):
+            anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
+            yield "receive", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
+
+
+def _grouped(samples: Round) -> dict[str, list[Sample]]:
+    found: dict[str, list[Sample]] = {}
+    for one in samples:
+        found.setdefault(one.what, []).append(one)
+    return found
+
+
+TYPICAL_X = {"publish": 4.0, "publish_next": 2.0, "sleep": 50_000.0, "wait": 1_000_000.0}
+"""Where a law is judged: four subscribers (two), 50 ms, a second."""
+
+DRAWS = 200
+NEGLIGIBLE_NS = 5_000.0
+"""An interval of less to each side is tight whatever the figure: a twentieth of what a cycle takes."""
+
+LOW, HIGH = 0.025, 0.975
+
+
+class CostLine(NamedTuple):
+    """``constant + per_x * x``, ns."""
+
+    constant: float
+    per_x: float = 0.0
+
+    def at(self, x: float) -> float:
+        """Its value."""
+        return self.constant + self.per_x * x
+
+
+@dataclass(frozen=True)
+class CallCost:
+    """What one call takes. ``caller`` is the part of ``whole`` that the calling thread spends.
+
+    ``low`` and ``high`` bound a typical call (95 per cent); ``spread`` is the inter-quartile range of single
+    measurements relative to the law; ``residual`` the greatest distance of a median from the line, relative.
+    """
+
+    call: str
+    whole: CostLine
+    caller: CostLine
+    low: float
+    high: float
+    spread: float
+    residual: float
+    count: int
+    points: dict[float, list[float]]
+
+    @property
+    def typical(self) -> float:
+        """What a typical call takes, ns."""
+        return self.whole.at(TYPICAL_X.get(self.call, 0.0))
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval, relative to a typical call, or to ``NEGLIGIBLE_NS`` if that takes less."""
+        return (self.high - self.low) / 2.0 / max(self.typical, NEGLIGIBLE_NS)
+
+    def is_tight(self, within: float) -> bool:
+        """Whether it is known to *within* (relative)."""
+        return self.half_width <= within or (self.high - self.low) / 2.0 <= NEGLIGIBLE_NS
+
+
+def fit(by_x: dict[float, list[float]]) -> CostLine:
+    """The line through the medians at each x, nowhere below zero for an x that is not.
+
+    With one x only: a constant if that is 0, else proportional.
+    """
+    medians = {x: median(values) for x, values in by_x.items()}
+    if len(medians) == 1:
+        [(x, value)] = medians.items()
+        return CostLine(0.0, max(0.0, value) / x) if x else CostLine(max(0.0, value))
+    constant, per_x = _least_squares(medians)
+    if per_x < 0.0:  # noise has turned a part of it below zero, which no cost is
+        return CostLine(max(0.0, median(medians.values())))
+    if constant < 0.0:
+        return CostLine(0.0, max(0.0, median(value / x for x, value in medians.items() if x)))
+    return CostLine(constant, per_x)
+
+
+def _least_squares(medians: dict[float, float]) -> tuple[float, float]:
+    """Constant and slope, residuals weighted by the value."""
+    weights = {x: max(value, NEGLIGIBLE_NS) ** -2 for x, value in medians.items()}
+    total = sum(weights.values())
+    mean_x = sum(weights[x] * x for x in medians) / total
+    mean_y = sum(weights[x] * value for x, value in medians.items()) / total
+    spread_x = sum(weights[x] * (x - mean_x) ** 2 for x in medians)
+    slope = sum(weights[x] * (x - mean_x) * (value - mean_y) for x, value in medians.items()) / spread_x
+    return mean_y - slope * mean_x, slope
+
+
+def call_costs(rounds: Sequence[Round], seed: int = 1) -> dict[str, CallCost]:
+    """What every call takes, by the rounds so far."""
+    whole = [points_of(one, "process_ns") for one in rounds]
+    together, callers = merged(whole), merged([points_of(one, "caller_ns") for one in rounds])
+    drawn = _drawn(whole, seed)
+    return {
+        call: _cost(call, by_x, callers[call], sorted(drawn[call])) for call, by_x in sorted(together.items())
+    }
+
+
+def _cost(
+    call: str, by_x: dict[float, list[float]], of_caller: dict[float, list[float]], drawn: list[float]
+) -> CallCost:
+    line = fit(by_x)
+    away = sorted(
+        (value - line.at(x)) / max(line.at(x), NEGLIGIBLE_NS)
+        for x, values in by_x.items()
+        for value in values
+    )
+    from_line = [
+        abs(median(values) - line.at(x)) / max(line.at(x), NEGLIGIBLE_NS) for x, values in by_x.items()
+    ]
+    return CallCost(
+        call=call,
+        whole=line,
+        caller=fit(of_caller),
+        low=_quantile(drawn, LOW),
+        high=_quantile(drawn, HIGH),
+        spread=_quantile(away, 0.75) - _quantile(away, 0.25),
+        residual=max(from_line),
+        count=len(away),
+        points=by_x,
+    )
+
+
+def _drawn(rounds: Sequence[Points], seed: int) -> dict[str, list[float]]:
+    """The typical cost of each call, from as many rounds drawn with repetition, many times."""
+    random = stream(seed, "calibrate/bootstrap")
+    found: dict[str, list[float]] = {}
+    for _ in range(DRAWS):
+        chosen = merged(random.choices(rounds, k=len(rounds)))
+        for call, by_x in chosen.items():
+            found.setdefault(call, []).append(fit(by_x).at(TYPICAL_X.get(call, 0.0)))
+    return found
+
+
+def _quantile(ordered: Sequence[float], share: float) -> float:
+    """Linear between order statistics."""
+    place = share * (len(ordered) - 1)
+    below = int(place)
+    above = min(below + 1, len(ordered) - 1)
+    return ordered[below] + (ordered[above] - ordered[below]) * (place - below)

@@ -1,0 +1,250 @@
+"""A component's file and what it imports, as modules of one run.
+
+Files are executed as they are, with three differences that the file cannot see: modules whose meaning depends
+on the run (``time``, ``random``, ``queue``, ``threading``, ``rospy`` ...) are replaced by stand-ins *for
+these files only*; modules beside the component's file are loaded the same way; and, where code is counted,
+counters are compiled in. Nothing global is changed.
+
+Each instance of a component executes its own copy of the component's file, as its own process would. Modules
+beside it are executed once a run, so that the classes they define are the same for everybody: types that
+components exchange belong into a file of their own.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+from volery.base.errors import ComponentError, Location, ModelError
+from volery.components.instance import COMPONENT_MARK
+from volery.cost.instrumentation import StepCounter
+
+_PREFIX = "volery.user"
+USER_MODULE_PREFIX = f"{_PREFIX}."
+"""What the names of all modules of users begin with."""
+SHARED_MODULE_PREFIX = f"{_PREFIX}.shared."
+"""And of those that components share: what is beside their files."""
+FRAMEWORK_PACKAGE = "volery"
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A component's file, parsed. ``file`` is as it is to be named in messages."""
+
+    path: Path
+    tree: ast.Module
+
+    def class_names(self) -> list[str]:
+        """Classes that the file defines or imports at top level."""
+        names = [node.name for node in self.tree.body if isinstance(node, ast.ClassDef)]
+        for node in self.tree.body:
+            if isinstance(node, ast.ImportFrom):
+                names += [alias.asname or alias.name for alias in node.names]
+        return names
+
+    def is_script(self) -> bool:
+        """Whether it has an ``if __name__ == "__main__":`` at top level."""
+        tests = (node.test for node in self.tree.body if isinstance(node, ast.If))
+        return any("__main__" in ast.unparse(test) for test in tests)
+
+    def line_of(self, class_name: str, method: str = "") -> int:
+        """The line of a top-level class, or of one of its methods; 1 if it is not there."""
+        for node in self.tree.body:
+            if isinstance(node, ast.ClassDef) and node.name == class_name:
+                inside = (
+                    item for item in node.body if isinstance(item, ast.FunctionDef) and item.name == method
+                )
+                return next((item.lineno for item in inside), node.lineno)
+        return 1
+
+
+def parse(path: Path, where: Location | None = None) -> SourceFile:
+    """Read a component's file. ``ModelError`` (at *where*, the line that names it) if it is missing or no
+    Python.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ModelError(f"no file {path}", where=where) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path} cannot be read: {error}", where=where) from error
+    try:
+        return SourceFile(path, ast.parse(text, filename=str(path)))
+    except SyntaxError as error:
+        raise ModelError(f"not Python: {error.msg}", where=Location(str(path), error.lineno or 1)) from error
+    except ValueError as error:
+        raise ModelError(f"not Python: {error}", where=Location(str(path), 1)) from error
+
+
+@dataclass
+class Loader:
+    """Loads the files of one run.
+
+    ``stand_ins`` maps dotted module names to what is imported in their place. ``steps`` is the counter of
+    code, or ``None`` where code is not counted.
+    """
+
+    stand_ins: Mapping[str, ModuleType] = field(default_factory=dict)
+    steps: StepCounter | None = None
+    libraries: set[str] = field(default_factory=set)
+    """Top-level names of the libraries that the files import beside Python's own: they compute uncounted."""
+
+    def __post_init__(self) -> None:
+        self._codes: dict[Path, CodeType] = {}
+        self._shared: dict[Path, ModuleType] = {}
+
+    def load(self, source: SourceFile, name: str, as_main: bool = False) -> ModuleType:
+        """Execute a component's file for the instance called *name* and return its module.
+
+        *as_main*: with ``__name__ == "__main__"``, for plain scripts; it may then block. ``ComponentError``
+        if a file is executed on loading and raises.
+        """
+        full_name = f"{_PREFIX}.{name}.{source.path.stem}"
+        code = self._compile(source)
+        module = self._module(full_name, source.path)
+        if as_main:
+            module.__name__ = "__main__"
+            exec(code, module.__dict__)
+            return module
+        self._execute(code, module, name)
+        return module
+
+    def _module(self, full_name: str, path: Path) -> ModuleType:
+        module = ModuleType(full_name)
+        module.__file__ = str(path)
+        module.__dict__[COMPONENT_MARK] = True
+        module.__dict__["__builtins__"] = self._builtins(path.parent)
+        if self.steps:
+            module.__dict__.update(self.steps.names())
+        sys.modules[full_name] = module  # dataclasses and typing look a class's module up there
+        return module
+
+    def _compile(self, source: SourceFile) -> CodeType:
+        code = self._codes.get(source.path)
+        if code is None:
+            tree = self.steps.instrument(source.tree) if self.steps else source.tree
+            code = compile(tree, str(source.path), "exec", dont_inherit=True)
+            self._codes[source.path] = code
+        return code
+
+    def _execute(self, code: CodeType, module: ModuleType, name: str) -> None:
+        try:
+            exec(code, module.__dict__)
+        except Exception as error:
+            raise ComponentError(
+                name, f"{module.__file__} cannot be loaded: {type(error).__name__}: {error}"
+            ) from error
+        finally:
+            if self.steps:
+                self.steps.take()  # loading is no part of what a component does
+
+    def _builtins(self, folder: Path) -> dict[str, Any]:
+        names = vars(self.stand_ins.get("builtins", builtins))
+        return {**names, "__import__": _Import(self, folder)}
+
+    def sibling(self, name: str, folder: Path) -> ModuleType | None:
+        """The module or package *name* (dotted) beside the file that asks for it; ``None`` if none is."""
+        base = folder.joinpath(*name.split("."))
+        for path in (base.with_name(base.name + ".py"), base / "__init__.py"):
+            if path.is_file():
+                return self._share(path, name)
+        return None
+
+    def _share(self, path: Path, name: str) -> ModuleType:
+        known = self._shared.get(path)
+        if known is not None:
+            return known
+        code = self._compile(parse(path))
+        module = self._module(f"{SHARED_MODULE_PREFIX}{name}", path)
+        if path.name == "__init__.py":
+            module.__path__ = [str(path.parent)]
+        self._shared[path] = module  # before it runs, as Python does: modules may import each other
+        try:
+            self._execute(code, module, name)
+        except BaseException:
+            del self._shared[path]
+            raise
+        return module
+
+
+class _Import:
+    """``__import__`` for the files in one folder."""
+
+    def __init__(self, loader: Loader, folder: Path) -> None:
+        self._loader = loader
+        self._folder = folder
+
+    def __call__(
+        self,
+        name: str,
+        globals_: Mapping[str, Any] | None = None,
+        locals_: Mapping[str, Any] | None = None,
+        fromlist: tuple[str, ...] | None = (),
+        level: int = 0,
+    ) -> ModuleType:
+        if level:
+            return self._relative(name, fromlist or (), level)
+        found = self._find(name)
+        if found is None:
+            return self._real(name, globals_, fromlist)
+        if fromlist:
+            self._submodules(found, name, fromlist)
+            return found
+        return self._top_of(name, found)
+
+    def _find(self, name: str) -> ModuleType | None:
+        return self._loader.stand_ins.get(name) or self._loader.sibling(name, self._folder)
+
+    def _real(
+        self, name: str, globals_: Mapping[str, Any] | None, fromlist: tuple[str, ...] | None
+    ) -> ModuleType:
+        module = builtins.__import__(name, globals_, None, fromlist or ())
+        top = name.partition(".")[0]
+        if top not in sys.stdlib_module_names and top != FRAMEWORK_PACKAGE:
+            self._loader.libraries.add(top)
+        return module
+
+    def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
+        """``from package import module``: the module has to be loaded before the name is looked up."""
+        for attribute in wanted:
+            if attribute == "*" or attribute in vars(package):
+                continue
+            module = self._find(f"{name}.{attribute}")
+            if module is not None:
+                setattr(package, attribute, module)
+                continue
+            try:
+                getattr(package, attribute)
+            except AttributeError as error:
+                raise ImportError(str(error)) from None
+
+    def _top_of(self, name: str, found: ModuleType) -> ModuleType:
+        """``import a.b.c`` binds ``a``, through which ``a.b.c`` is reached."""
+        parts = name.split(".")
+        module = found
+        for length in range(len(parts) - 1, 0, -1):
+            parent = self._find(".".join(parts[:length])) or ModuleType(".".join(parts[:length]))
+            setattr(parent, parts[length], module)
+            module = parent
+        return module
+
+    def _relative(self, name: str, fromlist: tuple[str, ...], level: int) -> ModuleType:
+        """``from .name import a`` and ``from . import a``: beside the file, or *level* - 1 folders above."""
+        folder = self._folder
+        for _ in range(level - 1):
+            folder = folder.parent
+        package = self._loader.sibling(name or "__init__", folder)
+        if package is None and name:
+            raise ImportError(f"no module {'.' * level}{name} in {folder}")
+        found = package or ModuleType(folder.name)
+        for attribute in fromlist:
+            module = self._loader.sibling(f"{name}.{attribute}" if name else attribute, folder)
+            if module is not None and attribute not in vars(found):
+                setattr(found, attribute, module)
+        return found

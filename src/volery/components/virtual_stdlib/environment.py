@@ -1,0 +1,195 @@
+"""``time`` and ``datetime`` on the clock of the run. Local time is UTC, on every machine.
+
+``random`` with a named stream for each component, seeded from the run's seed.
+
+``print``: what a component prints becomes a line of the trace, and goes to the standard error stream.
+
+The standard output belongs to the program that runs the components.
+"""
+
+from __future__ import annotations
+
+import builtins as real_builtins
+import datetime as real_datetime
+import random as real_random
+import sys
+import time as real_time
+from io import StringIO
+from types import ModuleType
+from typing import Any
+
+from volery.base.seeds import stream
+from volery.base.time import Ns, S, from_seconds, to_seconds
+from volery.components.virtual_stdlib.module import make_module
+from volery.kernel import waiting
+from volery.kernel.api import Kernel
+from volery.trace.events import Text
+
+_PURE = ("struct_time", "strptime", "asctime", "timezone", "tzname")
+
+
+class _Clock:
+    def __init__(self, kernel: Kernel, epoch: Ns) -> None:
+        self._kernel = kernel
+        self._epoch = epoch
+
+    def monotonic_ns(self) -> Ns:
+        """Since the start of the run. An interaction point."""
+        with self._kernel as kernel:
+            return kernel.now()
+
+    def monotonic(self) -> float:
+        return to_seconds(self.monotonic_ns())
+
+    def time_ns(self) -> Ns:
+        return self._epoch + self.monotonic_ns()
+
+    def time(self) -> float:
+        return self.time_ns() / S
+
+    def sleep(self, seconds: float) -> None:
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        waiting.sleep(self._kernel, from_seconds(seconds))
+
+    def gmtime(self, seconds: float | None = None) -> real_time.struct_time:
+        return real_time.gmtime(self.time() if seconds is None else seconds)
+
+    def ctime(self, seconds: float | None = None) -> str:
+        return real_time.asctime(self.gmtime(seconds))
+
+    def strftime(self, form: str, when: Any = None) -> str:
+        return real_time.strftime(form, self.gmtime() if when is None else when)
+
+
+def time_module(kernel: Kernel, epoch: Ns) -> ModuleType:
+    """Stands in for ``time``."""
+    clock = _Clock(kernel, epoch)
+    names: dict[str, Any] = {name: getattr(real_time, name) for name in _PURE}
+    names.update(timezone=0, tzname=("UTC", "UTC"), daylight=0, altzone=0)
+    for name in ("monotonic", "monotonic_ns", "time", "time_ns", "sleep", "gmtime", "ctime", "strftime"):
+        names[name] = getattr(clock, name)
+    names["localtime"] = clock.gmtime
+    names["perf_counter"] = clock.monotonic
+    names["perf_counter_ns"] = clock.monotonic_ns
+    return make_module("time", names)
+
+
+def datetime_module(kernel: Kernel, epoch: Ns) -> ModuleType:
+    """Stands in for ``datetime``: ``now``, ``utcnow`` and ``today`` on the clock of the run."""
+    clock = _Clock(kernel, epoch)
+
+    class RunDatetime(real_datetime.datetime):
+        @classmethod
+        def now(cls, tz: real_datetime.tzinfo | None = None) -> RunDatetime:
+            utc = cls.fromtimestamp(clock.time(), real_datetime.UTC)
+            return utc.astimezone(tz) if tz is not None else utc.replace(tzinfo=None)
+
+        @classmethod
+        def utcnow(cls) -> RunDatetime:
+            return cls.now()
+
+        @classmethod
+        def today(cls) -> RunDatetime:
+            return cls.now()
+
+    class RunDate(real_datetime.date):
+        @classmethod
+        def today(cls) -> RunDate:
+            now = RunDatetime.now()
+            return cls(now.year, now.month, now.day)
+
+    RunDatetime.__name__ = RunDatetime.__qualname__ = "datetime"
+    RunDate.__name__ = RunDate.__qualname__ = "date"
+    names = {name: value for name, value in vars(real_datetime).items() if not name.startswith("_")}
+    return make_module("datetime", {**names, "datetime": RunDatetime, "date": RunDate})
+
+
+_DRAWS = (
+    "betavariate",
+    "binomialvariate",
+    "choice",
+    "choices",
+    "expovariate",
+    "gammavariate",
+    "gauss",
+    "getrandbits",
+    "getstate",
+    "lognormvariate",
+    "normalvariate",
+    "paretovariate",
+    "randbytes",
+    "randint",
+    "random",
+    "randrange",
+    "sample",
+    "seed",
+    "setstate",
+    "shuffle",
+    "triangular",
+    "uniform",
+    "vonmisesvariate",
+    "weibullvariate",
+)
+
+
+class _Streams:
+    """One stream a component, made when it first draws. Who draws is read from the flow of control."""
+
+    def __init__(self, kernel: Kernel, seed: int) -> None:
+        self._kernel = kernel
+        self._seed = seed
+        self._streams: dict[str, real_random.Random] = {}
+
+    def mine(self) -> real_random.Random:
+        task = self._kernel.current()
+        component = task.place.component if task is not None else ""
+        if component not in self._streams:
+            self._streams[component] = stream(self._seed, f"component {component}")
+        return self._streams[component]
+
+
+def random_module(kernel: Kernel, seed: int) -> ModuleType:
+    """Stands in for ``random``. ``Random()`` without a seed takes one from the component's stream."""
+    streams = _Streams(kernel, seed)
+
+    class Random(real_random.Random):
+        def __init__(self, x: Any = None) -> None:
+            super().__init__(streams.mine().getrandbits(64) if x is None else x)
+
+    def draw(name: str) -> Any:
+        def drawn(*args: Any, **kwargs: Any) -> Any:
+            return getattr(streams.mine(), name)(*args, **kwargs)
+
+        drawn.__name__ = name
+        return drawn
+
+    names: dict[str, Any] = {name: draw(name) for name in _DRAWS if hasattr(real_random.Random, name)}
+    return make_module("random", {**names, "Random": Random, "SystemRandom": Random})
+
+
+INFO = 6
+"""Severity, as in syslog."""
+
+
+def builtins_module(kernel: Kernel) -> ModuleType:
+    """Stands in for ``builtins``, and for the names that are there without an import."""
+
+    def say(
+        *values: Any, sep: str | None = " ", end: str | None = "\n", file: Any = None, flush: bool = False
+    ) -> None:
+        if file is not None:
+            real_builtins.print(*values, sep=sep, end=end, file=file, flush=flush)
+            return
+        written = StringIO()
+        real_builtins.print(*values, sep=sep, end=end, file=written)
+        text = written.getvalue()
+        sys.stderr.write(text)
+        with kernel:
+            task = kernel.current()
+            if task is not None and text.strip():
+                kernel.record(Text(kernel.now(), task.place.component, INFO, text.rstrip()))
+
+    module = ModuleType("builtins", real_builtins.__doc__)
+    module.__dict__.update(vars(real_builtins), print=say)
+    return module

@@ -1,0 +1,210 @@
+"""What a call into ROS costs the processor of the node that makes it.
+
+Law (Modeling and Performance Estimation of Robotic Systems using ROS, formulas 1 and 2):
+
+    call with an x:     time_ns = (a f + b) x + (c f + d)
+    call without one:   time_ns = c f + d
+
+f is the processor's frequency; x is the number of subscribers for ``publish`` and the time slept in
+microseconds for ``sleep``. Coefficients were fitted to the CPU time of the whole process (the calling thread
+and the client library's own threads) at two frequencies per processor; a call without x is the line through
+its two.
+
+Validity: between the two frequencies. No change was seen with publish rate, message size or queue size. Error
+against the measured ROS time of a whole controller: 17 to 42 per cent, always too little (its Table III).
+
+Who pays what: the paper states sums. Measurements of roscpp show that ``publish`` itself is flat and its
+part per subscriber is spent by the library's threads, and that a sleep's cost falls while it sleeps. So
+
+* ``publish``: the constant part is the caller's, the part per subscriber is background;
+* ``sleep``: all of it is background;
+* every other call: all of it is the caller's.
+
+Figures that were measured apart (``caller``, ``caller_per_x``) go before this rule.
+
+Some things happen to a node beside its calls (``BACKGROUND_EVENTS``): a message arrives, somebody connects, time passes
+in ``spin``. The paper does not price them; a law that has figures for them does, all in the background.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pydantic import model_validator
+
+from volery.base.errors import EstimateError, choices
+from volery.base.time import Ns
+from volery.cost.figures import Line, WithProvenance, line_through
+
+NOT_COUNTED = (
+    "ROS service calls (left out of the law: negligible beside the service's own execution)",
+    "ROS parameter, name and time look-ups",
+    "ROS discovery and the master",
+    "connections, messages received and time spent in spin, where a law has no figures for them",
+)
+"""What the law leaves out, in words for a report."""
+
+BACKGROUND_EVENTS = ("receive", "connect", "accept", "wait")
+"""A message is received; a subscription connects to a publisher; a publisher accepts a subscription's
+connection; x microseconds pass in ``spin``. Without a figure they cost nothing, and a report says so.
+"""
+
+WARM_CALLS = {"publish_next": "publish"}
+"""A call that finds the library's threads awake, since they have just sent or received, and what it costs
+where a law does not tell them apart.
+"""
+
+_DEPENDENT = ("publish", "publish_next", "sleep", "wait")
+_SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
+
+
+class Price(NamedTuple):
+    """Target time of one call, ns: what the caller pays before it goes on, what its process pays beside it.
+
+    ``flags`` say what is doubtful about it.
+    """
+
+    caller: Ns
+    background: Ns
+    flags: tuple[str, ...] = ()
+
+
+class CallFigures(WithProvenance):
+    """What is known of one call.
+
+    Coefficients (``constant`` and, if it has an x, ``per_x``), or two points. ``caller`` and
+    ``caller_per_x`` are the parts of them that the calling thread spends, where that was measured. ``error``
+    is the relative band of a typical call.
+    """
+
+    constant: Line | None = None
+    per_x: Line | None = None
+    caller: Line | None = None
+    caller_per_x: Line | None = None
+    error: float | None = None
+    points: dict[float, float] | None = None
+    doubtful_mhz: tuple[float, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_form(self) -> CallFigures:
+        if (self.constant is None) == (self.points is None):
+            raise ValueError("give either 'constant' (and 'per_x') or 'points'")
+        if self.points is not None and len(self.points) != 2:
+            raise ValueError("'points' are two: one at each measured frequency")
+        return self
+
+    def lines(self) -> tuple[Line, Line | None]:
+        """The constant part and the part per x over the frequency, ns."""
+        if self.points is not None:
+            return line_through(self.points), None
+        assert self.constant is not None  # by validation
+        return self.constant, self.per_x
+
+
+class RosLaw(WithProvenance):
+    """The law of one client library on one kind of processor. ``error`` is its relative band."""
+
+    client: str
+    least_mhz: float
+    greatest_mhz: float
+    error: float
+    calls: dict[str, CallFigures]
+    processor: str = ""
+    charged_as: str = ""
+
+    def warnings(self, frequency_mhz: float) -> tuple[str, ...]:
+        """What a report has to say where this law is used at this frequency."""
+        said = []
+        if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
+            said.append(
+                f"{self.processor} at {frequency_mhz:g} MHz is outside the range of its {self.client} "
+                f"figures, {self.least_mhz:g} to {self.greatest_mhz:g} MHz: extrapolated"
+            )
+        if self.charged_as:
+            said.append(
+                f"{self.charged_as} nodes on {self.processor} are charged with {self.client} figures: "
+                f"no figures of {self.charged_as} are in the catalogue"
+            )
+        return tuple(said)
+
+    def price(self, call: str, x: float, frequency_mhz: float) -> Price:
+        """What one call takes; ``EstimateError`` for an unknown call or where a line goes below zero."""
+        return self.at(frequency_mhz)(call, x)
+
+    def at(self, frequency_mhz: float) -> Tariff:
+        """The law at one frequency, for whoever prices many calls."""
+        return Tariff(self, frequency_mhz)
+
+
+class Tariff:
+    """The prices of a law at one frequency: ``tariff(call, x)``."""
+
+    def __init__(self, law: RosLaw, frequency_mhz: float) -> None:
+        self.law = law
+        self.frequency_mhz = frequency_mhz
+        self.warnings = law.warnings(frequency_mhz)
+        self._parts: dict[str, tuple[float, float]] = {}
+        self._callers: dict[str, tuple[float, float]] = {}
+        self._known: dict[tuple[str, float], Price] = {}
+        for call, figures in law.calls.items():
+            self._parts[call] = _at(frequency_mhz, *figures.lines())
+            if figures.caller is not None:
+                self._callers[call] = _at(frequency_mhz, figures.caller, figures.caller_per_x)
+
+    def __call__(self, call: str, x: float = 0.0) -> Price:
+        """What one call takes; see ``RosLaw.price``."""
+        known = self._known.get((call, x))
+        return known if known is not None else self._work_out(call, x)
+
+    def _work_out(self, call: str, x: float) -> Price:
+        name = _SPIN.get(x, call) if call == "spin_once" else call
+        if name in BACKGROUND_EVENTS and name not in self._parts:
+            return NO_PRICE
+        if name not in self._parts:
+            name = WARM_CALLS.get(name, name)
+        if name not in self._parts:
+            raise EstimateError(
+                f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "
+                f"there is {choices(self._parts)}"
+            )
+        constant, per_x = self._parts[name]
+        variable = per_x * x if name in _DEPENDENT else 0.0
+        if constant < 0.0 or variable < 0.0:
+            raise EstimateError(
+                f"the {self.law.client} figures of {self.law.processor} give a negative time for {name!r} at "
+                f"{self.frequency_mhz:g} MHz; they hold from {self.law.least_mhz:g} to "
+                f"{self.law.greatest_mhz:g} MHz"
+            )
+        price = self._split(name, constant, variable, x)
+        if len(self._known) < _REMEMBERED:
+            self._known[call, x] = price
+        return price
+
+    def _split(self, name: str, constant: float, variable: float, x: float) -> Price:
+        flags = self._flags(name)
+        whole = round(constant + variable)
+        if (
+            name == "sleep" or name in BACKGROUND_EVENTS
+        ):  # a sleep's cost falls while it sleeps, whoever spends it
+            return Price(0, whole, flags)
+        if name in self._callers:
+            fixed, per_x = self._callers[name]
+            caller = min(whole, max(0, round(fixed + (per_x * x if name in _DEPENDENT else 0.0))))
+            return Price(caller, whole - caller, flags)
+        return Price(round(constant), round(variable), flags)
+
+    def _flags(self, name: str) -> tuple[str, ...]:
+        figures = self.law.calls[name]
+        if figures.doubtful_mhz and self.frequency_mhz > min(figures.points or {0.0: 0.0}):
+            return (*self.warnings, f"{name}: {figures.note}")
+        return self.warnings
+
+
+def _at(frequency_mhz: float, constant: Line, per_x: Line | None) -> tuple[float, float]:
+    return constant.at(frequency_mhz), per_x.at(frequency_mhz) if per_x else 0.0
+
+
+NO_PRICE = Price(0, 0)
+
+_REMEMBERED = 4096
+"""How many prices a tariff keeps; sleeps of many different lengths must not fill the memory."""

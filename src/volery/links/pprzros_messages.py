@@ -1,0 +1,58 @@
+"""pprzlink's frames as the messages of pprzros, ``pprzros_msgs/PprzrosMsg``, both ways.
+
+``data`` is the payload as on the wire and ``len`` its length. What pprzros itself leaves at 0 (``comp_id``,
+``receiver_id``, ``checksum``) is filled in here; when one arrives, only names, sender and data are looked at.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns, S
+from volery.links.link import Frame
+from volery.links.pprzlink_codec import HEADER, encode
+from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type
+from volery.ros.messages import message_class, new
+
+TYPE = "pprzros_msgs/msg/PprzrosMsg"
+TO_ROS, FROM_ROS = "pprzros/to_ros", "pprzros/from_ros"
+"""Topics: what the aircraft says, and what is said to it."""
+
+VERSION = 2
+"""Of the protocol: 2.0."""
+
+_CLASSES = {TELEMETRY: "telemetry", DATALINK: "datalink"}
+_header = message_class("std_msgs/msg/Header")
+_time = message_class("builtin_interfaces/msg/Time")
+
+
+def to_message(frame: Frame, stamp: Ns) -> Any:
+    """The message that says what *frame* says; *stamp* is ROS time. Raises ``UsageError`` as a codec does."""
+    octets = encode(frame)
+    kind = message_type(frame.name)
+    return new(
+        TYPE,
+        header=_header(_time(*divmod(stamp, S)), ""),
+        version=VERSION,
+        len=len(octets) - HEADER - 2,
+        class_name=_CLASSES.get(kind.kind, "ground"),
+        comp_id=frame.component,
+        msg_name=frame.name,
+        sender_id=frame.system,
+        receiver_id=octets[3],
+        checksum=octets[-2] << 8 | octets[-1],
+        data=list(octets[HEADER:-2]),
+    )
+
+
+def to_frame(message: Any) -> Frame:
+    """The frame that *message* stands for. Raises ``UsageError`` if there is no such message, or it has
+    another length.
+    """
+    kind = message_type(str(message.msg_name))
+    payload = bytes(message.data)
+    fields = kind.unpack(payload)
+    if fields is None:
+        raise UsageError(f"{kind.name} of {len(payload)} bytes: it has another length here")
+    return Frame(kind.name, fields, int(message.sender_id), int(message.comp_id) & 0x0F)

@@ -1,0 +1,334 @@
+"""Vehicles that components command by ROS messages alone: somebody brings them down at the end of a run.
+
+From a model to its running components: instances, ports, programs, nodes and the vehicles they command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from volery.base.position import Position
+from volery.components.instance import Instance
+from volery.components.loader import Loader
+from volery.components.ports import Body, Port, PortList
+from volery.components.programs import (
+    Program,
+    ScriptProgram,
+    StubProgram,
+    load_program,
+    script_or_class,
+    start,
+)
+from volery.components.virtual_stdlib import virtual_modules
+from volery.cost.instrumentation import StepCounter
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place
+from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
+from volery.model.system import Instance as InstanceModel
+from volery.ros.client_libraries.importable_modules import importable_modules
+from volery.ros.client_libraries.library_base import Launch
+from volery.ros.graph import Graph, Node, RosGraph
+from volery.ros.messages import define_imported
+from volery.run.assembly.computers import Platform, commanded_by, is_node
+from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
+from volery.run.assembly.fences import fence_of
+from volery.run.assembly.vehicle_nodes import graph_access, serve_on_graph
+from volery.run.ending import Ending, Landable
+from volery.run.trace_setup import node_name
+from volery.vehicles import Drone, Rover, Vehicle
+
+if TYPE_CHECKING:
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
+
+
+class UnattendedVehicle:
+    """See ``ending.Lands``: joins *graph* for the way down only, and commands what ``open_on`` opens there.
+
+    A vehicle that no computer commands in the end is left to its autopilot.
+    """
+
+    def __init__(self, graph: RosGraph, name: str, open_on: Callable[[Node], Vehicle]) -> None:
+        self.name = name
+        self._graph = graph
+        self._open_on = open_on
+
+    def come_to_rest(self) -> str:
+        """Land it if it is armed and nobody else has it; says what was done."""
+        vehicle = self._open_on(self._graph.node(f"safety_of_{self.name}"))
+        vehicle.wait_heard()
+        return vehicle.come_to_rest()
+
+
+INTERFACES = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
+"""By the kind of vehicle."""
+
+PYTHON_ROS = ("rospy", "rclpy")
+"""Languages whose files import interfaces of ROS."""
+
+
+class LateBoundProgram:
+    """A program whose object is also given what it can only be given in its own flow of control.
+
+    *connect* joins the graph and so costs time; that is the component's.
+    """
+
+    def __init__(
+        self, program: Program, names: Iterable[str], connect: Callable[[], Mapping[str, Any]]
+    ) -> None:
+        self._program = program
+        self._names = tuple(names)
+        self._connect = connect
+
+    def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
+        """See ``Program``."""
+        self._program.check([*given, *self._names], operations, active)
+
+    def make(self, given: Mapping[str, Any]) -> object:
+        """See ``Program``."""
+        return self._program.make({**given, **self._connect()})
+
+    def run(self, thing: object) -> None:
+        """See ``Program``."""
+        self._program.run(thing)
+
+
+@dataclass(frozen=True)
+class BuiltComponents:
+    """Components that are ready to start. ``start`` starts them in the order of the model; ``finish`` is for
+    when all have ended.
+    """
+
+    starters: tuple[Callable[[], object], ...]
+    loader: Loader
+    instances: Mapping[str, Instance]
+    doubts: tuple[str, ...] = ()
+    finish: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        """Every check comes first: nothing has started when something is missing."""
+        for starter in self.starters:
+            starter()
+
+    def warnings(self) -> list[str]:
+        """What the counting of code has left out, and what is doubtful about it."""
+        if self.loader.steps is None or not self.loader.libraries:
+            return list(self.doubts)
+        names = ", ".join(sorted(self.loader.libraries))
+        what = f"what components computed inside libraries was not counted: {names}"
+        return [*self.doubts, f"{what}; state it with volery.add_time()"]
+
+
+Truth = Callable[[], Position]
+"""Where a vehicle really is."""
+
+
+@dataclass(frozen=True)
+class ProcessPart:
+    """The part of a model that one process runs: its instances, its graph, and its way to the others.
+
+    ``reach(caller, callee)`` gives the port of an instance here to one that is elsewhere. ``nodes`` are those
+    that instances have already, by the instances' names; ``truth`` says where a vehicle really is.
+    """
+
+    graph: RosGraph
+    instances: tuple[InstanceModel, ...]
+    reach: Callable[[InstanceModel, InstanceModel], Port]
+    nodes: Mapping[str, Node] = field(default_factory=dict)
+    truth: Callable[[str], Truth] | None = None
+
+
+class Builder:
+    """Makes the components of one run, or of the *part* of it that is this process's.
+
+    Without an *airfield* the vehicles are elsewhere.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        kernel: Kernel,
+        platform: Platform,
+        airfield: SimulatedFleet | None,
+        ending: Ending,
+        *,
+        part: ProcessPart | None = None,
+    ) -> None:
+        self._system = system
+        self._kernel = kernel
+        self._platform = platform
+        self._airfield = airfield
+        self._ending = ending
+        self._fence = fence_of(system.environment)
+        self._part = part
+        self._truth = airfield.truth if airfield else part.truth if part else None
+        self._models = part.instances if part else system.instances
+        self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.between)
+        self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
+        self._lands: dict[str, Landable] = {}
+        self._instances: dict[str, Instance] = {}
+
+    def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
+        """Load every file, make every instance, connect every port."""
+        steps = StepCounter() if fidelity == "code" else None
+        for model in self._models:
+            if model.component.path and model.component.language in PYTHON_ROS:
+                define_imported(self._system.file_of(model.component))
+        launches = self._launches()
+        ready = compile_all(self._system, self._models, fidelity, traced=traces is not None)
+        self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes, traces)
+        modules = importable_modules(self._graph, launches, self._nodes, self._ending.farewell)
+        loader = Loader({**virtual_modules(self._kernel, seed), **modules}, steps)
+        self._instances = {model.name: self._instance(model, steps) for model in self._models}
+        starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
+        doubts = tuple(self._cpp.warnings(self._models))
+        return BuiltComponents(starters, loader, self._instances, doubts, self._cpp.finish)
+
+    def _launches(self) -> dict[str, Launch]:
+        return {
+            model.name: Launch(model.namespace, model.remap, dict(model.parameters))
+            for model in self._models
+            if is_node(model)
+        }
+
+    def _instance(self, model: InstanceModel, steps: StepCounter | None) -> Instance:
+        return Instance(
+            self._kernel,
+            model.name,
+            self._platform.seat(model),
+            self._platform.pricing(model),
+            tuple(self._operations(model)),
+            self._cpp.meters.get(model.name) or (steps.take if steps else None),
+        )
+
+    def _operations(self, model: InstanceModel) -> dict[str, str]:
+        """The operations that it provides, and what each returns."""
+        return {
+            name: signature.returns
+            for interface in model.component.provides.values()
+            for name, signature in self._system.interfaces[interface].operations.items()
+        }
+
+    def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
+        instance = self._instances[model.name]
+        program = self._program(model, loader)
+        given = self._given(model)
+        if not isinstance(program, ScriptProgram):  # a script has its parameters from ROS
+            given = {**model.parameters, **given}
+        if commanded_by(model):
+            commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
+            names = [one.port for one in commands]
+            program = LateBoundProgram(program, names, lambda: self._connect(model, commands))
+        scope = self._ending.users.child(model.name)
+        return lambda: start(instance, program, given, scope, self._ending.failed)
+
+    def _program(self, model: InstanceModel, loader: Loader) -> Program:
+        component = model.component
+        if not component.path or (is_cpp(component) and model.name not in self._cpp):
+            period = model.activity.period_ns if model.activity else None
+            return StubProgram(self._kernel, self._operations(model), period)
+        if is_cpp(component):
+            return self._cpp.program(model)
+        path = self._system.file_of(component)
+        chosen = component.class_name
+        if component.language in PYTHON_ROS and not component.class_stated:
+            chosen = script_or_class(path, chosen, component.where)
+        return load_program(loader, model.name, path, chosen, component.where)
+
+    # -- ports
+
+    def _given(self, model: InstanceModel) -> dict[str, Any]:
+        """What its ports are connected to, by the ports' names; the vehicles that it commands come later."""
+        found: dict[str, Any] = {}
+        for connection in model.connections.values():
+            kind = _kind(connection)
+            if kind is TargetKind.ENVIRONMENT:
+                found[connection.port] = self._system.environment
+            elif kind is TargetKind.INSTANCE:
+                ports = [self._port(model, target.name) for target in connection.targets]
+                found[connection.port] = PortList(ports) if connection.many else ports[0]
+            elif kind is TargetKind.VEHICLE and model.is_environment:
+                bodies = [self._body(target.name) for target in connection.targets]
+                found[connection.port] = bodies if connection.many else bodies[0]
+        return found
+
+    def _body(self, vehicle: str) -> Body:
+        assert self._airfield is not None, "components of the environment live where the vehicles are"
+        return Body(self._kernel, vehicle, self._airfield.truth(vehicle))
+
+    def _port(self, model: InstanceModel, callee: str) -> Port:
+        other = self._system.instance(callee)
+        if self._part is not None and callee not in self._instances:
+            return self._part.reach(model, other)
+        here, there = model.processor, other.processor
+        return Port(
+            self._kernel,
+            model.name,
+            self._instances[callee],
+            self._platform.travel(here, there),
+            self._platform.travel(there, here),
+        )
+
+    def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
+        """Join the graph and command vehicles over it."""
+        node = self._nodes.get(model.name)
+        if node is None:
+            node = self._graph.node(model.name, model.namespace, remaps=model.remap)
+            self._nodes[model.name] = node
+        found: dict[str, Any] = {}
+        for connection in commands:
+            vehicles = [
+                self._vehicle(node, target.name, connection.interface) for target in connection.targets
+            ]
+            found[connection.port] = vehicles if connection.many else vehicles[0]
+        return found
+
+    def _vehicle(self, node: Node, name: str, interface: str) -> Drone | Rover:
+        vehicle = self._open(node, name, interface)
+        self._lands.setdefault(name, vehicle)  # one of its commanders brings it down in the end
+        self._ending.vehicles = tuple(self._lands.values())
+        return vehicle
+
+    def _open(self, node: Node, name: str, interface: str) -> Drone | Rover:
+        served = graph_access(self._autopilot(name), name)
+        driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace})
+        truth = self._truth(name) if self._truth else None
+        if interface == "Drone":
+            return Drone(self._kernel, name, driver, fence=self._fence, truth=truth)
+        return Rover(self._kernel, name, driver, truth=truth)
+
+    # -- nodes that serve vehicles
+
+    def _vehicle_nodes(self) -> Iterable[Callable[[], object]]:
+        if self._airfield is None:
+            return
+        commanded = {name for model in self._system.instances for name in commanded_by(model)}
+        for vehicle in self._system.vehicles:
+            if vehicle.name in commanded or vehicle.processor is not None:
+                graph_access(
+                    vehicle.autopilot, vehicle.name
+                )  # one that cannot be served is told before the start
+                if vehicle.name not in commanded:
+                    self._leave_unattended(vehicle.name, INTERFACES[vehicle.kind])
+                yield partial(self._serve, self._airfield, vehicle.name, vehicle.processor)
+
+    def _leave_unattended(self, name: str, interface: str) -> None:
+        opened = partial(self._open, name=name, interface=interface)
+        self._lands[name] = UnattendedVehicle(self._graph, name, opened)
+        self._ending.vehicles = tuple(self._lands.values())
+
+    def _autopilot(self, vehicle: str) -> str:
+        return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
+
+    def _serve(self, airfield: SimulatedFleet, name: str, processor: str | None) -> None:
+        """In the root scope: it must outlive the components, for the way down."""
+        place = Place(node_name(name), self._platform.processors[processor] if processor else None)
+        serve_on_graph(self._graph, airfield, name, graph_access(self._autopilot(name), name), place)
+
+
+def _kind(connection: Connection) -> TargetKind | None:
+    """Of what it is connected to; all targets of a connection are of one kind."""
+    return connection.targets[0].kind if connection.targets else None

@@ -1,0 +1,333 @@
+"""Processors and networks of a run: what serves computing, what computing costs there, what travels between.
+
+Graph and components report what they do; ``cost`` prices it; this module joins the two for the processors of
+one allocation. Nodes and components that are allocated to no processor compute and communicate in no time.
+
+What else runs on a computer: the model's ``load``, a share of each core that components do not get.
+
+It is more urgent than any component, as interrupts and a reserved share are, and comes in pieces: one each
+``LOAD_PERIOD`` and core, of the stated share of it on average. How the pieces differ is seeded, so the same run
+has the same load, whatever runs on the machine that simulates it.
+
+On-board computers drain the battery of the vehicle that feeds them.
+
+Their busy time is looked at once a period, and what they drew on average goes to the vehicle's body as
+payload power for the next period: the battery is late by one period and misses nothing but the last one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING
+
+from volery.base.errors import EstimateError, choices
+from volery.base.seeds import stream
+from volery.base.time import MS, Ns, S
+from volery.components.instance import Allocation
+from volery.components.ports import Transfer
+from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
+from volery.cost.pricing import FREE, Cost, CountedPricing, Pricing, StatedPricing
+from volery.kernel.api import Action, Kernel
+from volery.kernel.network import Network
+from volery.kernel.processor import QUANTUM, Processor
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
+from volery.model.system import Network as NetworkModel
+from volery.model.system import Processor as ProcessorModel
+from volery.ros.graph.node import NodeId, Way
+from volery.run.assembly.cpp import core_of, ns_per_step
+
+if TYPE_CHECKING:
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
+
+LOAD_PERIOD: Ns = 10 * MS
+LOAD_PRIORITY = 1 << 30
+"""Above the priority of any component."""
+LOAD_VARIATION = 0.5
+"""By so much of what it may be, a piece is shorter or longer than the share of a period."""
+
+
+def load_name(processor: str) -> str:
+    """Under this name its computing stands among the components."""
+    return f"{processor} (load)"
+
+
+def start_background_load(kernel: Kernel, processor: Processor, model: ProcessorModel, seed: int) -> None:
+    """Let the load of *model*, if it has one, run on *processor*; core after core begins within a period."""
+    if model.load <= 0.0:
+        return
+    for core in range(model.cores):
+        place = Place(load_name(model.name), processor, LOAD_PRIORITY)
+        pieces = _CoreLoad(kernel, processor, place, model.load, seed, core)
+        kernel.call_at(kernel.now() + LOAD_PERIOD * core // model.cores, pieces.begin)
+
+
+class _CoreLoad:
+    """The load of one core."""
+
+    def __init__(
+        self, kernel: Kernel, processor: Processor, place: Place, share: float, seed: int, core: int
+    ) -> None:
+        self._kernel = kernel
+        self._run = partial(processor.load, place)
+        self._mean = share * LOAD_PERIOD
+        self._most_off = LOAD_VARIATION * min(share, 1.0 - share) * LOAD_PERIOD
+        self._random = stream(seed, f"load/{processor.name}/{core}")
+
+    def begin(self) -> None:
+        """From now on, each period."""
+        self._kernel.every(LOAD_PERIOD, self._piece)
+
+    def _piece(self) -> None:
+        self._run(round(self._mean + self._random.uniform(-self._most_off, self._most_off)))
+
+
+CALL_WITHIN: Ns = 10 * S
+"""A call whose arguments or result have not arrived by then raises ``LinkLost`` at its caller."""
+
+NO_COST = Price(0, 0)
+
+
+def commanded_by(instance: Instance) -> tuple[str, ...]:
+    """The vehicles that *instance* commands. A component of the environment sees bodies and commands none."""
+    if instance.is_environment:
+        return ()
+    return tuple(
+        target.name
+        for connection in instance.connections.values()
+        for target in connection.targets
+        if target.kind is TargetKind.VEHICLE
+    )
+
+
+def is_node(instance: Instance) -> bool:
+    """True if *instance* is a node of the graph: by its language, or because it commands a vehicle."""
+    return bool(commanded_by(instance)) or instance.component.language in ROS_LANGUAGES
+
+
+def ros_language(instance: Instance) -> str:
+    """The language whose client library its calls into ROS are charged as."""
+    language = instance.component.language
+    return "roscpp" if language == "c++" else language
+
+
+VEHICLE_NODE_LANGUAGE = "roscpp"
+"""The node that serves a vehicle stands for MAVROS, which is written with roscpp."""
+
+
+class Platform:
+    """The computers of one run."""
+
+    def __init__(self, system: System, kernel: VirtualKernel, seed: int, fidelity: str) -> None:
+        self._system = system
+        self._kernel = kernel
+        self._fidelity = fidelity
+        self._models = {model.name: model for model in system.processors}
+        known = catalogue(*system.catalogues)
+        self._entries = {model.name: known.processor(model.kind) for model in system.processors}
+        self.processors = {model.name: self._processor(model) for model in system.processors}
+        for model in system.processors:
+            start_background_load(kernel, self.processors[model.name], model, seed)
+        self._networks = {model.name: self._network(model, seed) for model in system.networks}
+        self._languages = {instance.name: ros_language(instance) for instance in system.instances}
+        self._tariffs: dict[tuple[str, str], Tariff] = {}
+        self.warnings: dict[str, None] = dict.fromkeys(system.warnings)  # an ordered set
+
+    def _processor(self, model: ProcessorModel) -> Processor:
+        return Processor(
+            self._kernel,
+            model.name,
+            cores=model.cores,
+            scheduler=model.scheduler,
+            quantum=QUANTUM if model.quantum_ns is None else model.quantum_ns,
+            context_switch=model.context_switch_ns,
+        )
+
+    def _network(self, model: NetworkModel, seed: int) -> Network:
+        return Network(
+            self._kernel,
+            model.name,
+            bandwidth_bit_s=round(model.bandwidth_bit_s),
+            latency=model.latency_ns,
+            loss=model.loss,
+            stream=stream(seed, f"network/{model.name}"),
+        )
+
+    def entry(self, processor: str) -> ProcessorEntry:
+        """What the catalogue says of the kind of *processor*."""
+        return self._entries[processor]
+
+    # -- what components are given
+
+    def seat(self, instance: Instance) -> Allocation:
+        """Where *instance* computes."""
+        activity = instance.activity
+        priority = activity.priority if activity else None
+        deadline = activity.deadline_ns if activity else None
+        start = activity.start_ns if activity else 0
+        if instance.processor is None:
+            return Allocation(priority=priority, deadline=deadline, starts_at=start)
+        frequency = self._models[instance.processor].frequency_mhz
+        return Allocation(self.processors[instance.processor], frequency, priority, deadline, start)
+
+    def pricing(self, instance: Instance) -> Pricing:
+        """What the own computing of *instance* costs, at this run's fidelity."""
+        if instance.processor is None:
+            return FREE
+        component = instance.component
+        if self._fidelity == "code" and component.path:
+            if component.language not in CPP_LANGUAGES:
+                return self._counted(instance, instance.processor)
+            core = core_of(self._system, self._fidelity, instance)
+            if core is not None:
+                return CountedPricing(ns_per_step(core, self._models[instance.processor].frequency_mhz))
+            if not (component.activation or component.operations):
+                what = f"what {instance.name} computes is not counted: it is C++"
+                self.warnings[f"{what}; state times in the model, or call uc_add_times()"] = None
+                return FREE
+        return self._stated(instance, instance.processor)
+
+    def _counted(self, instance: Instance, processor: str) -> Pricing:
+        law = self._entries[processor].code_law()
+        self.warnings.update(dict.fromkeys(law.warnings()))
+        return CountedPricing(law.ns_per_step(self._models[processor].frequency_mhz))
+
+    def _stated(self, instance: Instance, processor: str) -> Pricing:
+        component = instance.component
+        scale = partial(self._scaled, instance, processor)
+        return StatedPricing(
+            {name: scale(name, figures) for name, figures in component.operations.items()},
+            scale("activation", component.activation) if component.activation else None,
+        )
+
+    def _scaled(self, instance: Instance, processor: str, what: str, figures: tuple[Figure, ...]) -> Cost:
+        """The figure that is stated for this kind of processor, at the frequency that it runs at."""
+        model = self._models[processor]
+        fitting = [one for one in figures if one.processor == model.kind]
+        if not fitting:
+            stated = choices({one.processor for one in figures})
+            raise EstimateError(
+                f"{instance.name}: the time of {what!r} is stated for {stated}, but it is allocated to "
+                f"{processor}, of kind {model.kind}: state one for {model.kind} as well"
+            )
+        figure = min(fitting, key=lambda one: abs(one.frequency_hz - model.frequency_hz))
+        there, here = (figure.processor, figure.frequency_hz / 1e6), (model.kind, model.frequency_mhz)
+        time = scale_time(figure.time_ns, there, here)
+        if figure.energy_j is None:
+            return Cost(time)
+        return Cost(time, scale_energy(figure.energy_j, there, here, self._entries[processor].power_law()))
+
+    # -- what the graph is given
+
+    def price(self, node: NodeId, call: str, x: float) -> Price:
+        """What a call into ROS costs *node*."""
+        if not node.processor:
+            return NO_COST
+        language = self._languages.get(node.component, VEHICLE_NODE_LANGUAGE)
+        return self._tariff(node.processor, language)(call, x)
+
+    def _tariff(self, processor: str, language: str) -> Tariff:
+        tariff = self._tariffs.get((processor, language))
+        if tariff is None:
+            law = self._entries[processor].ros_law(language)
+            tariff = law.at(self._models[processor].frequency_mhz)
+            self._tariffs[processor, language] = tariff
+            self.warnings.update(dict.fromkeys(tariff.warnings))
+        return tariff
+
+    def foresee(self) -> None:
+        """Look up every law that nodes will need, so that what is missing or doubtful is known before the
+        start.
+        """
+        for instance in self._system.instances:
+            self.pricing(instance)
+            if instance.processor is not None and is_node(instance):
+                self._tariff(instance.processor, ros_language(instance))
+        for vehicle in self._system.vehicles:
+            if vehicle.processor is not None:
+                self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
+
+    def between(self, sender: NodeId, receiver: NodeId) -> Way | None:
+        """How messages get from node to node: over the network between their processors, if there is one."""
+        network = self._network_between(sender.processor, receiver.processor)
+        if network is None:
+            return None
+
+        def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
+            if reliable:
+                network.send_reliable(size, deliver, f"{sender.name}>{receiver.name}")
+            else:
+                network.send(size, deliver, lost)
+
+        return way
+
+    def travel(self, one: str | None, other: str | None) -> Transfer | None:
+        """How the arguments of a call get from processor to processor; ``None`` where that takes no time."""
+        network = self._network_between(one or "", other or "")
+        if network is None:
+            return None
+        return lambda size: network.carry(size, self._kernel.now() + CALL_WITHIN)
+
+    def _network_between(self, one: str, other: str) -> Network | None:
+        if one == other or not one or not other:
+            return None
+        model = self._system.network_between(one, other)
+        return self._networks[model.name] if model else None
+
+    # -- power
+
+    def powered_by(self) -> Mapping[str, tuple[str, ...]]:
+        """Vehicle -> processors that drain its battery."""
+        found: dict[str, tuple[str, ...]] = {}
+        for model in self._system.processors:
+            if model.powered_by is not None:
+                found[model.powered_by] = (*found.get(model.powered_by, ()), model.name)
+        return found
+
+    def watts(self, processor: str, busy_cores: float) -> float:
+        """What a processor draws with so many cores busy on average; ``EstimateError`` without figures."""
+        law = self._entries[processor].power_law()
+        return law.watts(busy_cores, self._models[processor].frequency_mhz)
+
+
+FEED_PERIOD: Ns = 500 * MS
+
+
+class PowerFeed:
+    """Feeds the computers of one platform from the batteries of one airfield."""
+
+    def __init__(self, kernel: Kernel, platform: Platform, airfield: SimulatedFleet) -> None:
+        self._kernel = kernel
+        self._platform = platform
+        self._airfield = airfield
+        self._fed = platform.powered_by()
+        self._busy: dict[str, Ns] = {name: 0 for names in self._fed.values() for name in names}
+        self._then: Ns = kernel.now()
+        for name in self._busy:
+            self._check(name)
+        for vehicle, names in self._fed.items():
+            airfield.flights[vehicle].payload_power(sum(platform.watts(name, 0.0) for name in names))
+        if self._fed:
+            kernel.every(FEED_PERIOD, self._feed)
+
+    def _check(self, processor: str) -> None:
+        try:
+            self._platform.watts(processor, 0.0)
+        except EstimateError as error:
+            raise EstimateError(f"{processor} is powered by a vehicle: {error}") from error
+
+    def _feed(self) -> None:
+        now = self._kernel.now()
+        if now == self._then:
+            return
+        for vehicle, names in self._fed.items():
+            self._airfield.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
+        self._then = now
+
+    def _watts(self, processor: str, now: Ns) -> float:
+        busy = self._platform.processors[processor].busy_ns(now)
+        cores = (busy - self._busy[processor]) / (now - self._then)
+        self._busy[processor] = busy
+        return self._platform.watts(processor, cores)

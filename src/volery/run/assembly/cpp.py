@@ -1,0 +1,359 @@
+"""C++ components that count what they compute, compiled for the core that they are allocated to.
+
+C++ components that tell which blocks of their code they enter, for the core that they are allocated to.
+
+C++ components of a model: compiled before a run, made into programs for it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from volery.base.errors import ModelError
+from volery.components.cpp.bindings import DRONE, RequiredPort, operations
+from volery.components.cpp.build import (
+    ClientLibrary,
+    CompiledComponent,
+    CppComponent,
+    compile_component,
+    compile_each,
+)
+from volery.components.cpp.compiler import (
+    COMPILER_HINT,
+    CppToolchain,
+    ReportProgress,
+    cache_folder,
+    find_sources,
+    has_compiler,
+)
+from volery.components.cpp.cpp_program import CppProgram
+from volery.components.cpp.framework import Counters, LoadedLibrary, StepMeter, ToSteps
+from volery.cost import catalogue
+from volery.cost.code_laws import CoreLaw
+from volery.kernel.api import Kernel
+from volery.model.system import (
+    CPP_LANGUAGES,
+    ENVIRONMENT_INTERFACE,
+    VEHICLE_INTERFACES,
+    Component,
+    Instance,
+    System,
+)
+from volery.model.system import Instance as InstanceModel
+from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries.library_base import Launch
+from volery.ros.graph import Node, RosGraph
+
+if TYPE_CHECKING:
+    from volery.cost.native.compilation import Program
+
+Cycles = np.ndarray[Any, np.dtype[Any]]
+"""Of each block."""
+
+_FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros)')
+"""Symbols of the border and of client libraries: what calls into these take has prices of its own."""
+
+STEPS_PER_CYCLE = 1000
+"""Steps of a cycle: costs are whole numbers of them, so that sums are exact on every machine."""
+
+
+def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None:
+    """The core that the code of *instance* is counted for.
+
+    ``None`` if it is not counted so: at another fidelity than ``code``, for other languages, where there is
+    no processor, and where nothing is known of its core.
+    """
+    component = instance.component
+    counts = fidelity == "code" and component.path and component.language in CPP_LANGUAGES
+    if not counts or instance.processor is None:
+        return None
+    known = catalogue(*system.catalogues).processors.get(system.processor(instance.processor).kind)
+    return None if known is None or known.core_model is None else known.core_law()
+
+
+def ns_per_step(law: CoreLaw, frequency_mhz: float) -> float:
+    """The time of a step on a core; ``EstimateError`` for a frequency outside the law's range."""
+    law.check_frequency(frequency_mhz)
+    return 1000.0 / frequency_mhz / STEPS_PER_CYCLE
+
+
+def compiler_options(include: Sequence[Path], flags: Sequence[str]) -> list[str]:
+    """What the compiler of counted and traced code is told."""
+    return ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path))), *flags]
+
+
+class CountingCompiler:
+    """A ``Compile`` for a core at a frequency. What is compiled is kept as the compiler's own objects are."""
+
+    def __init__(self, law: CoreLaw, frequency_mhz: float) -> None:
+        self._law, self._mhz = law, frequency_mhz
+        self._cycles: Cycles | None = None
+        self.estimated = ""
+
+    def __call__(
+        self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
+    ) -> list[Path]:
+        """One object that counts its blocks. What does not compile is told in the compiler's words first."""
+        plain = compile_each(tools, sources, include, flags)
+        made = cache_folder() / f"{self._digest(plain)}.o"
+        costs = made.with_suffix(".npz")
+        if not (made.exists() and costs.exists()):
+            if tools.tell is not None:
+                tools.tell(f"counting {tools.component} on {self._law.name}")
+            self._make(sources, include, flags, made)
+        self._price(costs)
+        return [made]
+
+    def _price(self, costs: Path) -> None:
+        """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
+
+        with np.load(costs) as found:
+            learnt = kept_costs(str(found["key"]))
+            cycles, memory = (found["cycles"], found["memory"])
+            self.estimated = str(found["estimated"])
+            if learnt is not None:
+                cycles, memory, self.estimated = learnt.cycles, learnt.memory, ""
+            self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
+
+    def _digest(self, plain: Sequence[Path]) -> str:
+        from volery.cost.native.compilation import METHOD
+
+        contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
+        told = " ".join((METHOD, self._law.model_dump_json(), *contents))
+        return sha256(told.encode()).hexdigest()[:32]
+
+    def _make(
+        self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
+    ) -> None:
+        from volery.cost.native import block_costs
+
+        new = made.with_suffix(".new.o")
+        found = block_costs(sources, self._law, new, compiler_options(include, flags))
+        costs = found.costs
+        theirs = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
+        np.savez(
+            made.with_suffix(".npz"),
+            cycles=costs.cycles,
+            memory=costs.memory,
+            theirs=theirs,
+            key=found.key,
+            estimated=found.estimated,
+        )
+        new.replace(made)
+
+    def worth(self) -> ToSteps:
+        """What counts amount to in steps, once it has compiled. All numbers are whole: nothing is rounded."""
+        assert self._cycles is not None
+        steps = np.rint(self._cycles * STEPS_PER_CYCLE).astype(np.int64)
+
+        def worth(counters: Counters) -> int:
+            return int((np.ctypeslib.as_array(counters).view(np.int64) * steps).sum())
+
+        return worth
+
+
+WINDOW, STRIDE = 1024, 4096
+"""Blocks that are told of so many: a run may enter billions."""
+
+
+class TracingCompiler:
+    """A ``Compile`` for a core. ``program`` is what was compiled."""
+
+    def __init__(self, law: CoreLaw) -> None:
+        self.law = law
+        self.program: Program | None = None
+
+    def __call__(
+        self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
+    ) -> list[Path]:
+        """One object that tells, and what it tells it to. The compiler's own words come first."""
+        from volery.cost.native.compilation import compile_program
+        from volery.cost.native.instrumented_run import runtime_objects
+
+        compile_each(tools, sources, include, flags)
+        self.program = compile_program(sources, self.law, compiler_options(include, flags))
+        with TemporaryDirectory(dir=cache_folder()) as scratch:
+            code = Path(scratch, "code.o")
+            self.program.traced_object(code)
+            made = [code, *runtime_objects(Path(scratch))]
+            kept = [cache_folder() / f"{self.program.key}.{one.name}" for one in made]
+            for one, place in zip(made, kept, strict=True):
+                one.replace(place)
+        return kept
+
+    def begin(self, library: LoadedLibrary, file: Path) -> None:
+        """Have a library that was compiled so tell it to *file*, until its ``volery_end`` is called."""
+
+        library.function("volery_model_caches")(in_words(self.law.memory).encode())
+        each, of = ctypes.c_uint64(WINDOW), ctypes.c_uint64(STRIDE)
+        library.function("volery_trace_into")(str(file).encode(), each, of)
+
+
+LANGUAGES = ("c++", "roscpp")
+_ROSCPP = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
+
+
+def is_cpp(component: Component) -> bool:
+    """Whether there is C++ to be compiled for it."""
+    return bool(component.path) and component.language in LANGUAGES
+
+
+def has_cpp(system: System) -> bool:
+    """Whether a component of *system* is written in C++."""
+    return any(is_cpp(instance.component) for instance in system.instances)
+
+
+class CompiledInstance(NamedTuple):
+    """What an instance is to run; how its code counts itself, or tells what it executes, if it does."""
+
+    compiled: CompiledComponent
+    counting: CountingCompiler | None = None
+    tracing: TracingCompiler | None = None
+
+
+def compile_all(
+    system: System,
+    instances: Iterable[InstanceModel],
+    fidelity: str,
+    tell: ReportProgress | None = None,
+    *,
+    traced: bool = False,
+) -> dict[str, CompiledInstance]:
+    """What the C++ components among *instances* are to run, by their names, compiled if it is not yet. Those
+    whose code would be counted tell what they execute where it is to be *traced*.
+
+    ``ModelError`` with the compiler's words for one that does not compile; ``UsageError`` if there is no
+    compiler, but nothing at fidelity ``times``, where components without code take their stated times.
+    """
+    if fidelity == "times" and not has_compiler():
+        return {}
+    return {
+        one.name: _compile(
+            system, one, None if traced else tell, TracingCompiler(core) if traced and core else core
+        )
+        for one in instances
+        if is_cpp(one.component)
+        for core in (core_of(system, fidelity, one),)
+    }
+
+
+def _compile(
+    system: System,
+    instance: InstanceModel,
+    tell: ReportProgress | None,
+    how: CoreLaw | TracingCompiler | None,
+) -> CompiledInstance:
+    component = instance.component
+    face = _ROSCPP if component.language == "roscpp" else ClientLibrary()
+    wanted = describe_component(system, component)
+    if how is None or instance.processor is None:
+        return CompiledInstance(compile_component(wanted, face, tell))
+    if isinstance(how, TracingCompiler):
+        return CompiledInstance(compile_component(wanted, face, tell, how), tracing=how)
+    counting = CountingCompiler(how, system.processor(instance.processor).frequency_mhz)
+    return CompiledInstance(compile_component(wanted, face, tell, counting), counting)
+
+
+def describe_component(system: System, component: Component) -> CppComponent:
+    """*component* as the compiler needs to know it."""
+    path = system.file_of(component)
+    for port in component.requires.values():
+        _check_port(component, port.name, port.interface)
+    return CppComponent(
+        component.name,
+        path,
+        _class_of(component, system),
+        tuple(
+            operation
+            for interface in component.provides.values()
+            for operation in operations(system.interfaces[interface])
+        ),
+        tuple(RequiredPort(port.name, port.interface, port.many) for port in component.requires.values()),
+        system.interfaces,
+        component.build.flags,
+        component.build.libraries,
+        component.where,
+    )
+
+
+def _class_of(component: Component, system: System) -> str:
+    """Its class, empty for a program of its own."""
+    if component.class_stated:
+        return component.class_name
+    sources = find_sources(system.file_of(component), component.where)
+    return "" if sources.defines_main() else component.class_name
+
+
+def _check_port(component: Component, port: str, interface: str) -> None:
+    if interface == ENVIRONMENT_INTERFACE or (interface in VEHICLE_INTERFACES and interface != DRONE):
+        what = f"a C++ component cannot require {interface}, but the model's interfaces and {DRONE}"
+        raise ModelError(what, f"components.{component.name}.requires.{port}", component.where)
+
+
+class CppPrograms:
+    """Makes the programs of the C++ components of one run."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        graph: RosGraph,
+        ready: Mapping[str, CompiledInstance],
+        launches: Mapping[str, Launch],
+        nodes: Mapping[str, Node],
+        traces: Path | None = None,
+    ) -> None:
+        self._kernel = kernel
+        self._traces = traces
+        self._told: list[LoadedLibrary] = []
+        self._graph = graph
+        self._ready = ready
+        self._launches = launches
+        self._nodes = nodes
+        self.meters = {name: StepMeter() for name, one in ready.items() if one.counting is not None}
+
+    def warnings(self, instances: Iterable[InstanceModel]) -> list[str]:
+        """What is doubtful about what they count, and who of *instances* could not be compiled."""
+        said = {one.counting.estimated: None for one in self._ready.values() if one.counting is not None}
+        missing = [one.name for one in instances if is_cpp(one.component) and one.name not in self]
+        if missing:
+            said[
+                f"{', '.join(missing)}: stated times alone, for there is no C++ compiler: {COMPILER_HINT}"
+            ] = None
+        return [warning for warning in said if warning]
+
+    def __contains__(self, name: str) -> bool:
+        """Whether the instance called *name* has a program here."""
+        return name in self._ready
+
+    def program(self, model: InstanceModel) -> CppProgram:
+        """What the instance is to run."""
+        compiled, counting, tracing = self._ready[model.name]
+        if model.component.language == "roscpp":
+            launch = self._launches.get(model.name, Launch())
+            session = roscpp.Session(self._graph, model.name, launch, self._nodes)
+            made = CppProgram(self._kernel, model.name, compiled, roscpp.answers(session), session.end)
+        else:
+            made = CppProgram(self._kernel, model.name, compiled)
+        if counting is not None:
+            made.count(self.meters[model.name], counting.worth())
+        if tracing is not None and self._traces is not None:
+            made.when_loaded(partial(self._trace, tracing, self._traces / model.name))
+        return made
+
+    def _trace(self, tracing: TracingCompiler, file: Path, library: LoadedLibrary) -> None:
+        tracing.begin(library, file)
+        self._told.append(library)
+
+    def finish(self) -> None:
+        """What they have to tell of themselves is told."""
+        for library in self._told:
+            library.function("volery_end")()

@@ -1,0 +1,308 @@
+"""From addresses to vehicles: simulated ones in one world, or those that are out there.
+
+Vehicles that are out there, recorded as their autopilots say that they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import nan, radians
+from typing import TYPE_CHECKING
+
+from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
+from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, euler_to_quaternion
+from volery.base.position import Position
+from volery.base.time import Ns
+from volery.kernel.api import Action, Kernel
+from volery.kernel.task import Place
+from volery.kernel.virtual import VirtualKernel
+from volery.kernel.wall import WallKernel
+from volery.links.link import Link
+from volery.links.shared_link import SharedLink
+from volery.ros.graph import RosGraph
+from volery.run.assembly.ros_graphs import GRAPHS, open_graph
+from volery.run.assembly.simulated_vehicles import HOME, SimulatedVehicle, parse_simulated
+from volery.run.assembly.vehicle_nodes import open_simulated_driver
+from volery.run.progress import VehicleProgress
+from volery.run.result import SAMPLING_PERIOD
+from volery.trace.events import VehicleState
+from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
+from volery.vehicles.address import Address, open_link, parse
+from volery.vehicles.driver import Driver, DriverFactory, drivers
+from volery.vehicles.limits import home_violation
+from volery.vehicles.telemetry import Attitude
+
+if TYPE_CHECKING:
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
+
+EMBEDDED = "graph"
+KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
+
+
+def _nothing() -> None:
+    """There is no graph to leave."""
+
+
+@dataclass(frozen=True)
+class OpenedVehicles:
+    """A kernel and the vehicles that were opened on it; ``airfield`` is ``None`` for vehicles that are out
+    there.
+    """
+
+    kernel: VirtualKernel | WallKernel
+    vehicles: tuple[Vehicle, ...]
+    airfield: SimulatedFleet | None = None
+    leave: Action = _nothing
+    """Leave the graphs that lead to them; once they are closed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleSettings:
+    """What holds for all vehicles that are opened together. *home* is where simulated ones stand."""
+
+    seed: int = 1
+    pace: float | None = None
+    home: Position = HOME
+    limits: Limits | None = None
+    fence: Fence | None = None
+
+
+def open_vehicles(
+    urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
+) -> OpenedVehicles:
+    """Open all of *urls*, by the vehicles' names: either simulated ones, in one world, or real ones.
+
+    Raises ``UsageError`` for an address that makes no sense or a fence that excludes a simulated home,
+    ``CapabilityError`` for what cannot be opened together or so.
+    """
+    addresses = {name: parse(url) for name, url in urls.items()}
+    for address in addresses.values():
+        drivers.load(address.driver)  # a name that is none is told before anything else
+    if any(address.carrier != "sim" for address in addresses.values()):
+        return _open_real(addresses, kinds, stated)
+    return _open_simulated(addresses, kinds, stated)
+
+
+def _open_simulated(
+    addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
+) -> OpenedVehicles:
+
+    wanted = [
+        parse_simulated(address, name, KINDS[kinds[name]], stated.home) for name, address in addresses.items()
+    ]
+    for one in wanted:
+        _check_home(one, stated.fence)
+    kernel = VirtualKernel(pace=stated.pace)
+    airfield = airfield_of(kernel, wanted, stated.seed)
+    vehicles = [_simulated_vehicle(kernel, airfield, one, kinds[one.vehicle.name], stated) for one in wanted]
+    return OpenedVehicles(kernel, tuple(vehicles), airfield)
+
+
+def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:
+    home = wanted.home
+    found = home_violation(fence, home) if fence is not None else ""
+    if found:
+        raise UsageError(f"{wanted.vehicle.name}: the fence excludes home: {found}")
+
+
+def _simulated_vehicle(
+    kernel: Kernel,
+    airfield: SimulatedFleet,
+    wanted: SimulatedVehicle,
+    kind: type[Vehicle],
+    stated: VehicleSettings,
+) -> Vehicle:
+    driver = open_simulated_driver(kernel, airfield, wanted, stated.seed)
+    name = wanted.vehicle.name
+    return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=airfield.truth(name))
+
+
+# -- out there
+
+
+def _open_real(
+    addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
+) -> OpenedVehicles:
+    for address in addresses.values():
+        if address.carrier == "sim":
+            raise CapabilityError(
+                f"{address}: simulated and real vehicles do not share a clock; fly them apart"
+            )
+        if address.carrier == EMBEDDED:
+            raise CapabilityError(
+                f"{address}: vehicles on the embedded graph are commanded by components of a model; "
+                f"on real ROS it is {address.driver}+ros1:// or {address.driver}+ros2://"
+            )
+    kernel = WallKernel()
+    by_graph = {name: one for name, one in addresses.items() if one.carrier in GRAPHS}
+    ways = _RealLinks(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
+    graphs = RealGraphs(kernel)
+    try:
+        vehicles = []
+        for name, address in addresses.items():
+            driver = graphs.driver(name, address) if name in by_graph else ways.driver(name, address)
+            vehicles.append(kinds[name](kernel, name, driver, limits=stated.limits, fence=stated.fence))
+    except VoleryError:
+        ways.close()
+        graphs.close()
+        raise
+    return OpenedVehicles(kernel, tuple(vehicles), leave=graphs.close)
+
+
+class RealGraphs:
+    """Real ROS graphs, each opened once, with a node of ours for each vehicle."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+        self._open: dict[str, RosGraph] = {}
+
+    def graph(self, name: str) -> RosGraph:
+        """The graph called *name*. Raises what ``open_graph`` raises."""
+        if name not in self._open:
+            self._open[name] = open_graph(self._kernel, name)
+        return self._open[name]
+
+    def driver(self, name: str, address: Address) -> Driver:
+        """The driver of the vehicle called *name*; the address's path is where its names are."""
+        open_driver = drivers.load(address.driver).on_graph
+        if open_driver is None:
+            raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
+        node = self.graph(address.carrier).node(f"volery_{name}", anonymous=True, place=Place(name))
+        namespace = address.path.rstrip("/")
+        stated = {"namespace": namespace} if namespace else {}
+        return open_driver(self._kernel, node, name, {**stated, **address.options})
+
+    def close(self) -> None:
+        """Leave them."""
+        for graph in self._open.values():
+            graph.close()
+        self._open.clear()
+
+
+class _RealLinks:
+    """The links of vehicles that are out there: one each, or one for all behind the same radio or port."""
+
+    def __init__(self, kernel: Kernel, addresses: Mapping[str, Address]) -> None:
+        self._kernel = kernel
+        self._addresses = addresses
+        self._links: list[Link] = []
+        self._shared: dict[tuple[object, ...], SharedLink] = {}
+        self._behind: dict[tuple[object, ...], list[str]] = {}
+        for name, address in addresses.items():
+            if drivers.load(address.driver).on_link is None:
+                raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
+            self._behind.setdefault(_endpoint(address), []).append(name)
+        for names in self._behind.values():
+            self._check_distinct(names)
+
+    def _check_distinct(self, names: list[str]) -> None:
+        """Several vehicles behind one link: it must be said which is which, in one protocol."""
+        if len(names) == 1:
+            return
+        first, *others = (self._addresses[name] for name in names)
+        systems = [self._addresses[name].options.get("system", "") for name in names]
+        if "" in systems or len(set(systems)) < len(systems):
+            raise UsageError(
+                f"{' and '.join(names)} are behind the same {first.carrier} address; say which is which by "
+                f"their system ids, as in {first.text.partition('?')[0]}?system=1"
+            )
+        for other in others:
+            codecs = {self._factory(one).codec.name for one in (first, other)}
+            if len(codecs) > 1:
+                raise UsageError(f"{first} and {other}: one link carries one protocol, not {choices(codecs)}")
+            if first.options.get("baud") != other.options.get("baud"):
+                raise UsageError(f"{first} and {other}: one serial line has one baud rate")
+
+    def _factory(self, address: Address) -> DriverFactory:
+        return drivers.load(address.driver)
+
+    def driver(self, name: str, address: Address) -> Driver:
+        """The driver of the vehicle called *name*."""
+        open_driver = self._factory(address).on_link
+        assert open_driver is not None, "seen when the ways were made"
+        return open_driver(self._kernel, self.to(name), name, for_driver(address))
+
+    def to(self, name: str) -> Link:
+        """The link for the driver of the vehicle called *name*."""
+        address = self._addresses[name]
+        codec, way = self._factory(address).codec, _endpoint(address)
+        if len(self._behind[way]) == 1:
+            self._links.append(open_link(self._kernel, address, codec))
+            return self._links[-1]
+        if way not in self._shared:
+            self._links.append(open_link(self._kernel, address, codec, shared=True))
+            self._shared[way] = SharedLink(self._links[-1])
+        return self._shared[way].share()
+
+    def close(self) -> None:
+        """Of those that were opened, each."""
+        for link in self._links:
+            link.close()
+
+
+def _endpoint(address: Address) -> tuple[object, ...]:
+    """What two vehicles behind one link have in common."""
+    return address.carrier, address.host, address.port, address.path
+
+
+def for_driver(address: Address) -> dict[str, str]:
+    """Options of the address that are not for the carrier."""
+    return {key: value for key, value in address.options.items() if key != "baud"}
+
+
+UNKNOWN = (nan, nan, nan)
+
+
+class ObservedVehicles:
+    """Vehicles of which nobody knows the truth. The origin is where the first of them was seen first."""
+
+    def __init__(self, kernel: Kernel, vehicles: Sequence[Vehicle]) -> None:
+        self._kernel = kernel
+        self._vehicles = vehicles
+        self._frame: LocalFrame | None = None
+
+    def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
+        """Record the state of every vehicle now and then each *period*."""
+        self._kernel.every(period, self.record_states)
+
+    def progress(self) -> tuple[VehicleProgress, ...]:
+        """What those that have been heard do now."""
+        heard = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.heard >= 0]
+        return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in heard)
+
+    def record_states(self) -> None:
+        """Record the state of every vehicle that has been heard."""
+        for vehicle in self._vehicles:
+            if vehicle.telemetry.heard >= 0:
+                self._kernel.record(self._state(vehicle))
+
+    def _state(self, vehicle: Vehicle) -> VehicleState:
+        seen = vehicle.telemetry
+        return VehicleState(
+            self._kernel.now(),
+            vehicle.name,
+            *UNKNOWN,
+            *_attitude(seen.attitude),
+            seen.velocity.east,
+            seen.velocity.north,
+            seen.velocity.up,
+            *self._about_origin(seen.position),
+            *seen.battery,
+            seen.armed,
+            seen.mode,
+        )
+
+    def _about_origin(self, at: Position | None) -> tuple[float, float, float]:
+        """ENU [m] of a position above mean sea level; NaN while it is not known."""
+        if at is None:
+            return nan, nan, nan
+        amsl = at.altitude.metres
+        if self._frame is None:
+            self._frame = LocalFrame(at.latitude, at.longitude, amsl)
+        return self._frame.to_enu(at.latitude, at.longitude, amsl)
+
+
+def _attitude(seen: Attitude) -> Quaternion:
+    """FLU body in ENU."""
+    return attitude_ned_to_enu(euler_to_quaternion(*map(radians, seen)))

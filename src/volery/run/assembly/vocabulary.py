@@ -1,0 +1,32 @@
+"""The names that point out of a model, as this installation knows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from volery.cost import catalogue
+from volery.model.system import ProcessorKind, Vocabulary
+from volery.requirements.observables import OBSERVABLES
+from volery.run.assembly.faults import KINDS
+from volery.simulation.autopilots.firmware import dialects
+
+LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
+"""Languages of components that run today."""
+
+
+def vocabulary() -> Vocabulary:
+    """What a model is checked against."""
+    autopilots = frozenset(dialects.names())
+    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, frozenset(KINDS), _kinds)
+
+
+def _kinds(*more: Path) -> dict[str, ProcessorKind]:
+    return {
+        name: ProcessorKind(
+            entry.cores,
+            entry.least_mhz * 1e6,
+            entry.greatest_mhz * 1e6,
+            tuple(one * 1e6 for one in entry.set_to()),
+        )
+        for name, entry in catalogue(*more).processors.items()
+    }

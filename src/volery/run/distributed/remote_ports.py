@@ -1,0 +1,225 @@
+"""What components say to each other through ports, as text: JSON, with the types that JSON does not have.
+
+Numbers, text, lists, tuples, mappings, enumerations, and dataclasses of ``volery`` or of a module beside the
+component's file. Nothing else is made from what arrives.
+
+Ports whose other end is another process: an operation is a service of the graph.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+from volery.base.errors import ComponentError, UsageError, VoleryError
+from volery.components.instance import Instance
+from volery.components.loader import SHARED_MODULE_PREFIX, USER_MODULE_PREFIX
+from volery.components.ports import Port, invoke
+from volery.kernel.api import Kernel
+from volery.kernel.task import Place, Scope, Task
+from volery.kernel.waiting import current_task
+from volery.model.system import Instance as InstanceModel
+from volery.model.system import System
+from volery.ros.graph import Client, Node, ServiceError
+from volery.ros.graph.group import Work
+from volery.ros.messages import Message, request, service
+from volery.run.distributed.plan import NODE, operations, service_name
+
+_KIND = "!"
+_TUPLE, _MAPPING = "tuple", "mapping"
+_VOLERY = "volery."
+
+Find = Callable[[str], ModuleType | None]
+"""The module of that name beside the components of this process, loaded if need be."""
+
+
+class ValueCodec:
+    """Both ways, for one process."""
+
+    def __init__(self, find: Find) -> None:
+        self._find = find
+
+    def to_text(self, value: object, what: str) -> str:
+        """*value* as JSON. ``UsageError``, naming *what* it is, if it cannot leave its process."""
+        return json.dumps(_encode(value, what))
+
+    def from_text(self, text: str) -> Any:
+        """What was written. ``UsageError`` if it is not what ``to_text`` writes."""
+        try:
+            return json.loads(text, object_hook=self._made)
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise UsageError(f"not the value of a port: {error}") from error
+
+    def _made(self, found: dict[str, Any]) -> Any:
+        kind = found.get(_KIND)
+        if kind is None:
+            return found
+        content = found["value"]
+        if kind == _TUPLE:
+            return tuple(content)
+        if kind == _MAPPING:
+            return dict(content)
+        cls = self._class(kind)
+        if issubclass(cls, Enum):
+            return cls[content]
+        if not is_dataclass(cls):
+            raise ValueError(f"{kind} is no dataclass")
+        made = cls(**{one.name: content.pop(one.name) for one in fields(cls) if one.init})
+        for name, value in content.items():
+            object.__setattr__(made, name, value)
+        return made
+
+    def _class(self, kind: str) -> type[Any]:
+        module, _, name = kind.partition(":")
+        if module.startswith(SHARED_MODULE_PREFIX):
+            found = self._find(module.removeprefix(SHARED_MODULE_PREFIX))
+        else:
+            ours = module.startswith(_VOLERY) and not module.startswith(USER_MODULE_PREFIX)
+            found = sys.modules.get(module) if ours else None
+        cls = getattr(found, name, None)
+        if not isinstance(cls, type):
+            raise ValueError(f"no class {name} in {module} here")
+        return cls
+
+
+def _encode(value: object, what: str) -> Any:
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    for kind, code in _CODES.items():
+        if isinstance(value, kind):
+            return code(value, what)
+    if is_dataclass(value) and not isinstance(value, type):
+        content = {one.name: _encode(getattr(value, one.name), what) for one in fields(value)}
+        return {_KIND: _name(value, what), "value": content}
+    raise _unfit(value, what)
+
+
+def _tuple(value: tuple[Any, ...], what: str) -> Any:
+    if type(value) is not tuple:
+        raise _unfit(value, what)  # its name and its own fields would be lost
+    return {_KIND: _TUPLE, "value": [_encode(one, what) for one in value]}
+
+
+def _mapping(value: dict[Any, Any], what: str) -> Any:
+    if all(isinstance(key, str) for key in value) and _KIND not in value:
+        return {key: _encode(one, what) for key, one in value.items()}
+    pairs = [[_encode(key, what), _encode(one, what)] for key, one in value.items()]
+    return {_KIND: _MAPPING, "value": pairs}
+
+
+def _name(value: object, what: str) -> str:
+    cls = type(value)
+    module = cls.__module__
+    known = (
+        module.startswith(SHARED_MODULE_PREFIX)
+        if module.startswith(USER_MODULE_PREFIX)
+        else module.startswith(_VOLERY)
+    )
+    if not known:
+        raise _unfit(value, what)
+    return f"{module}:{cls.__qualname__}"
+
+
+_CODES: Mapping[type, Callable[[Any, str], Any]] = {
+    Enum: lambda value, what: {_KIND: _name(value, what), "value": value.name},
+    int: lambda value, what: int(value),
+    float: lambda value, what: float(value),
+    list: lambda value, what: [_encode(one, what) for one in value],
+    tuple: _tuple,
+    dict: _mapping,
+}
+
+
+def _unfit(value: object, what: str) -> UsageError:
+    return UsageError(
+        f"{what}: a {type(value).__qualname__} cannot be sent to another process; use numbers, text, lists, "
+        "mappings, or dataclasses of a module beside the components"
+    )
+
+
+CALL = "volery_msgs/srv/Call"
+
+
+class RemotePort(Port):
+    """``port.operation(...)`` calls a component of another process.
+
+    Raises ``ComponentError``, naming the callee, for whatever goes wrong there; a process that is gone, too.
+    """
+
+    def __init__(
+        self, kernel: Kernel, caller: str, callee: Instance, clients: Mapping[str, Client], values: ValueCodec
+    ) -> None:
+        super().__init__(kernel, caller, callee, None, None)
+        self._clients = clients
+        self._values = values
+
+    def _there_and_back(
+        self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+    ) -> Any:
+        what = f"the arguments of {self.component}.{operation}"
+        asked = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
+        try:
+            answer = self._clients[operation].call(asked)
+        except ServiceError as error:
+            raise ComponentError(self.component, f"{operation} did not come back: {error.what}") from error
+        if not answer.done:
+            raise ComponentError(self.component, answer.result.removeprefix(f"{self.component}: "))
+        return self._values.from_text(answer.result)
+
+
+class PortClients:
+    """Makes the ports of the components of one process to those of others.
+
+    Clients are made with the port, long before a call: on ROS 2 an answer gets lost where its server has not
+    discovered yet who asked.
+    """
+
+    def __init__(self, kernel: Kernel, system: System, node: Node, values: ValueCodec) -> None:
+        self._kernel, self._system, self._node, self._values = kernel, system, node, values
+        self._clients: dict[str, Client] = {}
+
+    def __call__(self, caller: InstanceModel, callee: InstanceModel) -> RemotePort:
+        """The port of *caller*, which is here, to *callee*, which is elsewhere."""
+        provided = operations(self._system, callee)
+        far = Instance(self._kernel, callee.name, operations=provided)
+        clients = {name: self._client(service_name(callee, name)) for name in provided}
+        return RemotePort(self._kernel, caller.name, far, clients, self._values)
+
+    def _client(self, name: str) -> Client:
+        known = self._clients.get(name)
+        if known is None:
+            known = self._clients[name] = self._node.client(name, CALL)
+        return known
+
+
+class PortServer:
+    """Serves the operations of the components of one process to those of others, one task for each call."""
+
+    def __init__(self, kernel: Kernel, node: Node, values: ValueCodec, scope: Scope) -> None:
+        self._kernel, self._node, self._values, self._scope = kernel, node, values, scope
+        self._group = node.group(self._start)
+
+    def serve(self, model: InstanceModel, instance: Instance) -> None:
+        """From now on *instance* can be called."""
+        for operation in instance.operations:
+            handler = partial(self._answer, instance, operation)
+            self._node.serve(service_name(model, operation), CALL, handler, self._group)
+
+    def _start(self, work: Work) -> None:
+        self._kernel.spawn(work.run, f"{NODE} (call)", Place(NODE), self._scope)
+
+    def _answer(self, instance: Instance, operation: str, asked: Any) -> Message:
+        respond = service(CALL).response
+        try:
+            args, kwargs = self._values.from_text(asked.arguments)
+            with instance.visited(current_task(self._kernel), operation) as thing:
+                result = invoke(instance, thing, operation, tuple(args), kwargs)
+            return respond(True, self._values.to_text(result, f"the result of {instance.name}.{operation}"))
+        except VoleryError as error:
+            return respond(False, str(error))

@@ -1,0 +1,222 @@
+"""A run's circumstances for its trace: the setup, the map and the model's own text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from volery.cost import NOT_COUNTED, ProcessorEntry
+from volery.model.environment import Environment, Prism, Ways
+from volery.model.system import CPP_LANGUAGES, Instance, Processor, System
+from volery.run.assembly.computers import Platform
+from volery.run.assembly.cpp import core_of
+from volery.trace.attachments import (
+    MODEL_ATTACHMENT,
+    WORLD_ATTACHMENT,
+    Area,
+    ChainSetup,
+    ComponentSetup,
+    LawSetup,
+    Line,
+    Origin,
+    Place,
+    ProcessorSetup,
+    RequirementSetup,
+    RunSetup,
+    Scenery,
+    VehicleSetup,
+    scenery_to_json,
+)
+from volery.trace.events import NONE
+from volery.trace.mcap_writer import Attachment
+from volery.vehicles import Drone
+from volery.vehicles.address import parse
+
+if TYPE_CHECKING:
+    from volery.run.assembly.vehicles import OpenedVehicles
+
+ALWAYS_LEFT_OUT = (
+    "the operating system and everything else that runs on a computer",
+    "caches and memory traffic that components share",
+)
+"""What no figure of a run includes."""
+
+
+def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> RunSetup:
+    """The setup of a simulation of *system*."""
+    return RunSetup(
+        system=system.name,
+        fidelity=fidelity,
+        allocation=system.allocation,
+        scenario=system.scenario,
+        seed=seed,
+        components=(
+            *(_component(instance) for instance in system.instances),
+            *_vehicle_nodes(system),
+        ),
+        processors=tuple(_processor(model, platform.entry(model.name)) for model in system.processors),
+        vehicles=tuple(VehicleSetup(one.name, one.autopilot, one.kind) for one in system.vehicles),
+        chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
+        requirements=tuple(
+            RequirementSetup(one.name, one.observe, one.relation, one.bound, one.unit)
+            for one in system.requirements
+        ),
+        laws=tuple(_laws(system, platform, fidelity)),
+        not_counted=(*NOT_COUNTED, *ALWAYS_LEFT_OUT, *_missing_networks(system)),
+        warnings=tuple(platform.warnings),
+    )
+
+
+def node_name(vehicle: str) -> str:
+    """The component name of the node that serves a vehicle on the graph."""
+    return f"{vehicle}/mavros"
+
+
+def _component(instance: Instance) -> ComponentSetup:
+    activity = instance.activity
+    return ComponentSetup(
+        name=instance.name,
+        type=instance.component.name,
+        language=instance.component.language,
+        processor=instance.processor or "",
+        active=activity is not None,
+        period=_or_none(activity.period_ns if activity else None),
+        deadline=_or_none(activity.deadline_ns if activity else None),
+        priority=activity.priority if activity else 0,
+    )
+
+
+def _or_none(value: int | None) -> int:
+    return NONE if value is None else value
+
+
+def _vehicle_nodes(system: System) -> Iterable[ComponentSetup]:
+    for vehicle in system.vehicles:
+        if vehicle.processor is not None:
+            yield ComponentSetup(node_name(vehicle.name), "MAVROS", "roscpp", vehicle.processor, active=True)
+
+
+def _processor(model: Processor, entry: ProcessorEntry) -> ProcessorSetup:
+    power = entry.power
+    return ProcessorSetup(
+        name=model.name,
+        kind=model.kind,
+        frequency_mhz=model.frequency_mhz,
+        scheduler=model.scheduler,
+        cores=model.cores,
+        idle_w=power.watts(0.0, model.frequency_mhz) if power else None,
+        busy_w=power.watts(model.cores, model.frequency_mhz) if power else None,
+        power_error=power.band() or None if power else None,
+    )
+
+
+def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetup]:
+    """One entry per kind of processor and law, whatever the number of computers of that kind."""
+    first: dict[str, Processor] = {}
+    for one in system.processors:
+        first.setdefault(one.kind, one)
+    for kind, model in first.items():
+        entry = platform.entry(model.name)
+        for law in entry.ros.values():
+            warning = "; ".join(law.model_copy(update={"processor": kind}).warnings(model.frequency_mhz))
+            yield LawSetup(f"{law.client} calls on {kind}", law.source, law.provenance, law.validity, warning)
+        if fidelity == "code":
+            yield from _code_laws(system, entry, kind)
+        if entry.power is not None:
+            name = f"power of {kind}"
+            validity = f"{entry.power.validity}; {entry.power.how_good()}"
+            yield LawSetup(name, entry.power.source, entry.power.provenance, validity)
+
+
+def _code_laws(system: System, entry: ProcessorEntry, kind: str) -> Iterable[LawSetup]:
+    """The laws that the code of components is counted by, as far as there are such components."""
+    kinds = {one.name: one.kind for one in system.processors}
+    there = [one for one in system.instances if kinds.get(one.processor or "") == kind and one.component.path]
+    if any(one.component.language not in CPP_LANGUAGES for one in there):
+        for code in entry.code.values():
+            warning = "; ".join(code.model_copy(update={"processor": kind}).warnings())
+            name = f"counted {code.language} code on {kind}"
+            validity = f"{code.validity}; {code.how_good()}"
+            yield LawSetup(name, code.source, code.provenance, validity, warning)
+    core = next(filter(None, (core_of(system, "code", one) for one in there)), None)
+    if core is not None:
+        validity = f"code whose data stay in the first cache; {core.how_good()}"
+        yield LawSetup(f"counted C++ code on {kind}", core.source, core.provenance, validity)
+
+
+def _missing_networks(system: System) -> Iterable[str]:
+    """Connections between two processors that no network joins."""
+    where = {instance.name: instance.processor for instance in system.instances}
+    for instance in system.instances:
+        for connection in instance.connections.values():
+            for target in connection.targets:
+                here, there = instance.processor, where.get(target.name)
+                if here and there and here != there and system.network_between(here, there) is None:
+                    yield f"{instance.name} calls {target} in no time: no network joins {here} and {there}"
+
+
+# -- what is attached
+
+
+def attachments_of(system: System) -> list[Attachment]:
+    """The map and the text of every file that the model was read from."""
+    scenery = scenery_to_json(scenery_of(system.environment))
+    found = [Attachment(WORLD_ATTACHMENT, "application/json", scenery)]
+    for number, source in enumerate(system.sources):
+        name = MODEL_ATTACHMENT if number == 0 else source.name
+        found.append(Attachment(name, "application/yaml", source.text.encode()))
+    return found
+
+
+def scenery_of(environment: Environment) -> Scenery:
+    """What there is to draw."""
+    origin = environment.origin
+    return Scenery(
+        origin=Origin(origin.latitude, origin.longitude, origin.amsl),
+        places=tuple(
+            Place(one.name, one.east_m, one.north_m, one.role) for one in environment.places.values()
+        ),
+        roads=tuple(_lines(environment.roads)),
+        corridors=tuple(_lines(environment.corridors)),
+        areas=(
+            *(_area(zone, "no-fly") for zone in environment.no_fly_zones),
+            *(_area(building, "building") for building in environment.buildings),
+        ),
+    )
+
+
+def _lines(ways: Ways) -> Iterable[Line]:
+    for one, other, _ in ways.edges:
+        a, b = ways.nodes[one], ways.nodes[other]
+        yield (a.east_m, a.north_m), (b.east_m, b.north_m)
+
+
+def _area(prism: Prism, kind: str) -> Area:
+    return Area(prism.name, tuple(prism.corners), kind)
+
+
+# -- a flight without a model
+
+
+def setup_of_flight(
+    path: Path | None, urls: Sequence[str], opened: OpenedVehicles, seed: int
+) -> tuple[RunSetup, list[Attachment]]:
+    """The setup of ``fly``: vehicles, and no computers. Attached: the map, and the mission's text if it is a
+    file.
+    """
+    autopilots = [parse(url).driver for url in urls]
+    vehicles = tuple(
+        VehicleSetup(vehicle.name, autopilot, "multirotor" if isinstance(vehicle, Drone) else "rover")
+        for vehicle, autopilot in zip(opened.vehicles, autopilots, strict=True)
+    )
+    fidelity = "code" if opened.airfield else "hardware"
+    setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
+    attachments = []
+    if opened.airfield is not None:
+        origin = opened.airfield.frame
+        scenery = Scenery(Origin(origin.latitude, origin.longitude, origin.amsl))
+        attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", scenery_to_json(scenery)))
+    if path is not None:
+        attachments.append(Attachment(path.name, "text/x-python", path.read_bytes()))
+    return setup, attachments

@@ -1,0 +1,247 @@
+"""The way to a DJI node: what it says is taken in, set-points go out 50 times a second, requests get answers.
+
+It works in tasks of its own at the place of the node that commands: what that takes is charged there, it goes
+on while the component computes, and a computer that is too slow for it makes it late.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from volery.base.errors import LinkError, LinkSilent
+from volery.base.time import MS, Ns, S
+from volery.kernel.api import Action, Kernel
+from volery.kernel.task import Place
+from volery.kernel.waiting import Signal, sleep
+from volery.ros.graph import Node, ServiceError, Work
+from volery.ros.messages.dji import M100, DisplayMode
+from volery.trace.events import LinkState
+from volery.vehicles.drivers.dji.decoder import DjiDecoder
+from volery.vehicles.drivers.dji.node_interfaces import NodeInterface, ServiceRequest
+from volery.vehicles.drivers.dji.setpoints import SetpointStream
+from volery.vehicles.telemetry import Answer, Telemetry
+
+SETPOINT_PERIOD: Ns = 20 * MS
+ANSWERED_WITHIN: Ns = 60 * S
+"""The vehicle node of 4.1 may answer a task only when it is done."""
+QUIET: Ns = 200 * MS
+"""So long after the last set-point none is on its way any more: one that came later would end a task."""
+LOOK_PERIOD: Ns = S
+SILENT_AFTER: Ns = 3 * S
+KEPT = 1000
+"""Messages that wait to be taken in; older ones are dropped."""
+
+ACTIVATION, AUTHORITY, REFERENCE, MOTORS = "activation", "authority", "local reference", "motors"
+TASK, MISSION, START = "task", "mission", "mission start"
+"""Keys of ``Telemetry.answers``."""
+
+NOT_M100 = "aircraft of OSDK 4"
+
+
+def _nothing() -> None:
+    """Nothing follows from it."""
+
+
+class DjiBackend:
+    """Talks to one node. Making it subscribes and starts its tasks."""
+
+    def __init__(self, kernel: Kernel, node: Node, name: str, names: NodeInterface, *, record: bool) -> None:
+        self.telemetry = Telemetry(kernel, name)
+        self.hearing = DjiDecoder(kernel, self.telemetry, record=record)
+        self.stream = SetpointStream(kernel, self.telemetry, self.hearing)
+        self.names = names
+        self._kernel = kernel
+        self._node = node
+        self._wrong = ""
+        self._under_way: set[str] = set()
+        self._arrived: deque[Work] = deque(maxlen=KEPT)
+        self._due = Signal(kernel, f"messages of {names.namespace}")
+        self._next: Ns = 0
+        self._sent_at: Ns = -QUIET
+        self._silent = False
+        self._closed = False
+        self._place: Place = replace(node.place, deadline=None, on_release=None, meter=None)
+        self._scope = kernel.root.child(f"{name} (DJI)")
+        self._spinner = node.group()
+        inbox = node.group(self._take)
+        for topic, (kind, handler) in self.hearing.topics(names.package).items():
+            node.subscribe(f"{names.namespace}/{topic}", kind, handler, group=inbox)
+        self._spawn(self._run, "DJI node")
+        self._spawn(self._greet, "greeting")
+        self._watch = kernel.every(LOOK_PERIOD, self._notice_silence)
+
+    def _spawn(self, body: Any, what: str) -> None:
+        self._kernel.spawn(body, f"{self.telemetry.name} ({what})", self._place, self._scope)
+
+    # -- taking in
+
+    def _take(self, work: Work) -> None:
+        """House code."""
+        self._arrived.append(work)
+        if len(self._arrived) == 1:
+            self._due.notify()
+
+    def _run(self) -> None:
+        """The node's own loop: take in what has come, send what is due."""
+        while not self._closed and not self._node.closed:
+            self._due.wait_for(self._wakes, self._patience())
+            if self._arrived:
+                self._take_in()
+            self._send_setpoint()
+
+    def _wakes(self) -> bool:
+        return bool(self._arrived) or self._closed or self._node.closed or self.stream.fresh
+
+    def _patience(self) -> Ns | None:
+        return max(0, self._next - self._kernel.now()) if self.stream.wanted else None
+
+    def _take_in(self) -> None:
+        """It is paid as one ``spinOnce``, whatever the number of messages."""
+        self._spinner.spin_once(0)
+        with self._kernel.guard:
+            while self._arrived:
+                self._arrived.popleft().run()
+            self._judge()
+
+    def _judge(self) -> None:
+        if self._silent and self.telemetry.silence(self._kernel.now()) < 1.0:
+            self._silent = False
+            self._record_link("back", "the aircraft is heard again")
+        self.hearing.judge()
+        self.stream.judge()
+        self.telemetry.changed.notify()
+
+    def _send_setpoint(self) -> None:
+        now = self._kernel.now()
+        if not self.stream.wanted or (now < self._next and not self.stream.fresh):
+            return
+        with self._kernel.guard:
+            setpoint = self.stream.setpoint()
+        late = now - self._next
+        self._next = (self._next if 0 <= late < SETPOINT_PERIOD else now) + SETPOINT_PERIOD
+        if setpoint is None:
+            return
+        try:
+            self.names.setpoint(*setpoint)
+        except ServiceError as error:
+            self._wrong = str(error)
+        self._sent_at = self._kernel.now()
+
+    @property
+    def quiet(self) -> bool:
+        """No set-point is sent or on its way."""
+        return not self.stream.wanted and self._kernel.now() - self._sent_at >= QUIET
+
+    def stir(self) -> None:
+        """There is something else to send. House code."""
+        self._due.notify()
+
+    def _notice_silence(self) -> None:
+        heard, now = self.telemetry.heard, self._kernel.now()
+        if heard >= 0 and now - heard > SILENT_AFTER and not self._silent:
+            self._silent = True
+            self._record_link("silent", "the aircraft is not heard")
+
+    def _record_link(self, what: str, detail: str) -> None:
+        self._kernel.record(LinkState(self._kernel.now(), self.telemetry.name, what, detail))
+
+    # -- who it is
+
+    def _greet(self) -> None:
+        """Until it is known which aircraft it is, its numbers mean nothing."""
+        ask = self.names.version()
+        while ask is not None and not self._closed:
+            if ask.client.wait(S):
+                try:
+                    response = ask.client.call(ask.request, within=S)
+                except ServiceError as error:
+                    self._wrong = str(error)
+                else:
+                    self._wrong = ""
+                    self.hearing.aircraft = response.hardware or "aircraft"
+                    break
+                sleep(self._kernel, S)
+        if ask is None:
+            self.hearing.aircraft = NOT_M100
+            self.hearing.activate()
+        with self._kernel.guard:
+            self._judge()
+
+    # -- requests
+
+    def ask(self, key: str, ask: ServiceRequest | None, accepted: Action = _nothing) -> None:
+        """Send a request; its answer will be in the telemetry under *key*, *accepted* is called before if it
+        is. Never blocks.
+        """
+        if ask is None or key in self._under_way:
+            return
+        self._under_way.add(key)
+        self._spawn(partial(self._call, key, ask, accepted), key)
+
+    def _call(self, key: str, ask: ServiceRequest, accepted: Action) -> None:
+        try:
+            response = ask.client.call(ask.request, within=ANSWERED_WITHIN)
+        except ServiceError as error:
+            with self._kernel.guard:
+                self._under_way.discard(key)
+                self._wrong = str(error)
+            return
+        with self._kernel.guard:
+            self._under_way.discard(key)
+            self._wrong = ""
+            if response.result:
+                accepted()
+            self._answered(key, bool(response.result), getattr(response, "ack_data", None))
+
+    def _answered(self, key: str, accepted: bool, code: int | None) -> None:
+        result = "accepted" if accepted else "refused" if code is None else f"refused with {code}"
+        self.telemetry.answers[key] = Answer(self._kernel.now(), accepted, result)
+        self._judge()
+
+    def activate(self) -> None:
+        """Have the node activate, where it does not by itself."""
+        self.ask(ACTIVATION, self.names.activation(), self.hearing.activate)
+
+    def authority(self) -> None:
+        """Obtain the authority."""
+        self.ask(AUTHORITY, self.names.authority(True), self.hearing.granted)
+
+    def motors(self, on: bool, *, force: bool = False) -> None:
+        """Start or stop them; by force in the air, too."""
+        ask = self.names.kill() if force else self.names.motors(on)
+        self.ask(MOTORS, ask, partial(self.hearing.motors, on))
+
+    def task(self, task: int, mode: DisplayMode) -> None:
+        """A task, after which it is in that mode. Set-points would end it: none is sent any more."""
+        self.stream.stop()
+        self.hearing.asked = mode.name
+        self.ask(TASK, self.names.task(task))
+
+    # -- the end
+
+    def problem(self) -> LinkError | None:
+        """What is wrong on the way, as far as it shows."""
+        if self._wrong:
+            return LinkSilent(self._wrong)
+        if self.telemetry.heard >= 0:
+            return None
+        below = self.names.namespace
+        if self.hearing.node_seen:
+            return LinkSilent(f"the node at {below} does not say which aircraft it serves")
+        return LinkSilent(f"no DJI node publishes {below}/flight_status")
+
+    @property
+    def is_m100(self) -> bool:
+        """Its numbers and its topics are fewer."""
+        return self.hearing.aircraft == M100
+
+    def close(self) -> None:
+        """Commands no more; the node is its owner's."""
+        self.stream.stop()
+        self._closed = True
+        self._watch.cancel()
+        self._due.notify()
+        self._kernel.cancel(self._scope, "the driver was closed")

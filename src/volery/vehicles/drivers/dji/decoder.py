@@ -1,0 +1,261 @@
+"""What a DJI node's topics say, as ``Telemetry``. One method for each topic that is listened to.
+
+Who has the authority is on no topic: it follows from the answers to our requests and from the pilot's mode
+switch, which takes it whenever it is moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import degrees, isfinite, nan
+from typing import Any
+
+from volery.base.frames import attitude_enu_to_ned, enu_to_ned, quaternion_to_euler
+from volery.base.position import AMSL, Position
+from volery.base.time import MS, Ns, S
+from volery.kernel.api import Kernel
+from volery.ros.messages.dji import HEALTHY_GPS, M100, DisplayMode, FlightStatus, M100Status, display_name
+from volery.trace.events import Text
+from volery.vehicles.drivers.steps import DRONE_KIND
+from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity
+
+Handler = Callable[[Any], None]
+
+SWITCH_AXIS = 4
+"""Of ``rc``: the mode switch. Its numbers differ from aircraft to aircraft; that it moves is what counts."""
+MILLI = 1000.0
+MOST_VOLTS = 100.0
+"""A voltage above it is in millivolts."""
+NO_FIX = -1
+UNKNOWN = -1
+WARNING = 4
+TAKEN_OVER_FOR: Ns = 5 * S
+"""So long it shows as taken by another after set-points were not obeyed."""
+
+SETTLED: Ns = 200 * MS
+"""So long a mode after a way down must show before it is believed: on a bad wire the news that the motors
+stand may come later than that of the mode.
+"""
+
+WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
+"""Modes in which it hovers and takes commands, if the pilot lets it."""
+LANDS = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
+DESCENDING_MODES = LANDS | {DisplayMode.NAVI_GO_HOME}
+TAKES_OFF = frozenset({DisplayMode.ENGINE_START, DisplayMode.ASSISTED_TAKEOFF, DisplayMode.AUTO_TAKEOFF})
+
+
+class DjiDecoder:
+    """Turns messages into telemetry, once ``aircraft`` is known: the M100's numbers are its own.
+
+    ``asked`` is the mode that was asked of it last. Stages of what was asked go by its name: a landing at
+    the end of going home is still going home, the start of the motors for a take-off is the take-off.
+    """
+
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool) -> None:
+        self.aircraft = ""
+        self.activated = False
+        self.authority = False
+        self.asked = ""
+        self.node_seen = False
+        self.located_at: Ns = -1
+        """When it last said where it is."""
+        self._kernel = kernel
+        self._seen = telemetry
+        self._records = record
+        self._display = UNKNOWN
+        self._shown = UNKNOWN
+        self._shown_since: Ns = 0
+        self._status = UNKNOWN
+        self._gps_health = 0
+        self._height = nan
+        self._switch: float | None = None
+        self._granted_at: float | None = None  # where the switch was when we were given the authority
+        self._taken = ""
+        self._taken_at: Ns = 0
+        self._motors = False  # of an M100, whose status does not tell
+        self._anomalies = 0
+
+    def topics(self, package: str) -> Mapping[str, tuple[str, Handler]]:
+        """Type and handler of each topic."""
+        return {
+            "flight_status": ("std_msgs/msg/UInt8", self._flight_status),
+            "display_mode": ("std_msgs/msg/UInt8", self._display_mode),
+            "gps_health": ("std_msgs/msg/UInt8", self._health),
+            "gps_position": ("sensor_msgs/msg/NavSatFix", self._position),
+            "height_above_takeoff": ("std_msgs/msg/Float32", self._height_above),
+            "velocity": ("geometry_msgs/msg/Vector3Stamped", self._velocity),
+            "attitude": ("geometry_msgs/msg/QuaternionStamped", self._attitude),
+            "rc": ("sensor_msgs/msg/Joy", self._rc),
+            "battery_state": ("sensor_msgs/msg/BatteryState", self._battery),
+            "flight_anomaly": (f"{package}/msg/FlightAnomaly", self._anomaly),
+        }
+
+    # -- topics
+
+    def _flight_status(self, message: Any) -> None:
+        self.node_seen = True
+        if message.data == M100Status.FINISHED_LANDING != self._status and self.aircraft == M100:
+            self._motors = False  # when it begins to say so; it goes on for a while, whatever is started then
+        self._status = message.data
+        if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
+            self._seen.heard = self._kernel.now()
+
+    def _display_mode(self, message: Any) -> None:
+        now, shown = self._kernel.now(), message.data
+        if shown != self._shown:
+            self._shown, self._shown_since = shown, now
+        comes_down = self._display in DESCENDING_MODES and shown not in DESCENDING_MODES
+        if not comes_down or not self._seen.armed or now - self._shown_since >= SETTLED:
+            self._display = shown
+
+    def _health(self, message: Any) -> None:
+        self._gps_health = message.data
+        self._seen.fix = f"gps health {message.data}"
+
+    def _position(self, message: Any) -> None:
+        """Its altitude is above the sea: assumed."""
+        place = (message.latitude, message.longitude, message.altitude)
+        if message.status.status <= NO_FIX or not all(isfinite(value) for value in place) or not any(place):
+            return
+        if abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0:
+            self.located_at = self._kernel.now()
+            self._seen.position = Position(place[0], place[1], AMSL(place[2]))
+
+    def _height_above(self, message: Any) -> None:
+        self._height = message.data
+
+    def _velocity(self, message: Any) -> None:
+        vector = message.vector
+        north, east, down = enu_to_ned((vector.x, vector.y, vector.z))
+        self._seen.velocity = Velocity(north, east, -down)
+
+    def _attitude(self, message: Any) -> None:
+        q = message.quaternion
+        roll, pitch, yaw = quaternion_to_euler(attitude_enu_to_ned((q.w, q.x, q.y, q.z)))
+        self._seen.attitude = Attitude(degrees(roll), degrees(pitch), degrees(yaw) % 360.0)
+
+    def _battery(self, message: Any) -> None:
+        volts, amperes = message.voltage, -message.current
+        if volts > MOST_VOLTS:
+            volts, amperes = volts / MILLI, amperes / MILLI
+        self._seen.battery = Battery(message.percentage / 100.0, volts, amperes)
+
+    def _rc(self, message: Any) -> None:
+        """Any move of the mode switch takes the authority."""
+        if len(message.axes) <= SWITCH_AXIS:
+            return
+        switch = self._switch = float(message.axes[SWITCH_AXIS])
+        if self.authority and self._granted_at is None:
+            self._granted_at = switch
+        if self.authority and switch != self._granted_at:
+            self._lose("RC", "the pilot moved the mode switch: the authority is lost")
+        elif self._taken == "RC" and switch == self._granted_at:
+            self._taken = ""
+
+    def _anomaly(self, message: Any) -> None:
+        """What is new among the bits, as texts."""
+        new = message.data & ~self._anomalies
+        self._anomalies = message.data
+        if not new:
+            return
+        for name in dir(type(message)):
+            value = getattr(type(message), name)
+            if name.isupper() and isinstance(value, int) and value & new:
+                self.say(WARNING, name.replace("_", " ").lower())
+
+    # -- authority
+
+    def activate(self) -> None:
+        """It was activated."""
+        self.activated = True
+
+    def granted(self) -> None:
+        """We have it, for as long as the pilot's switch stays where it is."""
+        self.authority = True
+        self._granted_at = self._switch
+        self._taken = ""
+
+    def not_obeyed(self) -> None:
+        """Set-points have no effect: somebody else must have the authority."""
+        self._lose("another program", "set-points are not obeyed: the authority is lost")
+
+    def _lose(self, to: str, text: str) -> None:
+        self.authority = False
+        self._taken, self._taken_at = to, self._kernel.now()
+        self.say(WARNING, text)
+
+    def motors(self, on: bool) -> None:
+        """An M100 has accepted that its motors start or stop."""
+        self._motors = on
+
+    # -- what follows from all of them
+
+    def judge(self) -> None:
+        """After the messages that came at one time."""
+        seen = self._seen
+        if seen.heard < 0:
+            return
+        if self._taken and self._taken != "RC" and self._kernel.now() - self._taken_at > TAKEN_OVER_FOR:
+            self._taken = ""
+        seen.kind, seen.autopilot = DRONE_KIND, f"DJI {self.aircraft}"
+        was_armed = seen.armed
+        mode = self._judge_m100() if self.aircraft == M100 else self._judge_others()
+        self._judge_home(was_armed)
+        seen.armable = self.activated
+        healthy = self._gps_health >= HEALTHY_GPS
+        seen.ready = self.activated and healthy and seen.position is not None
+        name = self._named(mode)
+        by_itself = mode in DESCENDING_MODES and name != self.asked
+        lost_place = seen.flying and mode == DisplayMode.ATTITUDE and not healthy
+        seen.failsafe = bool(seen.armed and (by_itself or lost_place))
+        seen.status = "critical" if seen.failsafe else "active" if seen.flying else "standby"
+        seen.mode = f"{name} by {self._taken}" if self._taken and mode not in DESCENDING_MODES else name
+        if not seen.armed:
+            self.asked = ""
+
+    def _judge_others(self) -> int:
+        self._seen.armed = self._status >= FlightStatus.ON_GROUND
+        self._seen.flying = self._status >= FlightStatus.IN_AIR
+        return self._display
+
+    def _judge_m100(self) -> int:
+        """It has no display mode: what it does follows from its status and from what was asked of it."""
+        seen, status = self._seen, self._status
+        moving = (M100Status.TAKING_OFF, M100Status.IN_AIR, M100Status.LANDING)
+        seen.armed = self._motors or status in moving
+        seen.flying = status in (M100Status.IN_AIR, M100Status.LANDING)
+        if status == M100Status.TAKING_OFF:
+            return DisplayMode.AUTO_TAKEOFF
+        if status == M100Status.LANDING:
+            return DisplayMode.AUTO_LANDING
+        asked = self.asked if seen.flying and self.asked in DisplayMode.__members__ else ""
+        if asked and asked != DisplayMode.AUTO_TAKEOFF.name:
+            return DisplayMode[asked]
+        return DisplayMode.P_GPS
+
+    def _named(self, mode: int) -> str:
+        asked = self.asked
+        if asked == DisplayMode.NAVI_GO_HOME.name and mode == DisplayMode.AUTO_LANDING:
+            return asked
+        if asked == DisplayMode.AUTO_TAKEOFF.name and mode in TAKES_OFF:
+            return asked
+        return display_name(mode) if mode != UNKNOWN else ""
+
+    def _judge_home(self, was_armed: bool) -> None:
+        """Home is where the motors are started; before, it is where it stands."""
+        seen, here = self._seen, self._seen.position
+        if not seen.armed:
+            seen.above_home = 0.0 if here is not None else nan
+            seen.home = here
+            return
+        seen.above_home = self._height
+        if not was_armed and not seen.flying and here is not None and isfinite(self._height):
+            amsl = here.altitude.metres - self._height
+            seen.home = Position(here.latitude, here.longitude, AMSL(amsl))
+
+    def say(self, severity: int, text: str) -> None:
+        """A text of ours about the aircraft: it has none of its own."""
+        now = self._kernel.now()
+        self._seen.texts.append(StatusText(now, severity, text))
+        if self._records:
+            self._kernel.record(Text(now, self._seen.name, severity, text))

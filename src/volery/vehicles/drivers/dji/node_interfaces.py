@@ -1,0 +1,239 @@
+"""The two sets of names: what is asked is the same, the services and their types differ.
+
+``dji_sdk`` 3.8 takes set-points on topics, in the conventions of ROS. The vehicle node of ``dji_osdk_ros``
+4.1 takes them by a service, in those of the flight controller: north and east, or forward and right;
+clockwise; degrees. It has no service to ask which aircraft it is before it flies that is of use here: an
+M100, whose numbers differ, is not supported by 4.x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+from typing import Any, NamedTuple, Protocol
+
+from volery.base.frames import yaw_to_heading
+from volery.ros.graph import Client, Node, Publisher
+from volery.ros.messages import message_class, request
+from volery.ros.messages.dji import HORIZONTAL, NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS, Flag
+
+GO_HOME, TAKE_OFF, LAND = 1, 4, 6
+"""Tasks."""
+EXIT_GO_HOME, EXIT_LANDING = 12, 14
+START_MOTOR, STOP_MOTOR = 7, 8
+START_MISSION = 0
+
+SETPOINT_WITHIN = 200_000_000
+"""Nanoseconds that a set-point by a service may take."""
+
+JOY = "sensor_msgs/msg/Joy"
+
+
+class ServiceRequest(NamedTuple):
+    """A request to one of the services."""
+
+    client: Client
+    request: Any
+
+
+class NodeInterface(Protocol):
+    """What can be asked of either node. ``None``: that node needs no such request."""
+
+    namespace: str
+    package: str
+    kills_without_authority: bool
+
+    def version(self) -> ServiceRequest | None:
+        """Which aircraft it is: the response has ``hardware``."""
+
+    def activation(self) -> ServiceRequest | None:
+        """Activate."""
+
+    def authority(self, wanted: bool) -> ServiceRequest:
+        """Obtain or release the authority."""
+
+    def motors(self, on: bool) -> ServiceRequest:
+        """Start or stop them, on the ground."""
+
+    def kill(self) -> ServiceRequest:
+        """Stop them wherever it is."""
+
+    def task(self, task: int) -> ServiceRequest:
+        """Go home, take off or land."""
+
+    def interrupt(self, task: int) -> ServiceRequest | None:
+        """End going home or landing; ``None``: a set-point does."""
+
+    def reference(self) -> ServiceRequest:
+        """Set the local reference."""
+
+    def mission(self, task: Any) -> ServiceRequest:
+        """Upload a mission."""
+
+    def mission_action(self, action: int) -> ServiceRequest:
+        """Start it."""
+
+    def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
+        """Four numbers in the conventions of ROS. May block for as long as sending takes."""
+
+
+class _CommonInterface:
+    """What both have below their prefix."""
+
+    package = ""
+
+    def __init__(self, node: Node, namespace: str) -> None:
+        self.namespace = namespace
+        self._node = node
+        self._upload = self._client(f"{namespace}/mission_waypoint_upload", "MissionWpUpload")
+        self._action = self._client(f"{namespace}/mission_waypoint_action", "MissionWpAction")
+
+    def _client(self, name: str, kind: str) -> Client:
+        return self._node.client(name, f"{self.package}/srv/{kind}")
+
+    def _ask(self, client: Client, **fields: Any) -> ServiceRequest:
+        return ServiceRequest(client, request(client.type, **fields))
+
+    def mission(self, task: Any) -> ServiceRequest:
+        """``mission_waypoint_upload``."""
+        return self._ask(self._upload, waypoint_task=task)
+
+    def mission_action(self, action: int) -> ServiceRequest:
+        """``mission_waypoint_action``."""
+        return self._ask(self._action, action=action)
+
+
+class DjiSdkInterface(_CommonInterface):
+    """``dji_sdk`` 3.8."""
+
+    package = OLD_NAMES
+    kills_without_authority = False
+
+    def __init__(self, node: Node, namespace: str) -> None:
+        super().__init__(node, namespace)
+        below = f"{namespace}/"
+        self._version = self._client(f"{below}query_drone_version", "QueryDroneVersion")
+        self._activation = self._client(f"{below}activation", "Activation")
+        self._authority = self._client(f"{below}sdk_control_authority", "SDKControlAuthority")
+        self._arm = self._client(f"{below}drone_arm_control", "DroneArmControl")
+        self._task = self._client(f"{below}drone_task_control", "DroneTaskControl")
+        self._reference = self._client(f"{below}set_local_pos_ref", "SetLocalPosRef")
+        self._publishers: dict[int, Publisher] = {
+            flag: node.advertise(f"{below}{name}", JOY) for name, flag in SETPOINT_TOPICS.items()
+        }
+        self._generic = node.advertise(f"{below}{SETPOINT}generic", JOY)
+
+    def version(self) -> ServiceRequest:
+        """``query_drone_version``."""
+        return self._ask(self._version)
+
+    def activation(self) -> ServiceRequest:
+        """``activation``, with the key among the node's own parameters."""
+        return self._ask(self._activation)
+
+    def authority(self, wanted: bool) -> ServiceRequest:
+        """``sdk_control_authority``."""
+        return self._ask(self._authority, control_enable=int(wanted))
+
+    def motors(self, on: bool) -> ServiceRequest:
+        """``drone_arm_control``."""
+        return self._ask(self._arm, arm=int(on))
+
+    def kill(self) -> ServiceRequest:
+        """``drone_arm_control``: there is no kill switch."""
+        return self.motors(False)
+
+    def task(self, task: int) -> ServiceRequest:
+        """``drone_task_control``."""
+        return self._ask(self._task, task=task)
+
+    def interrupt(self, task: int) -> None:
+        """There is no such task: set-points are to end it. Assumed."""
+
+    def reference(self) -> ServiceRequest:
+        """``set_local_pos_ref``."""
+        return self._ask(self._reference)
+
+    def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
+        """On the topic of that flag, or on the generic one."""
+        publisher = self._publishers.get(flag)
+        axes = list(numbers) if publisher is not None else [*numbers, float(flag)]
+        joy: Any = message_class(JOY)()
+        joy.axes = axes
+        (publisher or self._generic).publish(joy)
+
+
+class OsdkRosInterface(_CommonInterface):
+    """The vehicle node of ``dji_osdk_ros`` 4.1: most services lie beside its prefix."""
+
+    package = NEW_NAMES
+    kills_without_authority = True
+
+    def __init__(self, node: Node, namespace: str) -> None:
+        super().__init__(node, namespace)
+        beside = namespace.rpartition("/")[0] + "/"
+        self._task = self._client(f"{beside}flight_task_control", "FlightTaskControl")
+        self._authority = self._client(f"{beside}obtain_release_control_authority", "ObtainControlAuthority")
+        self._kill = self._client(f"{beside}kill_switch", "KillSwitch")
+        self._reference = self._client(f"{beside}set_local_pos_reference", "SetLocalPosRef")
+        self._mode = self._client(f"{beside}set_joystick_mode", "SetJoystickMode")
+        self._joystick = self._client(f"{beside}joystick_action", "JoystickAction")
+        self._flag = -1
+
+    def version(self) -> None:
+        """Not asked: see above."""
+
+    def activation(self) -> None:
+        """The node activates when it starts."""
+
+    def authority(self, wanted: bool) -> ServiceRequest:
+        """``obtain_release_control_authority``."""
+        return self._ask(self._authority, enable_obtain=wanted)
+
+    def motors(self, on: bool) -> ServiceRequest:
+        """``flight_task_control``."""
+        return self.task(START_MOTOR if on else STOP_MOTOR)
+
+    def kill(self) -> ServiceRequest:
+        """``kill_switch``."""
+        return self._ask(self._kill, enable=True)
+
+    def task(self, task: int) -> ServiceRequest:
+        """``flight_task_control``."""
+        return self._ask(self._task, task=task)
+
+    def interrupt(self, task: int) -> ServiceRequest:
+        """``flight_task_control``."""
+        return self.task(EXIT_GO_HOME if task == GO_HOME else EXIT_LANDING)
+
+    def reference(self) -> ServiceRequest:
+        """``set_local_pos_reference``."""
+        return self._ask(self._reference)
+
+    def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
+        """``joystick_action``, after ``set_joystick_mode`` where the flag is another. Raises
+        ``ServiceError``.
+        """
+        if flag != self._flag:
+            self._mode.call(self._mode_of(flag).request, within=SETPOINT_WITHIN)
+            self._flag = flag
+        x, y, z, yaw = numbers
+        if not flag & HORIZONTAL:
+            x, y = degrees(x), -degrees(y)
+        else:
+            x, y = (x, -y) if flag & Flag.BODY else (y, x)
+        turn = -degrees(yaw) if flag & Flag.YAW_RATE else degrees(yaw_to_heading(yaw))
+        command = {"x": x, "y": y, "z": z, "yaw": turn}
+        self._joystick.call(
+            self._ask(self._joystick, joystickCommand=command).request, within=SETPOINT_WITHIN
+        )
+
+    def _mode_of(self, flag: int) -> ServiceRequest:
+        return self._ask(
+            self._mode,
+            horizontal_mode=(flag & HORIZONTAL) >> 6,
+            vertical_mode=(flag >> 4) & 3,
+            yaw_mode=int(bool(flag & Flag.YAW_RATE)),
+            horizontal_coordinate=int(bool(flag & Flag.BODY)),
+            stable_mode=int(bool(flag & Flag.STABLE)),
+        )

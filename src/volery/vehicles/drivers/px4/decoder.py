@@ -1,0 +1,228 @@
+"""PX4's events: what it says instead of texts, as numbers.
+
+An event's number is made of its name: the component (1, the autopilot) in the high byte, and below it 24
+bits of the name's FNV-1a hash. What an event means stands only in the firmware's sources; here are those of
+PX4 1.14 that were recorded, and the arming checks that a user meets. Others are shown as their number.
+
+What a PX4's messages say beyond those of every MAVLink autopilot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from volery.kernel.api import Kernel
+from volery.vehicles.drivers.mavlink import decoder
+from volery.vehicles.drivers.mavlink.decoder import Fields
+from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, MODES, mode_name
+from volery.vehicles.telemetry import Telemetry
+
+ALL_MODES = 0xFFFFFFFF
+ERROR = 3
+"""Log levels are those of syslog; an arming check for all modes that is no error is but a warning."""
+NOT_FOR_PEOPLE = 8
+
+_BASIS, _PRIME = 0x811C9DC5, 0x01000193
+_AUTOPILOT = 1 << 24
+
+
+def event_id(name: str) -> int:
+    """The number of the autopilot's event *name*."""
+    value = _BASIS
+    for octet in name.encode():
+        value = (value ^ octet) * _PRIME & 0xFFFFFFFF
+    return value & 0xFFFFFF | _AUTOPILOT
+
+
+class Event(NamedTuple):
+    """``modes`` is a set of bits, one for each mode's ``state``: of a check, those that it forbids."""
+
+    id: int
+    severity: int
+    modes: int
+
+
+REPORT_BEGINS = event_id("commander_arming_check_summary")
+REPORT_ENDS = event_id("commander_health_summary")
+"""Between these two stand the arming checks that fail, all of them each time one of them changes."""
+
+NO_STICKS = event_id("check_modes_manual_control")
+
+CHECKS: Mapping[int, str] = {
+    event_id(name): words
+    for name, words in {
+        "check_modes_cannot_takeoff": "mode not suitable for arming",
+        "check_modes_angular_velocity": "angular velocity not valid",
+        "check_modes_attitude": "no valid attitude estimate",
+        "check_modes_local_pos": "no valid local position estimate",
+        "check_modes_global_pos": "no valid global position estimate",
+        "check_modes_local_alt": "no valid altitude estimate",
+        "check_modes_mission": "no valid mission available",
+        "check_modes_home_position": "home position not set",
+        "check_modes_manual_control": "no manual control input",
+        "check_modes_offboard_signal": "no offboard signal",
+        "check_modes_not_supported": "mode not supported by this vehicle",
+        "check_rc_dl_no_dllink": "no connection to the ground station",
+        "check_estimator_missing_data": "waiting for the estimator",
+        "check_missing_gps": "no GPS",
+        "check_estimator_gps_fix_too_low": "GPS fix too low",
+        "check_estimator_gps_num_sats_too_low": "too few GPS satellites",
+        "check_battery_low": "low battery",
+        "check_battery_critical": "critically low battery",
+        "check_system_usb_connected": "USB connected",
+        "check_gyro_missing": "no gyroscope",
+        "check_accel_missing": "no accelerometer",
+        "check_mag_missing": "no compass",
+        "check_baro_missing": "no barometer",
+    }.items()
+}
+"""Arming checks."""
+
+KNOWN_EVENTS: Mapping[int, str] = {
+    event_id(name): words
+    for name, words in {
+        "commander_armed_by": "armed",
+        "commander_disarmed_by": "disarmed",
+        "commander_takeoff_detected": "take-off detected",
+        "commander_landing_detected": "landing detected",
+        "commander_landing_current_pos": "landing at current position",
+        "commander_rtl": "returning to launch",
+        "commander_modeswitch_not_avail": "this mode is not available now",
+        "commander_rc_lost": "manual control lost",
+        "commander_rc_regained": "manual control regained",
+        "commander_rc_override": "pilot took over using sticks",
+        "failsafe_rc_override": "pilot took over using sticks",
+        "commander_arm_denied_throttle_center": "arming denied: throttle above center",
+        "commander_disarming_denied_not_landed": "disarming denied: not landed",
+        "commander_failsafe_enter": "failsafe activated",
+        "commander_failsafe_enter_generic": "failsafe activated",
+        "commander_failsafe_enter_hold": "failsafe activated, holding first",
+        "mission_takeoff_to": "taking off",
+        "navigator_takeoff_min_alt": "using the minimum take-off altitude",
+        "navigator_takeoff_already_higher": "already higher than the take-off altitude",
+        "navigator_rtl_home_activated": "RTL: activated",
+        "rtl_land_at_home": "RTL: landing at home",
+        "rtl_climb_to": "RTL: climbing",
+        "rtl_return_at": "RTL: returning",
+        "rtl_descend_to": "RTL: descending",
+        "rtl_land_at_destination": "RTL: landing",
+        "mavlink_rcv_sp_target_unsup_coord": "set-point in a frame that PX4 does not take",
+        "mavlink_rcv_sp_target_invalid": "set-point that sets nothing",
+    }.items()
+}
+"""Other events. Of those that were recorded most come as texts, too."""
+
+WITHOUT_TEXT = frozenset(
+    event_id(name)
+    for name in (
+        "commander_rc_lost",
+        "commander_rc_regained",
+        "failsafe_rc_override",
+        "navigator_takeoff_already_higher",
+    )
+)
+
+
+def event_text(number: int) -> str:
+    """What it says; its number if that is not known."""
+    return CHECKS.get(number) or KNOWN_EVENTS.get(number) or f"event {number:#010x}"
+
+
+def event_of(fields: Mapping[str, Any]) -> Event:
+    """An EVENT message. Its low four bits of ``log_levels`` are the severity that is meant for people."""
+    arguments: Sequence[int] = fields["arguments"]
+    modes = int.from_bytes(bytes(arguments[:4]), "little")
+    return Event(fields["id"], fields["log_levels"] & 0x0F, modes)
+
+
+class ArmingChecks:
+    """Those that fail now, put together from reports."""
+
+    def __init__(self) -> None:
+        self.reported = False
+        self._failing: tuple[Event, ...] = ()
+        self._report: list[Event] | None = None
+
+    def hear(self, event: Event) -> bool:
+        """Take note of it; whether it belongs to a report."""
+        if event.id == REPORT_BEGINS:
+            self._report = []
+            return True
+        if self._report is None:
+            return False
+        if event.id == REPORT_ENDS:
+            self.reported = True
+            self._failing = tuple(self._report)
+            self._report = None
+        elif event.id in KNOWN_EVENTS:
+            return False
+        else:
+            self._report.append(event)
+        return True
+
+    def reasons(self, mode: str) -> list[str]:
+        """Why it cannot arm in this mode."""
+        return [event_text(event.id) for event in self._failing if _forbids(event, mode)]
+
+
+def _forbids(event: Event, mode: str) -> bool:
+    """Missing sticks are a warning for all modes, and forbid those that need them."""
+    if event.id == NO_STICKS:
+        return mode in MANUAL_MODES
+    if event.modes == ALL_MODES:
+        return event.severity <= ERROR
+    return bool(event.modes >> MODES[mode].state & 1) if mode in MODES else True
+
+
+WARNING = 4
+
+
+class PX4Decoder(decoder.TelemetryDecoder):
+    """PX4's mode names, its estimator's ESTIMATOR_STATUS, and its events.
+
+    PX4 says nearly all events as a text, too, as long as it hears a ground station; that text ends with a
+    tabulator. So an event is said here only if it has no text, or is a warning that is not known here.
+    """
+
+    autopilot = "PX4"
+    resting = HOLD
+
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
+        super().__init__(kernel, telemetry, record=record)
+        self._checks = ArmingChecks()
+        self._estimator_heard = False
+        self._handlers["ESTIMATOR_STATUS"] = self._estimator_status
+        self._handlers["EVENT"] = self._event
+
+    def _mode_name(self, number: int) -> str:
+        return mode_name(number)
+
+    def _judge_ready(self) -> None:
+        """It flies to altitudes above home by its own home: without one it is not ready."""
+        seen = self._seen
+        placed = seen.position is not None and seen.home is not None
+        seen.ready = seen.armable and placed and (self._estimates_position or not self._estimator_heard)
+
+    def _estimator_status(self, fields: Fields) -> None:
+        self._estimator_heard = True
+        self._estimator(fields)
+
+    def say(self, severity: int, text: str) -> None:
+        """The autopilot says this."""
+        super().say(severity, text.rstrip("\t"))
+
+    def _event(self, fields: Fields) -> None:
+        event = event_of(fields)
+        if self._checks.hear(event) or event.severity >= NOT_FOR_PEOPLE:
+            return
+        unknown = event.id not in KNOWN_EVENTS and event.severity <= WARNING
+        if event.id in WITHOUT_TEXT or unknown:
+            self.say(event.severity, event_text(event.id))
+
+    def say_failing_checks(self) -> None:
+        """It refused to arm: PX4 says why in its last report, which may have come long before."""
+        if not self._checks.reported:
+            self.say(WARNING, "Arming check: not all are done yet")
+        for reason in self._checks.reasons(self._seen.mode):
+            self.say(WARNING, f"Arming check: {reason}")
