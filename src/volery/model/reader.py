@@ -12,8 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from volery.base.errors import ModelError, choices
-from volery.model import assembly
-from volery.model.assembly import Assembly, Selection, assemble
+from volery.model.assembly import Assembly, Selection, assemble, change_from_option
 from volery.model.document import ModelForm, validate
 from volery.model.resolution import (
     Context,
@@ -119,7 +118,7 @@ def load(
     allocation it does not have.
     """
     options = tuple(overrides)
-    wanted = Selection(scenario, allocation, tuple(assembly.from_option(text) for text in options))
+    wanted = Selection(scenario, allocation, tuple(change_from_option(text) for text in options))
     file = _file(Path(path))
     made, problems = assemble(file, wanted)
     form = validate(ModelForm, made.root, problems)
