@@ -8,12 +8,12 @@ import pytest
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
-from volery.ros.graph import Cost, Graph, free
+from volery.ros.graph import Cost, EmbeddedGraph, free
 from volery.trace.events import Text
 
 
@@ -24,7 +24,7 @@ class Aviary:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
-        self.graph = Graph(self.kernel, self._price)
+        self.graph = EmbeddedGraph(self.kernel, self._price)
         ours, self._theirs = in_process_pair(self.kernel, MS, name="drone_1")
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
@@ -32,8 +32,8 @@ class Aviary:
         self.node = VehicleNode(
             self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=LevelGeoid(geoid), **options)
         )
-        self.node.start(Place("mavros"), self.kernel.root)
-        self.user = self.graph.node("user", place=Place("user"))
+        self.node.start(ExecutionContext("mavros"), self.kernel.root)
+        self.user = self.graph.node("user", place=ExecutionContext("user"))
         self.got: dict[str, list[Any]] = {}
 
     def _price(self, node: Any, call: str, x: float) -> Cost:
@@ -81,7 +81,7 @@ class Aviary:
             client.wait()
             answers.append(client.call(messages.request(service_type, **fields)))
 
-        self.kernel.spawn(body, "user", Place("user"))
+        self.kernel.spawn(body, "user", ExecutionContext("user"))
         for _ in range(200):
             self.run(100 * MS)
             if answers:

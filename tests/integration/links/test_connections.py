@@ -1,0 +1,248 @@
+"""Real sockets and a real pseudo terminal, on ports that the system hands out."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import closing
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import MINUTE, S
+from volery.kernel.task import ExecutionContext
+from volery.kernel.waiting import Signal
+from volery.kernel.wall import WallKernel
+from volery.links.coded_link import CodedLink
+from volery.links.link import Frame
+from volery.links.mavlink_messages import encode
+from volery.links.serial_link import SerialLink
+from volery.links.tcp_link import TcpClient, TcpServer
+from volery.links.udp_link import UdpLink
+from volery.trace.events import LinkState
+from volery.vehicles.address import listen, open_link, parse, parse_listen
+
+pytestmark = pytest.mark.integration
+
+BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "mavlink_version": 3}, 1, 1)
+ASK = Frame("HEARTBEAT", {"type": 6, "autopilot": 8, "mavlink_version": 3}, 255, 190)
+HERE = "127.0.0.1"
+
+
+class Bench:
+    """A wall clock, what its links heard, and ``until``: run on until something has happened."""
+
+    def __init__(self) -> None:
+        self.states: list[LinkState] = []
+        self.kernel = WallKernel(record=self._record)
+        self.changed = Signal(self.kernel, "the bench")
+        self.links: list[CodedLink] = []
+        self.heard: dict[CodedLink, list[Frame]] = {}
+        self._asked = 0
+
+    def _record(self, event: object) -> None:
+        if isinstance(event, LinkState):
+            self.states.append(event)
+            self.changed.notify()
+
+    def add(self, link: CodedLink) -> CodedLink:
+        self.links.append(link)
+        self.heard[link] = []
+
+        def note(frame: Frame) -> None:
+            self.heard[link].append(frame)
+            self.changed.notify()
+
+        link.receive(note)
+        return link
+
+    def until(self, holds: Callable[[], object]) -> None:
+        """Run until it *holds*; it is looked at after every event and each 20 ms."""
+        seen: list[bool] = []
+        scope = self.kernel.root.child(f"wait {self._asked}")
+        self._asked += 1
+        look = self.kernel.every(S // 50, self.changed.notify)
+
+        def wait() -> None:
+            seen.append(self.changed.wait_for(holds, MINUTE))
+            stop.set()
+
+        stop = threading.Event()
+        self.kernel.start()
+        self.kernel.spawn(wait, "wait", ExecutionContext("test"), scope)
+        assert stop.wait(70), "the wait never ended"
+        look.cancel()
+        assert seen == [True]
+
+    def close(self) -> None:
+        for link in self.links:
+            link.close()
+        assert self.kernel.close() == []
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    before = threading.active_count()
+    yield bench
+    bench.close()
+    assert threading.active_count() <= before, "a thread was left behind"
+
+
+def free_port() -> int:
+    with socket.create_server((HERE, 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+def test_a_client_and_a_server_talk_both_ways(bench: Bench) -> None:
+    server = bench.add(TcpServer(bench.kernel, HERE, 0))
+    client = bench.add(TcpClient(bench.kernel, HERE, server.port))
+    bench.until(lambda: not client.problem())
+    client.send(ASK)
+    bench.until(lambda: bench.heard[server])
+    server.send(BEAT)
+    bench.until(lambda: bench.heard[client])
+    assert bench.heard[client][0].fields["autopilot"] == 3
+
+
+def test_a_server_serves_several_clients_and_survives_one_that_leaves(bench: Bench) -> None:
+    joined: list[str] = []
+    server = TcpServer(bench.kernel, HERE, 0, joined=lambda: joined.append("one"))
+    bench.add(server)
+    assert "nobody has connected" in server.problem()
+    first = bench.add(TcpClient(bench.kernel, HERE, server.port))
+    second = bench.add(TcpClient(bench.kernel, HERE, server.port))
+    bench.until(lambda: server.clients == 2)
+    server.send_bytes(b"Init ArduCopter\n")
+    server.send(BEAT)
+    bench.until(lambda: bench.heard[first] and bench.heard[second])
+    assert list(first.heard.lines) == ["Init ArduCopter"]
+    first.close()
+    bench.until(lambda: server.clients == 1)
+    server.send(BEAT)
+    bench.until(lambda: len(bench.heard[second]) == 2)
+    assert joined == ["one", "one"]
+
+
+def test_a_url_with_no_listener_says_so_and_is_tried_again(bench: Bench) -> None:
+    port = free_port()
+    client = bench.add(TcpClient(bench.kernel, HERE, port))
+    bench.until(lambda: "nothing listens" in client.problem())
+    assert f"{HERE}:{port}" in client.problem()
+    bench.add(TcpServer(bench.kernel, HERE, port))
+    bench.until(lambda: not client.problem())
+
+
+def test_a_connection_that_breaks_comes_back(bench: Bench) -> None:
+    port = free_port()
+    server = bench.add(TcpServer(bench.kernel, HERE, port))
+    client = bench.add(TcpClient(bench.kernel, HERE, port, "client"))
+    bench.until(lambda: not client.problem())
+    server.close()
+    bench.until(client.problem)
+    again = bench.add(TcpServer(bench.kernel, HERE, port))
+    bench.until(lambda: not client.problem())
+    client.send(ASK)
+    bench.until(lambda: bench.heard[again])
+    assert [state.state for state in bench.states if state.link == client.name] == ["up", "lost", "back"]
+
+
+@pytest.mark.parametrize(
+    ("speaks", "says"),
+    [(b"SSH-2.0-OpenSSH_9.6\r\n", "only text arrives: 'SSH-2.0"), (bytes(range(130, 200)), "no MAVLink")],
+)
+def test_a_peer_that_speaks_something_else_is_named(bench: Bench, speaks: bytes, says: str) -> None:
+    with closing(socket.create_server((HERE, 0))) as listener:
+        client = bench.add(TcpClient(bench.kernel, HERE, listener.getsockname()[1]))
+        with closing(listener.accept()[0]) as peer:
+            peer.sendall(speaks)
+            bench.until(lambda: says in client.problem())
+
+
+def test_a_host_that_does_not_exist(bench: Bench) -> None:
+    client = bench.add(TcpClient(bench.kernel, "no-such-host.invalid", 5760))
+    bench.until(lambda: "no host" in client.problem())
+
+
+def test_a_port_that_is_taken(bench: Bench) -> None:
+    with socket.create_server((HERE, 0)) as listener, pytest.raises(UsageError, match="cannot listen at tcp"):
+        TcpServer(bench.kernel, HERE, listener.getsockname()[1])
+
+
+def test_udp_bound_answers_the_first_who_speaks_and_nobody_else(bench: Bench) -> None:
+    bound = UdpLink(bench.kernel, HERE, 0)
+    bench.add(bound)
+    assert "nobody speaks" in bound.problem()
+    first = bench.add(UdpLink(bench.kernel, HERE, 0, (HERE, bound.port)))
+    assert "nobody" in first.problem()
+    first.send(BEAT)
+    bench.until(lambda: bench.heard[bound])
+    other = bench.add(UdpLink(bench.kernel, HERE, 0, (HERE, bound.port)))
+    other.send(BEAT)
+    bound.send(ASK)
+    bench.until(lambda: bench.heard[first])
+    first.send(BEAT)
+    bench.until(lambda: len(bench.heard[bound]) == 2)  # the other's was not one of them
+    assert bench.heard[other] == []
+    assert bound.problem() == first.problem() == ""
+
+
+def test_a_udp_port_that_is_taken(bench: Bench) -> None:
+    taken = UdpLink(bench.kernel, HERE, 0)
+    bench.add(taken)
+    with pytest.raises(UsageError, match=f"cannot use udp {HERE}:{taken.port}"):
+        UdpLink(bench.kernel, HERE, taken.port)
+
+
+def test_a_serial_line_both_ways_and_its_end(bench: Bench) -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    line = bench.add(SerialLink(bench.kernel, os.ttyname(theirs), 57600))
+    bench.until(lambda: "nothing arrives" in line.problem())
+    os.write(ours, encode(BEAT, 0))
+    bench.until(lambda: bench.heard[line])
+    line.send(ASK)
+    assert os.read(ours, 300) == encode(ASK, 0)
+    os.close(theirs)
+    os.close(ours)
+    bench.until(lambda: "lost" in [state.state for state in bench.states])
+    assert line.problem()
+
+
+def test_a_serial_device_that_is_not_there(bench: Bench) -> None:
+    line = bench.add(SerialLink(bench.kernel, "/dev/ttyNONE0", 57600))
+    bench.until(lambda: "no device /dev/ttyNONE0" in line.problem())
+
+
+def test_links_from_addresses(bench: Bench) -> None:
+    port = free_port()
+    joined: list[str] = []
+    server = bench.add(
+        listen(bench.kernel, parse_listen(f"tcp://{HERE}:{port}"), joined=lambda: joined.append("one"))
+    )
+    client = bench.add(open_link(bench.kernel, parse(f"ardupilot+tcp://{HERE}:{port}")))
+    bench.until(lambda: joined)
+    server.send(BEAT)
+    bench.until(lambda: bench.heard[client])
+    bound = UdpLink(bench.kernel, "", 0)
+    bench.add(bound)
+    for sender in (
+        open_link(bench.kernel, parse(f"ardupilot+udp://{HERE}:{bound.port}")),
+        listen(bench.kernel, parse_listen(f"udp://{HERE}:{bound.port}")),
+    ):
+        bench.add(sender)
+    sender.send(BEAT)
+    bench.until(lambda: bench.heard[bound])
+
+
+def test_a_link_that_is_closed_says_so_and_drops_what_is_sent(bench: Bench) -> None:
+    client = bench.add(TcpClient(bench.kernel, HERE, free_port()))
+    client.close()
+    client.send(BEAT)
+    client.send_bytes(b"text")
+    client.arrived(encode(BEAT, 0))
+    assert bench.heard[client] == []
+    assert client.problem() == "the link was closed"

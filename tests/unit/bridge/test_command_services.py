@@ -1,0 +1,346 @@
+from math import nan, pi
+from typing import Any
+
+import pytest
+
+from volery.base.time import MS
+from volery.ros import messages
+from volery.trace.events import Text
+
+LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
+
+
+def acknowledge(aviary: Any, result: int = 0) -> None:
+    aviary.answers["COMMAND_LONG"] = lambda fields: aviary.say(
+        "COMMAND_ACK", command=fields["command"], result=result
+    )
+
+
+def parameters(fields: dict[str, Any]) -> list[float]:
+    return [fields[f"param{number}"] for number in range(1, 8)]
+
+
+@pytest.mark.parametrize(
+    ("service", "kind", "request_fields", "command", "expected"),
+    [
+        ("cmd/arming", "CommandBool", {"value": True}, 400, [1, 0, 0, 0, 0, 0, 0]),
+        ("cmd/arming", "CommandBool", {"value": False}, 400, [0, 0, 0, 0, 0, 0, 0]),
+        ("cmd/takeoff", "CommandTOL", {"altitude": 10.0, "yaw": 90.0}, 22, [0, 0, 0, 90, 0, 0, 10]),
+        ("cmd/land", "CommandTOL", {"latitude": 1.5, "longitude": 2.5}, 21, [0, 0, 0, 0, 1.5, 2.5, 0]),
+        ("cmd/set_home", "CommandHome", {"current_gps": True}, 179, [1, 0, 0, 0, 0, 0, 0]),
+        ("cmd/command", "CommandLong", {"command": 178, "param2": 5.0}, 178, [0, 5, 0, 0, 0, 0, 0]),
+    ],
+)
+def test_a_command_is_answered_with_its_acknowledgement(
+    aviary: Any, service: str, kind: str, request_fields: dict[str, Any], command: int, expected: list[float]
+) -> None:
+    aviary.connect()
+    acknowledge(aviary)
+    answer = aviary.call(service, f"mavros_msgs/{kind}", **request_fields)
+    assert (answer.success, answer.result) == (True, 0)
+    [sent] = [fields for fields in aviary.asked("COMMAND_LONG") if fields["command"] == command]
+    assert parameters(sent) == expected
+    assert (sent["target_system"], sent["target_component"]) == (1, 1)
+
+
+def test_a_refusal_carries_the_result(aviary: Any) -> None:
+    aviary.connect()
+    acknowledge(aviary, result=4)
+    answer = aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
+    assert (answer.success, answer.result) == (False, 4)
+
+
+def test_without_an_acknowledgement_it_fails_after_five_seconds(aviary: Any) -> None:
+    aviary.connect()
+    start = aviary.kernel.now()
+    answer = aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
+    assert not answer.success
+    assert 5000 * MS <= aviary.kernel.now() - start <= 5200 * MS
+    assert any("command 400: no acknowledgement within 5 s" in event.text for event in aviary.of_texts())
+
+
+def test_in_progress_is_not_the_end(aviary: Any) -> None:
+    aviary.connect()
+
+    def slowly(fields: dict[str, Any]) -> None:
+        if fields["command"] == 400:
+            aviary.say("COMMAND_ACK", command=511, result=4)  # of another command
+            aviary.say("COMMAND_ACK", command=400, result=5)
+            later = aviary.kernel.now() + 3000 * MS
+            aviary.kernel.call_at(later, lambda: aviary.say("COMMAND_ACK", command=400, result=0))
+
+    aviary.answers["COMMAND_LONG"] = slowly
+    assert aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True).success
+
+
+@pytest.mark.parametrize(
+    ("request_fields", "sent", "base", "custom"),
+    [
+        ({"custom_mode": "GUIDED"}, True, 1, 4),
+        ({"custom_mode": "rtl"}, True, 1, 6),
+        ({"custom_mode": "CMODE(21)"}, True, 1, 21),
+        ({"custom_mode": "21"}, True, 1, 21),
+        ({"base_mode": 80}, True, 80, 0),
+    ],
+)
+def test_set_mode(aviary: Any, request_fields: dict[str, Any], sent: bool, base: int, custom: int) -> None:
+    aviary.connect()
+    assert aviary.call("set_mode", "mavros_msgs/SetMode", **request_fields).mode_sent == sent
+    [fields] = aviary.asked("SET_MODE")
+    assert (fields["target_system"], fields["base_mode"], fields["custom_mode"]) == (1, base, custom)
+
+
+def test_an_unknown_mode_is_not_sent(aviary: Any) -> None:
+    aviary.connect()
+    assert not aviary.call("set_mode", "mavros_msgs/SetMode", custom_mode="GUIDE").mode_sent
+    assert aviary.asked("SET_MODE") == []
+    assert any("did you mean 'GUIDED'" in event.text for event in aviary.of_texts())
+
+
+def test_command_int_and_stream_rate_are_sent_and_not_waited_for(aviary: Any) -> None:
+    aviary.connect()
+    fields = {"frame": 6, "command": 192, "x": 470000000, "y": -80000000, "z": 20.0, "param1": -1.0}
+    assert aviary.call("cmd/command_int", "mavros_msgs/CommandInt", **fields).success
+    [sent] = aviary.asked("COMMAND_INT")
+    assert {name: sent[name] for name in fields} == fields
+    aviary.sent.clear()
+    aviary.call("set_stream_rate", "mavros_msgs/StreamRate", stream_id=10, message_rate=25, on_off=True)
+    assert {"req_stream_id": 10, "req_message_rate": 25, "start_stop": 1} in [
+        {key: one[key] for key in ("req_stream_id", "req_message_rate", "start_stop")}
+        for one in aviary.asked("REQUEST_DATA_STREAM")
+    ]
+
+
+def test_message_intervals_are_microseconds(aviary: Any) -> None:
+    aviary.connect()
+    acknowledge(aviary)
+    for rate, interval in ((50.0, 20_000.0), (0.0, 0.0), (-1.0, -1.0)):
+        aviary.sent.clear()
+        assert aviary.call(
+            "set_message_interval", "mavros_msgs/MessageInterval", message_id=30, message_rate=rate
+        ).success
+        assert [30.0, interval] in [parameters(one)[:2] for one in aviary.asked("COMMAND_LONG")]
+
+
+def only(aviary: Any, name: str) -> dict[str, Any]:
+    aviary.run(100 * MS)
+    [fields] = aviary.asked(name)
+    return fields
+
+
+def vector(x: float, y: float, z: float) -> dict[str, float]:
+    return {"x": x, "y": y, "z": z}
+
+
+def test_a_global_set_point(aviary: Any) -> None:
+    aviary.connect()
+    aviary.tell(
+        "setpoint_raw/global",
+        "mavros_msgs/GlobalPositionTarget",
+        coordinate_frame=5,
+        type_mask=3576,
+        latitude=47.3977418,
+        longitude=8.5455939,
+        altitude=500.0,
+        velocity=vector(1.0, 2.0, 3.0),
+        yaw=0.0,
+        yaw_rate=0.5,
+    )
+    sent = only(aviary, GLOBAL)
+    assert (sent["coordinate_frame"], sent["type_mask"]) == (5, 3576)
+    assert (sent["lat_int"], sent["lon_int"], sent["alt"]) == (473977418, 85455939, 500.0)
+    assert (sent["vx"], sent["vy"], sent["vz"]) == (2.0, 1.0, -3.0)
+    assert sent["yaw"] == pytest.approx(pi / 2)  # east
+    assert sent["yaw_rate"] == -0.5
+
+
+@pytest.mark.parametrize(
+    ("frame", "position", "yaw"),
+    [
+        (1, (2.0, 1.0, -3.0), pi / 2),
+        (7, (2.0, 1.0, -3.0), pi / 2),
+        (8, (1.0, -2.0, -3.0), 0.0),
+        (9, (1.0, -2.0, -3.0), 0.0),
+    ],
+)
+def test_a_local_set_point_is_turned_by_its_frame(
+    aviary: Any, frame: int, position: tuple[float, float, float], yaw: float
+) -> None:
+    aviary.connect()
+    aviary.tell(
+        "setpoint_raw/local",
+        "mavros_msgs/PositionTarget",
+        coordinate_frame=frame,
+        position=vector(1.0, 2.0, 3.0),
+    )
+    sent = only(aviary, LOCAL)
+    assert (sent["x"], sent["y"], sent["z"]) == position
+    assert sent["yaw"] == pytest.approx(yaw)
+    assert sent["coordinate_frame"] == frame
+
+
+def test_a_position_above_the_ellipsoid_becomes_amsl(raised_aviary: Any) -> None:
+    aviary = raised_aviary
+    aviary.connect()
+    pose = {"position": {"latitude": 47.0, "longitude": 8.0, "altitude": 547.0}}
+    aviary.tell("setpoint_position/global", "geographic_msgs/GeoPoseStamped", pose=pose)
+    sent = only(aviary, GLOBAL)
+    assert (sent["alt"], sent["coordinate_frame"], sent["type_mask"]) == (500.0, 5, 0x9F8)
+    assert sent["yaw"] == pytest.approx(pi / 2)
+
+
+def test_a_local_position(aviary: Any) -> None:
+    aviary.connect()
+    aviary.tell(
+        "setpoint_position/local", "geometry_msgs/PoseStamped", pose={"position": vector(1.0, 2.0, 3.0)}
+    )
+    sent = only(aviary, LOCAL)
+    assert (sent["x"], sent["y"], sent["z"], sent["type_mask"]) == (2.0, 1.0, -3.0, 0x9F8)
+
+
+def test_a_velocity(aviary: Any) -> None:
+    aviary.connect()
+    twist = {"linear": vector(1.0, 2.0, 0.5), "angular": vector(0.0, 0.0, 0.25)}
+    aviary.tell("setpoint_velocity/cmd_vel", "geometry_msgs/TwistStamped", twist=twist)
+    sent = only(aviary, LOCAL)
+    assert (sent["vx"], sent["vy"], sent["vz"], sent["yaw_rate"]) == (2.0, 1.0, -0.5, -0.25)
+    assert (sent["coordinate_frame"], sent["type_mask"]) == (1, 0x5C7)
+
+
+def test_sticks(aviary: Any) -> None:
+    aviary.connect()
+    channels = [1500, 1400, 1600, 0, *[65535] * 14]
+    aviary.tell("rc/override", "mavros_msgs/OverrideRCIn", channels=channels)
+    aviary.tell(
+        "manual_control/send", "mavros_msgs/ManualControl", x=100.0, y=-200.4, z=500.0, r=0.0, buttons=3
+    )
+    sent = only(aviary, "RC_CHANNELS_OVERRIDE")
+    assert [sent[f"chan{number}_raw"] for number in range(1, 19)] == channels
+    assert aviary.sent[-1].system == 255  # the only one from which ArduPilot takes sticks
+    sent = only(aviary, "MANUAL_CONTROL")
+    assert (sent["x"], sent["y"], sent["z"], sent["buttons"], sent["target"]) == (100, -200, 500, 3, 1)
+
+
+def test_a_set_point_that_makes_no_sense_is_dropped_with_a_warning(aviary: Any) -> None:
+    aviary.connect()
+    aviary.tell("setpoint_raw/global", "mavros_msgs/GlobalPositionTarget", latitude=nan)
+    aviary.tell("manual_control/send", "mavros_msgs/ManualControl", x=1e6)
+    aviary.run(100 * MS)
+    assert aviary.asked(GLOBAL, "MANUAL_CONTROL") == []
+    warned = [event.text.partition(":")[0] for event in aviary.of_texts()]
+    assert warned == ["/drone_1/setpoint_raw/global", "/drone_1/manual_control/send"]
+
+
+def test_parameters_are_read_and_set_by_their_type(aviary: Any) -> None:
+    aviary.connect()
+    values = {"RTL_ALT": (1500.0, 6), "GUID_TIMEOUT": (3.0, 9)}
+
+    def tell(name: str) -> None:
+        value, kind = values[name]
+        aviary.say("PARAM_VALUE", param_id="OTHER", param_value=9.0, param_type=9)
+        aviary.say("PARAM_VALUE", param_id=name, param_value=value, param_type=kind)
+
+    def store(fields: dict[str, Any]) -> None:
+        values[fields["param_id"]] = (fields["param_value"], fields["param_type"])
+        tell(fields["param_id"])
+
+    aviary.answers["PARAM_REQUEST_READ"] = lambda fields: (
+        tell(fields["param_id"]) if fields["param_id"] in values else None
+    )
+    aviary.answers["PARAM_SET"] = store
+    answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id="RTL_ALT")
+    assert (answer.success, answer.value.integer, answer.value.real) == (True, 1500, 0.0)
+    answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id="GUID_TIMEOUT")
+    assert (answer.success, answer.value.integer, answer.value.real) == (True, 0, 3.0)
+    answer = aviary.call("param/set", "mavros_msgs/ParamSet", param_id="RTL_ALT", value={"integer": 2000})
+    assert (answer.success, answer.value.integer) == (True, 2000)
+    answer = aviary.call("param/set", "mavros_msgs/ParamSet", param_id="GUID_TIMEOUT", value={"real": 0.5})
+    assert (answer.success, answer.value.real) == (True, 0.5)
+    assert values == {"RTL_ALT": (2000.0, 6), "GUID_TIMEOUT": (0.5, 9)}
+    assert not aviary.call("param/get", "mavros_msgs/ParamGet", param_id="NO_SUCH").success
+    assert not aviary.call("param/set", "mavros_msgs/ParamSet", param_id="NO_SUCH").success
+
+
+def waypoint(**fields: Any) -> Any:
+    return messages.new("mavros_msgs/Waypoint", **fields)
+
+
+def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
+    aviary.connect()
+    stored: list[dict[str, Any]] = []
+    expected = 0
+
+    def count(fields: dict[str, Any]) -> None:
+        nonlocal expected
+        expected = fields["count"]
+        stored.clear()
+        aviary.say("MISSION_REQUEST", seq=0)
+
+    def item(fields: dict[str, Any]) -> None:
+        stored.append(fields)
+        if len(stored) < expected:
+            aviary.say("MISSION_REQUEST_INT", seq=len(stored))
+        else:
+            aviary.say("MISSION_ACK", type=0)
+
+    aviary.answers["MISSION_COUNT"] = count
+    aviary.answers["MISSION_ITEM_INT"] = item
+    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.say("MISSION_COUNT", count=len(stored))
+    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.say(
+        "MISSION_ITEM_INT", **stored[fields["seq"]]
+    )
+    aviary.answers["MISSION_CLEAR_ALL"] = lambda fields: aviary.say("MISSION_ACK", type=0)
+    route = [
+        waypoint(frame=3, command=22, z_alt=10.0, is_current=True),
+        waypoint(
+            frame=3,
+            command=16,
+            x_lat=47.3977418,
+            y_long=-8.5455939,
+            z_alt=20.0,
+            param1=2.0,
+            autocontinue=True,
+        ),
+        waypoint(frame=1, command=16, x_lat=12.5, y_long=-2.25, z_alt=-5.0),
+    ]
+    shown = aviary.hear("mission/waypoints", "mavros_msgs/WaypointList")
+    pushed = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=route)
+    assert (pushed.success, pushed.wp_transfered) == (True, 3)
+    assert [(one["seq"], one["x"], one["y"], one["z"]) for one in stored] == [
+        (0, 0, 0, 10.0),
+        (1, 473977418, -85455939, 20.0),
+        (2, 125000, -22500, -5.0),
+    ]
+    pulled = aviary.call("mission/pull", "mavros_msgs/WaypointPull")
+    assert (pulled.success, pulled.wp_received) == (True, 3)
+    assert [message.waypoints for message in shown] == [route, route]
+    assert aviary.call("mission/clear", "mavros_msgs/WaypointClear").success
+
+
+def test_a_mission_that_is_refused_or_not_answered(aviary: Any) -> None:
+    aviary.connect()
+    aviary.answers["MISSION_COUNT"] = lambda fields: aviary.say("MISSION_ACK", type=4)
+    refused = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()])
+    assert (refused.success, refused.wp_transfered) == (False, 0)
+    for empty in ({}, {"waypoints": [waypoint()], "start_index": 1}):
+        assert not aviary.call("mission/push", "mavros_msgs/WaypointPush", **empty).success
+    del aviary.answers["MISSION_COUNT"]
+    assert not aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()]).success
+    assert not aviary.call("mission/pull", "mavros_msgs/WaypointPull").success
+    assert not aviary.call("mission/clear", "mavros_msgs/WaypointClear").success
+    assert len(aviary.asked("MISSION_REQUEST_LIST")) == 3
+
+
+def test_the_current_waypoint(aviary: Any) -> None:
+    aviary.connect()
+    aviary.answers["MISSION_SET_CURRENT"] = lambda fields: aviary.say(
+        "MISSION_CURRENT", seq=min(fields["seq"], 3)
+    )
+    assert aviary.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=2).success
+    assert not aviary.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=7).success
+
+
+def test_warnings_are_of_the_nodes_component(aviary: Any) -> None:
+    aviary.connect()
+    aviary.call("set_mode", "mavros_msgs/SetMode", custom_mode="NONSENSE")
+    assert {event.source for event in aviary.events if isinstance(event, Text)} == {"mavros"}

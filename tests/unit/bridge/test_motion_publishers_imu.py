@@ -1,0 +1,77 @@
+"""What the sensors felt, in FLU and SI, whichever frame brings it."""
+
+from typing import Any
+
+import pytest
+
+from volery.base.time import MS
+
+from .test_motion_publishers import xyz
+
+IMU, FIELD = "sensor_msgs/Imu", "sensor_msgs/MagneticField"
+THOUSANDTHS = {
+    "xacc": 100,
+    "yacc": 200,
+    "zacc": -1000,
+    "xgyro": 10,
+    "ygyro": 20,
+    "zgyro": 30,
+    "xmag": 200,
+    "ymag": 30,
+}
+SI = {"xacc": 0.980665, "yacc": 1.96133, "zacc": -9.80665, "xgyro": 0.01, "ygyro": 0.02, "zgyro": 0.03}
+
+
+@pytest.mark.parametrize(
+    ("name", "fields"),
+    [
+        ("RAW_IMU", THOUSANDTHS),
+        ("SCALED_IMU", THOUSANDTHS),
+        ("HIGHRES_IMU", {**SI, "xmag": 0.2, "ymag": 0.03}),
+    ],
+)
+def test_a_measurement(aviary: Any, name: str, fields: dict[str, float]) -> None:
+    aviary.connect()
+    felt, fields_heard = aviary.hear("imu/data_raw", IMU), aviary.hear("imu/mag", FIELD)
+    together = aviary.hear("imu/data", IMU)
+    aviary.say(name, **fields)
+    aviary.say("ATTITUDE", rollspeed=0.5)
+    aviary.run(200 * MS)
+    [raw], [field], [data] = felt, fields_heard, together
+    assert xyz(raw.linear_acceleration) == pytest.approx((0.980665, -1.96133, 9.80665), rel=1e-6)
+    assert xyz(raw.angular_velocity) == pytest.approx((0.01, -0.02, -0.03))
+    assert raw.orientation_covariance[0] == -1.0  # there is none
+    assert xyz(field.magnetic_field) == pytest.approx((2e-5, -3e-6, 0.0))
+    assert xyz(data.linear_acceleration) == pytest.approx((0.980665, -1.96133, 9.80665), rel=1e-6)
+    assert (data.header.frame_id, data.angular_velocity.x) == ("base_link", 0.5)
+
+
+def test_the_better_source_wins(aviary: Any) -> None:
+    aviary.connect()
+    felt = aviary.hear("imu/data_raw", IMU)
+    aviary.say("RAW_IMU", zacc=-1000)
+    aviary.run(200 * MS)
+    aviary.say("HIGHRES_IMU", zacc=-5.0)
+    aviary.run(200 * MS)
+    aviary.say("RAW_IMU", zacc=-1000)
+    aviary.run(200 * MS)
+    assert [message.linear_acceleration.z for message in felt] == pytest.approx([9.80665, 5.0])
+
+
+def test_without_a_measurement_the_acceleration_is_unknown(aviary: Any) -> None:
+    aviary.connect()
+    heard = aviary.hear("imu/data", IMU)
+    aviary.say("ATTITUDE")
+    aviary.run(200 * MS)
+    assert heard[0].linear_acceleration_covariance[0] == -1.0
+
+
+def test_pressures_and_temperature(aviary: Any) -> None:
+    aviary.connect()
+    pressures = aviary.hear("imu/static_pressure", "sensor_msgs/FluidPressure")
+    differences = aviary.hear("imu/diff_pressure", "sensor_msgs/FluidPressure")
+    degrees = aviary.hear("imu/temperature_imu", "sensor_msgs/Temperature")
+    aviary.say("SCALED_PRESSURE", press_abs=910.5, press_diff=0.25, temperature=2150)
+    aviary.run(200 * MS)
+    assert (pressures[0].fluid_pressure, differences[0].fluid_pressure) == (91_050.0, 25.0)
+    assert degrees[0].temperature == 21.5

@@ -1,0 +1,181 @@
+"""roscopter's names: its types, its units, its services."""
+
+from math import pi
+from typing import Any
+
+import pytest
+
+from volery.base.time import MS, S
+from volery.bridge import ROSCOPTER
+from volery.ros.messages import ros1_type
+
+RC = "roscopter/RC"
+BOOTED = 12_000_000
+
+
+def empty(aviary: Any, service: str) -> None:
+    aviary.call(service, "std_srvs/Empty")
+
+
+def test_the_types_are_those_of_the_real_one() -> None:
+    """MD5 sum of roscopter's own RC.msg, as its generated code carries it."""
+    assert ros1_type("roscopter/RC").md5 == "0f8285b6fdeccee6bef1d0353358d5cf"
+
+
+@pytest.mark.parametrize(("fix_type", "status"), [(0, -1), (2, -1), (3, 0), (5, 0)])
+def test_gps_is_amsl(roscopter: Any, fix_type: int, status: int) -> None:
+    roscopter.heartbeat()
+    heard = roscopter.hear("gps", "sensor_msgs/NavSatFix")
+    roscopter.run(10 * MS)
+    roscopter.say("GPS_RAW_INT", lat=473977418, lon=-85455939, alt=488_100, fix_type=fix_type)
+    roscopter.run(10 * MS)
+    [fix] = heard
+    assert (fix.latitude, fix.longitude, fix.altitude) == (47.3977418, -8.5455939, 488.1)
+    assert (fix.status.status, fix.status.service) == (status, 1)
+
+
+def test_state_is_that_of_the_heartbeat(roscopter: Any) -> None:
+    heard = roscopter.hear("state", "roscopter/State")
+    roscopter.heartbeat(base_mode=81, custom_mode=0)
+    roscopter.run(10 * MS)
+    roscopter.heartbeat(base_mode=128 | 8, custom_mode=4)
+    roscopter.run(10 * MS)
+    seen = [(message.armed, message.guided, message.mode) for message in heard]
+    assert seen == [(False, False, "STABILIZE"), (True, True, "GUIDED")]
+
+
+def test_frames_are_published_as_they_arrive(roscopter: Any) -> None:
+    roscopter.heartbeat()
+    heard = roscopter.hear("attitude", "roscopter/Attitude")
+    roscopter.run(10 * MS)
+    for roll in (0.5, 0.25):
+        roscopter.say(
+            "ATTITUDE", roll=roll, pitch=-0.5, yaw=1.0, rollspeed=2.0, pitchspeed=-2.0, yawspeed=0.5
+        )
+        roscopter.run(2 * MS)
+    assert [message.roll for message in heard] == [0.5, 0.25]
+    last = heard[-1]  # NED and FRD, as MAVLink has it
+    angles = (last.pitch, last.yaw, last.rollspeed, last.pitchspeed, last.yawspeed)
+    assert angles == (-0.5, 1.0, 2.0, -2.0, 0.5)
+
+
+def test_the_head_up_display_and_the_channels(roscopter: Any) -> None:
+    roscopter.heartbeat()
+    huds = roscopter.hear("vfr_hud", "roscopter/VFR_HUD")
+    channels = roscopter.hear("rc", RC)
+    roscopter.run(10 * MS)
+    roscopter.say("VFR_HUD", airspeed=1.5, groundspeed=2.5, heading=271, throttle=40, alt=900.5, climb=-0.5)
+    eight = {f"chan{number}_raw": 1000 + number for number in range(1, 9)}
+    roscopter.say("RC_CHANNELS_RAW", **eight)
+    roscopter.run(10 * MS)
+    roscopter.say("RC_CHANNELS", chancount=16, **{**eight, "chan1_raw": 1500, "chan9_raw": 1900})
+    roscopter.run(10 * MS)
+    roscopter.say("RC_CHANNELS_RAW", **eight)  # what it has in RC_CHANNELS already
+    roscopter.run(10 * MS)
+    [hud] = huds
+    assert (hud.airspeed, hud.groundspeed, hud.heading, hud.throttle) == (1.5, 2.5, 271, 40)
+    assert (hud.alt, hud.climb) == (900.5, -0.5)
+    assert [list(message.channel) for message in channels] == [
+        [1001, 1002, 1003, 1004, 1005, 1006, 1007, 1008],
+        [1500, 1002, 1003, 1004, 1005, 1006, 1007, 1008],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "time", "fields"),
+    [
+        ("RAW_IMU", {"time_usec": BOOTED}, {"zacc": -1000, "xgyro": 250, "ymag": 330}),
+        ("SCALED_IMU", {"time_boot_ms": BOOTED // 1000}, {"zacc": -1000, "xgyro": 250, "ymag": 330}),
+        ("HIGHRES_IMU", {"time_usec": BOOTED}, {"zacc": -9.80665, "xgyro": 0.25, "ymag": 0.33}),
+    ],
+)
+def test_the_raw_imu_is_in_thousandths_whoever_measured(
+    roscopter: Any, name: str, time: dict[str, int], fields: dict[str, float]
+) -> None:
+    roscopter.heartbeat()
+    heard = roscopter.hear("raw_imu", "roscopter/Mavlink_RAW_IMU")
+    roscopter.run(10 * MS)
+    roscopter.say(name, **time, **fields)
+    roscopter.run(10 * MS)
+    [message] = heard
+    assert message.time_usec == BOOTED
+    assert (message.zacc, message.xgyro, message.ymag) == (-1000, 250, 330)
+
+
+def test_sticks_reach_eight_channels_and_leave_the_others(roscopter: Any) -> None:
+    roscopter.connect()
+    roscopter.tell("send_rc", RC, channel=[1500, 1500, 1620, 1700, 0, 0, 0, 0])
+    roscopter.run(10 * MS)
+    [sent] = roscopter.asked("RC_CHANNELS_OVERRIDE")
+    assert [sent[f"chan{number}_raw"] for number in range(1, 9)] == [1500, 1500, 1620, 1700, 0, 0, 0, 0]
+    assert (sent["chan9_raw"], sent["target_system"]) == (0, 1)
+
+
+def test_a_channel_that_is_none_is_dropped_with_a_warning(roscopter: Any) -> None:
+    roscopter.connect()
+    roscopter.tell("send_rc", RC, channel=[-1, 0, 0, 0, 0, 0, 0, 0])
+    roscopter.run(10 * MS)
+    assert roscopter.asked("RC_CHANNELS_OVERRIDE") == []
+    [warning] = roscopter.of_texts()
+    assert warning.text.startswith("/drone_1/send_rc: message dropped")
+
+
+def test_without_leave_it_takes_no_sticks(aviary_of: Any) -> None:
+    aviary = aviary_of(names=ROSCOPTER, period=None)
+    aviary.connect()
+    aviary.tell("send_rc", RC, channel=[1500] * 8)
+    aviary.run(S)
+    assert aviary.asked("RC_CHANNELS_OVERRIDE") == []
+
+
+@pytest.mark.parametrize(("service", "wanted"), [("arm", 1.0), ("disarm", 0.0)])
+def test_arming(roscopter: Any, service: str, wanted: float) -> None:
+    roscopter.connect()
+    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.say("COMMAND_ACK", command=400, result=0)
+    empty(roscopter, service)
+    [sent] = [one for one in roscopter.asked("COMMAND_LONG") if one["command"] == 400]
+    assert sent["param1"] == wanted
+    assert roscopter.of_texts() == []
+
+
+def test_a_refusal_is_a_warning(roscopter: Any) -> None:
+    roscopter.connect()
+    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.say("COMMAND_ACK", command=400, result=4)
+    empty(roscopter, "arm")
+    assert [event.text for event in roscopter.of_texts()] == ["arm: the autopilot says FAILED"]
+
+
+def test_it_asks_for_all_streams_until_they_come(roscopter: Any) -> None:
+    roscopter.heartbeat()
+    roscopter.run(2500 * MS)
+    asked = roscopter.asked("REQUEST_DATA_STREAM")
+    assert len(asked) >= 2
+    assert {(one["req_stream_id"], one["req_message_rate"], one["start_stop"]) for one in asked} == {
+        (0, 10, 1)
+    }
+    roscopter.say("ATTITUDE", yaw=pi)
+    roscopter.run(S)
+    roscopter.sent.clear()
+    roscopter.run(S)
+    assert roscopter.asked("REQUEST_DATA_STREAM") == []
+
+
+def test_a_px4_is_asked_for_messages(roscopter: Any) -> None:
+    roscopter.heartbeat(autopilot=12)
+    roscopter.run(1500 * MS)
+    asked = {one["param1"]: one["param2"] for one in roscopter.asked("COMMAND_LONG") if one["command"] == 511}
+    assert {1.0, 24.0, 30.0, 65.0, 74.0, 105.0} <= set(asked)
+    assert set(asked.values()) == {100_000.0}
+
+
+def test_of_several_on_one_link_the_one_that_is_wanted_is_heard(aviary_of: Any) -> None:
+    aviary = aviary_of(names=ROSCOPTER, period=None, vehicle=7)
+    heard = aviary.hear("state", "roscopter/State")
+    aviary.heartbeat()  # of system 1
+    aviary.run(S)
+    assert heard == []
+    assert aviary.node.summary == ""
+    aviary.say_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
+    aviary.run(S)
+    assert [message.mode for message in heard] == ["GUIDED"]
+    assert aviary.node.summary == "ArduPilot (system 7): GUIDED, armed"

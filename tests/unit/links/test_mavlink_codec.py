@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import pytest
+from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from volery.links.link import Frame
+from volery.links.mavlink_codec import MavlinkParser
+from volery.links.mavlink_messages import CHECKSUM, HEADER, encode
+
+BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
+BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
+
+
+def old_beat() -> bytes:
+    sender = dialect_v1.MAVLink(None, srcSystem=1, srcComponent=1)
+    return bytes(dialect_v1.MAVLink_heartbeat_message(2, 3, 81, 0, 4, 3).pack(sender))
+
+
+def test_the_text_of_a_booting_autopilot_is_skipped_and_kept() -> None:
+    parser = MavlinkParser()
+    assert [frame.name for frame in parser.feed(BOOT + BEAT + b"Init Gyro" + BEAT)] == ["HEARTBEAT"] * 2
+    assert "Init ArduCopter V4.5.6 (7ce11b41)" in parser.heard.lines
+    assert parser.problem() == ""
+
+
+def test_frames_come_whole_however_the_bytes_are_cut() -> None:
+    parser = MavlinkParser()
+    frames = [frame for octet in BOOT + BEAT + BEAT for frame in parser.feed(bytes([octet]))]
+    assert [frame.fields["base_mode"] for frame in frames] == [81, 81]
+
+
+def test_a_turned_bit_costs_one_frame() -> None:
+    broken = bytearray(BEAT)
+    broken[12] ^= 4
+    parser = MavlinkParser()
+    assert len(parser.feed(bytes(broken) + BEAT)) == 1
+    assert parser.heard.corrupt == 1
+
+
+def test_a_signature_is_passed_over() -> None:
+    signing = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    signing.signing.secret_key = b"k" * 32
+    signing.signing.sign_outgoing = True
+    signing.signing.timestamp = 1
+    signed = bytes(dialect.MAVLink_heartbeat_message(2, 3, 81, 0, 4, 3).pack(signing))
+    assert len(signed) > len(BEAT)
+    assert [frame.name for frame in MavlinkParser().feed(signed + BEAT)] == ["HEARTBEAT"] * 2
+
+
+def test_a_message_that_the_dialect_lacks_is_counted() -> None:
+    header = HEADER.pack(0xFD, 3, 0, 0, 0, 1, 1, 0xFFF0, 0)
+    parser = MavlinkParser()
+    assert [frame.name for frame in parser.feed(header + b"abc" + CHECKSUM.pack(7) + BEAT)] == ["HEARTBEAT"]
+    assert parser.heard.unknown == 1
+
+
+def test_mavlink_1_is_read_and_named_as_the_problem_until_mavlink_2_comes() -> None:
+    parser = MavlinkParser()
+    (frame,) = parser.feed(old_beat())
+    assert (frame.name, frame.fields["autopilot"], frame.system) == ("HEARTBEAT", 3, 1)
+    assert "MAVLink 1 only: set SERIALx_PROTOCOL=2" in parser.problem()
+    parser.feed(BEAT)
+    assert parser.problem() == ""
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", ""),
+        (b"SSH-2.0-OpenSSH_9.6\r\n", "only text arrives: 'SSH-2.0-OpenSSH_9.6'"),
+        (b"login: ", "only text arrives: 'login: '"),
+        (bytes(range(128, 200)) * 3, "216 bytes arrive but no MAVLink"),
+        (b"".join(BEAT[:-1] + b"\x00" for _ in range(5)) + b"\0" * 300, "no whole MAVLink frame (5 corrupt"),
+    ],
+)
+def test_the_problem_in_words(data: bytes, says: str) -> None:
+    parser = MavlinkParser()
+    assert parser.feed(data) == []
+    assert says in parser.problem()
+    assert bool(says) == bool(parser.problem())
+
+
+def test_a_broken_connection_leaves_no_half_frame() -> None:
+    parser = MavlinkParser()
+    parser.feed(BEAT[:10])
+    parser.reset()
+    assert len(parser.feed(BEAT)) == 1

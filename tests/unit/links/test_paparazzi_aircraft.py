@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import ModelError, UsageError
+from volery.links.paparazzi_aircraft import read_aircraft, stock_aircraft
+from volery.links.pprzlink_messages import entry_value, message_type
+
+SETTINGS = """<!DOCTYPE settings SYSTEM "settings.dtd">
+<settings target="ap">
+  <dl_settings>
+    <dl_settings NAME="Telemetry"><dl_setting VAR="telemetry_mode" MIN="0" MAX="3" STEP="1"/></dl_settings>
+    <dl_settings NAME="System">
+      <dl_setting var="autopilot.kill_throttle" shortname="kill_throttle" min="0" max="1"
+        values="Resurrect|Kill"/>
+      <dl_setting var="autopilot.mode_auto2" shortname="auto2" min="0" step="1" max="19"/>
+    </dl_settings>
+  </dl_settings>
+</settings>
+"""
+PLAN = """<dump><flight_plan name="mine" lat0="43 33 50.83" lon0="1 28 52.61" max_dist_from_home="80">
+  <waypoints><waypoint name="HOME" x="1.5" y="-2"/><waypoint name="_TD" lat="43.5" lon="1.4"/></waypoints>
+  <blocks><block no="0" name="Wait"/><block no="1" name="Take off!"/></blocks>
+</flight_plan></dump>
+"""
+CONF = '<conf><aircraft name="Bee" ac_id="202" airframe="bee.xml"/></conf>'
+
+
+def folder(at: Path, **documents: str) -> Path:
+    for name, text in documents.items():
+        (at / f"{name}.xml").write_text(text)
+    return at
+
+
+def test_the_stock_rotorcraft() -> None:
+    stock = stock_aircraft()
+    names = [block.name for block in stock.blocks]
+    assert names[3:5] == ["Start Engine", "Takeoff"]
+    assert names[13:] == ["land here", "land", "flare", "landed"]
+    assert [block.number for block in stock.blocks] == list(range(17))
+    assert stock.setting("auto2").words[19] == "Guided"
+    assert stock.setting("mode").variable == "autopilot_mode"
+    assert stock.setting("kill_throttle").words == ("Resurrect", "Kill")
+    assert stock.waypoint("HOME").number == 1
+
+
+def test_a_setting_has_a_word_for_each_mode() -> None:
+    modes = message_type("ROTORCRAFT_STATUS").words("ap_mode")
+    assert len(stock_aircraft().setting("auto2").words) == len(modes)
+    assert entry_value("ROTORCRAFT_STATUS", "ap_mode", "GUIDED") == 19
+
+
+def test_the_folder_of_an_aircraft(tmp_path: Path) -> None:
+    aircraft = read_aircraft(folder(tmp_path, settings=SETTINGS, flight_plan=PLAN, conf_aircraft=CONF))
+    assert (aircraft.name, aircraft.system, aircraft.farthest) == ("Bee", 202, 80.0)
+    assert aircraft.setting("auto2").number == 2
+    assert aircraft.setting("autopilot.mode_auto2").number == 2
+    assert aircraft.setting("kill_throttle").number == 1
+    assert aircraft.block("Take off!").number == 1
+    assert (aircraft.waypoint("HOME").east, aircraft.waypoint("HOME").number) == (1.5, 1)
+    assert aircraft.waypoint("_TD").number == 2
+
+
+def test_what_a_single_file_does_not_say_is_as_in_the_stock_rotorcraft(tmp_path: Path) -> None:
+    folder(tmp_path, settings=SETTINGS)
+    aircraft = read_aircraft(tmp_path / "settings.xml")
+    assert aircraft.setting("auto2").number == 2
+    assert aircraft.blocks == stock_aircraft().blocks
+    assert aircraft.system is None
+
+
+def test_an_unknown_name_is_told_with_what_there_is(tmp_path: Path) -> None:
+    aircraft = read_aircraft(folder(tmp_path, settings=SETTINGS, flight_plan=PLAN))
+    with pytest.raises(UsageError) as raised:
+        aircraft.block("Take off")
+    assert "no block 'Take off' (did you mean 'Take off!'?); it has Take off! or Wait" in str(raised.value)
+    with pytest.raises(UsageError, match="no setting 'mode'"):
+        aircraft.setting("mode")
+    with pytest.raises(UsageError, match="no waypoint 'home'"):
+        aircraft.waypoint("home")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<settings>\n<dl_setting", "mine.xml:2: not XML"),
+        ("", "mine.xml"),
+        (
+            "<settings>\n<dl_setting var='a' max='x'/></settings>",
+            "mine.xml:2: dl_setting: max='x' is not a number",
+        ),
+        ("<flight_plan><blocks><block/></blocks></flight_plan>", "mine.xml:1: a block without a name"),
+        (
+            "<flight_plan><blocks><block no='1' name='a'/><block no='1' name='b'/></blocks></flight_plan>",
+            "'b' and 'a' both have number 1",
+        ),
+        ("<flight_plan><blocks><block no='256' name='a'/></blocks></flight_plan>", "has room for 0 to 255"),
+        (
+            "<!DOCTYPE settings [<!ENTITY a 'x'>]><settings><dl_setting var='&a;'/></settings>",
+            "entities are not read",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(ModelError) as raised:
+        read_aircraft(folder(tmp_path, mine=text))
+    assert says in str(raised.value)
+
+
+def test_no_file_outside_is_read(tmp_path: Path) -> None:
+    secret = tmp_path / "secret.txt"
+    secret.write_text("secret")
+    inside = "<settings><dl_setting var='v'>&x;</dl_setting></settings>"
+    text = f"<!DOCTYPE s [<!ENTITY x SYSTEM '{secret}'>]>{inside}"
+    with pytest.raises(ModelError, match="entities are not read"):
+        read_aircraft(folder(tmp_path, mine=text))
+
+
+def test_nothing_to_read(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no XML of an aircraft there"):
+        read_aircraft(tmp_path)
+    with pytest.raises(UsageError, match="no XML of an aircraft there"):
+        read_aircraft(tmp_path / "missing")
+    with pytest.raises(UsageError, match="neither settings nor a flight plan"):
+        read_aircraft(folder(tmp_path, conf=CONF))

@@ -1,0 +1,164 @@
+"""roscpp's face without a compiler: generated headers, and answers on the embedded graph."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import S
+from volery.kernel.task import ExecutionContext
+from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries.abi_codec import CppFlow, Reader, Writer
+from volery.ros.client_libraries.library_base import Launch
+from volery.ros.client_libraries.roscpp import node_requests
+from volery.ros.messages import new, to_cdr
+from volery.trace.events import Text
+
+HERE = Path(__file__)
+
+
+def test_a_header_and_those_that_it_needs():
+    texts = roscpp.generate(["geometry_msgs/PoseStamped.h", "vector", "mavros_msgs/VFR_HUD.h"], HERE)
+    assert {"geometry_msgs/PoseStamped.h", "geometry_msgs/Point.h", "std_msgs/Header.h"} <= set(texts)
+    pose = texts["geometry_msgs/PoseStamped.h"]
+    assert '#include "std_msgs/Header.h"' in pose
+    assert "std_msgs::Header header{};" in pose
+    assert "using PoseStampedConstPtr = PoseStamped::ConstPtr;" in pose
+    header = texts["std_msgs/Header.h"]
+    assert "std::uint32_t seq{};" in header
+    assert 'visit("seq"' not in header, "the encoding has no seq"
+    assert 'return "mavros_msgs/msg/VfrHud"' in texts["mavros_msgs/VFR_HUD.h"]
+    assert "vector" not in texts
+
+
+def test_services_constants_and_arrays():
+    texts = roscpp.generate(
+        ["std_srvs/SetBool.h", "sensor_msgs/CameraInfo.h", "sensor_msgs/NavSatStatus.h"], HERE
+    )
+    assert "using Request = SetBoolRequest;" in texts["std_srvs/SetBool.h"]
+    assert "std::uint8_t data{};" in texts["std_srvs/SetBoolRequest.h"]
+    assert "boost::array<double, 9> K{};" in texts["sensor_msgs/CameraInfo.h"], "in ROS 1's names"
+    assert (
+        "static constexpr std::int8_t STATUS_NO_FIX = static_cast<std::int8_t>(-1);"
+        in texts["sensor_msgs/NavSatStatus.h"]
+    )
+
+
+def test_what_ros_has_and_is_not_offered_says_so():
+    texts = roscpp.generate(["ros/callback_queue.h", "std_msgs/Nothing.h", "ros/ros.h", "foo/bar.h"], HERE)
+    assert set(texts) == {"ros/callback_queue.h", "std_msgs/Nothing.h"}
+    assert all("is not offered" in text for text in texts.values())
+
+
+@pytest.mark.parametrize("value", [True, -3, 2.5, "text", [1, 2.5, ["x"]], {"a": {"b": 1}, "c": []}])
+def test_parameters_cross_the_border_unchanged(value):
+    out = Writer()
+    node_requests.write_parameter(out, value)
+    assert node_requests.read_parameter(Reader(out.done())) == value
+    assert type(node_requests.read_parameter(Reader(out.done()))) is type(value)
+
+
+class Code:
+    """Stands for C++ code: asks questions as a task, and keeps what it is called back with."""
+
+    def __init__(self, stage: Any, name: str, launch: Launch | None = None) -> None:
+        self.session = roscpp.Session(stage.graph, name, launch or Launch())
+        self.answers = roscpp.answers(self.session)
+        self.called: list[tuple[int, bytes]] = []
+        self.returns = b""
+
+    def call(self, callable_number: int, argument: bytes = b"") -> bytes:
+        self.called.append((callable_number, argument))
+        return self.returns
+
+    def ask(self, question: str, with_: Writer | None = None) -> Reader:
+        flow: CppFlow = self
+        return Reader(self.answers[f"ros.{question}"](flow, Reader((with_ or Writer()).done())))
+
+
+def _run(stage: Any, body: Any, name: str = "node") -> None:
+    failed: list[BaseException] = []
+
+    def guarded() -> None:
+        try:
+            body()
+        except Exception as error:
+            failed.append(error)
+
+    stage.kernel.spawn(guarded, name, ExecutionContext(name))
+    stage.run(10 * S)
+    if failed:
+        raise failed[0]
+
+
+def test_callbacks_run_on_the_stack_of_whoever_spins(stage):
+    code = Code(stage, "node")
+    word = to_cdr(new("std_msgs/String", data="hello"))
+
+    def body() -> None:
+        code.ask("init", Writer().text("other").flag(False))
+        topic = Writer().text("/words").text("std_msgs/msg/String")
+        code.ask("subscribe", Writer().text("/words").text("std_msgs/msg/String").integer(5).integer(7))
+        publisher = code.ask("advertise", topic.integer(5).flag(False)).integer()
+        for _ in range(3):
+            code.ask("publish", Writer().integer(publisher).raw(word))
+        code.ask("sleep", Writer().integer(S))
+        assert not code.called, "nobody has spun yet"
+        code.ask("spin_once")
+
+    _run(stage, body)
+    assert code.called == [(7, word)] * 3
+    assert stage.priced.count(("/node", "spin_once")) == 1
+
+
+def test_nothing_before_init(stage):
+    code = Code(stage, "node")
+    with pytest.raises(UsageError, match="call ros::init"):
+        _run(stage, lambda: code.ask("node_handle", Writer().text("").text("")))
+
+
+def test_names_and_parameters(stage):
+    code = Code(stage, "node", Launch("/robot", {"scan": "/laser"}, {"rate": 5}))
+
+    def body() -> None:
+        code.ask("init", Writer().text("other").flag(False))
+        assert code.ask("name").text() == "/robot/node"
+        private = code.ask("node_handle", Writer().text("").text("~")).text()
+        assert private == "/robot/node"
+        assert code.ask("node_handle", Writer().text("").text("arm")).text() == "/robot/arm"
+        assert code.ask("resolve", Writer().text("/robot").text("scan")).text() == "/laser"
+        found = code.ask("param_get", Writer().text("/robot/node/rate"))
+        assert found.flag()
+        assert node_requests.read_parameter(found) == 5
+        assert not code.ask("param_get", Writer().text("/nothing")).flag()
+        code.ask("log", Writer().integer(2).text("careful"))
+
+    _run(stage, body)
+    assert [(one.severity, one.text) for one in stage.of(Text)] == [(4, "careful")]
+
+
+def test_a_handler_that_returns_false_is_a_refusal_and_no_failure(stage):
+    server, client = Code(stage, "server"), Code(stage, "client")
+    empty = to_cdr(new("std_srvs/srv/SetBool_Response"))
+    server.returns = Writer().flag(False).raw(empty).done()
+    told: list[bool] = []
+
+    def serve() -> None:
+        server.ask("init", Writer().text("server").flag(False))
+        server.ask("serve", Writer().text("/set").text("std_srvs/srv/SetBool_Request").integer(3))
+        server.ask("spin")
+
+    def call() -> None:
+        client.ask("init", Writer().text("client").flag(False))
+        assert client.ask("wait_for_service", Writer().text("/set").integer(-1)).flag()
+        number = client.ask("client", Writer().text("/set").text("std_srvs/srv/SetBool")).integer()
+        request = to_cdr(new("std_srvs/srv/SetBool_Request"))
+        told.extend(client.ask("call", Writer().integer(number).raw(request)).flag() for _ in range(2))
+
+    stage.kernel.spawn(serve, "server", ExecutionContext("server"))
+    _run(stage, call, "client")
+    assert told == [False, False]
+    assert len(server.called) == 2

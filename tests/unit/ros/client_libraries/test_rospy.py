@@ -1,0 +1,414 @@
+from typing import Any
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.base.time import MS, S
+from volery.kernel.task import ExecutionContext
+from volery.ros.client_libraries.rospy import Launch
+from volery.trace.events import Activation, Call, Failure, Text
+
+TALKER = """
+from std_msgs.msg import String
+rospy.init_node("talker")
+publisher = rospy.Publisher("chatter", String, queue_size=10)
+rate = rospy.Rate(10)
+count = 0
+while not rospy.is_shutdown() and count < {count}:
+    publisher.publish("hello %d" % count)
+    count += 1
+    rate.sleep()
+"""
+
+
+def test_the_talker_and_the_listener_of_the_tutorials(stage: Any) -> None:
+    stage.component(
+        "listener",
+        """
+from std_msgs.msg import String
+def callback(data):
+    out((rospy.get_time(), data.data))
+rospy.init_node("listener", anonymous=True)
+rospy.Subscriber("chatter", String, callback)
+rospy.spin()
+""",
+    )
+    stage.component("talker", TALKER.format(count=3))
+    assert stage.run(S) == [(0.0, "hello 0"), (0.1, "hello 1"), (0.2, "hello 2")]
+    assert stage.graph.node_names() == ["/listener_1", "/talker"]
+
+
+def test_callbacks_run_while_the_main_flow_sleeps_and_each_topic_by_itself(stage: Any) -> None:
+    stage.component(
+        "listener",
+        """
+from std_msgs.msg import String
+rospy.init_node("listener")
+def slow(data):
+    rospy.sleep(10)
+    out("slow")
+rospy.Subscriber("chatter", String, slow)
+rospy.Subscriber("chatter", String, lambda data, who: out(who + data.data), "me: ")
+rospy.sleep(0.15)
+out("main")
+""",
+    )
+    stage.component("talker", TALKER.format(count=3))
+    assert stage.run(5 * S) == ["me: hello 0", "me: hello 1", "main", "me: hello 2"]
+
+
+def test_published_fields_may_be_given_directly(stage: Any) -> None:
+    stage.component(
+        "both",
+        """
+from geometry_msgs.msg import Point
+from std_msgs.msg import String
+rospy.init_node("both")
+rospy.Subscriber("a", Point, lambda m: out((m.x, m.y, m.z)))
+publisher = rospy.Publisher("a", Point)
+publisher.publish(1.0, 2.0, 3.0)
+publisher.publish(x=4.0)
+publisher.publish(Point(5.0, 6.0, 7.0))
+for wrong in (("x",) * 4, (String(),)):
+    try:
+        publisher.publish(*wrong)
+    except rospy.ROSSerializationException as error:
+        out(type(error).__name__)
+out((publisher.get_num_connections(), publisher.name))
+rospy.sleep(1)
+""",
+    )
+    refused = ["ROSSerializationException"] * 2
+    heard = [(1.0, 2.0, 3.0), (4.0, 0.0, 0.0), (5.0, 6.0, 7.0)]
+    assert stage.run() == [*refused, (1, "/a"), *heard]
+
+
+def test_a_latched_message_reaches_who_comes_late(stage: Any) -> None:
+    stage.component(
+        "both",
+        """
+from std_msgs.msg import Int32
+rospy.init_node("both")
+publisher = rospy.Publisher("map", Int32, latch=True)
+publisher.publish(1)
+publisher.publish(2)
+out(rospy.wait_for_message("map", Int32, timeout=1).data)
+""",
+    )
+    assert stage.run() == [2]
+
+
+def test_services_take_what_rospy_takes(stage: Any) -> None:
+    stage.component(
+        "server",
+        """
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, Empty
+rospy.init_node("server")
+rospy.Service("response", SetBool, lambda request: SetBoolResponse(request.data, "response"))
+rospy.Service("pair", SetBool, lambda request: (request.data, "pair"))
+rospy.Service("dict", SetBool, lambda request: {"success": request.data, "message": "dict"})
+rospy.Service("nothing", Empty, lambda request: None)
+rospy.Service("none", Trigger, lambda request: None)
+rospy.spin()
+""",
+    )
+    stage.component(
+        "client",
+        """
+from std_srvs.srv import SetBool, SetBoolRequest, Trigger, Empty
+rospy.init_node("client")
+for name in ("response", "pair", "dict"):
+    rospy.wait_for_service(name)
+    proxy = rospy.ServiceProxy(name, SetBool)
+    out((proxy(True).message, proxy(data=True).success, proxy.call(SetBoolRequest(data=False)).success))
+out(type(rospy.ServiceProxy("nothing", Empty)()).__name__)
+for name, kind in (("none", Trigger), ("nowhere", Trigger)):
+    try:
+        rospy.ServiceProxy(name, kind)()
+    except rospy.ServiceException as error:
+        out(str(error).partition(": ")[0])
+""",
+    )
+    assert stage.run(S) == [
+        ("response", True, False),
+        ("pair", True, False),
+        ("dict", True, False),
+        "Empty_Response",
+        "service [/none]",
+        "service [/nowhere]",
+    ]
+    assert {event.callee for event in stage.of(Call)} == {"server"}
+
+
+def test_requests_are_served_at_the_same_time(stage: Any) -> None:
+    stage.component(
+        "server",
+        """
+from std_srvs.srv import Trigger
+rospy.init_node("server")
+def handle(request):
+    rospy.sleep(1)
+    return True, "done"
+rospy.Service("work", Trigger, handle)
+rospy.spin()
+""",
+    )
+    client = """
+from std_srvs.srv import Trigger
+rospy.init_node("{name}")
+rospy.wait_for_service("work")
+rospy.ServiceProxy("work", Trigger)()
+out((rospy.get_name(), rospy.get_time()))
+"""
+    stage.component("one", client.format(name="one"))
+    stage.component("two", client.format(name="two"))
+    assert stage.run(5 * S) == [("/one", 1.0), ("/two", 1.0)]
+
+
+def test_what_a_callback_raises_is_logged_and_a_failure_of_the_component(stage: Any) -> None:
+    stage.component("talker", TALKER.format(count=4))
+    stage.component(
+        "listener",
+        """
+from std_msgs.msg import String
+rospy.init_node("listener")
+def fail(data):
+    raise ValueError("no battery")
+rospy.Subscriber("chatter", String, fail)
+rospy.sleep(5)
+out("still here")
+""",
+    )
+    assert stage.run() == ["still here"]
+    [failure] = stage.of(Failure)
+    assert failure.who == "listener"
+    assert failure.what.startswith("callback of /chatter raised ValueError: no battery (line ")
+    assert len([event for event in stage.of(Text) if "bad callback" in event.text]) >= 3
+
+
+def test_time_outs(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+from std_msgs.msg import String
+rospy.init_node("n")
+try:
+    rospy.wait_for_message("nothing", String, timeout=0.5)
+except rospy.ROSException as error:
+    out((rospy.get_time(), str(error)))
+try:
+    rospy.wait_for_service("nothing", timeout=rospy.Duration(0, 500000000))
+except rospy.ROSException as error:
+    out((rospy.get_time(), str(error)))
+""",
+    )
+    assert stage.run() == [
+        (0.5, "timeout exceeded while waiting for message on topic /nothing"),
+        (1.0, "timeout exceeded while waiting for service /nothing"),
+    ]
+
+
+def test_time_and_duration(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+from std_msgs.msg import Header
+rospy.init_node("n")
+rospy.sleep(rospy.Duration(1.5))
+now = rospy.Time.now()
+out((now.secs, now.nsecs, now.to_sec()))
+header = Header(stamp=rospy.Time.from_sec(1.0))
+age = now - header.stamp
+later = header.stamp + rospy.Duration(2)
+out((age.to_sec(), age > rospy.Duration(0.4), now == rospy.get_rostime(), later > now))
+out(rospy.Time(1, 2500000000) == rospy.Time(3.5))
+""",
+    )
+    assert stage.run() == [(1, 500_000_000, 1.5), (0.5, True, True, True), True]
+
+
+def test_timers(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+rospy.init_node("n")
+def tick(event):
+    last = event.last_real.to_sec() if event.last_real else None
+    out((event.current_expected.to_sec(), event.current_real.to_sec(), last))
+timer = rospy.Timer(rospy.Duration(0.5), tick)
+rospy.Timer(0.2, lambda event: out("once"), oneshot=True)
+rospy.sleep(1.2)
+timer.shutdown()
+rospy.sleep(2)
+""",
+    )
+    assert stage.run() == ["once", (0.5, 0.5, None), (1.0, 1.0, 0.5)]
+
+
+def test_parameters(stage: Any) -> None:
+    stage.launched["n"] = Launch(namespace="/drone_1", parameters={"height": 12, "gains": {"p": 1.0}})
+    stage.component(
+        "n",
+        """
+rospy.init_node("whatever")
+out((rospy.get_param("~height"), rospy.get_param("~gains/p"), rospy.get_param("/none", 7)))
+rospy.set_param("mode", "auto")
+out((rospy.get_param("/drone_1/mode"), rospy.has_param("mode"), rospy.has_param("made")))
+rospy.delete_param("mode")
+for action in (rospy.get_param, rospy.delete_param):
+    try:
+        action("mode")
+    except KeyError as error:
+        out("no parameter" in str(error))
+out(rospy.get_param_names())
+""",
+    )
+    assert stage.run() == [
+        (12, 1.0, 7),
+        ("auto", True, False),
+        True,
+        True,
+        ["/drone_1/n/gains/p", "/drone_1/n/height"],
+    ]
+
+
+def test_a_launched_component_names_its_node(stage: Any) -> None:
+    for name in ("left", "right"):
+        stage.launched[name] = Launch("/fleet", remaps={"cmd": f"{name}/cmd"})
+        stage.component(
+            name,
+            """
+rospy.init_node("controller")
+rospy.init_node("controller")
+out((rospy.get_name(), rospy.get_namespace(), rospy.get_caller_id(), rospy.resolve_name("cmd")))
+""",
+        )
+    assert stage.run() == [
+        (f"/fleet/{name}", "/fleet/", f"/fleet/{name}", f"/fleet/{name}/cmd") for name in ("left", "right")
+    ]
+
+
+def test_a_node_that_is_there_already_is_taken_over(stage: Any) -> None:
+    stage.nodes["n"] = stage.graph.node("made_before", place=ExecutionContext("n"))
+    stage.component("n", 'rospy.init_node("n")\nout(rospy.get_name())')
+    assert stage.run() == ["/made_before"]
+    assert stage.graph.node_names() == ["/made_before"]
+
+
+def test_shutting_down(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+from std_msgs.msg import String
+rospy.init_node("n")
+rospy.on_shutdown(lambda: out("hook"))
+rospy.Publisher("a", String)
+out(rospy.is_shutdown())
+rospy.signal_shutdown("battery is empty")
+out(rospy.is_shutdown())
+rospy.spin()
+try:
+    rospy.sleep(1)
+except rospy.ROSInterruptException as error:
+    out(str(error))
+""",
+    )
+    assert stage.run() == [False, "hook", True, "rospy shutdown: battery is empty"]
+    assert stage.graph.node_names() == []
+
+
+def test_log_lines_go_into_the_trace(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+rospy.init_node("n")
+rospy.loginfo("height %.1f m", 2.0)
+rospy.logwarn("plain 100%")
+rospy.logerr("bad")
+for _ in range(6):
+    rospy.loginfo_throttle(1.0, "now and then")
+    rospy.logdebug_once("first")
+    rospy.sleep(0.25)
+""",
+    )
+    stage.run()
+    said = [(event.at, event.severity, event.text) for event in stage.of(Text) if event.source == "n"]
+    assert said == [
+        (0, 6, "height 2.0 m"),
+        (0, 4, "plain 100%"),
+        (0, 3, "bad"),
+        (0, 6, "now and then"),
+        (0, 7, "first"),
+        (S, 6, "now and then"),
+    ]
+
+
+def test_what_is_not_there_is_named(stage: Any) -> None:
+    rospy = stage.modules["rospy"]
+    with pytest.raises(AttributeError, match=r"rospy\.Publsher is not there.*did you mean 'Publisher'"):
+        _ = rospy.Publsher
+    assert not hasattr(rospy, "__wrapped__")
+    assert rospy.exceptions is stage.modules["rospy.exceptions"]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("rospy.Publisher('a', str)", "no message class"),
+        ("rospy.Subscriber('a', None, out)", "no message class"),
+        ("rospy.Service('a', 'std_srvs/Empty', out)", "no service class"),
+        ("rospy.Rate(0)", "above 0 Hz"),
+        ("rospy.Publisher('not a name', Empty)", "no valid ROS name"),
+    ],
+)
+def test_wrong_calls_are_explained(stage: Any, call: str, words: str) -> None:
+    stage.component("n", f"from std_msgs.msg import Empty\nrospy.init_node('n')\n{call}")
+    with pytest.raises(UsageError, match=words):
+        stage.run()
+
+
+def test_calls_before_init_node(stage: Any) -> None:
+    stage.component("n", "out(rospy.is_shutdown())\nrospy.Rate(10)")
+    with pytest.raises(stage.modules["rospy"].ROSInitException, match=r"n: call rospy\.init_node\(\) first"):
+        stage.run()
+    assert stage.out == [False]
+
+
+def test_the_published_topics(stage: Any) -> None:
+    stage.component(
+        "n",
+        """
+from std_msgs.msg import Empty
+rospy.init_node("n")
+rospy.Publisher("/a/x", Empty)
+rospy.Publisher("/b", Empty)
+rospy.Subscriber("/c", Empty, None)
+out(rospy.get_published_topics())
+out(rospy.get_published_topics("/a"))
+rospy.signal_shutdown("")
+""",
+    )
+    assert stage.run() == [
+        [["/a/x", "std_msgs/Empty"], ["/b", "std_msgs/Empty"]],
+        [["/a/x", "std_msgs/Empty"]],
+    ]
+
+
+def test_helping_tasks_do_not_inherit_the_deadline_of_the_loop(stage: Any) -> None:
+    text = """
+import rospy
+from std_msgs.msg import Empty
+def main():
+    rospy.init_node("n")
+    rospy.Subscriber("a", Empty, lambda m: None)
+    rate = rospy.Rate(10)
+    publisher = rospy.Publisher("a", Empty)
+    for _ in range(2):
+        publisher.publish()
+        rate.sleep()
+"""
+    stage.kernel.spawn(stage.load(text).main, "n", ExecutionContext("n", deadline=100 * MS))
+    stage.kernel.run(150 * MS)
+    deadlines = {(event.released, event.deadline) for event in stage.of(Activation)}
+    assert (0, 100 * MS) in deadlines
+    assert (100 * MS, -1) in deadlines
