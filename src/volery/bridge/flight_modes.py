@@ -11,7 +11,7 @@ import re
 from typing import NamedTuple
 
 from volery.links.pprzlink_messages import message_type
-from volery.ros.messages.dji import DisplayMode
+from volery.ros.messages.dji_constants import DisplayMode
 
 COPTER = {
     0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 7: "CIRCLE",

@@ -16,7 +16,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.bridge.vehicle_node import WARNING
-from volery.kernel.task import Place, Scope, Task
+from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.link import Frame, Link
 from volery.links.pprzros_messages import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
 from volery.ros.graph import Node, RosGraph
@@ -43,7 +43,7 @@ class PprzrosNode:
         self._heard_of: set[int] = set()
         link.receive(self._heard)
 
-    def start(self, place: Place, scope: Scope) -> Task:
+    def start(self, place: ExecutionContext, scope: Scope) -> Task:
         """Spawn the node's task: its computing is spent at *place*, it ends with *scope*."""
         self._component = place.component
         return self._kernel.spawn(lambda: self._run(place, scope), place.component, place, scope)
@@ -59,7 +59,7 @@ class PprzrosNode:
         if len(self._fresh) < MOST_WAITING:
             self._fresh.append((frame, self._kernel.now()))
 
-    def _run(self, place: Place, scope: Scope) -> None:
+    def _run(self, place: ExecutionContext, scope: Scope) -> None:
         node = self._graph.node("pprzros", self.namespace, place=place)
         publisher = node.advertise(TO_ROS, TYPE)
         self._listen(node, replace(place, deadline=None, on_release=None), scope)
@@ -71,7 +71,7 @@ class PprzrosNode:
                 publisher.publish(to_message(frame, self._graph.epoch + at))
             rate.sleep()
 
-    def _listen(self, node: Node, aside: Place, scope: Scope) -> None:
+    def _listen(self, node: Node, aside: ExecutionContext, scope: Scope) -> None:
         group = node.group()
         node.subscribe(FROM_ROS, TYPE, self._send, group=group)
         self._kernel.spawn(group.spin, f"{aside.component} (datalink)", aside, scope)
@@ -87,7 +87,7 @@ class PprzrosNode:
                 kernel.record(Text(kernel.now(), self._component, WARNING, what))
 
 
-def serve_pprzros(graph: RosGraph, link: Link, name: str, place: Place) -> PprzrosNode:
+def serve_pprzros(graph: RosGraph, link: Link, name: str, place: ExecutionContext) -> PprzrosNode:
     """Serve the aircraft behind *link* under ``/name`` until the run ends, computing at *place*."""
     served = PprzrosNode(graph, link, f"/{name}")
     served.start(place, graph.kernel.root)

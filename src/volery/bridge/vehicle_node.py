@@ -25,10 +25,10 @@ from volery.bridge.autopilot_link import AutopilotLink, ReceivedFrame, StreamReq
 from volery.bridge.flight_modes import AUTOPILOTS, mode_name
 from volery.bridge.mavros_names import MAVROS
 from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Service, Subscription
-from volery.kernel.task import Place, Scope, Task
+from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.link import Link
 from volery.ros.graph import Node, Publisher, RosGraph
-from volery.ros.graph.group import Work
+from volery.ros.graph.callbacks import Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
@@ -83,7 +83,7 @@ class VehicleNode:
         self.connected = False
         self._component = ""
 
-    def start(self, place: Place, scope: Scope) -> Task:
+    def start(self, place: ExecutionContext, scope: Scope) -> Task:
         """Spawn the node's task: its computing is spent at *place*, it ends with *scope*."""
         self._component = place.component
         return self._kernel.spawn(lambda: self._run(place, scope), place.component, place, scope)
@@ -100,7 +100,7 @@ class VehicleNode:
         armed = "armed" if beat["base_mode"] & SAFETY_ARMED else "disarmed"
         return f"{who} (system {self.wire.target[0]}): {mode}, {armed}"
 
-    def _run(self, place: Place, scope: Scope) -> None:
+    def _run(self, place: ExecutionContext, scope: Scope) -> None:
         options = self.options
         node = self._graph.node(options.names.node, self.namespace, place=place)
         aside = replace(place, deadline=None, on_release=None)
@@ -169,7 +169,7 @@ class VehicleNode:
         publisher = self._publishers.get(topic)
         return publisher is not None and (topic not in self._on_demand or publisher.subscribers() > 0)
 
-    def _subscribe(self, node: Node, offering: NodeInterface, aside: Place, scope: Scope) -> None:
+    def _subscribe(self, node: Node, offering: NodeInterface, aside: ExecutionContext, scope: Scope) -> None:
         group = node.group()
         missing: list[str] = []
         for one in offering.subscriptions:
@@ -187,7 +187,7 @@ class VehicleNode:
         except NONSENSE as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
 
-    def _serve(self, node: Node, offering: NodeInterface, aside: Place, scope: Scope) -> None:
+    def _serve(self, node: Node, offering: NodeInterface, aside: ExecutionContext, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
                 work.run()
@@ -251,7 +251,11 @@ class VehicleNode:
 
 
 def serve_vehicle(
-    graph: RosGraph, link: Link, name: str, place: Place, options: VehicleNodeOptions = VehicleNodeOptions()
+    graph: RosGraph,
+    link: Link,
+    name: str,
+    place: ExecutionContext,
+    options: VehicleNodeOptions = VehicleNodeOptions(),
 ) -> VehicleNode:
     """Serve the autopilot behind *link* under ``/name`` until the run ends, computing at *place*."""
     served = VehicleNode(graph, link, f"/{name}", options)

@@ -25,7 +25,7 @@ from volery.bridge.mavlink_adapter.drone_commands import (
 from volery.bridge.mavlink_adapter.mission_transfer import MissionTransfer
 from volery.bridge.mavlink_adapter.telemetry_encoder import TelemetryEncoder
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame, Receiver
 from volery.links.mavlink_conventions import CHUNK, MessageStreams, status_text_chunks
@@ -67,7 +67,7 @@ class MavlinkAdapter:
     What it takes to fly it is computed at *place*.
     """
 
-    def __init__(self, kernel: Kernel, driver: Driver, place: Place) -> None:
+    def __init__(self, kernel: Kernel, driver: Driver, place: ExecutionContext) -> None:
         self.name = driver.name
         self._kernel, self._driver = kernel, driver
         self._ours, self._theirs = in_process_pair(kernel, name=driver.name)

@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple, Protocol
 from volery.base.errors import CapabilityError, LinkError, NotArrived, VoleryError
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Handle, Kernel
-from volery.kernel.task import Place, Scope
+from volery.kernel.task import ExecutionContext, Scope
 from volery.links.mavlink_messages import constant
 from volery.vehicles.driver import Driver, ManualControl
 from volery.vehicles.drone import Drone
@@ -84,7 +84,7 @@ def result_of(error: VoleryError) -> int:
 class CommandHandler:
     """Flies *driver*'s vehicle, in tasks at *place*. *say* tells in words what went wrong."""
 
-    def __init__(self, kernel: Kernel, driver: Driver, place: Place, say: Say) -> None:
+    def __init__(self, kernel: Kernel, driver: Driver, place: ExecutionContext, say: Say) -> None:
         self.drone = Drone(kernel, driver.name, driver, limits=NO_LIMITS)
         self._kernel, self._driver, self._place, self._say = kernel, driver, place, say
         self._scope = self._new_scope()

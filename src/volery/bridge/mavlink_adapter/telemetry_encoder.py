@@ -16,7 +16,7 @@ from volery.base.time import MS, US
 from volery.bridge.flight_modes import DJI_ID, GENERIC_ID, PAPARAZZI_ID, AutopilotType, mode_number
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
-from volery.ros.messages.dji import HEALTHY_GPS
+from volery.ros.messages.dji_constants import HEALTHY_GPS
 from volery.vehicles.driver import Driver
 
 Fields = dict[str, Any]

@@ -10,9 +10,9 @@ from types import ModuleType
 from typing import Any, NamedTuple, NoReturn
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import current_task
-from volery.ros.graph import Graph, Node, Publisher, QoS, RosGraph
+from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
 from volery.ros.messages import message_class
 
 
@@ -24,11 +24,11 @@ class Launch(NamedTuple):
     parameters: Mapping[str, Any] = {}
 
 
-AtEnd = Callable[[Place, Callable[[], object]], None]
+AtEnd = Callable[[ExecutionContext, Callable[[], object]], None]
 """Has something done at a place when the run ends, by which components have been cancelled already."""
 
 
-def ignore_end(place: Place, last: Callable[[], object]) -> None:
+def ignore_end(place: ExecutionContext, last: Callable[[], object]) -> None:
     """Where runs end without a word."""
 
 
@@ -123,4 +123,4 @@ class Rosout:
             self._closed = True
 
     def _wanted(self) -> bool:
-        return not isinstance(self._graph, Graph) or self._graph.heard(ROSOUT)
+        return not isinstance(self._graph, EmbeddedGraph) or self._graph.heard(ROSOUT)

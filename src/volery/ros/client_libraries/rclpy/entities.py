@@ -11,7 +11,7 @@ from volery.ros.client_libraries.rclpy.errors import InvalidHandle
 from volery.ros.client_libraries.rclpy.executors import Future
 from volery.ros.client_libraries.rclpy.qos import graph_qos
 from volery.ros.graph import ServiceError
-from volery.ros.graph.group import Work
+from volery.ros.graph.callbacks import Work
 from volery.ros.messages import Message
 
 if TYPE_CHECKING:

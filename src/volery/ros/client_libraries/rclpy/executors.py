@@ -21,10 +21,9 @@ from volery.kernel.waiting import Signal, current_task, end_activation
 from volery.ros.client_libraries.rclpy.context import Context, Contexts
 from volery.ros.client_libraries.rclpy.errors import ExternalShutdownException
 from volery.ros.graph import Group
-from volery.ros.graph.group import Work
+from volery.ros.graph.callbacks import Work
 
 if TYPE_CHECKING:
-    pass
     from volery.ros.client_libraries.rclpy.node import Node
 
 

@@ -32,8 +32,8 @@ from volery.ros.client_libraries.rclpy.parameters import (
     serve_parameters,
 )
 from volery.ros.client_libraries.rclpy.time import Clock, ClockType, Rate
-from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, Graph, QoS
-from volery.ros.graph.group import Work
+from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS
+from volery.ros.graph.callbacks import Work
 
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
 _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")
@@ -77,7 +77,7 @@ class Node(NodeParameters):
         if automatically_declare_parameters_from_overrides:
             for override in parameter_overrides or ():
                 self._declared.declare(override.name, override.value)
-        if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, Graph):
+        if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, EmbeddedGraph):
             serve_parameters(self)  # elsewhere the transport's own node does
 
     # -- who it is

@@ -31,7 +31,6 @@ from volery.ros.messages import new
 from volery.ros.messages.packages import service_class
 
 if TYPE_CHECKING:
-    pass
     from volery.ros.client_libraries.rclpy.node import Node
 
 _NAMES = (

@@ -8,7 +8,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.ros.client_libraries.rclpy.time import Duration
 from volery.ros.graph import QoS
-from volery.ros.graph.node import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE
+from volery.ros.graph.interface import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE
 
 
 class InvalidQoSProfileException(Exception):  # noqa: N818 - rclpy's name

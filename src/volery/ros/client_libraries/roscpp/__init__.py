@@ -20,4 +20,4 @@ from volery.ros.client_libraries.roscpp.session import Session
 
 FALLBACK = Path(__file__).parent / "fallback"
 
-__all__ = ["FALLBACK", "INCLUDE", "Session", "request_handlers", "generate"]
+__all__ = ["FALLBACK", "INCLUDE", "Session", "generate", "request_handlers"]

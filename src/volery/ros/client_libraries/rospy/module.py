@@ -17,7 +17,7 @@ from volery.ros.client_libraries.rospy import services, time, topics
 from volery.ros.client_libraries.rospy.logging import LEVELS, loggers
 from volery.ros.client_libraries.rospy.session import EXCEPTIONS, Sessions
 from volery.ros.client_libraries.rospy.topics import AnyMsg
-from volery.ros.graph import Graph, Node, RosGraph
+from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 
 _NO_DEFAULT = object()
 
@@ -59,7 +59,7 @@ def delete_param(sessions: Sessions, param_name: str) -> None:
 def get_param_names(sessions: Sessions) -> list[str]:
     """All parameters, where the graph is embedded: what others keep is not listed."""
     graph = sessions.graph
-    if not isinstance(graph, Graph):
+    if not isinstance(graph, EmbeddedGraph):
         raise UsageError("rospy.get_param_names() works on the embedded graph only")
     with sessions.kernel:
         return graph.parameters.names()
