@@ -16,30 +16,30 @@ from typing import Any
 
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
-from volery.ros.graph import Graph, free
+from volery.ros.graph import EmbeddedGraph, free
 from volery.ros.messages.cdr import copied_to_cdr
 
 POSE = "geometry_msgs/msg/PoseStamped"
 
 
-def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> Graph:
-    tariff = catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
+def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> EmbeddedGraph:
+    tariff = load_catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
     price = (lambda node, call, x: tariff(call, x)) if priced else free
-    return Graph(kernel, price, records=lambda topic: recorded)
+    return EmbeddedGraph(kernel, price, records=lambda topic: recorded)
 
 
 def publishing(count: int, priced: bool, recorded: bool) -> float:
     """Microseconds from publish to the end of the callback, one subscriber."""
     kernel = VirtualKernel()
     graph = graph_on(kernel, priced, recorded)
-    place = Place("both", Processor(kernel, "cpu", cores=4) if priced else None)
+    place = ExecutionContext("both", Processor(kernel, "cpu", cores=4) if priced else None)
     took = [0.0]
 
     def both() -> None:
@@ -87,7 +87,7 @@ def serving(seconds: int) -> float:
 
     kernel.every(100 * MS, stream)
     kernel.every(S, instruments)
-    serve_vehicle(graph, ours, "drone_1", Place("mavros", Processor(kernel, "cpu", cores=4)))
+    serve_vehicle(graph, ours, "drone_1", ExecutionContext("mavros", Processor(kernel, "cpu", cores=4)))
     kernel.run(5 * S)
     start = process_time()
     kernel.run(kernel.now() + seconds * S)

@@ -20,7 +20,7 @@ import simpy
 
 from volery.base.time import MS, US
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Queue, current_task
 
@@ -47,7 +47,7 @@ def sleepers(processes: int, events: int) -> float:
         return loop
 
     for i in range(processes):
-        kernel.spawn(body(MS + i), str(i), Place(str(i)))
+        kernel.spawn(body(MS + i), str(i), ExecutionContext(str(i)))
     return each * processes / timed(lambda: kernel.run(FOREVER))
 
 
@@ -80,7 +80,7 @@ def computing(processes: int, events: int) -> float:
         return loop
 
     for i in range(processes):
-        kernel.spawn(body(MS + i), str(i), Place(str(i), processor, i))
+        kernel.spawn(body(MS + i), str(i), ExecutionContext(str(i), processor, i))
     return 2 * each * processes / timed(lambda: kernel.run(FOREVER))
 
 
@@ -115,8 +115,8 @@ def handover(events: int) -> float:
 
         return loop
 
-    kernel.spawn(body(there, back), "a", Place("a"))
-    kernel.spawn(body(back, there), "b", Place("b"))
+    kernel.spawn(body(there, back), "a", ExecutionContext("a"))
+    kernel.spawn(body(back, there), "b", ExecutionContext("b"))
     return events / timed(lambda: kernel.run(FOREVER))
 
 

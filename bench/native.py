@@ -26,7 +26,7 @@ from tempfile import TemporaryDirectory
 from volery.calibration.machine import this_machine
 from volery.calibration.processor.core_fit import core_law
 from volery.calibration.processor.microbenchmarks import isa, measure
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import BlockCosts, traced_costs
 from volery.cost.native.compilation import Program, compile_program, run_tool
@@ -178,7 +178,7 @@ def executed(program: Program, given: int, folder: Path) -> int:
 
 
 def on_a72(paths: list[Path]) -> None:
-    law = catalogue().processor(A72).core_law()
+    law = load_catalogue().processor(A72).core_law()
     print("instructions on a Cortex-A72, judging input: estimated, executed by qemu-aarch64")
     errors = []
     for path in paths:
@@ -196,7 +196,7 @@ def on_a72(paths: list[Path]) -> None:
 
 
 def anchors() -> None:
-    law = catalogue().processor(A72).core_law()
+    law = load_catalogue().processor(A72).core_law()
     with TemporaryDirectory() as made:
         folder = Path(made)
         source = folder / "primes.cpp"

@@ -33,7 +33,7 @@ from volery.calibration.ros.results import format_line, ros_law, write_entry
 from volery.calibration.validation.comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
 from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
 from volery.cli.measure import tables
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.model.reader import load
 from volery.model.system import System
 from volery.run.assembly.vocabulary import vocabulary
@@ -88,7 +88,9 @@ class Campaign:
         machine, mhz = self.machine, self.machine.frequency_mhz
         under = Conditions(self.client, machine.description, mhz)
         write_entry(self.catalogue, machine, ros_law(self.costs(), under))
-        code = catalogue().processor("generic-host").code["python"]  # a thousandth of what the nodes take
+        code = (
+            load_catalogue().processor("generic-host").code["python"]
+        )  # a thousandth of what the nodes take
         put_law(self.catalogue, machine, ("code", "python"), code, (mhz, mhz))
         host = f"{{is: {machine.name}, frequency: {mhz:g} MHz}}"
         system = self.system(f"platform.catalogues={self.catalogue}", f"platform.processors.host={host}")

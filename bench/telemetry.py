@@ -29,7 +29,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from volery.base.position import Position
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.mavlink_codec import MAVLINK
@@ -109,7 +109,7 @@ def ours(chunks: Chunks) -> Callable[[], int]:
                 seen.changed.wait_for(partial(_moved, seen, seen.position), 10 * S)
                 woken[0] += 1
 
-        kernel.spawn(follow, "follower", Place("follower"))
+        kernel.spawn(follow, "follower", ExecutionContext("follower"))
         turn = iter(chunks)
 
         def arrive(data: bytes) -> None:

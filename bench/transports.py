@@ -28,10 +28,10 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.client_libraries.importable_modules import importable_modules
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import message_class
 from volery.ros.transports.ros1 import Roscore, available
 
@@ -145,12 +145,16 @@ LISTENERS: Mapping[str, Any] = {"rospy": rospy_listener, "rclpy": rclpy_listener
 def embedded(library: str, recorded: bool, count: int) -> Taken:
     """Both as components of one run in virtual time, so that the talker's CPU time is that of both."""
     kernel = VirtualKernel()
-    graph = Graph(kernel, unrecorded=not recorded)
+    graph = EmbeddedGraph(kernel, unrecorded=not recorded)
     face = importable_modules(graph)[library]
     kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
-    kernel.spawn(lambda: LISTENERS[library](face, kind, heard, count), "listener", Place("listener"))
+    kernel.spawn(
+        lambda: LISTENERS[library](face, kind, heard, count), "listener", ExecutionContext("listener")
+    )
     used: list[float] = []
-    kernel.spawn(lambda: used.append(TALKERS[library](face, kind, count)), "talker", Place("talker"))
+    kernel.spawn(
+        lambda: used.append(TALKERS[library](face, kind, count)), "talker", ExecutionContext("talker")
+    )
     kernel.call_at(TIMEOUT_S * S + 1, lambda: None)  # the listener's threads wait for ever: no deadlock
     kernel.run(TIMEOUT_S * S)
     return heard.result(used[0])

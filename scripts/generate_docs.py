@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 from typer.main import get_command
 
 from volery.cli.main import app
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.model.document import schema
 from volery.requirements.observables import OBSERVABLES
-from volery.simulation.autopilots.ardupilot import DIALECT as ARDUPILOT
-from volery.simulation.autopilots.firmware import Family
-from volery.simulation.autopilots.px4 import DIALECT as PX4
+from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
+from volery.simulation.autopilots.firmware import FirmwareFamily
+from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
 from volery.testing.faults import FAULTS
@@ -56,7 +56,7 @@ def processors() -> str:
         "# Processors of the catalogue\n",
         "Every figure carries its provenance; what is missing is not known.\n",
     ]
-    for name, entry in catalogue().processors.items():
+    for name, entry in load_catalogue().processors.items():
         lines += [
             f"\n## {name}\n",
             f"{entry.description}. {entry.cores} cores, {entry.least_mhz:g} to {entry.greatest_mhz:g} MHz.\n",
@@ -106,7 +106,7 @@ class Firmware(NamedTuple):
 
     name: str
     recorded: str
-    family: Family
+    family: FirmwareFamily
     parameters: str
 
 

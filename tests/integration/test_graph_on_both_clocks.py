@@ -9,13 +9,13 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
-from volery.ros.graph import Graph, QoS
+from volery.ros.graph import EmbeddedGraph, QoS
 
 STRING, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/SetBool"
 
@@ -26,8 +26,8 @@ def kernel(request: pytest.FixtureRequest) -> Any:
 
 
 @pytest.fixture
-def graph(kernel: Any) -> Graph:
-    return Graph(kernel)
+def graph(kernel: Any) -> EmbeddedGraph:
+    return EmbeddedGraph(kernel)
 
 
 def play(kernel: Any, *bodies: Callable[[], None]) -> None:
@@ -47,14 +47,14 @@ def play(kernel: Any, *bodies: Callable[[], None]) -> None:
         return run
 
     for body in bodies:
-        kernel.spawn(guarded(body), body.__name__, Place(body.__name__))
+        kernel.spawn(guarded(body), body.__name__, ExecutionContext(body.__name__))
     kernel.run(60 * S)
     assert kernel.close() == []
     if errors:
         raise errors[0]
 
 
-def test_topics_and_services(kernel: Any, graph: Graph) -> None:
+def test_topics_and_services(kernel: Any, graph: EmbeddedGraph) -> None:
     heard: list[str] = []
 
     def server() -> None:
@@ -85,7 +85,7 @@ def test_topics_and_services(kernel: Any, graph: Graph) -> None:
     assert heard == [str(number) for number in range(20)]
 
 
-def test_a_vehicle_is_served(kernel: Any, graph: Graph) -> None:
+def test_a_vehicle_is_served(kernel: Any, graph: EmbeddedGraph) -> None:
     ours, theirs = in_process_pair(kernel)
     states: list[str] = []
 
@@ -98,7 +98,7 @@ def test_a_vehicle_is_served(kernel: Any, graph: Graph) -> None:
 
     theirs.receive(answer)
     kernel.every(50 * MS, beat)
-    serve_vehicle(graph, ours, "drone_1", Place("mavros"))
+    serve_vehicle(graph, ours, "drone_1", ExecutionContext("mavros"))
 
     def pilot() -> None:
         node = graph.node("pilot")

@@ -13,7 +13,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import message_type
-from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, REAL32, quantised
 from volery.simulation.autopilots.flight_stack.flight import make_world
@@ -92,14 +92,14 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     kernel = VirtualKernel()
     place = LocalFrame(48.0, 11.0, 500.0)
     _, (flight,) = make_world(kernel.now, [Multirotor(sensors="perfect")], seed=1, frame=place)
-    autopilot = Autopilot(kernel, flight, DIALECT, warm=True)
+    autopilot = Autopilot(kernel, flight, FIRMWARE, warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
     autopilot.connect(theirs)
     return kernel, autopilot, ours
 
 
-COMMANDS = [*sorted(_vehicle()[1].face.dialect.commands), 510, 511, 512, 520]
-PARAMETERS = sorted(DIALECT.kinds["multirotor"].honoured)
+COMMANDS = [*sorted(_vehicle()[1].face.firmware.commands), 510, 511, 512, 520]
+PARAMETERS = sorted(FIRMWARE.kinds["multirotor"].supported_parameters)
 LISTENED = sorted(_vehicle()[1].face.listens_to)
 
 

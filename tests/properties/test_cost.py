@@ -1,14 +1,14 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.cost import Tariff, catalogue, scale_time
+from volery.cost import Tariff, load_catalogue, scale_time
 
 KINDS = st.sampled_from(["intel-i5-3470", "rpi4-cortex-a72"])
 
 
 @st.composite
 def tariffs(draw: st.DrawFn) -> Tariff:
-    law = catalogue().processor(draw(KINDS)).ros_law("roscpp")
+    law = load_catalogue().processor(draw(KINDS)).ros_law("roscpp")
     return law.at(draw(st.floats(law.least_mhz, law.greatest_mhz)))
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.kernel.processor import SCHEDULERS, Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Queue, sleep
 from volery.trace.events import Event, Slice
@@ -87,8 +87,8 @@ def execute(load: Workload) -> Outcome:
 
     for number, (priority, bursts) in enumerate(load.tasks):
         name = f"t{number}"
-        kernel.spawn(body(name, priority, bursts), name, Place(name, processor, priority))
-    node = Place("node", processor, 2)
+        kernel.spawn(body(name, priority, bursts), name, ExecutionContext(name, processor, priority))
+    node = ExecutionContext("node", processor, 2)
     for when, amount in load.background:
         kernel.call_at(when, lambda amount=amount: processor.load(node, amount))
     kernel.run(FAR)
@@ -186,7 +186,7 @@ def test_sleepers_wake_when_they_asked_to_however_the_run_is_cut(pauses: list[li
             return run
 
         for number in range(len(pauses)):
-            kernel.spawn(body(number), str(number), Place(str(number)))
+            kernel.spawn(body(number), str(number), ExecutionContext(str(number)))
         for end in ends:
             kernel.run(end)
         assert kernel.close() == []
@@ -220,8 +220,8 @@ def test_a_queue_loses_nothing_and_keeps_the_order(puts: list[int], gets: list[i
             if item is not None:
                 got.append(item)
 
-    kernel.spawn(producer, "producer", Place("producer"))
-    kernel.spawn(consumer, "consumer", Place("consumer"))
+    kernel.spawn(producer, "producer", ExecutionContext("producer"))
+    kernel.spawn(consumer, "consumer", ExecutionContext("consumer"))
     kernel.run(2 * FAR * len(gets))
     assert got == list(range(len(got)))
     assert len(got) + len(queue) == len(puts)

@@ -34,7 +34,7 @@ def at(east: float, north: float, height: float = 10.0) -> Position:
 class Airstrip:
     """One simulated vehicle, its driver, and a second station that plays the pilot."""
 
-    dialect: str
+    firmware: str
     opener: Any
 
     def __init__(
@@ -49,9 +49,9 @@ class Airstrip:
         self.kernel = VirtualKernel(record=self.events.append)
         body = Multirotor() if kind is Drone else Rover()
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
-        dialect = dialects.load(self.dialect)
+        firmware = dialects.load(self.firmware)
         self.autopilot = Autopilot(
-            self.kernel, self.flight, dialect, warm=warm, name="craft_1", parameters=parameters
+            self.kernel, self.flight, firmware, warm=warm, name="craft_1", parameters=parameters
         )
         self.link = self._connect(faults)
         self._pilot, theirs = in_process_pair(self.kernel, name="pilot")

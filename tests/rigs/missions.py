@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.base.time import HOUR, Ns, S
-from volery.kernel.task import Place, Scope
+from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.virtual import VirtualKernel
 
 
@@ -24,7 +24,7 @@ def carried_out(
         if scope is not None:
             kernel.cancel(scope, "done")
 
-    kernel.spawn(body, "mission", Place("mission"), scope)
+    kernel.spawn(body, "mission", ExecutionContext("mission"), scope)
     until = kernel.now() + 2 * HOUR
     while not outcome and kernel.now() < until:
         kernel.run(kernel.now() + step)

@@ -13,7 +13,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import Family
+from volery.simulation.autopilots.firmware import FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 
@@ -39,7 +39,7 @@ class Heard(NamedTuple):
 class Station:
     """One vehicle, one ground station on one link."""
 
-    dialect: Family
+    firmware: FirmwareFamily
     home: LocalFrame
     heading: float = 0.0
     looks_per_second = 20  # while it waits
@@ -49,7 +49,7 @@ class Station:
         body = Multirotor if kind == "copter" else Rover
         spec = body(sensors="rtk", heading_deg=self.heading)
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=3, frame=self.home)
-        self.autopilot = Autopilot(self.kernel, self.flight, self.dialect, warm=warm, **options)
+        self.autopilot = Autopilot(self.kernel, self.flight, self.firmware, warm=warm, **options)
         self.vehicle = self.autopilot.vehicle
         self.heard: list[Heard] = []
         self.latest: dict[str, dict[str, Any]] = {}

@@ -17,7 +17,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from volery.base.errors import UsageError
-from volery.cost.catalogue import read
+from volery.cost.catalogue import parse_catalogue
 from volery.cost.figures import WithProvenance
 
 CPUINFO = Path("/proc/cpuinfo")
@@ -116,7 +116,7 @@ def put_law(
     yaml = YAML()
     yaml.width = 110
     if file.exists():
-        read(file.read_text(encoding="utf-8"), str(file))
+        parse_catalogue(file.read_text(encoding="utf-8"), str(file))
     data = (yaml.load(file.read_text(encoding="utf-8")) if file.exists() else None) or {}
     entry = data.setdefault("processors", {}).setdefault(machine.name, _new_entry(machine))
     entry["least_mhz"] = min(entry["least_mhz"], reach_mhz[0])
@@ -132,7 +132,7 @@ def put_law(
             yaml.dump(data, out)
     except OSError as error:
         raise UsageError(f"{file} cannot be written: {error.strerror}") from error
-    read(file.read_text(encoding="utf-8"), str(file))
+    parse_catalogue(file.read_text(encoding="utf-8"), str(file))
 
 
 def _new_entry(machine: Machine) -> dict[str, Any]:

@@ -13,9 +13,8 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
-from volery.ros.graph.playing import Playing, play
-from volery.ros.graph.recording import Recorder
-from volery.ros.messages.bag_writing import create_bag
+from volery.ros.graph.rosbag import PlayOptions, Recorder, play
+from volery.ros.messages.bag_writer import create_bag
 from volery.ros.messages.bags import Bag, open_bag
 from volery.run.assembly.ros_graphs import on_graph
 
@@ -86,7 +85,7 @@ def play_bag(output: Output, path: Path, wanted: Wanted) -> int:
             show(to_seconds(at - bag.start))
 
         node = graph.node("volery_play", anonymous=True)
-        how = Playing(wanted.rate, wanted.topics or None, wanted.after, wanted.clock, wanted.delay, told)
+        how = PlayOptions(wanted.rate, wanted.topics or None, wanted.after, wanted.clock, wanted.delay, told)
         played = play(node, bag, how)
     output.give({"played": played})
     output.show(f"played {played} messages")

@@ -11,7 +11,7 @@ from rich.text import Text
 from volery.base.errors import EstimateError, UsageError
 from volery.cli.console import Output, figures, table
 from volery.cli.endings import OK
-from volery.cost.catalogue import Catalogue, catalogue
+from volery.cost.catalogue import Catalogue, load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.compilation import compile_program
 from volery.cost.native.instrumented_run import Invocation as Run
@@ -79,7 +79,7 @@ def _core(wanted: Wanted) -> tuple[CoreLaw, float]:
 
 
 def _known(wanted: Wanted) -> Catalogue:
-    return catalogue(*([wanted.catalogue] if wanted.catalogue else []))
+    return load_catalogue(*([wanted.catalogue] if wanted.catalogue else []))
 
 
 def _joules(wanted: Wanted, law: CoreLaw, mhz: float, seconds: float) -> float | None:

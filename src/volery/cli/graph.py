@@ -13,7 +13,7 @@ from volery.cli.console import Output, table
 from volery.cli.endings import OK
 from volery.report.graph_of_run import graph_of_run
 from volery.report.graph_picture import picture
-from volery.ros.graph.portrait import Portrait, portrait
+from volery.ros.graph.snapshot import GraphSnapshot, snapshot
 from volery.run.assembly.ros_graphs import GRAPHS, on_graph
 
 
@@ -42,17 +42,17 @@ def graph(output: Output, wanted: Wanted) -> int:
     return OK
 
 
-def _look(wanted: Wanted) -> Portrait:
+def _look(wanted: Wanted) -> GraphSnapshot:
     folder = Path(wanted.source)
     if wanted.source not in GRAPHS and folder.is_dir():
         return graph_of_run(folder)
     if wanted.source not in GRAPHS and folder.exists():
         raise UsageError(f"{folder} is no run folder")
     with on_graph(wanted.source, "volery graph") as there:
-        return portrait(there, from_seconds(wanted.within))
+        return snapshot(there, from_seconds(wanted.within))
 
 
-def _tables(seen: Portrait) -> list[Table]:
+def _tables(seen: GraphSnapshot) -> list[Table]:
     nodes = table(_folded("node"), "publishes", "subscribes", "serves", title="nodes")
     for name in seen.nodes:
         published = sum(name in line.publishers for line in seen.topics)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from volery.cli.console import Output
 from volery.cli.endings import OK
-from volery.ros.transports.ros1.packages import write_package
+from volery.ros.transports.ros1.package_export import write_package
 
 
 def interfaces(output: Output, packages: list[str], folder: Path) -> int:

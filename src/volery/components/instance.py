@@ -15,8 +15,8 @@ from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
 from volery.cost.pricing import FREE, Cost, Pricing
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Scope, Server, Task
-from volery.kernel.waiting import Lock, Signal, at
+from volery.kernel.task import ComputeResource, ExecutionContext, Scope, Task
+from volery.kernel.waiting import Lock, Signal, executing_in
 from volery.trace.events import Charge, Failure
 
 COMPONENT_MARK = "__volery_user__"
@@ -39,7 +39,7 @@ class Allocation:
     component's ``run``.
     """
 
-    processor: Server | None = None
+    processor: ComputeResource | None = None
     frequency_mhz: float | None = None
     priority: int | None = None
     deadline: Ns | None = None
@@ -52,7 +52,7 @@ class Allocation:
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentContext(Place):
+class ComponentContext(ExecutionContext):
     """A place that knows whose it is, so that services called by user code find their component."""
 
     instance: Instance = field(kw_only=True)
@@ -176,7 +176,7 @@ class Instance:
         thing = self._ready()
         with self._lock:
             try:
-                with at(self.kernel, self.place):
+                with executing_in(self.kernel, self.place):
                     self._charge(task, f"operation:{operation}", cost)
                     yield thing
             finally:

@@ -5,7 +5,7 @@ frequency into nanoseconds, joules or watts, and says where its figures come fro
 missing figure is an ``EstimateError``, never zero.
 """
 
-from volery.cost.catalogue import Catalogue, Figure, ProcessorEntry, catalogue
+from volery.cost.catalogue import Catalogue, Figure, ProcessorEntry, load_catalogue
 from volery.cost.code_laws import CodeLaw
 from volery.cost.figures import PowerLaw, scale_energy, scale_time
 from volery.cost.ros_law import NOT_COUNTED, Price, RosLaw, Tariff
@@ -20,7 +20,7 @@ __all__ = [
     "ProcessorEntry",
     "RosLaw",
     "Tariff",
-    "catalogue",
+    "load_catalogue",
     "scale_energy",
     "scale_time",
 ]

@@ -15,7 +15,7 @@ from volery.cost.code_laws import CodeLaw, CoreLaw
 from volery.cost.figures import Figure, PowerLaw, WithProvenance
 from volery.cost.ros_law import RosLaw
 
-__all__ = ["Catalogue", "Figure", "ProcessorEntry", "Settings", "catalogue", "read"]
+__all__ = ["Catalogue", "Figure", "ProcessorEntry", "Settings", "load_catalogue", "parse_catalogue"]
 
 ROSCPP = "roscpp"
 
@@ -126,7 +126,7 @@ class Catalogue(BaseModel):
         return entry
 
 
-def read(text: str, name: str = "catalogue") -> Catalogue:
+def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
     """A catalogue from YAML text. ``ModelError`` names the place of what is wrong."""
     try:
         data = YAML(typ="safe").load(text)
@@ -144,26 +144,26 @@ def read(text: str, name: str = "catalogue") -> Catalogue:
         raise ModelError(said, name) from error
 
 
-def catalogue(*more: Path) -> Catalogue:
+def load_catalogue(*more: Path) -> Catalogue:
     """The catalogue that comes with volery, and the entries of the files *more*.
 
     An entry of a name that is there already adds its laws to it, in place of those of the same library or
     language. ``ModelError`` names a file that cannot be read, and the place in it of what is wrong.
     """
-    found = dict(_own().processors)
+    found = dict(_shipped_catalogue().processors)
     for file in more:
-        for name, entry in read_file(file).processors.items():
-            found[name] = _joined(found[name], entry) if name in found else entry
+        for name, entry in read_catalogue(file).processors.items():
+            found[name] = _merge_entries(found[name], entry) if name in found else entry
     return Catalogue(processors=found)
 
 
 @cache
-def _own() -> Catalogue:
+def _shipped_catalogue() -> Catalogue:
     text = files("volery.cost").joinpath("catalogue.yaml").read_text(encoding="utf-8")
-    return read(text, "catalogue.yaml")
+    return parse_catalogue(text, "catalogue.yaml")
 
 
-def _joined(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
+def _merge_entries(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
     laws = {"ros": {**known.ros, **new.ros}, "code": {**known.code, **new.code}}
     reach = {
         "least_mhz": min(known.least_mhz, new.least_mhz),
@@ -180,10 +180,10 @@ def _joined(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
     )
 
 
-def read_file(file: Path) -> Catalogue:
+def read_catalogue(file: Path) -> Catalogue:
     """A user's catalogue. ``ModelError`` if there is no such file, or for what is wrong in it."""
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError(f"{file}: this catalogue cannot be read: {error}") from error
-    return read(text, str(file))
+    return parse_catalogue(text, str(file))

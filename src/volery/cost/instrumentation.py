@@ -22,17 +22,20 @@ from itertools import repeat
 from operator import length_hint
 from typing import Any, TypeVar
 
-from volery.cost import python_operations
 from volery.cost.python_operations import (
     CATCH,
     ENTER,
     ITEM,
     ITERATING_BUILTINS,
     ITERATING_METHODS,
+    OPERATIONS,
     RESUME,
     ROUND,
     STEPS_PER_NS,
+    construction_operations,
+    item_operation,
     operation_table,
+    operations_of,
 )
 
 CELL = "__volery_steps__"
@@ -62,7 +65,7 @@ class Weights:
 
     def look_at(self, tree: ast.Module) -> None:
         """From now on *tree* is weighed: whose objects does it make?"""
-        self._made = python_operations.made_by(tree)
+        self._made = construction_operations(tree)
 
     def __getitem__(self, operation: str) -> float:
         return self._steps[operation]
@@ -81,7 +84,7 @@ class Weights:
     def _operations(self, node: ast.AST) -> Iterable[tuple[str, int]]:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self._made:
             return self._made[node.func.id]
-        return python_operations.of(node)
+        return operations_of(node)
 
 
 def _executed_parts(node: ast.AST) -> Iterator[ast.AST]:
@@ -317,7 +320,7 @@ def _at(new: Node, place: ast.AST) -> Node:
     return ast.copy_location(new, place)
 
 
-UNIFORM_COSTS: Mapping[str, float] = dict.fromkeys(python_operations.OPERATIONS, 1.0 / STEPS_PER_NS)
+UNIFORM_COSTS: Mapping[str, float] = dict.fromkeys(OPERATIONS, 1.0 / STEPS_PER_NS)
 """One step for each operation: for those who want to know how often something is done, not what it takes."""
 
 _PLENTY = 2**62
@@ -340,7 +343,7 @@ class StepCounter:
 
     def __init__(self, costs: Mapping[str, float] | None = None, exact: bool = False) -> None:
         costs = operation_table().nanoseconds if costs is None else costs
-        steps = {name: STEPS_PER_NS * costs[name] for name in python_operations.OPERATIONS}
+        steps = {name: STEPS_PER_NS * costs[name] for name in OPERATIONS}
         self._weights = Weights(steps, exact)
         self._cell = [0]
         self._ticks: dict[int, tuple[repeat[None], int]] = {}
@@ -372,7 +375,7 @@ class StepCounter:
 
     def _taking(self, name: str) -> Callable[[Any], Any]:
         """What the argument of builtin or method *name* goes through: it comes out as it was."""
-        cell, weight, sorts = self._cell, self._weights[python_operations.item_of(name)], name == "sorted"
+        cell, weight, sorts = self._cell, self._weights[item_operation(name)], name == "sorted"
 
         def take(things: Any) -> Any:
             if type(things) in _PLAIN:

@@ -176,7 +176,7 @@ class Tariff:
                 f"{self.law.greatest_mhz:g} MHz"
             )
         price = self._split(name, constant, variable, x)
-        if len(self._known) < _REMEMBERED:
+        if len(self._known) < _MAX_CACHED:
             self._known[call, x] = price
         return price
 
@@ -206,5 +206,5 @@ def _at(frequency_mhz: float, constant: Line, per_x: Line | None) -> tuple[float
 
 NO_PRICE = Price(0, 0)
 
-_REMEMBERED = 4096
+_MAX_CACHED = 4096
 """How many prices a tariff keeps; sleeps of many different lengths must not fill the memory."""

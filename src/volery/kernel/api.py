@@ -4,6 +4,8 @@
 blocks wherever it likes. ``with kernel:`` marks an interaction point: user code enters the house. There
 virtual time first serves what the task owes its processor, and the wall clock takes the one monitor that
 guards all house data.
+
+What repeats, on either clock.
 """
 
 from __future__ import annotations
@@ -11,11 +13,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
+from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.kernel.task import Place, Scope, Task
+from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.trace.events import Record
+
+if TYPE_CHECKING:
+    from volery.base.time import Ns
+
+    pass
 
 Action = Callable[[], None]
 
@@ -48,7 +56,7 @@ class Kernel(Protocol):
     def post(self, action: Action) -> None:
         """Run house code as soon as possible. The only call that a foreign thread may make."""
 
-    def spawn(self, body: Action, name: str, place: Place, scope: Scope | None = None) -> Task:
+    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a flow of control. An exception that leaves *body* is a fault of the house."""
 
     def adopt(self, name: str) -> AbstractContextManager[Task]:
@@ -92,3 +100,23 @@ class Kernel(Protocol):
 
     def close(self, why: str = "end of run") -> list[str]:
         """Unwind every task; returns the names of those that would not go."""
+
+
+class PeriodicAction:
+    """House code now and each *period* from now, counted from the start, so that it never drifts."""
+
+    def __init__(self, kernel: Kernel, period: Ns, action: Action) -> None:
+        if period <= 0:
+            raise UsageError(f"a period of {period} ns; it must be above 0")
+        self._kernel, self._period, self._action = kernel, period, action
+        self._due = kernel.now()
+        self._next = kernel.call_at(self._due, self._tick)
+
+    def cancel(self) -> None:
+        """Stop; also from inside the action."""
+        self._next.cancel()
+
+    def _tick(self) -> None:
+        self._due += self._period
+        self._next = self._kernel.call_at(self._due, self._tick)
+        self._action()

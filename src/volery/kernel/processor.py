@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.trace.events import Preemption, Slice
 
@@ -39,7 +39,7 @@ QUANTUM: Ns = 10 * MS
 class Job:
     """An amount of computing that wants a core."""
 
-    owner: Task | Place  # a place: computing in the background, nobody waits for it
+    owner: Task | ExecutionContext  # a place: computing in the background, nobody waits for it
     name: str
     component: str
     priority: int
@@ -97,8 +97,8 @@ class Processor:
         self._context_switch = context_switch
         self._jobs: list[Job] = []  # the first ``cores`` of them run
         self._free = list(range(cores))
-        self._last: list[Task | Place | None] = [None] * cores  # whom a core served last
-        self._background: dict[Place, Job] = {}
+        self._last: list[Task | ExecutionContext | None] = [None] * cores  # whom a core served last
+        self._background: dict[ExecutionContext, Job] = {}
         self._arrivals = 0
         self._busy: Ns = 0
 
@@ -131,7 +131,7 @@ class Processor:
         self._kernel.record(Slice(start, start + total, self.name, 0, task.name, task.place.component))
         return True
 
-    def load(self, place: Place, amount: Ns) -> None:
+    def load(self, place: ExecutionContext, amount: Ns) -> None:
         """Execute *amount* in the background of *place*: one thread, at the priority of the place."""
         if amount <= 0:
             return

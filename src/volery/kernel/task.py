@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from volery.base.time import Ns
 from volery.trace.events import NONE, Activation
 
-STUBBORN = 10
+MAX_SWALLOWED_CANCELLATIONS = 10
 """How often a task may swallow its end before it is left where it is and never runs again."""
 
 
@@ -17,7 +17,7 @@ class Cancelled(BaseException):
     """Ends a task at its next interaction point. No ``Exception``, lest user code catch it by accident."""
 
 
-class Server(Protocol):
+class ComputeResource(Protocol):
     """A processor, as a task sees it."""
 
     name: str
@@ -25,12 +25,12 @@ class Server(Protocol):
     def serve(self, task: Task, amount: Ns) -> None:
         """Block *task* until *amount* of target time has been executed for it, in contention with others."""
 
-    def load(self, place: Place, amount: Ns) -> None:
+    def load(self, place: ExecutionContext, amount: Ns) -> None:
         """Execute *amount* beside whatever the caller does: background threads of a process. Never blocks."""
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ExecutionContext:
     """Where computing is spent: whose it is, on which processor, how urgent, and how it is metered.
 
     ``processor`` is ``None`` where computing takes no simulated time. ``priority`` ``None`` means the
@@ -40,7 +40,7 @@ class Place:
     """
 
     component: str
-    processor: Server | None = None
+    processor: ComputeResource | None = None
     priority: int | None = 0
     deadline: Ns | None = None
     meter: Callable[[], Ns] | None = None
@@ -54,7 +54,7 @@ class Task:
     blocking wait of the user's. Waits inside the house (for a processor, a network, a lock) do not end it.
     """
 
-    def __init__(self, name: str, place: Place, scope: Scope) -> None:
+    def __init__(self, name: str, place: ExecutionContext, scope: Scope) -> None:
         self.name = name
         self.places = [place]
         self.scope = scope
@@ -77,7 +77,7 @@ class Task:
             self.summons = Cancelled(self.scope.cancelled)  # an end is delivered again and again
         if isinstance(error, Cancelled):
             self.refusals += 1
-            if self.refusals > STUBBORN and not self.adopted:
+            if self.refusals > MAX_SWALLOWED_CANCELLATIONS and not self.adopted:
                 return
         if error is not None:
             raise error
@@ -100,7 +100,7 @@ class Task:
         return activation
 
     @property
-    def place(self) -> Place:
+    def place(self) -> ExecutionContext:
         """Where it computes now: its own place, or that of the component it is visiting through a port."""
         return self.places[-1]
 

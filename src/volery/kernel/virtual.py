@@ -4,25 +4,27 @@ The *hub* is a greenlet of its own that takes from the heap: house code runs the
 started. A task that blocks hands over directly to a task that is next (``_yield``), and does not even do that
 where nobody would notice (``leap``). A ticket is drawn for every entry; an entry is void once its target
 bears another.
+
+Keeps virtual time from running ahead of the clock on the wall.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from heapq import heappop, heappush, heapreplace
 from itertools import count
+from queue import Empty, SimpleQueue
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Self
 
 from greenlet import GreenletExit, getcurrent, greenlet
 
 from volery.base.errors import Deadlock, UsageError
-from volery.base.time import Ns
-from volery.kernel.interrupt import Interrupts
-from volery.kernel.pacing import Pacer
-from volery.kernel.task import Cancelled, Place, Scope, Task
-from volery.kernel.timer import Every
-from volery.kernel.watchdog import Watchdog
+from volery.base.time import Ns, to_seconds
+from volery.kernel.api import PeriodicAction
+from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts, Watchdog
+from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
 from volery.trace.events import Record, ignore
 
 if TYPE_CHECKING:
@@ -30,7 +32,43 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from types import TracebackType
 
+    from volery.base.time import Ns
     from volery.kernel.api import Action
+
+
+class Pacer:
+    """Lets *pace* seconds pass in one second on the wall, at most: time that was lost is not made good."""
+
+    def __init__(self, pace: float) -> None:
+        if pace <= 0.0:
+            raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
+        self._pace = pace
+        self._anchor: tuple[int, Ns] | None = None  # a moment on the wall and in virtual time
+        self._bell: SimpleQueue[None] = (
+            SimpleQueue()
+        )  # unlike an Event's, its ring is safe in a signal handler
+
+    def rest(self) -> None:
+        """Virtual time stands still until the next ``wait``."""
+        self._anchor = None
+
+    def ring(self) -> None:
+        """End the wait that is under way, or else the next; from any thread."""
+        self._bell.put(None)
+
+    def wait(self, now: Ns, when: Ns) -> Ns | None:
+        """``None`` if *when* has come; else what time it is after a wait, which may have been cut short."""
+        if self._anchor is None:
+            self._anchor = (monotonic_ns(), now)
+        wall, virtual = self._anchor
+        ahead = to_seconds(when - virtual) / self._pace - to_seconds(monotonic_ns() - wall)
+        if ahead <= 0.0:
+            return None
+        with suppress(Empty):
+            self._bell.get(timeout=min(ahead, LONGEST_WAIT_S))
+        passed = int((monotonic_ns() - wall) * self._pace)
+        return max(now, min(virtual + passed, when))
+
 
 FOREVER: Ns = 2**63 - 1
 NEVER: Ns = -1
@@ -101,9 +139,9 @@ class VirtualKernel:
         heappush(self._heap, (when if when > self._now else self._now, ticket, entry))
         return entry
 
-    def every(self, period: Ns, action: Action) -> Every:
+    def every(self, period: Ns, action: Action) -> PeriodicAction:
         """Run house code now and then each *period*."""
-        return Every(self, period, action)
+        return PeriodicAction(self, period, action)
 
     def post(self, action: Action) -> None:
         """Run house code as soon as possible; from any thread, and from signal handlers."""
@@ -112,7 +150,7 @@ class VirtualKernel:
         if self._pacer is not None:
             self._pacer.ring()
 
-    def spawn(self, body: Action, name: str, place: Place, scope: Scope | None = None) -> Task:
+    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a flow of control; it begins at this instant, after what is already due."""
         task = Task(name, place, scope or self.root)
         task.woken = True  # nothing to wake before it has begun
@@ -359,7 +397,7 @@ class VirtualKernel:
         """
         if self._current is not None:
             raise UsageError(f"adopt({name!r}): this flow is the task {self._current.name!r} already")
-        task = Task(name, Place(name), self.root)
+        task = Task(name, ExecutionContext(name), self.root)
         task.adopted = True
         task.flow = self._owner = getcurrent()
         self._until = FOREVER

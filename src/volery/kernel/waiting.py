@@ -15,12 +15,12 @@ from typing import Generic, Self, TypeVar, overload
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 
 T = TypeVar("T")
 Predicate = Callable[[], object]
 
-MOST_PERIODS_LATE = 2
+MAX_PERIODS_LATE = 2
 """A ``Rate`` that is later than this gives up catching up, as rospy's does."""
 
 
@@ -69,7 +69,7 @@ class Rate:
             end_activation(kernel)
             now = kernel.now()
             due = self._last + self.period
-            if now - due > MOST_PERIODS_LATE * self.period:
+            if now - due > MAX_PERIODS_LATE * self.period:
                 due = now
             self._last = due
             kernel.sleep_until(due)
@@ -241,7 +241,7 @@ class Lock:
 
 
 @contextmanager
-def at(kernel: Kernel, place: Place) -> Iterator[None]:
+def executing_in(kernel: Kernel, place: ExecutionContext) -> Iterator[None]:
     """The current task computes at *place*: it pays before it goes there, and before it leaves.
 
     That holds for an error that leaves, too; a task that is ended owes nothing.

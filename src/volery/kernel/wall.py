@@ -2,6 +2,8 @@
 
 ``run`` is the hub in the thread that calls it; ``start`` gives the hub a thread of its own, so that a script
 can be a task (``adopt``). Computing takes the time that it takes: what a task owes is forgotten.
+
+Time that somebody else keeps: it stands still until it is told to go on (``/clock`` of real ROS).
 """
 
 from __future__ import annotations
@@ -18,9 +20,9 @@ from typing import TYPE_CHECKING, Self
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
-from volery.kernel.interrupt import LONGEST_WAIT_S, Interrupts
-from volery.kernel.task import STUBBORN, Cancelled, Place, Scope, Task
-from volery.kernel.timer import Every
+from volery.kernel.api import PeriodicAction
+from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts
+from volery.kernel.task import MAX_SWALLOWED_CANCELLATIONS, Cancelled, ExecutionContext, Scope, Task
 from volery.trace.events import Record, ignore
 
 if TYPE_CHECKING:
@@ -101,16 +103,16 @@ class WallKernel:
                 self._bell.put(None)
         return entry
 
-    def every(self, period: Ns, action: Action) -> Every:
+    def every(self, period: Ns, action: Action) -> PeriodicAction:
         """Run house code now and then each *period*."""
-        return Every(self, period, action)
+        return PeriodicAction(self, period, action)
 
     def post(self, action: Action) -> None:
         """Run house code as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
         self._bell.put(None)
 
-    def spawn(self, body: Action, name: str, place: Place, scope: Scope | None = None) -> Task:
+    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a flow of control; before the run has begun it waits for that."""
         with self._monitor:
             task = Task(name, place, scope or self.root)
@@ -332,7 +334,7 @@ class WallKernel:
         current = self.current()
         if current is not None:
             raise UsageError(f"adopt({name!r}): this flow is the task {current.name!r} already")
-        task = Task(name, Place(name), self.root)
+        task = Task(name, ExecutionContext(name), self.root)
         task.adopted = True
         task.flow = Flow(threading.Condition(self._monitor))
         self.start()
@@ -349,7 +351,7 @@ class WallKernel:
     # -- the end
 
     def _is_unwound(self) -> bool:
-        return all(task.refusals > STUBBORN for task in self.root.all_tasks())
+        return all(task.refusals > MAX_SWALLOWED_CANCELLATIONS for task in self.root.all_tasks())
 
     def close(self, why: str = "end of run", grace_s: float = GRACE_S) -> list[str]:
         """Unwind every task; returns the names of those that would not go within *grace_s* in all.
@@ -367,3 +369,29 @@ class WallKernel:
         self._stop()
         self._raise_fault()
         return [task.name for task in self.root.all_tasks()]
+
+
+class FollowingKernel(WallKernel):
+    """A kernel on threads whose time goes on by ``advance`` alone.
+
+    What waits for a time waits until it has been told of it, however long that takes on the wall.
+    """
+
+    def __init__(self, record: Record = ignore) -> None:
+        super().__init__(record)
+        self._now: Ns = 0
+
+    def now(self) -> Ns:
+        """The sum of all advances."""
+        return self._now
+
+    def advance(self, by: Ns) -> None:
+        """Let time pass; from any thread. What has become due happens."""
+        with self._monitor:
+            self._now += max(0, by)
+            for task in self.root.all_tasks():
+                task.flow.woken.notify()  # it looks itself whether its time has come
+            self._bell.put(None)
+
+    def _wall_seconds(self, until: Ns) -> float:
+        return 0.0 if until <= self._now else LONGEST_WAIT_S

@@ -8,15 +8,15 @@ from pathlib import Path
 from volery.base.errors import UsageError
 from volery.base.time import to_seconds
 from volery.report.document import TRACE_FILE
-from volery.ros.graph.node import ServiceState
-from volery.ros.graph.portrait import Portrait, TopicLine
+from volery.ros.graph.interface import ServiceState
+from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.trace.events import Call, Message, Published
 from volery.trace.reader import Reading
 
 NODES = "/"
 
 
-def graph_of_run(folder: Path) -> Portrait:
+def graph_of_run(folder: Path) -> GraphSnapshot:
     """Who said what to whom in the run whose folder this is; rates are over the whole run.
 
     Raises ``UsageError`` if there is no trace in it.
@@ -43,7 +43,7 @@ def graph_of_run(folder: Path) -> Portrait:
         raise UsageError(f"{folder}: nobody published anything in this run; there is no graph to show")
     seconds = to_seconds(lasted) or 1.0
     topics = tuple(
-        TopicLine(
+        TopicSnapshot(
             name,
             types.get(name, ""),
             tuple(sorted(publishers[name])),
@@ -54,4 +54,4 @@ def graph_of_run(folder: Path) -> Portrait:
     )
     nodes = {node for topic in topics for node in (*topic.publishers, *topic.subscribers)}
     served = tuple(ServiceState(name, "", server) for name, server in sorted(services.items()))
-    return Portrait(tuple(sorted(nodes)), topics, served)
+    return GraphSnapshot(tuple(sorted(nodes)), topics, served)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from volery.ros.graph.portrait import Portrait, TopicLine
+from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 
 ROW, PAD, TOP = 34, 20, 46
 RATE = 70
@@ -22,7 +22,7 @@ text { font: 12px ui-monospace, monospace; fill: #1d2733; }
 """
 
 
-def picture(graph: Portrait) -> str:
+def picture(graph: GraphSnapshot) -> str:
     """The whole SVG document. A node that does both stands on both sides."""
     topics = [topic for topic in graph.topics if topic.publishers or topic.subscribers]
     left = _ordered(topic.publishers for topic in topics)
@@ -73,7 +73,7 @@ def _heads(starts: Sequence[float]) -> Iterable[str]:
 
 
 def _wires(
-    topics: Iterable[TopicLine],
+    topics: Iterable[TopicSnapshot],
     places: Sequence[Mapping[str, float]],
     starts: Sequence[float],
     widths: Sequence[float],
@@ -106,5 +106,5 @@ def _boxes(
             yield f'<text class="rate" {at}>{note}</text>'
 
 
-def _rate(topic: TopicLine) -> str:
+def _rate(topic: TopicSnapshot) -> str:
     return "" if topic.rate is None else f"{topic.rate:.3g} Hz"

@@ -26,7 +26,7 @@ from volery.bridge import (
     VehicleNodeOptions,
 )
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
@@ -98,7 +98,7 @@ class Bridge:
             undo.callback(self._link.close)
             self._node = self._made(address, wanted)
             undo.pop_all()
-        self._node.start(Place("bridge"), self.kernel.root)
+        self._node.start(ExecutionContext("bridge"), self.kernel.root)
 
     def _way(self, address: Address, wanted: BridgeOptions) -> Link:
         """To an autopilot that speaks the protocol of the names."""
@@ -122,7 +122,7 @@ class Bridge:
             except UsageError:
                 link.close()
                 raise
-        return MavlinkAdapter(self.kernel, driver, Place("bridge"))
+        return MavlinkAdapter(self.kernel, driver, ExecutionContext("bridge"))
 
     def _made(self, address: Address, wanted: BridgeOptions) -> VehicleNode | PprzrosNode:
         graph = self._graphs.graph(wanted.graph)

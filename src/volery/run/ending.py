@@ -19,7 +19,7 @@ from typing import Protocol
 from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Scope
+from volery.kernel.task import ExecutionContext, Scope
 from volery.requirements.record import Status
 from volery.trace.events import Failure
 
@@ -55,7 +55,7 @@ class Ending:
         self.reason = ""
         self.error: VoleryError | None = None
         self.begun = False
-        self._farewells: list[tuple[Place, Callable[[], object]]] = []
+        self._farewells: list[tuple[ExecutionContext, Callable[[], object]]] = []
         self._left = 0
 
     def failed(self, who: str, error: Exception) -> None:
@@ -74,18 +74,18 @@ class Ending:
         self._left = len(self.vehicles) + len(self._farewells)
         for vehicle in self.vehicles:
             name = f"safety of {vehicle.name}"
-            self._kernel.spawn(partial(self._bring_down, vehicle), name, Place(name), self._safety)
+            self._kernel.spawn(partial(self._bring_down, vehicle), name, ExecutionContext(name), self._safety)
         for place, last in self._farewells:
             self._part_with(place, last)
         if not self._left:
             self._kernel.cancel(self._kernel.root, reason)
         self._kernel.call_at(self._kernel.now() + SAFETY_WITHIN, self._give_up)
 
-    def farewell(self, place: Place, last: Callable[[], object]) -> None:
+    def farewell(self, place: ExecutionContext, last: Callable[[], object]) -> None:
         """Have *last* done at *place* when the run ends, after the components have been cancelled."""
         self._farewells.append((place, last))
 
-    def _part_with(self, place: Place, last: Callable[[], object]) -> None:
+    def _part_with(self, place: ExecutionContext, last: Callable[[], object]) -> None:
         who = place.component
         scope = self._safety.child(f"farewell of {who}")
 

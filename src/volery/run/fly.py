@@ -16,7 +16,7 @@ from volery.components.instance import describe
 from volery.components.loader import Loader
 from volery.components.programs import load_function
 from volery.components.virtual_stdlib import virtual_modules
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.run.assembly.simulated_vehicles import HOME
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
@@ -127,7 +127,7 @@ class _Flight:
         register_kernel(kernel)
         for vehicle in self._opened.vehicles:
             name = f"mission of {vehicle.name}"
-            kernel.spawn(partial(self._fly, vehicle), name, Place(FUNCTION), ending.users)
+            kernel.spawn(partial(self._fly, vehicle), name, ExecutionContext(FUNCTION), ending.users)
         left: Sequence[str] = ()
         try:
             with ending.signals():

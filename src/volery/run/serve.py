@@ -6,20 +6,20 @@ from collections.abc import Callable
 from functools import partial
 
 from volery.base.errors import UsageError
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded_link import CodedLink
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
-from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.firmware import firmwares
 from volery.vehicles.address import Address, listen, parse_listen
 
 
 def has_links(autopilot: str) -> bool:
     """Whether a simulated *autopilot* is reached over links; else over a graph."""
-    return dialects.load(autopilot).codec is not None
+    return firmwares.load(autopilot).codec is not None
 
 
 class VehicleServer:
@@ -82,7 +82,7 @@ class VehicleNodeServer:
         usual = graph_access(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
         self.namespace = namespace or usual
         self.graph = open_graph(self.kernel, graph)
-        self.airfield.autopilots[name].join(self.graph, self.namespace, Place(name))
+        self.airfield.autopilots[name].join(self.graph, self.namespace, ExecutionContext(name))
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """See ``Server.run``."""

@@ -9,10 +9,10 @@ from typing import Protocol
 
 from volery.base.seeds import stream
 from volery.kernel.api import Action, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.links.wire_faults import FaultyLink, WireFaults
-from volery.ros.graph.node import NodeId, Way
+from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle, link_to
 from volery.run.assembly.vehicle_nodes import (
@@ -114,7 +114,7 @@ class _HandOnNode(GraphWire):
         """All passes again."""
         self.hears = self.speaks = True
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Way:
+    def between(self, sender: NodeId, receiver: NodeId) -> Route:
         """See ``GraphWire``; what the hand does not let pass is lost."""
         whole = super().between(sender, receiver)
 
@@ -144,7 +144,11 @@ class ByGraph(Access):
         self._numbers = count(1)
         for vehicle in filter(None, (self._vehicle, sharing)):
             serve_on_graph(
-                self._graph, airfield, vehicle, graph_access(self._autopilot, vehicle), Place(vehicle)
+                self._graph,
+                airfield,
+                vehicle,
+                graph_access(self._autopilot, vehicle),
+                ExecutionContext(vehicle),
             )
 
     def suffer(self, faults: WireFaults) -> None:
@@ -164,7 +168,7 @@ class ByGraph(Access):
     def _commander(self, vehicle: str, options: dict[str, str]) -> tuple[Driver, str]:
         how = graph_access(self._autopilot, vehicle)
         name = f"commander_{next(self._numbers)}"
-        node = self._graph.node(name, f"/{vehicle}", place=Place(name))
+        node = self._graph.node(name, f"/{vehicle}", place=ExecutionContext(name))
         driver = how.open_driver(self._kernel, node, vehicle, {"namespace": how.namespace, **options})
         return driver, node.name
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, MS, Ns, S
-from volery.kernel.task import Cancelled, Place
+from volery.kernel.task import Cancelled, ExecutionContext
 from volery.testing.checks import BrokenError, demand
 from volery.testing.faults import FAULTS, WHOLE, Fault
 from volery.testing.phases import PHASES
@@ -120,7 +120,7 @@ class _Trying:
 
     def _fly(self) -> None:
         kernel = self._stage.kernel
-        kernel.spawn(self._call, "program", Place("program"), self._scope)
+        kernel.spawn(self._call, "program", ExecutionContext("program"), self._scope)
         while not self._caller:
             demand(kernel.now() < LONGEST, "it hangs")
             kernel.run(kernel.now() + S)
@@ -146,7 +146,7 @@ class _Trying:
             self._fault.begins(self._stage)
             kernel.call_at(kernel.now(), partial(kernel.cancel, self._scope, "killed"))
             return
-        kernel.spawn(self._begin, "fate", Place("fate"))
+        kernel.spawn(self._begin, "fate", ExecutionContext("fate"))
 
     def _begin(self) -> None:
         try:

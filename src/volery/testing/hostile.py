@@ -15,7 +15,7 @@ from volery.base.errors import VoleryError
 from volery.base.position import AboveHome, Position
 from volery.base.seeds import stream
 from volery.base.time import MS
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.coded_link import CodedLink
@@ -204,7 +204,7 @@ def besiege(
     drone = Drone(kernel, "craft", opened)
     random = stream(seed, f"hostile/{driver}")
     result = Siege()
-    kernel.spawn(lambda: _fly_on(kernel, drone, result), "program", Place("program"))
+    kernel.spawn(lambda: _fly_on(kernel, drone, result), "program", ExecutionContext("program"))
     portion: list[bytes] = []
     for data in Mutator(factory.codec.name, frames, random):
         portion.append(data)

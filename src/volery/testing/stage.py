@@ -16,7 +16,7 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Altitude, Position
 from volery.base.time import S, from_seconds
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import constant
@@ -103,7 +103,9 @@ class Stage(ABC):
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Do it in so many seconds, beside what the check does. Its refusals are nobody's concern."""
-        self.kernel.spawn(partial(self._after, seconds, action), "somebody else", Place("somebody else"))
+        self.kernel.spawn(
+            partial(self._after, seconds, action), "somebody else", ExecutionContext("somebody else")
+        )
 
     def _after(self, seconds: float, action: Callable[[], None]) -> None:
         self.sleep(seconds)

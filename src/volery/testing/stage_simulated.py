@@ -9,7 +9,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.position import Position
 from volery.base.time import MINUTE, Ns, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.wire_faults import WireFaults
 from volery.run.assembly.simulated_fleet import fleet_of
@@ -97,7 +97,7 @@ class SimulatedStage(Stage):
             except Exception as error:
                 outcome.append(error)
 
-        self.kernel.spawn(flow, "check", Place("check"))
+        self.kernel.spawn(flow, "check", ExecutionContext("check"))
         while not outcome:
             if self.kernel.now() >= HUNG_AFTER:
                 raise TimeoutError(f"it hangs: not over after {HUNG_AFTER // MINUTE} simulated minutes")

@@ -19,7 +19,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from volery.ros.graph.node import RosGraph
+from volery.ros.graph.interface import RosGraph
 from volery.testing import transports_graph, transports_services, transports_topics
 from volery.testing.checks import BrokenError
 from volery.testing.transports_site import CHECKS, EMBEDDED, ROS1, ROS2, Site, Traits, check

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from volery.base.errors import UsageError
 from volery.base.time import MS
-from volery.ros.graph.node import Work
+from volery.ros.graph.interface import Work
 from volery.ros.messages import new, service
 from volery.testing.checks import demand, raising
 from volery.testing.transports_site import LIMIT, Site, check

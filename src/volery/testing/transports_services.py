@@ -6,7 +6,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.ros.graph.services import ServiceError
 from volery.ros.messages import new, request, service
 from volery.testing.checks import demand, raising
@@ -73,7 +73,7 @@ def a_handler_that_raises(site: Site) -> None:
         except ValueError as error:
             raised.append(str(error))
 
-    site.kernel.spawn(spin, "spins the server", Place(server.name))
+    site.kernel.spawn(spin, "spins the server", ExecutionContext(server.name))
     client = caller.client("broken", TRIGGER)
     demand(client.wait(LIMIT), "the service is not found")
     with raising(ServiceError, naming="broken") as caught:
@@ -96,7 +96,7 @@ def a_handler_that_returns_nonsense(site: Site) -> None:
         except UsageError as error:
             raised.append(str(error))
 
-    site.kernel.spawn(spin, "spins the server", Place(server.name))
+    site.kernel.spawn(spin, "spins the server", ExecutionContext(server.name))
     client = caller.client("odd", TRIGGER)
     demand(client.wait(LIMIT), "the service is not found")
     with raising(ServiceError, naming="odd"):
@@ -129,7 +129,7 @@ def a_server_that_leaves(site: Site) -> None:
         server.sleep(200 * MS)
         served.close()
 
-    site.kernel.spawn(leave, "leaves", Place(server.name))
+    site.kernel.spawn(leave, "leaves", ExecutionContext(server.name))
     with raising(ServiceError, naming="leaving"):
         client.call(request(TRIGGER), 3 * S)
     site.until(caller, lambda: not client.ready(), "the service is not ready any more")

@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import Self
 
 from volery.base.time import MS, Ns, S
-from volery.kernel.task import Place
-from volery.ros.graph.node import Node, RosGraph
+from volery.kernel.task import ExecutionContext
+from volery.ros.graph.interface import Node, RosGraph
 from volery.testing.checks import demand
 
 LIMIT: Ns = 10 * S
@@ -65,7 +65,7 @@ class Site:
 
     def spinning(self, node: Node) -> Node:
         """The same node, spun by a task beside the check."""
-        self.kernel.spawn(node.spin, f"spins {node.name}", Place(node.name))
+        self.kernel.spawn(node.spin, f"spins {node.name}", ExecutionContext(node.name))
         return node
 
     def until(self, node: Node, holds: Callable[[], object], what: str, within: Ns = LIMIT) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.ros.graph.node import BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, Node, Publisher, QoS
+from volery.ros.graph.interface import BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, Node, Publisher, QoS
 from volery.ros.messages import message_class, new, types
 from volery.testing.checks import demand, raising
 from volery.testing.transports_site import Site, check

@@ -49,7 +49,7 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 from volery.trace.events import Operation, Text
 from volery.vehicles.driver import Capability, Driver, ManualControl, Step
 from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor
@@ -411,7 +411,7 @@ class Commanded(Heard):
             handle.cancel()
             self._strayed = type(error)(self.name, asked, f"{error.what}; it was told to hold")
             name = f"safety of {self.name}"
-            self._kernel.spawn(self._hold_strayed, name, Place(name))
+            self._kernel.spawn(self._hold_strayed, name, ExecutionContext(name))
 
         with self._kernel.guard:
             self._straying = handle = self._kernel.every(STRAY_PERIOD, look)

@@ -10,13 +10,13 @@ import pytest
 from rigs.station import STATION, TARGET, Station, facts_of
 from volery.base.frames import LocalFrame
 from volery.base.time import from_seconds
-from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.ardupilot import FIRMWARE
 
 
 class Bench(Station):
     """One vehicle, one ground station on one link."""
 
-    dialect = DIALECT
+    firmware = FIRMWARE
     home = LocalFrame(-35.363261, 149.165230, 584.0)
     heading = 353.0
 

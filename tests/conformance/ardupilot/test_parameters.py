@@ -10,7 +10,7 @@ import pytest
 
 import volery.simulation.autopilots
 from volery.base.errors import UsageError
-from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.ardupilot import FIRMWARE
 
 REAL32, INT8 = 9, 2
 
@@ -154,8 +154,10 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     read |= {
         f"RC{channel}_{part}" for channel in range(1, 17) for part in ("MIN", "TRIM", "MAX", "DZ", "REVERSED")
     }
-    stated = set(DIALECT.kinds["multirotor"].honoured) | set(DIALECT.kinds["rover"].honoured)
+    stated = set(FIRMWARE.kinds["multirotor"].supported_parameters) | set(
+        FIRMWARE.kinds["rover"].supported_parameters
+    )
     assert stated == read
-    for dialect in DIALECT.kinds.values():
-        names = {parameter.name for parameter in dialect.parameters()}
-        assert set(dialect.honoured) <= names
+    for firmware in FIRMWARE.kinds.values():
+        names = {parameter.name for parameter in firmware.parameters()}
+        assert set(firmware.supported_parameters) <= names

@@ -11,13 +11,13 @@ from rigs.station import TARGET, Station, facts_of
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.api import Handle
-from volery.simulation.autopilots.px4 import DIALECT
+from volery.simulation.autopilots.px4 import FIRMWARE
 
 
 class Bench(Station):
     """One vehicle, one ground station on one link, whose heartbeat it hears."""
 
-    dialect = DIALECT
+    firmware = FIRMWARE
     home = LocalFrame(45.4671160, -73.7578370, 32.34)
     looks_per_second = 50
 

@@ -13,7 +13,7 @@ import pytest
 
 import volery.simulation.autopilots
 from volery.simulation.autopilots.autopilot_parameters import REAL32
-from volery.simulation.autopilots.px4 import DIALECT, events
+from volery.simulation.autopilots.px4 import FIRMWARE, events
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NOT_SENT = {
@@ -87,7 +87,7 @@ def test_an_accepted_mode_shows_at_the_next_heartbeat_only(bench: Any) -> None:
 
 
 def test_every_recorded_mode_has_its_bits(facts: dict[str, Any]) -> None:
-    modes = DIALECT.kinds["multirotor"].modes
+    modes = FIRMWARE.kinds["multirotor"].modes
     for number, base in facts["modes"]:
         unstreamed = number == 0x00060000 and base == 1
         assert unstreamed or modes[number].base_mode == base & ~128
@@ -209,10 +209,12 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
     read |= set(re.findall(r'seconds_parameter\("([A-Z0-9_]+)"', source))
     read |= {"BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"}
-    stated = set(DIALECT.kinds["multirotor"].honoured) | set(DIALECT.kinds["rover"].honoured)
+    stated = set(FIRMWARE.kinds["multirotor"].supported_parameters) | set(
+        FIRMWARE.kinds["rover"].supported_parameters
+    )
     assert stated == read
-    for dialect in DIALECT.kinds.values():
-        assert set(dialect.honoured) <= {parameter.name for parameter in dialect.parameters()}
+    for firmware in FIRMWARE.kinds.values():
+        assert set(firmware.supported_parameters) <= {parameter.name for parameter in firmware.parameters()}
     assert REAL32 == 9
 
 

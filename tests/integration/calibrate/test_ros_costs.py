@@ -22,7 +22,7 @@ from volery.calibration.ros.results import ros_law, write_entry
 from volery.calibration.validation.comparison import prepare_nodes
 from volery.calibration.validation.node_processes import measurement_session
 from volery.cli.main import app
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.model.reader import load
 from volery.run.assembly.vocabulary import vocabulary
 
@@ -98,7 +98,7 @@ def test_both_libraries_are_calibrated(ros: None, tmp_path: Path) -> None:
         assert these["sleep"].typical > 0.0
         under = Conditions(client, MACHINE.description, MACHINE.frequency_mhz)
         write_entry(tmp_path / "catalogue.yaml", MACHINE, ros_law(these, under))
-    entry = catalogue(tmp_path / "catalogue.yaml").processor("here")
+    entry = load_catalogue(tmp_path / "catalogue.yaml").processor("here")
     assert entry.ros_law("rospy").warnings(2000.0) == ()
     assert entry.ros_law("rclpy").warnings(2000.0) != ()
 

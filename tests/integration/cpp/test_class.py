@@ -7,7 +7,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.calibration.component_profile import profile_components
 from volery.calibration.machine import Machine, put_law
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.model.reader import load
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.result import Options
@@ -165,7 +165,7 @@ def test_there_is_nothing_to_learn_of_python(tmp_path):
 
 @pytest.mark.usefixtures("llvm")
 def test_a_core_that_the_model_brings_along_is_counted_for(run_model, tmp_path):
-    law = catalogue().processor("intel-i5-3470").core_law().model_copy(update={"name": ""})
+    law = load_catalogue().processor("intel-i5-3470").core_law().model_copy(update={"name": ""})
     machine = Machine("mine", "a computer", 2, 3000.0)
     put_law(tmp_path / "mine.yaml", machine, ("core_model",), law, (1600.0, 3000.0))
     put_law(tmp_path / "mine.yaml", machine, ("code", "python"), python_law(), (1600.0, 3000.0))
@@ -180,4 +180,4 @@ def test_a_core_that_the_model_brings_along_is_counted_for(run_model, tmp_path):
 
 
 def python_law():
-    return catalogue().processor("intel-i5-3470").code_law().model_copy(update={"processor": ""})
+    return load_catalogue().processor("intel-i5-3470").code_law().model_copy(update={"processor": ""})

@@ -14,7 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Argument, Interface, Signature
 from volery.ros import messages
 from volery.ros.client_libraries import roscpp
-from volery.ros.messages.layout import FieldLayout, ros1_layout
+from volery.ros.messages.ros1 import FieldLayout, ros1_layout
 
 pytestmark = pytest.mark.integration
 

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from rigs.requirements import lacking
 from volery.base.errors import UsageError
 from volery.cli.main import app
-from volery.cost import catalogue
-from volery.cost.native import CompilerError, block_costs, compile_program
+from volery.cost import load_catalogue
+from volery.cost.native import CompilerError, compile_program, instrument
 from volery.cost.native.compilation import llvm_toolchain
 from volery.cost.native.instrumented_run import Invocation
 from volery.cost.native.program_estimate import estimate_program
@@ -75,7 +75,7 @@ def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
     """Costs of a run where a branch seldom goes the other way hold for one where it does so often."""
     file = tmp_path / "choice.cpp"
     file.write_text(CHOICE, encoding="utf-8")
-    program = compile_program([file], catalogue().processor("rpi4-cortex-a72").core_law())
+    program = compile_program([file], load_catalogue().processor("rpi4-cortex-a72").core_law())
     seldom, often = (
         estimate_program(program, Invocation("count", (f"fill({percent})",))) for percent in (5, 25)
     )
@@ -84,7 +84,7 @@ def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
 
 
 def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
-    program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
+    program = compile_program([source], load_catalogue().processor("rpi4-cortex-a72").core_law())
     once, twice = (estimate_program(program, Invocation(f"work({rounds})")) for rounds in (1000, 2000))
     assert once.library_calls == {"sin": 1000}
     assert twice.cycles == pytest.approx(2 * once.cycles, rel=0.03)
@@ -93,15 +93,15 @@ def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
 
 
 def test_the_same_run_costs_the_same_each_time(source):
-    program = compile_program([source], catalogue().processor("intel-i5-3470").core_law())
+    program = compile_program([source], load_catalogue().processor("intel-i5-3470").core_law())
     first, second = (estimate_program(program, Invocation("work(500)")) for _ in range(2))
     assert (first.cycles, first.instructions) == (second.cycles, second.instructions)
     assert (first.counts == second.counts).all()
 
 
 def test_components_get_an_object_that_counts(source, tmp_path):
-    law = catalogue().processor("rpi4-cortex-a72").core_law()
-    made = block_costs([source], law, tmp_path / "work.o")
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
+    made = instrument([source], law, tmp_path / "work.o")
     library = tmp_path / "libwork.so"
     subprocess.run([llvm_toolchain().clang, "-shared", made.object_file, "-lm", "-o", library], check=True)
     loaded = ctypes.CDLL(str(library))
@@ -115,9 +115,9 @@ def test_components_get_an_object_that_counts(source, tmp_path):
 
 
 def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
-    law = catalogue().processor("rpi4-cortex-a72").core_law()
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
     estimate_program(compile_program([source], law), Invocation("work(50)"))
-    assert block_costs([source], law, tmp_path / "work.o").estimated == ""
+    assert instrument([source], law, tmp_path / "work.o").estimated == ""
 
 
 def test_the_command_gives_time_and_energy(source):
@@ -133,7 +133,7 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
     wrong = tmp_path / "wrong.cpp"
     wrong.write_text("int main() { return nobody; }", encoding="utf-8")
     with pytest.raises(CompilerError, match=r"wrong.cpp:1:21: error: use of undeclared identifier 'nobody'"):
-        compile_program([wrong], catalogue().processor("rpi4-cortex-a72").core_law())
+        compile_program([wrong], load_catalogue().processor("rpi4-cortex-a72").core_law())
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
     ],
 )
 def test_a_wrong_entry_is_told(source, entry, said):
-    program = compile_program([source], catalogue().processor("rpi4-cortex-a72").core_law())
+    program = compile_program([source], load_catalogue().processor("rpi4-cortex-a72").core_law())
     with pytest.raises(UsageError, match=said):
         estimate_program(program, Invocation(entry))
 
@@ -155,7 +155,8 @@ def test_a_crash_is_told(tmp_path):
     crashing.write_text("int main() { volatile int *p = nullptr; return *p; }", encoding="utf-8")
     with pytest.raises(UsageError, match=r"SIGSEGV|SIGILL|SIGTRAP"):
         estimate_program(
-            compile_program([crashing], catalogue().processor("rpi4-cortex-a72").core_law()), Invocation()
+            compile_program([crashing], load_catalogue().processor("rpi4-cortex-a72").core_law()),
+            Invocation(),
         )
 
 
@@ -193,7 +194,7 @@ def test_caches_cost_cycles_and_memory_costs_time(tmp_path):
     """A circle of loads that each need the one before, in the first cache, the second one, and memory."""
     file = tmp_path / "memory.cpp"
     file.write_text(MEMORY, encoding="utf-8")
-    law = catalogue().processor("rpi4-cortex-a72").core_law()
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
     program = compile_program([file], law)
     first, second, behind = (
         estimate_program(program, Invocation("chase(20000)", (f"fill({kib})",))) for kib in (16, 512, 8192)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery import Options, simulate
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.run import simulate as simulation
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 
@@ -46,7 +46,7 @@ def test_a_battery_feeds_its_computer_but_for_the_last_period(flown, vehicle, pr
     record, truths = flown
     found = record.processors[processor]
     busy_s = found.utilisation * found.cores * record.sim_s
-    law = catalogue().processor(found.kind).power_law()
+    law = load_catalogue().processor(found.kind).power_law()
     assert found.energy_j == pytest.approx(law.joules(busy_s, record.sim_s, found.frequency_mhz), rel=1e-9)
     assert truths[vehicle].payload_j == pytest.approx(found.energy_j, abs=LIGHT_LOAD_J)
     assert truths[vehicle].payload_j < found.energy_j

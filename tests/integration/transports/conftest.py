@@ -17,12 +17,12 @@ import pytest
 
 from rigs.requirements import lacking
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import Node
-from volery.ros.transports.graph import TransportGraph
 from volery.ros.transports.ros1 import Roscore, available, ros1_graph
-from volery.ros.transports.ros1.roscore import environment
+from volery.ros.transports.ros1.master import environment
+from volery.ros.transports.transport_graph import TransportGraph
 from volery.trace.events import Text
 
 HERE = Path(__file__).parent
@@ -69,7 +69,7 @@ class Ours(NamedTuple):
 
     def spinning(self, name: str, **options: Any) -> Node:
         node = self.graph.node(name, **options)
-        self.graph.kernel.spawn(node.spin, f"spins {name}", Place(name))
+        self.graph.kernel.spawn(node.spin, f"spins {name}", ExecutionContext(name))
         return node
 
     def until(self, holds: Callable[[], object], what: str, within: int = 20 * S) -> None:

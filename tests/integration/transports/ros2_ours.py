@@ -9,7 +9,7 @@ import sys
 from functools import partial
 from typing import Any
 
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import QoS
 from volery.ros.messages import request, service, types
@@ -42,7 +42,7 @@ def main() -> None:
 
         node.subscribe("/order", "std_msgs/msg/String", order, group=aside)
         for spin in (node.spin, aside.spin):
-            kernel.spawn(spin, "spins", Place("mavros"))
+            kernel.spawn(spin, "spins", ExecutionContext("mavros"))
         sys.stdout.write("\n".join(["ready", *names, ""]))
         sys.stdout.flush()
         node_wait = partial(sys.stdin.read, 1)

@@ -17,7 +17,7 @@ import pytest
 
 from volery.ros.messages import from_cdr
 from volery.ros.transports.ros1 import Roscore
-from volery.ros.transports.ros1.roscore import master_answers
+from volery.ros.transports.ros1.master import master_answers
 from volery.trace.events import Message, Published, Text
 from volery.trace.reader import read
 

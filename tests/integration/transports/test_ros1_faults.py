@@ -16,8 +16,7 @@ from volery.base.time import S
 from volery.ros.graph import LATCHED, QoS
 from volery.ros.messages import new
 from volery.ros.transports.ros1 import Roscore
-from volery.ros.transports.ros1.classes import message_carrier
-from volery.ros.transports.ros1.rospy_copy import rospy_copy
+from volery.ros.transports.ros1.rospy_copy import raw_message_class, rospy_copy
 
 from .conftest import Ours, Run, Start
 
@@ -81,7 +80,7 @@ def test_a_subscriber_that_never_reads(ours: Ours, roscore: Roscore) -> None:
     speaker, listener = ours.graph.node("speaker"), ours.spinning("listener")
     heard: list[str] = []
     publisher = speaker.advertise("chat", STRING, QoS(depth=10))
-    deaf = Deaf(roscore, "/chat", message_carrier(STRING))
+    deaf = Deaf(roscore, "/chat", raw_message_class(STRING))
     listener.subscribe("chat", STRING, lambda one: heard.append(one.data[:3]))
     ours.until(lambda: publisher.subscribers() == 2, "both connect")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -98,7 +97,7 @@ def test_a_subscriber_that_never_reads(ours: Ours, roscore: Roscore) -> None:
 
 def test_a_publisher_that_floods(ours: Ours, roscore: Roscore) -> None:
     rospy = foreign(roscore, "flood")
-    kind = message_carrier(STRING)
+    kind = raw_message_class(STRING)
     flood = rospy.Publisher("/chat", kind, queue_size=0)
     listener = ours.graph.node("listener")
     heard: list[str] = []
@@ -121,7 +120,7 @@ def test_a_publisher_that_floods(ours: Ours, roscore: Roscore) -> None:
 
 def test_a_message_that_is_none(ours: Ours, roscore: Roscore) -> None:
     rospy = foreign(roscore, "liar")
-    kind = message_carrier("sensor_msgs/msg/Imu")
+    kind = raw_message_class("sensor_msgs/msg/Imu")
     liar = rospy.Publisher("/imu", kind, queue_size=10)
     listener = ours.spinning("listener")
     heard: list[Any] = []
@@ -162,7 +161,7 @@ def test_our_type_on_anothers_topic(ours: Ours, start: Start) -> None:
 
 def test_another_definition_of_our_type(ours: Ours, roscore: Roscore) -> None:
     rospy = foreign(roscore, "old")
-    ours_is = message_carrier(STRING)
+    ours_is = raw_message_class(STRING)
     old = type("old", (ours_is,), {"__slots__": [], "_md5sum": "0" * 32})
     rospy.Publisher("/chat", old, latch=True, queue_size=1).publish(old(b"\0\0\0\0"))
     listener = ours.spinning("listener")

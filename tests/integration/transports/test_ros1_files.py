@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from volery.ros.transports.ros1 import Roscore
-from volery.ros.transports.ros1.roscore import environment
+from volery.ros.transports.ros1.master import environment
 
 from .conftest import HERE
 from .files_on_ros import Case, compare, embedded, observed, running

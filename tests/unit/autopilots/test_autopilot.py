@@ -13,9 +13,9 @@ from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.simulation.autopilots.ardupilot import DIALECT
+from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.firmware import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 
@@ -30,7 +30,7 @@ class Yard:
         _, self.flights = make_world(self.kernel.now, list(bodies), seed=5, frame=FRAME)
 
     def autopilot(self, index: int = 0, **options: Any) -> Autopilot:
-        return Autopilot(self.kernel, self.flights[index], DIALECT, **options)
+        return Autopilot(self.kernel, self.flights[index], FIRMWARE, **options)
 
     def listen(self, autopilot: Autopilot) -> tuple[Any, list[Frame]]:
         ours, theirs = in_process_pair(self.kernel, MS, "station")
@@ -51,18 +51,18 @@ def yard() -> Yard:
 
 
 def test_the_dialect_is_found_by_its_name() -> None:
-    assert dialects.load("ardupilot") is DIALECT
+    assert firmwares.load("ardupilot") is FIRMWARE
 
 
 def test_the_body_chooses_the_kind() -> None:
     yard = Yard(Multirotor(), Rover(at=(5.0, 0.0, 0.0)))
-    assert yard.autopilot(0).dialect.kind == "multirotor"
-    assert yard.autopilot(1, system=2).dialect.kind == "rover"
+    assert yard.autopilot(0).firmware.kind == "multirotor"
+    assert yard.autopilot(1, system=2).firmware.kind == "rover"
 
 
 def test_a_dialect_of_another_kind_is_refused(yard: Yard) -> None:
     with pytest.raises(UsageError, match=r"rover.*multirotor"):
-        Autopilot(yard.kernel, yard.flights[0], DIALECT.kinds["rover"])
+        Autopilot(yard.kernel, yard.flights[0], FIRMWARE.kinds["rover"])
 
 
 def test_a_warm_vehicle_has_its_position_soon(yard: Yard) -> None:

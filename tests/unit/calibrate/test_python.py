@@ -15,7 +15,7 @@ from volery.calibration.python.timed_code import (
     timed_programs,
     timed_statements,
 )
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.cost.python_operations import OPERATIONS, operation_table
 
 HERE = Machine("bench", "A Processor", 4, 2600.0)
@@ -75,7 +75,7 @@ def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):
     law = evaluate(statements, whole, Rounds(4, 4)).law("A Processor", 2600.0)
     file = tmp_path / "catalogue.yaml"
     put_law(file, HERE, ("code", "python"), law, (2600.0, 2600.0))
-    read = catalogue(file).processor("bench").code_law()
+    read = load_catalogue(file).processor("bench").code_law()
     assert read.ns_per_step(1300.0) == pytest.approx(0.6)
     assert read.warnings() == ()
     assert "measured within" in read.how_good()

@@ -8,7 +8,7 @@ from volery.calibration.machine import Machine
 from volery.calibration.ros.call_costs import call_costs
 from volery.calibration.ros.campaign import Conditions
 from volery.calibration.ros.results import format_line, plot_svg, ros_law, write_entry
-from volery.cost import RosLaw, catalogue
+from volery.cost import RosLaw, load_catalogue
 
 from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe
 
@@ -23,7 +23,7 @@ def law(client: str = "roscpp", mhz: float = 2600.0, spins: bool = True) -> RosL
 def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
     file = tmp_path / "deeper" / "catalogue.yaml"
     write_entry(file, MACHINE, law())
-    entry = catalogue(file).processor("my-computer")
+    entry = load_catalogue(file).processor("my-computer")
     assert (entry.cores, entry.least_mhz, entry.greatest_mhz) == (2, 2600, 2600)
     prices = entry.ros_law("roscpp").at(2600)
     publish = prices("publish", 3)
@@ -39,7 +39,7 @@ def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
 
 def test_it_holds_at_its_frequency_only(tmp_path: Path) -> None:
     write_entry(tmp_path / "one.yaml", MACHINE, law())
-    entry = catalogue(tmp_path / "one.yaml").processor("my-computer")
+    entry = load_catalogue(tmp_path / "one.yaml").processor("my-computer")
     with pytest.raises(EstimateError, match="1300 MHz is outside"):
         entry.check_frequency(1300)
 
@@ -57,7 +57,7 @@ def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
         file, replace(MACHINE, frequency_mhz=1300.0), slower.model_copy(update={"calls": doubled})
     )
     assert (made.least_mhz, made.greatest_mhz) == (1300, 2600)
-    entry = catalogue(file).processor("my-computer")
+    entry = load_catalogue(file).processor("my-computer")
     assert (entry.least_mhz, entry.greatest_mhz) == (1300, 2600)
     halfway = entry.ros_law("roscpp").price("receive", 0, 1950)
     assert halfway.background == pytest.approx((2e5 + RECEIVE) / 2, rel=1e-3)
@@ -66,7 +66,7 @@ def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
 
 def test_rospys_callbacks_pay_for_their_messages(tmp_path: Path) -> None:
     write_entry(tmp_path / "all.yaml", MACHINE, law("rospy", spins=False))
-    prices = catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
+    prices = load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
     callback = prices("spin_once", 0)
     assert callback.caller + callback.background == pytest.approx(RECEIVE, rel=1e-3)
     assert prices("receive") == (0, 0, ())
@@ -78,7 +78,7 @@ def test_what_else_the_file_says_stays(tmp_path: Path) -> None:
     file.write_text("# mine\n" + file.read_text())
     write_entry(file, MACHINE, law("rospy", spins=False))
     assert file.read_text().startswith("# mine\n")
-    assert sorted(catalogue(file).processor("my-computer").ros) == ["roscpp", "rospy"]
+    assert sorted(load_catalogue(file).processor("my-computer").ros) == ["roscpp", "rospy"]
 
 
 def test_a_file_that_is_no_catalogue_is_not_touched(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from volery.cli.main import app
 from volery.ros import messages
-from volery.ros.messages.bag_writing import create_bag
+from volery.ros.messages.bag_writer import create_bag
 from volery.ros.messages.bags import open_bag
 
 

@@ -15,7 +15,7 @@ from volery.components.programs import start
 from volery.cost.pricing import FREE, Cost, StatedPricing
 from volery.kernel import waiting
 from volery.kernel.processor import Processor
-from volery.kernel.task import Cancelled, Place
+from volery.kernel.task import Cancelled, ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.trace.events import Call, Charge, Failure, Slice
@@ -112,7 +112,7 @@ def test_nested_calls_over_two_processors_under_preemption():
             kernel.sleep_until(int(at * MS))
             kernel.pay(int(amount * MS))
 
-        kernel.spawn(body, "urgent", Place("urgent", processor, 9))
+        kernel.spawn(body, "urgent", ExecutionContext("urgent", processor, 9))
 
     urgent(house.onboard, 2, 3)
     urgent(house.ground, 11, 2)

@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.cost import catalogue, scale_energy, scale_time
-from volery.cost.catalogue import read
+from volery.cost import load_catalogue, scale_energy, scale_time
+from volery.cost.catalogue import parse_catalogue
 from volery.cost.figures import WithProvenance
 from volery.cost.python_operations import STEPS_PER_NS, operation_table
 
@@ -25,13 +25,13 @@ def stated_in(value: object) -> list[WithProvenance]:
 
 
 def test_every_figure_says_where_it_comes_from() -> None:
-    figures = stated_in(dict(catalogue().processors))
+    figures = stated_in(dict(load_catalogue().processors))
     assert len(figures) > 30
     assert all(figure.source for figure in figures)
 
 
 def test_processors_and_their_ranges() -> None:
-    intel, arm = catalogue().processor(INTEL), catalogue().processor(ARM)
+    intel, arm = load_catalogue().processor(INTEL), load_catalogue().processor(ARM)
     assert (intel.cores, intel.least_mhz, intel.greatest_mhz) == (4, 1600, 3000)
     assert (arm.cores, arm.least_mhz, arm.greatest_mhz) == (4, 600, 1500)
     arm.check_frequency(600)
@@ -42,23 +42,23 @@ def test_processors_and_their_ranges() -> None:
 
 
 def test_the_settings_of_processors() -> None:
-    intel, arm = catalogue().processor(INTEL), catalogue().processor(ARM)
+    intel, arm = load_catalogue().processor(INTEL), load_catalogue().processor(ARM)
     assert arm.set_to() == (600, 700, 800, 900, 1000, 1100, 1200, 1300, 1400, 1500)
     assert intel.settings is not None
     assert intel.settings.mhz() == tuple(range(1600, 3201, 100))
     assert intel.set_to()[-1] == 3000  # the laws end there
-    assert catalogue().processor(HOST).set_to() == ()
+    assert load_catalogue().processor(HOST).set_to() == ()
 
 
 def test_an_unknown_processor_names_the_known_ones() -> None:
     with pytest.raises(
         EstimateError, match=r"'rpi4-cortex-a27'.*did you mean 'rpi4-cortex-a72'.*generic-host"
     ):
-        catalogue().processor("rpi4-cortex-a27")
+        load_catalogue().processor("rpi4-cortex-a27")
 
 
 def test_a_missing_figure_is_an_error() -> None:
-    host = catalogue().processor(HOST)
+    host = load_catalogue().processor(HOST)
     with pytest.raises(EstimateError, match="generic-host: the catalogue has no figures of ROS calls"):
         host.ros_law("roscpp")
     with pytest.raises(EstimateError, match="generic-host: the catalogue has no power figures"):
@@ -68,7 +68,7 @@ def test_a_missing_figure_is_an_error() -> None:
 
 
 def test_the_power_of_a_raspberry_pi_is_inside_the_published_readings() -> None:
-    law = catalogue().processor(ARM).power_law()
+    law = load_catalogue().processor(ARM).power_law()
     assert 2.2 <= law.watts(0, 1500) <= 2.8
     assert 5.1 <= law.watts(4, 1500) <= 6.5
     assert law.watts(4, 600) < law.watts(4, 1500)
@@ -77,12 +77,12 @@ def test_the_power_of_a_raspberry_pi_is_inside_the_published_readings() -> None:
 
 
 def test_energy_is_power_over_time() -> None:
-    law = catalogue().processor(ARM).power_law()
+    law = load_catalogue().processor(ARM).power_law()
     assert math.isclose(law.joules(30.0, 10.0, 1500), law.watts(3.0, 1500) * 10.0)
 
 
 def test_the_power_of_a_core_goes_with_frequency_and_voltage_squared() -> None:
-    law = catalogue().processor(INTEL).power_law()
+    law = load_catalogue().processor(INTEL).power_law()
     assert law.core_w(3400) == 13.2
     assert math.isclose(law.core_w(1600), 13.2 * 1600 / 3400 * (0.85 / 1.05) ** 2)
 
@@ -97,12 +97,12 @@ def test_times_scale_with_the_clock_on_the_same_kind_only() -> None:
 
 
 def test_energies_scale_with_the_voltage_squared() -> None:
-    law = catalogue().processor(ARM).power_law()
+    law = load_catalogue().processor(ARM).power_law()
     assert math.isclose(scale_energy(3e-3, (ARM, 1500), (ARM, 600), law), 3e-3 * (0.80 / 0.88) ** 2)
 
 
 def test_counted_code_says_how_good_it_is() -> None:
-    law = catalogue().processor(ARM).code_law()
+    law = load_catalogue().processor(ARM).code_law()
     assert math.isclose(law.ns_per_step(1500), 6.1 / STEPS_PER_NS)
     assert math.isclose(law.ns_per_step(600), 2.5 * law.ns_per_step(1500))
     table = operation_table()
@@ -114,7 +114,7 @@ def test_counted_code_says_how_good_it_is() -> None:
 
 
 def test_a_measured_slowdown_is_nothing_to_warn_of() -> None:
-    law = catalogue().processor(ARM).code_law()
+    law = load_catalogue().processor(ARM).code_law()
     measured = law.slowdown.model_copy(update={"provenance": "measured", "error": None})
     law = law.model_copy(update={"slowdown": measured})
     assert law.warnings() == ()
@@ -131,7 +131,7 @@ def test_a_measured_slowdown_is_nothing_to_warn_of() -> None:
 )
 def test_a_broken_catalogue_is_a_model_error(text: str, words: str) -> None:
     with pytest.raises(ModelError, match=rf"(?i){words}"):
-        read(text)
+        parse_catalogue(text)
 
 
 MORE = f"""
@@ -157,15 +157,15 @@ processors:
 def test_a_catalogue_of_ones_own_adds_processors_and_laws(tmp_path: Path) -> None:
     file = tmp_path / "more.yaml"
     file.write_text(MORE, encoding="utf-8")
-    more = catalogue(file)
+    more = load_catalogue(file)
     assert more.processor("my-computer").greatest_mhz == 2600
     arm = more.processor(ARM)
     assert (arm.least_mhz, arm.greatest_mhz, sorted(arm.ros)) == (600, 1800, ["roscpp", "rospy"])
-    assert arm.power == catalogue().processor(ARM).power
-    assert arm.settings == catalogue().processor(ARM).settings
-    assert "my-computer" not in catalogue().processors
+    assert arm.power == load_catalogue().processor(ARM).power
+    assert arm.settings == load_catalogue().processor(ARM).settings
+    assert "my-computer" not in load_catalogue().processors
 
 
 def test_a_catalogue_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"nowhere\.yaml: this catalogue cannot be read"):
-        catalogue(tmp_path / "nowhere.yaml")
+        load_catalogue(tmp_path / "nowhere.yaml")

@@ -2,8 +2,8 @@ import pytest
 
 from volery.base.errors import EstimateError, ModelError
 from volery.calibration.machine import Machine, put_law
-from volery.cost import catalogue
-from volery.cost.catalogue import read
+from volery.cost import load_catalogue
+from volery.cost.catalogue import parse_catalogue
 
 MINE = """
 processors:
@@ -18,29 +18,29 @@ processors:
 
 def test_an_unknown_core_names_those_there_are():
     with pytest.raises(EstimateError, match=r"did you mean 'rpi4-cortex-a72'.*intel-i5-3470"):
-        catalogue().processor("rpi4-cortex-a73")
+        load_catalogue().processor("rpi4-cortex-a73")
 
 
 def test_a_core_runs_at_its_frequencies_only():
     with pytest.raises(EstimateError, match="a72: 2000 MHz is outside the range of its laws, 600 to"):
-        catalogue().processor("rpi4-cortex-a72").core_law().check_frequency(2000.0)
+        load_catalogue().processor("rpi4-cortex-a72").core_law().check_frequency(2000.0)
 
 
 def test_a_processor_may_have_no_figures_of_compiled_code():
     with pytest.raises(EstimateError, match="mine: the catalogue has no figures of compiled code for it"):
-        read(MINE).processor("mine").core_law()
+        parse_catalogue(MINE).processor("mine").core_law()
 
 
 def test_a_wrong_figure_is_told():
     with pytest.raises(ModelError, match=r"mine\.core_model\.isa: Field required"):
-        read(MINE + "    core_model: {cpu: x86-64}\n", "mine.yaml")
+        parse_catalogue(MINE + "    core_model: {cpu: x86-64}\n", "mine.yaml")
 
 
 def test_a_model_of_a_core_joins_the_entry_that_is_there(tmp_path):
-    shipped = catalogue().processor("intel-i5-3470")
+    shipped = load_catalogue().processor("intel-i5-3470")
     law = shipped.core_law().model_copy(update={"name": "", "width": 2.0})
     file = tmp_path / "more.yaml"
     put_law(file, Machine("intel-i5-3470", "mine", 4, 3000.0), ("core_model",), law, (1600.0, 3000.0))
-    joined = catalogue(file).processor("intel-i5-3470")
+    joined = load_catalogue(file).processor("intel-i5-3470")
     assert joined.core_law().width == 2.0
     assert joined.ros == shipped.ros

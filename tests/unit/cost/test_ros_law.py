@@ -3,8 +3,8 @@ import math
 import pytest
 
 from volery.base.errors import EstimateError
-from volery.cost import Price, RosLaw, catalogue
-from volery.cost.catalogue import read
+from volery.cost import Price, RosLaw, load_catalogue
+from volery.cost.catalogue import parse_catalogue
 
 INTEL, ARM = "intel-i5-3470", "rpi4-cortex-a72"
 PLATFORMS = ((INTEL, 1600), (INTEL, 3000), (ARM, 600), (ARM, 1500))
@@ -23,7 +23,7 @@ POINTS = {
 
 
 def law(kind: str) -> RosLaw:
-    return catalogue().processor(kind).ros_law("roscpp")
+    return load_catalogue().processor(kind).ros_law("roscpp")
 
 
 @pytest.mark.parametrize("call", POINTS)
@@ -100,7 +100,7 @@ def test_where_a_line_goes_below_zero_there_is_no_estimate() -> None:
 
 
 def test_a_python_node_charged_with_the_figures_of_roscpp_is_flagged() -> None:
-    borrowed = catalogue().processor(ARM).ros_law("rospy")
+    borrowed = load_catalogue().processor(ARM).ros_law("rospy")
     own = law(ARM)
     assert borrowed.price("init", 0, 600)[:2] == own.price("init", 0, 600)[:2]
     assert own.price("init", 0, 600).flags == ()
@@ -149,7 +149,7 @@ processors:
 
 
 def measured_law(client: str) -> RosLaw:
-    return read(MEASURED).processor("here").ros_law(client)
+    return parse_catalogue(MEASURED).processor("here").ros_law(client)
 
 
 def test_a_part_that_the_caller_was_measured_to_spend_is_the_callers() -> None:
@@ -162,7 +162,7 @@ def test_what_happens_beside_the_calls_is_background_where_there_are_figures() -
     assert law.price("receive", 0, 2600) == Price(0, 150000)
     assert law.price("wait", 1e6, 2600) == Price(0, 600000)
     assert law.price("accept", 0, 2600) == Price(0, 0)
-    assert catalogue().processor(INTEL).ros_law("roscpp").price("receive", 0, 3000) == Price(0, 0)
+    assert load_catalogue().processor(INTEL).ros_law("roscpp").price("receive", 0, 3000) == Price(0, 0)
 
 
 def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
@@ -182,5 +182,5 @@ def test_publishing_again_costs_the_same_where_a_law_does_not_tell_it_apart() ->
     assert paper.price("publish_next", 3, 3000) == paper.price("publish", 3, 3000)
     assert mine.price("publish_next", 3, 2600) == mine.price("publish", 3, 2600)
     told = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
-    apart = read(told).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
+    apart = parse_catalogue(told).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
     assert (apart.caller, apart.background) == (7000, 0)

@@ -20,7 +20,7 @@ from volery.base.errors import (
 )
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.trace.events import LinkState, Operation, Text
 from volery.vehicles import ChangeSpeed, Fence, Limits, ReturnHome, TakeOff, Waypoint, Zone
@@ -457,7 +457,7 @@ def test_two_tasks_do_not_command_one_vehicle(bench: Make) -> None:
             errors.append(str(error))
 
     at.kernel.run(2 * S)
-    at.kernel.call_at(4 * S, lambda: at.kernel.spawn(second, "second", Place("second")))
+    at.kernel.call_at(4 * S, lambda: at.kernel.spawn(second, "second", ExecutionContext("second")))
     at.fly(up)
     assert errors == ["craft_1: disarm: mission has takeoff under way"]
 
@@ -640,7 +640,9 @@ def test_the_end_of_a_program_whose_task_has_not_gone_yet(bench: Make) -> None:
     """The safety task may land it although the operation that is being ended has not unwound."""
     at = bench()
     scope = at.kernel.root.child("users")
-    at.kernel.spawn(lambda: (at.vehicle.takeoff(10), at.vehicle.goto(NEAR)), "user", Place("user"), scope)
+    at.kernel.spawn(
+        lambda: (at.vehicle.takeoff(10), at.vehicle.goto(NEAR)), "user", ExecutionContext("user"), scope
+    )
     at.craft.velocity = (5.0, 0.0, 0.0)
     at.kernel.run(20 * S)
     at.kernel.cancel(scope, "end")

@@ -20,7 +20,7 @@ from volery.base.errors import (
 )
 from volery.base.position import AboveHome, Position
 from volery.base.time import S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.trace.events import Operation, Text
 from volery.vehicles import ChangeSpeed, Fence, Limits, Rover, TakeOff, Waypoint
@@ -58,7 +58,7 @@ def meanwhile(at: Any, seconds: float, action: Callable[[], Any]) -> list[Any]:
         except VoleryError as error:
             raised.append(error)
 
-    at.after(seconds, lambda: at.kernel.spawn(body, "guardian", Place("guardian")))
+    at.after(seconds, lambda: at.kernel.spawn(body, "guardian", ExecutionContext("guardian")))
     return raised
 
 

@@ -13,10 +13,10 @@ from volery.base.errors import Failsafe, LinkLost, LinkSilent, NotArrived, Overr
 from volery.base.frames import LocalFrame
 from volery.base.time import HOUR, MS, S
 from volery.bridge import serve_vehicle
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.links.wire_faults import WireFaults
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import LinkState, Text
 from volery.vehicles import Drone, Land, Rover, TakeOff, Vehicle, Waypoint
 from volery.vehicles.drivers.ardupilot import open_driver, open_mavros
@@ -25,7 +25,7 @@ from volery.vehicles.drivers.ardupilot import open_driver, open_mavros
 class Field(Airstrip):
     """A simulated ArduPilot, over its link or over MAVROS's names."""
 
-    dialect = "ardupilot"
+    firmware = "ardupilot"
     opener = staticmethod(open_driver)
 
     def __init__(self, kind: type[Vehicle] = Drone, *, mavros: bool = False, **stated: Any) -> None:
@@ -36,8 +36,8 @@ class Field(Airstrip):
         return None if self._mavros else super().open()
 
     def _over_mavros(self) -> Vehicle:
-        graph = Graph(self.kernel)
-        serve_vehicle(graph, self.link, "craft_1", Place("vehicle node"))
+        graph = EmbeddedGraph(self.kernel)
+        serve_vehicle(graph, self.link, "craft_1", ExecutionContext("vehicle node"))
         return self.commanded_by(open_mavros(self.kernel, graph.node("control"), "craft_1", {}))
 
     def fly(self, mission: Callable[[Any], Any]) -> Any:
@@ -204,7 +204,7 @@ def test_a_vehicle_node_that_hears_its_autopilot_no_more() -> None:
 
 def test_a_vehicle_node_that_is_not_there() -> None:
     field = Field(mavros=True)
-    graph = Graph(field.kernel)
+    graph = EmbeddedGraph(field.kernel)
 
     def nobody(drone: Any) -> None:
         driver = open_mavros(field.kernel, graph.node("control"), "craft_2", {})

@@ -7,9 +7,9 @@ import pytest
 
 from volery.base.time import S
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import Graph, NodeId, Way
+from volery.ros.graph import EmbeddedGraph, NodeId, Route
 
 
 class Price(NamedTuple):
@@ -31,14 +31,14 @@ class Rig:
         self.carried: list[tuple[NodeId, NodeId, int, bool]] = []
         self.graph = self.new_graph()
 
-    def new_graph(self, **options: Any) -> Graph:
-        return Graph(self.kernel, self.price, self.between, **options)
+    def new_graph(self, **options: Any) -> EmbeddedGraph:
+        return EmbeddedGraph(self.kernel, self.price, self.between, **options)
 
     def price(self, node: NodeId, call: str, x: float) -> Price:
         self.asked.append((node.name, call, x))
         return self.prices.get(call, Price(0, 0))
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Way:
+    def between(self, sender: NodeId, receiver: NodeId) -> Route:
         def way(size: int, reliable: bool, deliver: Any, lost: Any) -> None:
             self.carried.append((sender, receiver, size, reliable))
             arrives = lost if self.loses and not reliable else deliver
@@ -47,7 +47,7 @@ class Rig:
         return way
 
     def task(self, body: Callable[[], None], name: str = "component", on_processor: bool = False) -> None:
-        place = Place(name, self.processor if on_processor else None)
+        place = ExecutionContext(name, self.processor if on_processor else None)
         self.kernel.spawn(body, name, place)
 
     def run(self, *bodies: Callable[[], None], until: int = 100 * S) -> None:

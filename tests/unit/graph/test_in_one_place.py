@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from volery.base.time import S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros import messages
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import Charge, Message
 
 STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"
@@ -18,9 +18,9 @@ def played(*bodies: Any, **options: Any) -> list[Any]:
     """Each body as a component of one graph; what was recorded."""
     events: list[Any] = []
     kernel = VirtualKernel(events.append)
-    graph = Graph(kernel, **options)
+    graph = EmbeddedGraph(kernel, **options)
     for body in bodies:
-        kernel.spawn(lambda body=body: body(graph), body.__name__, Place(body.__name__))
+        kernel.spawn(lambda body=body: body(graph), body.__name__, ExecutionContext(body.__name__))
     kernel.run(100 * S)
     return events
 
@@ -28,7 +28,7 @@ def played(*bodies: Any, **options: Any) -> list[Any]:
 def test_a_message_waits_for_its_callback_when_publish_returns() -> None:
     heard: list[str] = []
 
-    def both(graph: Graph) -> None:
+    def both(graph: EmbeddedGraph) -> None:
         node = graph.node("both")
         node.subscribe("chat", STRING, lambda message: heard.append(message.data))
         node.advertise("chat", STRING).publish(messages.new(STRING, data="hello"))
@@ -44,7 +44,7 @@ def test_work_that_is_started_at_once_is_not_the_publishers() -> None:
     """It is begun as house code: what it takes is not paid by the task that published."""
     begun: list[Any] = []
 
-    def both(graph: Graph) -> None:
+    def both(graph: EmbeddedGraph) -> None:
         node = graph.node("both")
         group = node.group(lambda work: begun.append(graph.kernel.current()))
         node.subscribe("chat", STRING, print, group=group)
@@ -60,12 +60,12 @@ def test_a_service_is_answered_in_no_time() -> None:
 
     kind = messages.service(TRIGGER)
 
-    def server(graph: Graph) -> None:
+    def server(graph: EmbeddedGraph) -> None:
         node = graph.node("server")
         node.serve("go", TRIGGER, lambda request: kind.response(success=True))
         node.spin_once()
 
-    def client(graph: Graph) -> None:
+    def client(graph: EmbeddedGraph) -> None:
         client = graph.node("client").client("go", TRIGGER)
         client.wait()
         started = graph.kernel.now()
@@ -83,7 +83,7 @@ def test_an_unrecorded_graph_says_nothing_and_asks_for_no_price_of_what_nobody_e
         asked.append(call)
         raise AssertionError(call)
 
-    def both(graph: Graph) -> None:
+    def both(graph: EmbeddedGraph) -> None:
         node = graph.node("both")
         node.subscribe("chat", STRING, lambda message: None)
         node.advertise("chat", STRING).publish(messages.new(STRING))

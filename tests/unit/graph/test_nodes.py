@@ -5,7 +5,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.ros import messages
 from volery.trace.events import Activation
 
@@ -39,14 +39,14 @@ def test_invalid_node_names_are_refused(rig: Any, name: str, namespace: str) -> 
 
 
 def test_a_name_is_taken_until_its_node_leaves(rig: Any) -> None:
-    first = rig.graph.node("nav", place=Place("one"))
+    first = rig.graph.node("nav", place=ExecutionContext("one"))
     with pytest.raises(UsageError, match=r"/nav is there already \(of component one\).*component two"):
-        rig.graph.node("nav", place=Place("two"))
+        rig.graph.node("nav", place=ExecutionContext("two"))
     assert rig.graph.node("nav", "/other").name == "/other/nav"
     assert rig.graph.node("nav", anonymous=True).name == "/nav_1"
     assert rig.graph.node("nav", anonymous=True).name == "/nav_2"
     first.close()
-    assert rig.graph.node("nav", place=Place("two")).name == "/nav"
+    assert rig.graph.node("nav", place=ExecutionContext("two")).name == "/nav"
     assert rig.graph.node_names() == ["/nav", "/nav_1", "/nav_2", "/other/nav"]
 
 

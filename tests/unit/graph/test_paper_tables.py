@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.cost import RosLaw, catalogue
+from volery.cost import RosLaw, load_catalogue
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import Charge, Slice
 
 SLEEPS = 2566
@@ -25,7 +25,7 @@ TABLE_III = {
 
 
 def law_of(kind: str) -> RosLaw:
-    return catalogue().processor(kind).ros_law("roscpp")
+    return load_catalogue().processor(kind).ros_law("roscpp")
 
 
 def ros_time(law: RosLaw, mhz: int) -> tuple[int, int]:
@@ -34,7 +34,7 @@ def ros_time(law: RosLaw, mhz: int) -> tuple[int, int]:
     kernel = VirtualKernel(events.append)
     processor = Processor(kernel, "board", cores=4)
     tariff = law.at(mhz)
-    graph = Graph(
+    graph = EmbeddedGraph(
         kernel,
         lambda node, call, x: tariff(call, x),
         lambda sender, receiver, size, reliable, deliver, lost: None,
@@ -45,7 +45,7 @@ def ros_time(law: RosLaw, mhz: int) -> tuple[int, int]:
         for _ in range(SLEEPS):
             node.sleep(100 * MS)
 
-    kernel.spawn(controller, "controller", Place("controller", processor))
+    kernel.spawn(controller, "controller", ExecutionContext("controller", processor))
     kernel.run(300 * S)
     charged = sum(event.caller + event.background for event in events if isinstance(event, Charge))
     executed = sum(event.end - event.start for event in events if isinstance(event, Slice))

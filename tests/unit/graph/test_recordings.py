@@ -10,9 +10,8 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.ros import messages
-from volery.ros.graph.playing import Playing, play
-from volery.ros.graph.recording import Recorder
-from volery.ros.messages.bag_writing import create_bag
+from volery.ros.graph.rosbag import PlayOptions, Recorder, play
+from volery.ros.messages.bag_writer import create_bag
 from volery.ros.messages.bags import Bag, open_bag
 
 from .conftest import Rig
@@ -46,7 +45,7 @@ def test_a_recording_is_played_in_time(rig: Rig, bag: Bag, rate: float) -> None:
     listen(rig, "/steps", "std_msgs/Int32", heard)
 
     def player() -> None:
-        played.append(play(rig.graph.node("player"), bag, Playing(rate)))
+        played.append(play(rig.graph.node("player"), bag, PlayOptions(rate)))
 
     rig.run(player)
     assert heard == [(round(number * 500 * MS / rate), number) for number in range(5)]
@@ -57,7 +56,7 @@ def test_only_some_topics_from_a_moment_on(rig: Rig, bag: Bag) -> None:
     heard: list[Any] = []
     told: list[Any] = []
     listen(rig, "/words", "std_msgs/String", heard)
-    how = Playing(topics=["/words"], after=1.0, told=lambda played, at: told.append(played))
+    how = PlayOptions(topics=["/words"], after=1.0, told=lambda played, at: told.append(played))
 
     def player() -> None:
         play(rig.graph.node("player"), bag, how)
@@ -78,7 +77,7 @@ def test_the_recorded_time_on_the_clock(rig: Rig, bag: Bag) -> None:
 
     def player() -> None:
         node = rig.graph.node("player", remaps={"/clock": "/seconds"})
-        play(node, bag, Playing(topics=["/steps"], clock=True))
+        play(node, bag, PlayOptions(topics=["/steps"], clock=True))
 
     rig.kernel.call_at(101 * S, lambda: None)
     rig.task(listener)
@@ -89,7 +88,7 @@ def test_the_recorded_time_on_the_clock(rig: Rig, bag: Bag) -> None:
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("inf"), float("nan")])
 def test_a_rate_that_is_none(rate: float) -> None:
     with pytest.raises(UsageError, match="above 0"):
-        Playing(rate)
+        PlayOptions(rate)
 
 
 def test_a_topic_that_was_not_recorded(rig: Rig, bag: Bag) -> None:
@@ -97,7 +96,7 @@ def test_a_topic_that_was_not_recorded(rig: Rig, bag: Bag) -> None:
 
     def player() -> None:
         with pytest.raises(UsageError) as error:
-            play(rig.graph.node("player"), bag, Playing(topics=["/step"]))
+            play(rig.graph.node("player"), bag, PlayOptions(topics=["/step"]))
         said.append(str(error.value))
 
     rig.run(player)

@@ -3,14 +3,14 @@
 import pytest
 
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.testing.transports import CHECKS, EMBEDDED, Site
 
 
 @pytest.mark.parametrize("check", CHECKS)
 def test_embedded(check: str) -> None:
     kernel = VirtualKernel()
-    graph = Graph(kernel)
+    graph = EmbeddedGraph(kernel)
     with kernel.adopt("check"), Site(graph, check, EMBEDDED) as site:
         CHECKS[check](site)
     graph.close()

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.time import MS
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Scope, Task
+from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.trace.events import Event, Slice
@@ -48,7 +48,7 @@ def spawn(request: pytest.FixtureRequest) -> Spawn:
     kernel: Kernel = request.getfixturevalue("kernel" if both else "virtual")
 
     def spawn(body: Callable[[], object], name: str = "task", scope: Scope | None = None) -> Task:
-        return kernel.spawn(lambda: void(body()), name, Place(name), scope)
+        return kernel.spawn(lambda: void(body()), name, ExecutionContext(name), scope)
 
     return spawn
 

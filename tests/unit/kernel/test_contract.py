@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
 from volery.kernel.wall import WallKernel
@@ -189,7 +189,7 @@ def test_foreign_threads_post_into_a_run_in_which_nothing_else_happens(kernel: K
             got.append(inbox.get())
         kernel.cancel(kernel.root, "that was all")
 
-    kernel.spawn(reader, "reader", Place("reader"))
+    kernel.spawn(reader, "reader", ExecutionContext("reader"))
     for name in ("a", "b"):
         thread = threading.Thread(target=partial(kernel.post, partial(inbox.put, name)))
         kernel.call_at(0, thread.start)
@@ -200,7 +200,7 @@ def test_foreign_threads_post_into_a_run_in_which_nothing_else_happens(kernel: K
 
 def test_what_a_task_costs_nowhere_is_forgotten(kernel: Kernel) -> None:
     meter = iter([7, 0, 5, 0, 0, 0, 0, 0])
-    task = kernel.spawn(lambda: sleep(kernel, MS), "t", Place("t", meter=lambda: next(meter)))
+    task = kernel.spawn(lambda: sleep(kernel, MS), "t", ExecutionContext("t", meter=lambda: next(meter)))
     task.charge(5)
     kernel.run(LONG)
     assert task.debt == 0

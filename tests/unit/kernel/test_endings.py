@@ -9,7 +9,7 @@ import pytest
 from volery.base.time import MS, S
 from volery.kernel.api import Kernel
 from volery.kernel.processor import Processor
-from volery.kernel.task import STUBBORN, Cancelled, Place, Task
+from volery.kernel.task import MAX_SWALLOWED_CANCELLATIONS, Cancelled, ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Event, Lock, Queue, Rate, sleep
 
@@ -221,19 +221,19 @@ def test_close_names_who_would_not_go(kernel: Kernel, spawn: Spawn) -> None:
     spawn(lambda: (begun.wait(), kernel.cancel(kernel.root, "over")))
     kernel.run(LONG)
     assert kernel.close() == ["mule"]
-    assert len(tries) == STUBBORN
+    assert len(tries) == MAX_SWALLOWED_CANCELLATIONS
 
 
 def test_a_script_is_never_left_where_it_is(kernel: Kernel) -> None:
     tries: list[int] = []
     with kernel.adopt("script"):
         kernel.cancel(kernel.root, "over")
-        while len(tries) < 2 * STUBBORN:
+        while len(tries) < 2 * MAX_SWALLOWED_CANCELLATIONS:
             try:
                 sleep(kernel, MS)
             except Cancelled:
                 tries.append(1)
-    assert len(tries) == 2 * STUBBORN
+    assert len(tries) == 2 * MAX_SWALLOWED_CANCELLATIONS
 
 
 def test_an_end_with_several_clean_ups_is_not_stubborn(kernel: Kernel, spawn: Spawn) -> None:
@@ -251,11 +251,11 @@ def test_an_end_with_several_clean_ups_is_not_stubborn(kernel: Kernel, spawn: Sp
             seen.append(depth)
             flag.is_set()
 
-    spawn(lambda: nest(STUBBORN - 2))
+    spawn(lambda: nest(MAX_SWALLOWED_CANCELLATIONS - 2))
     spawn(lambda: (begun.wait(), kernel.cancel(kernel.root, "over")))
     kernel.run(LONG)
     assert kernel.close() == []
-    assert seen == list(range(STUBBORN - 1))
+    assert seen == list(range(MAX_SWALLOWED_CANCELLATIONS - 1))
 
 
 def test_a_lock_passes_on_when_its_owner_is_ended(kernel: Kernel, spawn: Spawn) -> None:
@@ -346,12 +346,12 @@ def test_a_task_ended_while_it_computes_leaves_the_processor_clean(virtual: Virt
 
         return body
 
-    virtual.spawn(compute(100 * MS), "ended", Place("ended", processor, 5), scope)
-    virtual.spawn(compute(10 * MS), "waits", Place("waits", processor, 1))
+    virtual.spawn(compute(100 * MS), "ended", ExecutionContext("ended", processor, 5), scope)
+    virtual.spawn(compute(10 * MS), "waits", ExecutionContext("waits", processor, 1))
     virtual.call_at(30 * MS, lambda: virtual.cancel(scope, "enough"))
     virtual.run(S)
     assert ends == [40 * MS]
     assert processor.busy_ns(virtual.now()) == 40 * MS
-    virtual.spawn(compute(5 * MS), "after", Place("after", processor, 1))
+    virtual.spawn(compute(5 * MS), "after", ExecutionContext("after", processor, 1))
     virtual.run(2 * S)
     assert ends == [40 * MS, 45 * MS]

@@ -3,9 +3,9 @@
 import threading
 
 from volery.base.time import S
-from volery.kernel.following import FollowingKernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Rate, sleep
+from volery.kernel.wall import FollowingKernel
 
 
 def test_time_stands_still_until_it_is_told() -> None:
@@ -24,7 +24,7 @@ def test_time_stands_still_until_it_is_told() -> None:
         house.set()
 
     with kernel.adopt("test"):
-        kernel.spawn(body, "sleeper", Place("sleeper"))
+        kernel.spawn(body, "sleeper", ExecutionContext("sleeper"))
         kernel.call_at(3 * S, act)
         asleep.wait()
         assert kernel.now() == 0

@@ -11,9 +11,9 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.network import Network
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.waiting import at
+from volery.kernel.waiting import executing_in
 from volery.trace.events import Event, Preemption
 
 Slices = Callable[[], list[tuple[float, float, str, str]]]
@@ -28,7 +28,7 @@ def compute(
         kernel.sleep_until(at * MS)
         kernel.pay(ms * MS)
 
-    kernel.spawn(body, name, Place(name, processor, priority))
+    kernel.spawn(body, name, ExecutionContext(name, processor, priority))
 
 
 def test_the_more_urgent_preempts_at_once(virtual: VirtualKernel, slices: Slices) -> None:
@@ -73,8 +73,10 @@ def test_who_is_done_at_the_instant_of_its_preemption_is_done(virtual: VirtualKe
         virtual.sleep_until(5 * MS)
         virtual.pay(10 * MS)
 
-    virtual.spawn(high, "high", Place("high", core, 9))  # its timer is set first: it comes first at 5 ms
-    virtual.spawn(low, "low", Place("low", core, 1))
+    virtual.spawn(
+        high, "high", ExecutionContext("high", core, 9)
+    )  # its timer is set first: it comes first at 5 ms
+    virtual.spawn(low, "low", ExecutionContext("low", core, 1))
     virtual.run(S)
     assert done == [5 * MS]
     assert slices() == [(0, 5, "cpu.0", "low"), (5, 15, "cpu.0", "high")]
@@ -151,9 +153,11 @@ def test_nested_calls_over_two_processors_with_preemption(virtual: VirtualKernel
     radio = Network(virtual, "radio", bandwidth_bit_s=1_600_000, latency=2 * MS, loss=0.0, stream=Random(1))
     result: list[float] = []
 
-    def call(place: Place, ms_before: int, ms_after: int, inner: Callable[[], None] | None = None) -> None:
+    def call(
+        place: ExecutionContext, ms_before: int, ms_after: int, inner: Callable[[], None] | None = None
+    ) -> None:
         radio.carry(200)
-        with at(virtual, place):
+        with executing_in(virtual, place):
             virtual.pay(ms_before * MS)
             if inner is not None:
                 inner()
@@ -162,12 +166,12 @@ def test_nested_calls_over_two_processors_with_preemption(virtual: VirtualKernel
 
     def a() -> None:
         virtual.pay(4 * MS)
-        c = Place("c", onboard, None)
-        call(Place("b", ground, 5), 3, 1, inner=lambda: call(c, 2, 0))
+        c = ExecutionContext("c", onboard, None)
+        call(ExecutionContext("b", ground, 5), 3, 1, inner=lambda: call(c, 2, 0))
         virtual.pay(1 * MS)
         result.append(virtual.now() / MS)
 
-    virtual.spawn(a, "a", Place("a", onboard, 1))
+    virtual.spawn(a, "a", ExecutionContext("a", onboard, 1))
     compute(virtual, onboard, "urgent", at=2, ms=3, priority=9)
     compute(virtual, ground, "busy", at=11, ms=2, priority=9)
     virtual.run(S)
@@ -189,10 +193,10 @@ def test_a_passive_component_computes_at_its_callers_priority(virtual: VirtualKe
     core = Processor(virtual, "cpu")
 
     def caller() -> None:
-        with at(virtual, Place("passive", core, None)):
+        with executing_in(virtual, ExecutionContext("passive", core, None)):
             virtual.pay(4 * MS)
 
-    virtual.spawn(caller, "caller", Place("caller", core, 5))
+    virtual.spawn(caller, "caller", ExecutionContext("caller", core, 5))
     compute(virtual, core, "middle", at=1, ms=2, priority=3)
     virtual.run(S)
     assert slices() == [(0, 4, "cpu.0", "passive"), (4, 6, "cpu.0", "middle")]
@@ -202,7 +206,7 @@ def test_background_computing_contends_and_nobody_waits_for_it(
     virtual: VirtualKernel, slices: Slices
 ) -> None:
     core = Processor(virtual, "cpu")
-    ros = Place("node", core, 5)
+    ros = ExecutionContext("node", core, 5)
     compute(virtual, core, "low", at=0, ms=5, priority=1)
     compute(virtual, core, "high", at=3, ms=1, priority=9)
     virtual.call_at(2 * MS, lambda: core.load(ros, 2 * MS))
@@ -218,7 +222,7 @@ def test_background_computing_contends_and_nobody_waits_for_it(
 
 def test_the_background_of_a_place_is_one_thread(virtual: VirtualKernel, slices: Slices) -> None:
     cores = Processor(virtual, "cpu", cores=2)
-    node = Place("node", cores)
+    node = ExecutionContext("node", cores)
     for when in (0, 0, 3, 10):
         virtual.call_at(when * MS, lambda: cores.load(node, 2 * MS))
     virtual.run(S)
@@ -241,7 +245,7 @@ def test_going_on_with_the_same_task_takes_no_context_switch(virtual: VirtualKer
         virtual.sleep_until(10 * MS)
         virtual.pay(2 * MS)
 
-    virtual.spawn(body, "a", Place("a", core))
+    virtual.spawn(body, "a", ExecutionContext("a", core))
     virtual.run(S)
     assert slices() == [(0, 3, "cpu.0", "a"), (10, 12, "cpu.0", "a")]
 
@@ -253,7 +257,7 @@ def test_nor_does_it_when_something_happens_meanwhile(virtual: VirtualKernel, sl
         for _ in range(3):
             virtual.pay(2 * MS)
 
-    virtual.spawn(body, "a", Place("a", core))
+    virtual.spawn(body, "a", ExecutionContext("a", core))
     for when in range(10):
         virtual.call_at(when * MS, lambda: None)
     virtual.run(S)
@@ -268,7 +272,7 @@ def test_a_job_that_ends_with_its_turn_is_done(virtual: VirtualKernel, slices: S
         virtual.pay(8 * MS)
         done.append(virtual.now() / MS)
 
-    virtual.spawn(body, "a", Place("a", core))
+    virtual.spawn(body, "a", ExecutionContext("a", core))
     compute(virtual, core, "b", at=6, ms=4)
     virtual.run(S)
     assert done == [8]
@@ -284,7 +288,7 @@ def test_what_happens_at_the_instant_a_job_ends_comes_in_the_order_asked_for(vir
         seen.append("done")
 
     virtual.call_at(5 * MS, lambda: seen.append("asked for before"))
-    virtual.spawn(body, "a", Place("a", core))
+    virtual.spawn(body, "a", ExecutionContext("a", core))
     virtual.run(S)
     assert seen == ["asked for before", "done"]
 
@@ -303,7 +307,7 @@ def test_busy_time_is_known_while_jobs_run(virtual: VirtualKernel) -> None:
 def test_nothing_takes_no_time(virtual: VirtualKernel, slices: Slices) -> None:
     core = Processor(virtual, "cpu")
     compute(virtual, core, "idle", at=0, ms=0)
-    core.load(Place("node", core), 0)
+    core.load(ExecutionContext("node", core), 0)
     virtual.run(S)
     assert slices() == []
     assert virtual.now() == 0

@@ -9,7 +9,7 @@ import pytest
 from volery.base.errors import Deadlock, UsageError
 from volery.base.time import MS, S
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
 from volery.kernel.wall import WallKernel
@@ -172,7 +172,7 @@ def test_the_wall_runs_on_between_scripts() -> None:
     ticked = Event(kernel, "ticked")
     with kernel.adopt("script"):
         pass
-    kernel.spawn(ticked.set, "background", Place("background"))
+    kernel.spawn(ticked.set, "background", ExecutionContext("background"))
     with kernel.adopt("script"):
         assert ticked.wait(1000 * S)
     assert kernel.close() == []

@@ -10,11 +10,10 @@ import pytest
 
 from volery.base.errors import ComponentError, Deadlock, UsageError
 from volery.base.time import MS, S
-from volery.kernel.pacing import Pacer
-from volery.kernel.task import Place, Scope, Task
-from volery.kernel.virtual import VirtualKernel
+from volery.kernel.interrupts import Watchdog
+from volery.kernel.task import ExecutionContext, Scope, Task
+from volery.kernel.virtual import Pacer, VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
-from volery.kernel.watchdog import Watchdog
 
 Spawn = Callable[..., Task]
 
@@ -162,8 +161,8 @@ def test_two_runs_record_the_same(spawn: Spawn) -> None:
                 seen.append((kernel.now(), queue.get()))
 
         for name, period in (("a", 3), ("b", 5), ("c", 3)):
-            kernel.spawn(producer(name, period), name, Place(name))
-        kernel.spawn(consumer, "consumer", Place("consumer"))
+            kernel.spawn(producer(name, period), name, ExecutionContext(name))
+        kernel.spawn(consumer, "consumer", ExecutionContext("consumer"))
         kernel.run(S)
         return seen
 
@@ -223,7 +222,7 @@ def test_with_a_pace_everything_happens_at_the_same_virtual_times() -> None:
                 sleep(kernel, 70 * MS)
                 seen.append(kernel.now())
 
-        kernel.spawn(body, "sleeper", Place("sleeper"))
+        kernel.spawn(body, "sleeper", ExecutionContext("sleeper"))
         kernel.run(S)
         assert kernel.now() == S
         kernel.close()
@@ -271,7 +270,7 @@ def test_a_pacer_lets_pass_what_passes_on_the_wall_and_makes_nothing_good(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wall = [0]
-    monkeypatch.setattr("volery.kernel.pacing.monotonic_ns", lambda: wall[0])
+    monkeypatch.setattr("volery.kernel.virtual.monotonic_ns", lambda: wall[0])
     pacer = Pacer(2.0)
 
     def cut_short(now: int, when: int) -> int | None:
@@ -297,7 +296,7 @@ def test_the_watchdog_names_component_and_line_of_code_that_freezes_virtual_time
         while True:
             pass
 
-    kernel.spawn(endless, "spinner", Place("spinner"))
+    kernel.spawn(endless, "spinner", ExecutionContext("spinner"))
     with pytest.raises(ComponentError, match=r"spinner: virtual time is frozen: .* in .*test_virtual.py:\d+"):
         kernel.run(S)
     assert kernel.close() == []
@@ -311,7 +310,7 @@ def test_the_watchdog_also_names_code_that_only_looks() -> None:
         while not flag.is_set():
             pass
 
-    kernel.spawn(polling, "poller", Place("poller"))
+    kernel.spawn(polling, "poller", ExecutionContext("poller"))
     with pytest.raises(ComponentError, match=r"poller: virtual time is frozen: .*test_virtual.py:\d+"):
         kernel.run(S)
     assert kernel.close() == []
@@ -319,7 +318,7 @@ def test_the_watchdog_also_names_code_that_only_looks() -> None:
 
 def test_the_watchdog_reaches_code_that_blocks_the_host() -> None:
     kernel = VirtualKernel(watchdog_s=0.02)
-    kernel.spawn(signal.pause, "blocker", Place("blocker"))
+    kernel.spawn(signal.pause, "blocker", ExecutionContext("blocker"))
     with pytest.raises(ComponentError, match="blocker: virtual time is frozen"):
         kernel.run(S)
     kernel.close()
@@ -352,7 +351,7 @@ class Still:
 def test_the_watchdog_accuses_who_does_not_move_and_nobody_else() -> None:
     kernel, accused = Still(), Accused()
     dog = Watchdog(kernel, accused, patience_s=10.0)
-    a, b = (Task(name, Place(name), Scope("run")) for name in "ab")
+    a, b = (Task(name, ExecutionContext(name), Scope("run")) for name in "ab")
 
     def look(moment: float, task: Task | None, time: int) -> None:
         kernel.task, kernel.time = task, time

@@ -12,9 +12,9 @@ from volery.base.time import MS, S
 from volery.kernel.api import Kernel
 from volery.kernel.network import Network
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place, Task
+from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.waiting import Event, Lock, Queue, Rate, Signal, at, sleep
+from volery.kernel.waiting import Event, Lock, Queue, Rate, Signal, executing_in, sleep
 from volery.trace.events import NONE, Activation
 from volery.trace.events import Event as Recorded
 
@@ -230,7 +230,7 @@ def test_a_lock_goes_to_the_most_urgent_and_among_equals_to_the_first(virtual: V
         return run
 
     for name, priority in (("first", 0), ("low", 1), ("high", 9), ("high too", 9)):
-        virtual.spawn(body(name), name, Place(name, None, priority))
+        virtual.spawn(body(name), name, ExecutionContext(name, None, priority))
     virtual.run(S)
     assert seen == ["first", "high", "high too", "low"]
 
@@ -276,7 +276,7 @@ def computing(virtual: VirtualKernel, loads: list[int], wait: Callable[[], objec
 def test_an_activation_runs_from_its_release_to_the_next_wait_of_the_users(
     virtual: VirtualKernel, core: Processor, activations: Activations
 ) -> None:
-    place = Place("loop", core, deadline=50 * MS)
+    place = ExecutionContext("loop", core, deadline=50 * MS)
     virtual.call_at(5 * MS, lambda: None)
     virtual.spawn(computing(virtual, [10, 20], lambda: sleep(virtual, 100 * MS)), "loop", place)
     virtual.run(S)
@@ -284,7 +284,7 @@ def test_an_activation_runs_from_its_release_to_the_next_wait_of_the_users(
 
 
 def test_an_activation_without_a_deadline_says_so(virtual: VirtualKernel, events: list[Recorded]) -> None:
-    virtual.spawn(lambda: sleep(virtual, MS), "loop", Place("loop"))
+    virtual.spawn(lambda: sleep(virtual, MS), "loop", ExecutionContext("loop"))
     virtual.run(S)
     assert events == [Activation(0, 0, "loop", NONE), Activation(MS, MS, "loop", NONE)]
 
@@ -296,7 +296,7 @@ def test_a_late_rate_catches_up_and_its_activations_count_from_when_they_were_du
         rate = Rate(virtual, 100 * MS)
         computing(virtual, [150, 120, 10, 10], rate.sleep)()
 
-    virtual.spawn(body, "loop", Place("loop", core))
+    virtual.spawn(body, "loop", ExecutionContext("loop", core))
     virtual.run(10 * S)
     assert [(released, finished) for released, finished, *_ in activations()] == [
         (0, 150),  # due at 100 and late by 50: goes on at once
@@ -314,7 +314,7 @@ def test_a_rate_that_is_more_than_two_periods_late_starts_anew(
         rate = Rate(virtual, 100 * MS)
         computing(virtual, [300, 350, 10], rate.sleep)()
 
-    virtual.spawn(body, "loop", Place("loop", core))
+    virtual.spawn(body, "loop", ExecutionContext("loop", core))
     virtual.run(10 * S)
     assert [(released, finished) for released, finished, *_ in activations()] == [
         (0, 300),  # due at 100, late by exactly two periods: catches up
@@ -331,7 +331,7 @@ def test_a_rate_always_ends_the_activation(virtual: VirtualKernel, activations: 
         for _ in range(4):
             rate.sleep()
 
-    virtual.spawn(body, "loop", Place("loop"))
+    virtual.spawn(body, "loop", ExecutionContext("loop"))
     virtual.run(S)
     assert [(released, finished) for released, finished, *_ in activations()] == [
         (0, 30), (10, 30), (20, 30), (30, 30), (40, 40)
@@ -353,7 +353,7 @@ def test_a_message_releases_and_one_that_is_there_already_does_not_end_the_activ
             queue.get()
         queue.get(within=100 * MS)
 
-    virtual.spawn(body, "reader", Place("reader"))
+    virtual.spawn(body, "reader", ExecutionContext("reader"))
     for when in (10, 20, 20):
         virtual.call_at(when * MS, lambda: queue.put(0))
     virtual.run(S)
@@ -379,7 +379,7 @@ def test_waits_of_the_house_end_no_activation(
         changed.wait_for(lambda: False, within=10 * MS, ends_activation=True)
         flag.wait(within=10 * MS)
 
-    virtual.spawn(body, "component", Place("component", core))
+    virtual.spawn(body, "component", ExecutionContext("component", core))
     virtual.run(S)
     assert [(released, finished) for released, finished, *_ in activations()] == [(0, 50), (60, 60), (70, 70)]
 
@@ -388,7 +388,7 @@ def test_a_task_that_is_ended_finishes_no_activation(
     virtual: VirtualKernel, activations: Activations
 ) -> None:
     scope = virtual.root.child("components")
-    virtual.spawn(lambda: virtual.sleep_until(S), "component", Place("component"), scope)
+    virtual.spawn(lambda: virtual.sleep_until(S), "component", ExecutionContext("component"), scope)
     virtual.call_at(10 * MS, lambda: virtual.cancel(scope, "enough"))
     virtual.run(S)
     assert activations() == []
@@ -397,7 +397,7 @@ def test_a_task_that_is_ended_finishes_no_activation(
 def test_each_release_can_be_charged(
     virtual: VirtualKernel, core: Processor, activations: Activations
 ) -> None:
-    place = Place("loop", core, on_release=lambda task: task.charge(7 * MS))
+    place = ExecutionContext("loop", core, on_release=lambda task: task.charge(7 * MS))
 
     def body() -> None:
         rate = Rate(virtual, 20 * MS)  # an interaction point: counts from 7 ms
@@ -422,14 +422,14 @@ def test_at_pays_before_it_goes_and_before_it_leaves(
         task = virtual.current()
         assert task is not None
         task.charge(3 * MS)
-        with at(virtual, Place("callee", other, None)):
+        with executing_in(virtual, ExecutionContext("callee", other, None)):
             assert task.priority == 4
             task.charge(5 * MS)
         left.append(virtual.now())
         assert task.place.component == "caller"
         task.charge(2 * MS)
 
-    virtual.spawn(body, "caller", Place("caller", core, 4))
+    virtual.spawn(body, "caller", ExecutionContext("caller", core, 4))
     virtual.run(S)
     assert left == [8 * MS]
     assert slices() == [(0, 3, "core.0", "caller"), (3, 8, "other.0", "callee"), (8, 10, "core.0", "caller")]
@@ -439,7 +439,7 @@ def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, 
     left: list[int] = []
 
     def visit(task: Task) -> None:
-        with at(virtual, Place("callee", core)):
+        with executing_in(virtual, ExecutionContext("callee", core)):
             task.charge(5 * MS)
             raise ZeroDivisionError
 
@@ -451,7 +451,7 @@ def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, 
         left.append(virtual.now())
         assert len(task.places) == 1
 
-    virtual.spawn(body, "caller", Place("caller", core))
+    virtual.spawn(body, "caller", ExecutionContext("caller", core))
     virtual.run(S)
     assert left == [5 * MS]
 
@@ -459,19 +459,19 @@ def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, 
 def test_a_task_that_is_ended_at_a_place_owes_nothing(virtual: VirtualKernel, core: Processor) -> None:
     scope = virtual.root.child("components")
     meter = iter([0, 100 * MS, 0])
-    place = Place("callee", core, meter=lambda: next(meter, 0))
+    place = ExecutionContext("callee", core, meter=lambda: next(meter, 0))
     tasks: list[Task] = []
 
     def body() -> None:
         task = virtual.current()
         assert task is not None
         tasks.append(task)
-        with at(virtual, place):
+        with executing_in(virtual, place):
             virtual.cancel(scope, "enough")
             task.charge(50 * MS)
             sleep(virtual, 1)
 
-    virtual.spawn(body, "caller", Place("caller", core), scope)
+    virtual.spawn(body, "caller", ExecutionContext("caller", core), scope)
     virtual.run(S)
     assert core.busy_ns(virtual.now()) == 0
     assert len(tasks[0].places) == 1
@@ -495,6 +495,6 @@ def test_a_meter_is_pulled_at_every_interaction_point(
         virtual.sleep_until(15 * MS)
         counted[0] += 4
 
-    virtual.spawn(body, "counted", Place("counted", core, meter=meter))
+    virtual.spawn(body, "counted", ExecutionContext("counted", core, meter=meter))
     virtual.run(S)
     assert [(start, end) for start, end, *_ in slices()] == [(0, 2), (2, 5), (15, 19)]

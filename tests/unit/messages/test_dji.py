@@ -16,7 +16,7 @@ from volery.ros.messages import (
     service_types,
     to_cdr,
 )
-from volery.ros.messages.dji import (
+from volery.ros.messages.dji_constants import (
     ANGLE_YAW_RATE_HEIGHT,
     POSITION_YAW,
     SETPOINT_TOPICS,

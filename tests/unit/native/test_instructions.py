@@ -1,6 +1,6 @@
 import pytest
 
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.cost.native import isa_aarch64, isa_x86_64
 from volery.cost.native.assembly import OPERATION_CLASSES, End, Instruction, machine_blocks
 
@@ -104,7 +104,7 @@ def test_a64_moves_two_registers_and_steps_its_address():
 
 def test_every_operation_has_figures_on_every_core():
 
-    known = [one.core_law() for one in catalogue().processors.values() if one.core_model is not None]
+    known = [one.core_law() for one in load_catalogue().processors.values() if one.core_model is not None]
     assert len(known) == 2
     assert all(set(law.operations) == set(OPERATION_CLASSES) for law in known)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.cost.native.assembly import machine_blocks
 from volery.cost.native.cache_misses import cache_misses
 from volery.cost.native.instruction_tables import instruction_tables
@@ -68,7 +68,9 @@ f:                                      # @f
 def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None:
     made = machine_blocks(ASSEMBLY)
     machine = MachineCode([BasicBlock("f", "entry", True)], made)
-    encoded = instruction_tables(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
+    encoded = instruction_tables(
+        made, load_catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"})
+    )
     told = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
     late = cache_misses(reconstruct_path(machine, BlockTrace([0], accesses={0: told})), encoded, [4])
     assert late.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
@@ -77,5 +79,7 @@ def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None
 def test_nothing_is_late_where_nothing_was_told() -> None:
     made = machine_blocks(ASSEMBLY)
     machine = MachineCode([BasicBlock("f", "entry", True)], made)
-    encoded = instruction_tables(made, catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"}))
+    encoded = instruction_tables(
+        made, load_catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"})
+    )
     assert cache_misses(reconstruct_path(machine, BlockTrace([0])), encoded, [4]).shape == (0, 4)

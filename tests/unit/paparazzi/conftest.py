@@ -17,7 +17,7 @@ from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
-from volery.simulation.autopilots.paparazzi import DIALECT
+from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Battery, Multirotor
 from volery.simulation.world.environment_models import Wind
 
@@ -42,9 +42,9 @@ class Craft:
         _, flights = make_world(self.kernel.now, [body], seed=5, frame=FRAME, wind=wind)
         self.flight: Flight = flights[0]
         self.autopilot = Autopilot(
-            self.kernel, self.flight, DIALECT, system=AIRCRAFT, parameters=parameters, warm=warm
+            self.kernel, self.flight, FIRMWARE, system=AIRCRAFT, parameters=parameters, warm=warm
         )
-        codec = DIALECT.codec
+        codec = FIRMWARE.codec
         assert codec is not None
         theirs: Any
         if through_bytes:

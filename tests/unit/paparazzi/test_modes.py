@@ -11,9 +11,9 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
 from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.firmware import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.autopilots.paparazzi import DIALECT
+from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Rover
 
 NO_RC, ARMED, KILLED, NOT_ALIGNED = 0, 3, 5, 15
@@ -21,14 +21,14 @@ Make = Callable[..., Any]
 
 
 def test_it_is_found_by_its_name() -> None:
-    assert dialects.load("paparazzi") is DIALECT
+    assert firmwares.load("paparazzi") is FIRMWARE
 
 
 def test_there_is_no_rover() -> None:
     kernel = VirtualKernel()
     _, flights = make_world(kernel.now, [Rover()], seed=1, frame=LocalFrame(48.0, 11.0, 500.0))
     with pytest.raises(UsageError, match=r"paparazzi has no rover; it has multirotor"):
-        Autopilot(kernel, flights[0], DIALECT)
+        Autopilot(kernel, flights[0], FIRMWARE)
 
 
 def test_it_waits_at_its_holding_point_in_nav(craft: Any) -> None:

@@ -10,8 +10,8 @@ from lxml import etree
 from volery.base.errors import UsageError
 from volery.report.graph_of_run import graph_of_run
 from volery.report.graph_picture import picture
-from volery.ros.graph.node import ServiceState
-from volery.ros.graph.portrait import Portrait, TopicLine
+from volery.ros.graph.interface import ServiceState
+from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.testing.sample_run import sample_events, sample_setup
 from volery.trace.mcap_writer import McapWriter
 
@@ -23,11 +23,11 @@ def words(svg: str) -> list[str]:
 
 
 def test_every_node_topic_and_rate_is_in_the_picture() -> None:
-    seen = Portrait(
+    seen = GraphSnapshot(
         ("/camera", "/lonely", "/viewer"),
         (
-            TopicLine("/image", "sensor_msgs/msg/Image", ("/camera",), ("/viewer",), 29.97),
-            TopicLine("/odd<&>", "std_msgs/msg/Empty", ("/camera", "/viewer"), (), None),
+            TopicSnapshot("/image", "sensor_msgs/msg/Image", ("/camera",), ("/viewer",), 29.97),
+            TopicSnapshot("/odd<&>", "std_msgs/msg/Empty", ("/camera", "/viewer"), (), None),
         ),
         (ServiceState("/start", "std_srvs/srv/Empty", "/camera"),),
     )
@@ -39,7 +39,7 @@ def test_every_node_topic_and_rate_is_in_the_picture() -> None:
 
 
 def test_an_empty_graph() -> None:
-    assert words(picture(Portrait((), (), ()))) == ["publishes", "topic", "subscribes"]
+    assert words(picture(GraphSnapshot((), (), ()))) == ["publishes", "topic", "subscribes"]
 
 
 def test_the_graph_of_a_run(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from volery.base.time import MS, S
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Rate, current_task, end_activation
 from volery.requirements.response_bounds import Demand, Demands, Load, response_bounds
@@ -70,7 +70,9 @@ def test_no_simulated_response_is_longer_than_its_bound(costs, starts, cores):
 
     for number, (name, cost, start) in enumerate(zip(names, costs, starts, strict=False)):
         body = partial(loop, cost, 40 + 10 * number)
-        kernel.call_at(start * MS, partial(kernel.spawn, body, name, Place(name, processor, number)))
+        kernel.call_at(
+            start * MS, partial(kernel.spawn, body, name, ExecutionContext(name, processor, number))
+        )
     kernel.run(2 * S)
     kernel.close()
     found, longest = analysed(events, names, cores)
@@ -121,7 +123,9 @@ def test_bursts_of_messages_stay_within_their_bounds(arrivals, cores, promised):
 
     names = [f"t{number}" for number in range(len(arrivals))]
     for number, name in enumerate(names):
-        kernel.spawn(lambda at=arrivals[number]: work_off(at), name, Place(name, processor, number))
+        kernel.spawn(
+            lambda at=arrivals[number]: work_off(at), name, ExecutionContext(name, processor, number)
+        )
     kernel.run(10 * S)
     kernel.close()
     found, longest = analysed(events, names, cores, promised)

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.kernel.processor import Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import Processor as ProcessorModel
 from volery.run.assembly.computers import load_name, start_background_load
@@ -18,7 +18,7 @@ def loaded(share, cores=2, seed=1, work=0):
     kernel = VirtualKernel(events.append)
     processor = Processor(kernel, "onboard", cores=cores)
     start_background_load(kernel, processor, ProcessorModel("onboard", "any", 1e9, cores, load=share), seed)
-    kernel.spawn(lambda: kernel.pay(work), "loop", Place("loop", processor, 99))
+    kernel.spawn(lambda: kernel.pay(work), "loop", ExecutionContext("loop", processor, 99))
     kernel.run(1 * S)
     kernel.close()
     return [event for event in events if isinstance(event, Slice)]

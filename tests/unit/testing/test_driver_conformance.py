@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
 from volery.cli.main import app
-from volery.simulation.autopilots.ardupilot import DIALECT
-from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.ardupilot import FIRMWARE
+from volery.simulation.autopilots.firmware import firmwares
 from volery.testing import Outcome, conformance
 from volery.testing.checks import BrokenError, demand, raising
 from volery.testing.driver_conformance import chosen
@@ -58,9 +58,9 @@ def cheats() -> Iterator[None]:
             return Cheat(way, *opened)
 
         drivers.add(f"cheat-{way.replace(' ', '-')}", DriverFactory(on_link=opens))
-        dialects.add(f"cheat-{way.replace(' ', '-')}", DIALECT)
+        firmwares.add(f"cheat-{way.replace(' ', '-')}", FIRMWARE)
     yield
-    for registry in (drivers, dialects):
+    for registry in (drivers, firmwares):
         for name in [name for name in registry._added if name.startswith("cheat")]:
             del registry._added[name]
 

@@ -18,7 +18,7 @@ from volery.base.errors import LinkError, LinkSilent, UsageError, choices
 from volery.calibration.ros.call_costs import Round, read_round
 from volery.components.cpp.compiler import CppToolchain
 from volery.ros.transports.ros1 import Roscore, available
-from volery.ros.transports.ros1.roscore import environment
+from volery.ros.transports.ros1.master import environment
 
 CLIENTS = ("roscpp", "rospy", "rclpy")
 PROBES = Path(str(files("volery.calibration.ros").joinpath("probes")))

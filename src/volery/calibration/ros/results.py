@@ -17,7 +17,7 @@ from statistics import median
 from volery.calibration.machine import Machine, put_law
 from volery.calibration.ros.call_costs import CallCost, CostLine
 from volery.calibration.ros.campaign import Conditions
-from volery.cost.catalogue import read_file
+from volery.cost.catalogue import read_catalogue
 from volery.cost.figures import Line, line_through
 from volery.cost.ros_law import CallFigures, RosLaw
 
@@ -136,7 +136,7 @@ def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
     Returns the law that stands there now. ``ModelError`` if the file is there and no catalogue,
     ``UsageError`` if it cannot be written.
     """
-    known = read_file(file).processors.get(machine.name) if file.exists() else None
+    known = read_catalogue(file).processors.get(machine.name) if file.exists() else None
     before = known.ros.get(law.client) if known is not None else None
     made = join_laws(before, law) if before is not None else law
     put_law(file, machine, ("ros", law.client), made, (made.least_mhz, made.greatest_mhz))

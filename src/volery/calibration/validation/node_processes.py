@@ -25,8 +25,7 @@ from volery.calibration.ros.probe_environment import roscpp_program
 from volery.components.cpp.compiler import find_sources
 from volery.components.programs import script_or_class
 from volery.model.system import Instance, System
-from volery.ros.transports.ros1.master import Master
-from volery.ros.transports.ros1.roscore import environment
+from volery.ros.transports.ros1.master import Master, environment
 from volery.run.assembly.computers import commanded_by
 
 METERS = Path(str(files("volery.calibration.validation").joinpath("meters")))

@@ -1,23 +1,62 @@
-"""Native simulation: what compiled code costs on a core, from one run of it on this machine.
+"""Cost of compiled code on another core, from one run of the code on this machine.
 
-The sources become LLVM's intermediate code, optimised for the target. The target's machine code for it is run
-through a model of its core once, along a trace of blocks, which gives each block its mean cost. From then on
-code runs at the speed of this machine with one counter per block: cost = counts . costs.
+The sources become LLVM's intermediate code, optimised for the target. The target's machine code for it runs
+once through a model of the core along a recorded sequence of basic blocks, which gives each block its mean
+cost. From then on the code runs at the speed of this machine with one counter per block, and the cost of a
+run is the scalar product of counts and costs.
 
-Imports ``cost`` and ``base``. It must not know components, the kernel or models: it turns sources and a core
-into costs.
+Compiled code is counted, not emulated: an instruction-set simulator is a hundred times slower. llvm-mca knows
+neither caches nor branch prediction, and its schedules cover one block only.
+
+This package may import ``cost`` and ``base`` only. Other packages import from here, not from the modules.
 """
 
-from volery.cost.native.block_costs import BlockCosts, Instrumented, instrument, static_costs, traced_costs
-from volery.cost.native.compilation import CompilerError, Program, compile_program
+from volery.cost.native.block_costs import (
+    BlockCosts,
+    Instrumented,
+    instrument,
+    load_costs,
+    save_costs,
+    static_costs,
+    traced_costs,
+)
+from volery.cost.native.compilation import (
+    METHOD,
+    CompilerError,
+    Program,
+    compile_program,
+    llvm_toolchain,
+    run_tool,
+)
+from volery.cost.native.instrumented_run import (
+    BlockTrace,
+    Invocation,
+    cache_settings,
+    read_trace,
+    runtime_objects,
+)
+from volery.cost.native.program_estimate import ProgramEstimate, SourceLineCost, estimate_program
 
 __all__ = [
-    "CompilerError",
+    "METHOD",
     "BlockCosts",
+    "BlockTrace",
+    "CompilerError",
     "Instrumented",
+    "Invocation",
     "Program",
+    "ProgramEstimate",
+    "SourceLineCost",
+    "cache_settings",
     "compile_program",
+    "estimate_program",
     "instrument",
+    "llvm_toolchain",
+    "load_costs",
+    "read_trace",
+    "run_tool",
+    "runtime_objects",
+    "save_costs",
     "static_costs",
     "traced_costs",
 ]

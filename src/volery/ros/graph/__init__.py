@@ -4,9 +4,9 @@ Knows the kernel (waiting) and messages. It must not know what a call costs nor 
 are asked of two functions that are given from above.
 """
 
-from volery.ros.graph.embedded import EmbeddedNode
-from volery.ros.graph.graph import Graph
-from volery.ros.graph.node import (
+from volery.ros.graph.embedded_graph import EmbeddedGraph
+from volery.ros.graph.embedded_node import EmbeddedNode
+from volery.ros.graph.interface import (
     AS_OFFERED,
     BEST_AVAILABLE,
     BEST_EFFORT,
@@ -16,7 +16,6 @@ from volery.ros.graph.node import (
     SENSOR_DATA,
     TRANSIENT_LOCAL,
     VOLATILE,
-    Between,
     Client,
     Cost,
     Group,
@@ -28,12 +27,13 @@ from volery.ros.graph.node import (
     QoS,
     Rate,
     RosGraph,
+    Route,
+    Routing,
     Service,
     ServiceState,
     Subscription,
     Timer,
     TopicState,
-    Way,
     Work,
     free,
 )
@@ -49,11 +49,11 @@ __all__ = [
     "SENSOR_DATA",
     "TRANSIENT_LOCAL",
     "VOLATILE",
-    "Between",
+    "Routing",
     "Client",
     "Cost",
     "EmbeddedNode",
-    "Graph",
+    "EmbeddedGraph",
     "Group",
     "Handler",
     "Node",
@@ -69,7 +69,7 @@ __all__ = [
     "Subscription",
     "Timer",
     "TopicState",
-    "Way",
+    "Route",
     "Work",
     "free",
 ]

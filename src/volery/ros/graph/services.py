@@ -8,9 +8,9 @@ from typing import Any
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import Ns, to_seconds
 from volery.kernel.waiting import Signal
-from volery.ros.graph.context import Member
-from volery.ros.graph.group import CallbackGroup, Work
-from volery.ros.graph.node import Handler
+from volery.ros.graph.callbacks import CallbackGroup, Work
+from volery.ros.graph.graph_context import NodeContext
+from volery.ros.graph.interface import Handler
 from volery.ros.messages import cdr_size, service
 from volery.trace.events import Call
 
@@ -28,7 +28,7 @@ class Exchange:
 
     __slots__ = ("answer", "answered", "caller", "problem", "request")
 
-    def __init__(self, caller: Member, request: Any, name: str) -> None:
+    def __init__(self, caller: NodeContext, request: Any, name: str) -> None:
         self.caller, self.request = caller, request
         self.answer: Any = None
         self.problem = ""
@@ -50,12 +50,12 @@ class Exchange:
 
 
 class EmbeddedService:
-    """See ``volery.ros.graph.node.Service``."""
+    """See ``volery.ros.graph.interface.Service``."""
 
-    member: Member
+    member: NodeContext
 
     def __init__(
-        self, member: Member, name: str, service_type: str, handler: Handler, group: CallbackGroup
+        self, member: NodeContext, name: str, service_type: str, handler: Handler, group: CallbackGroup
     ) -> None:
         kind = service(service_type)
         other = member.context.services.get(name)
@@ -115,9 +115,9 @@ class EmbeddedService:
 
 
 class EmbeddedClient:
-    """See ``volery.ros.graph.node.Client``. Waiting for the answer belongs to the caller's activation."""
+    """See ``volery.ros.graph.interface.Client``. Waiting for the answer belongs to the caller's activation."""
 
-    def __init__(self, member: Member, name: str, service_type: str) -> None:
+    def __init__(self, member: NodeContext, name: str, service_type: str) -> None:
         self._kind = service(service_type)
         self.name, self.type = name, self._kind.name
         self._member = member

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.ros.graph.context import Context, Member
-from volery.ros.graph.group import CallbackGroup, Work
-from volery.ros.graph.node import (
+from volery.ros.graph.callbacks import CallbackGroup, Work
+from volery.ros.graph.graph_context import GraphContext, NodeContext
+from volery.ros.graph.interface import (
     BEST_AVAILABLE,
     BEST_EFFORT,
     RELIABLE,
@@ -18,7 +18,7 @@ from volery.ros.graph.node import (
     VOLATILE,
     Callback,
     QoS,
-    Way,
+    Route,
 )
 from volery.ros.messages import Message as Value
 from volery.ros.messages import cdr_size, message_class
@@ -40,7 +40,7 @@ class Topic:
         self.subscriptions: list[EmbeddedSubscription] = []
 
 
-def topic(context: Context, name: str, message_type: str, member: Member) -> Topic:
+def topic(context: GraphContext, name: str, message_type: str, member: NodeContext) -> Topic:
     """The topic of that name, made if need be; ``UsageError`` if it carries another type."""
     full = message_class(message_type).__msgtype__
     found = context.topics.get(name)
@@ -70,14 +70,14 @@ class Connection(NamedTuple):
     """
 
     to: EmbeddedSubscription
-    way: Way | None
+    way: Route | None
     reliable: bool
 
 
 class EmbeddedPublisher:
-    """See ``volery.ros.graph.node.Publisher``."""
+    """See ``volery.ros.graph.interface.Publisher``."""
 
-    def __init__(self, member: Member, at: Topic, qos: QoS) -> None:
+    def __init__(self, member: NodeContext, at: Topic, qos: QoS) -> None:
         self.member, self.qos = member, qos
         self.topic, self.type = at.name, at.type
         self._context = member.context
@@ -180,9 +180,11 @@ def _type_of(message: object) -> str:
 
 
 class EmbeddedSubscription:
-    """See ``volery.ros.graph.node.Subscription``. ``dropped`` counts messages that its full queue gave up."""
+    """See ``volery.ros.graph.interface.Subscription``. ``dropped`` counts messages that its full queue gave up."""
 
-    def __init__(self, member: Member, at: Topic, callback: Callback, qos: QoS, group: CallbackGroup) -> None:
+    def __init__(
+        self, member: NodeContext, at: Topic, callback: Callback, qos: QoS, group: CallbackGroup
+    ) -> None:
         self.member, self.qos = member, qos
         self.topic, self.type = at.name, at.type
         self.dropped = 0

@@ -7,8 +7,7 @@ ROS 2 Humble; the few packages that the stores lack are written out in ``definit
 
 from volery.ros.messages.cdr import cdr_size, from_cdr, to_cdr
 from volery.ros.messages.message import Message
-from volery.ros.messages.nearby import define_imported, define_packages
-from volery.ros.messages.packages import modules
+from volery.ros.messages.packages import define_imported, define_packages, modules
 from volery.ros.messages.ros1 import Ros1Service, Ros1Type, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.ros.messages.store import (
     ServiceType,

@@ -1,13 +1,24 @@
-"""Packages of interfaces as modules, so that a file may say ``from std_msgs.msg import String``."""
+"""Packages of interfaces as modules, so that a file may say ``from std_msgs.msg import String``.
+
+Interfaces that lie beside a user's file, or in packages that the environment names.
+
+``from robot_msgs.msg import Wheels`` in a file finds ``robot_msgs/msg/Wheels.msg`` beside the file, in the
+package that the file is part of, or in a folder of ``ROS_PACKAGE_PATH`` or ``AMENT_PREFIX_PATH``; and what
+its types are made of likewise.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ast
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from volery.base.errors import choices, did_you_mean
-from volery.ros.messages.store import action_types, message_class, service, service_types, types
+from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
+from volery.ros.messages.store import action_types, define_all, message_class, service, service_types, types
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
 """Types that ROS 1 spells otherwise: by package, its name and ours."""
@@ -86,3 +97,99 @@ def modules() -> dict[str, ModuleType]:
             setattr(parent, kind, inner)
             found[f"{package}.{kind}"] = inner
     return found
+
+
+KINDS = ("msg", "srv", "action")
+_LEVELS = 3
+"""How far above the file its package may begin."""
+_FIELD = re.compile(r"^\s*(\w+)/(?:msg/)?\w+(?:\[[^]]*\])?\s+\w", re.MULTILINE)
+_NAME = re.compile(r"<name>\s*([\w-]+)\s*</name>")
+
+
+def define_imported(file: Path) -> list[str]:
+    """``define_packages`` for what a Python file imports."""
+    return define_packages(file, _imported(file))
+
+
+def define_packages(file: Path, packages: Iterable[str]) -> list[str]:
+    """Define the interfaces of *packages*, which *file* speaks of, if nobody has; returns those it found.
+
+    ``ModelError`` at the interface's file where one is no definition. Packages that are nowhere are left to
+    whoever then misses them.
+    """
+    known = {name.partition("/")[0] for name in (*types(), *service_types(), *action_types())}
+    known -= _from_files.keys()  # another file may mean another package by the same name
+    texts: dict[str, str] = {}
+    found: list[str] = []
+    wanted = [name for name in packages if name not in known]
+    while wanted:
+        package = wanted.pop(0)
+        folder = _folder_of(package, file)
+        if folder is None or package in found:
+            continue
+        found.append(package)
+        for name, text in _texts(package, folder):
+            texts[name] = text
+            wanted += [other for other in _FIELD.findall(text) if other not in (*known, *found)]
+    try:
+        define_all({name: text for name, text in texts.items() if _from_files.get(name) != text})
+    except UsageError as error:
+        raise ModelError(str(error), where=Location(str(file), 1)) from error
+    _from_files.update(texts)
+    _from_files.update(dict.fromkeys(found, ""))
+    return found
+
+
+_from_files: dict[str, str] = {}
+"""What was read from files so far: texts by name, and the packages' own names."""
+
+
+def _imported(file: Path) -> list[str]:
+    """The packages of whose interfaces the file speaks, in order."""
+    found: dict[str, None] = {}
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module]
+        for name in names:
+            package, _, kind = name.partition(".")
+            if kind.partition(".")[0] in KINDS:
+                found[package] = None
+    return list(found)
+
+
+def _texts(package: str, folder: Path) -> Iterator[tuple[str, str]]:
+    for kind in KINDS:
+        for path in sorted((folder / kind).glob(f"*.{kind}")):
+            yield f"{package}/{kind}/{path.stem}", path.read_text(encoding="utf-8")
+
+
+def _folder_of(package: str, file: Path) -> Path | None:
+    """Where *package* has its interfaces, as far as *file* can know."""
+    return next((folder for folder in _candidates(package, file) if _is_package(folder, package)), None)
+
+
+def _candidates(package: str, file: Path) -> Iterator[Path]:
+    above = file.resolve().parents[: _LEVELS + 1]
+    for folder in above:
+        yield folder / package
+        yield folder
+    for entry in _entries("ROS_PACKAGE_PATH"):
+        yield entry / package
+        yield entry
+    for entry in _entries("AMENT_PREFIX_PATH"):
+        yield entry / "share" / package
+
+
+def _entries(variable: str) -> list[Path]:
+    return [Path(entry) for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
+
+
+def _is_package(folder: Path, package: str) -> bool:
+    if not any((folder / kind).is_dir() for kind in KINDS):
+        return False
+    manifest = folder / "package.xml"
+    if not manifest.is_file():
+        return folder.name == package
+    named = _NAME.search(manifest.read_text(encoding="utf-8", errors="replace"))
+    return named is not None and named.group(1) == package

@@ -1,4 +1,9 @@
-"""Which types there are, and one of each on demand."""
+"""Which types there are, and one of each on demand.
+
+An interface file's text as the messages that it stands for.
+
+How the classes of rclpy spell their fields' types, so that theirs and ours can be compared.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +18,50 @@ from rosbags.typesys.base import TypesysError, normalize_fieldname
 from rosbags.typesys.store import Typestore
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.ros.messages.interface import parts
 from volery.ros.messages.message import Field, Header, Message, Nothing, make_class
 from volery.ros.messages.stamp import DurationValue, TimeValue
+
+_ID = "unique_identifier_msgs/UUID goal_id\n"
+
+
+def interface_messages(name: str, text: str) -> dict[str, str]:
+    """The messages behind ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``, by name.
+
+    A service has ``Name_Request`` and ``Name_Response``. An action has what ROS 2 makes of it: ``Name_Goal``,
+    ``Name_Result``, ``Name_Feedback``, the services ``Name_SendGoal`` and ``Name_GetResult``, and
+    ``Name_FeedbackMessage``.
+    """
+    package, kind, label = [*name.split("/"), "", ""][:3]
+    if not package or kind not in ("msg", "srv", "action") or not label or name.count("/") != 2:
+        raise UsageError(
+            f"{name!r} is no name of a type: package/msg/Name, package/srv/Name or package/action/Name"
+        )
+    if kind == "msg":
+        return {name: text}
+    if kind == "srv":
+        request, response = _split(name, text, "a request and a response", 2)
+        return {f"{name}_Request": request, f"{name}_Response": response}
+    goal, result, feedback = _split(name, text, "a goal, a result and a feedback", 3)
+    inner = f"{package}/msg/{label}"  # rosbags writes out no definition with an action's parts inside
+    return {
+        f"{inner}_Goal": goal,
+        f"{inner}_Result": result,
+        f"{inner}_Feedback": feedback,
+        f"{name}_SendGoal_Request": f"{_ID}{package}/{label}_Goal goal",
+        f"{name}_SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp",
+        f"{name}_GetResult_Request": _ID,
+        f"{name}_GetResult_Response": f"int8 status\n{package}/{label}_Result result",
+        f"{name}_FeedbackMessage": f"{_ID}{package}/{label}_Feedback feedback",
+    }
+
+
+def _split(name: str, text: str, what: str, count: int) -> list[str]:
+    found = f"\n{text}".split("\n---")
+    if len(found) != count:
+        lines = "one line '---'" if count == 2 else f"{count - 1} lines '---'"
+        raise UsageError(f"{name}: {what}, with {lines} between them; here are {len(found)} parts")
+    return found
+
 
 _classes: dict[str, type[Message]] = {}
 _services: dict[str, ServiceType] = {}
@@ -39,7 +85,7 @@ def store() -> Typestore:
         package, text = file.name.removesuffix(".txt"), file.read_text(encoding="utf-8")
         for section in text.split("\n=== ")[1:]:
             heading, body = section.split("\n", 1)
-            texts.update(parts(f"{package}/{heading.strip()}", body))
+            texts.update(interface_messages(f"{package}/{heading.strip()}", body))
     _register(humble, texts)
     return humble
 
@@ -85,7 +131,7 @@ def define_all(texts: Mapping[str, str]) -> None:
     """``define`` several types, which may be made of each other."""
     found: dict[str, str] = {}
     for name, text in texts.items():
-        found.update(parts(name, text))
+        found.update(interface_messages(name, text))
     _register(store(), found)
 
 
@@ -246,3 +292,40 @@ def request(name: str, /, **fields: Any) -> Any:
 def definition(name: str) -> str:
     """A type's text in ROS 2's ``.msg`` format, those it is made of included (MCAP's ``ros2msg``)."""
     return store().generate_msgdef(message_name(name), ros_version=2)[0]
+
+
+_SPELLED = {"float32": "float", "float64": "double", "bool": "boolean", "byte": "octet", "char": "uint8"}
+
+
+@cache
+def idl_fields(name: str) -> dict[str, str]:
+    """The types of a message's fields by their names: ``{"data": "sequence<double>"}``."""
+    fields = store().fielddefs[message_name(name)][1]
+    return {label: _spell(what) for label, what in fields if label != "structure_needs_at_least_one_member"}
+
+
+@cache
+def nested_types(name: str) -> tuple[str, ...]:
+    """The message types that *name* is made of directly."""
+    inner = (_inner(what) for _, what in store().fielddefs[message_name(name)][1])
+    return tuple(sorted({one for one in inner if one}))
+
+
+def _inner(what: Any) -> str:
+    kind, detail = what
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return _inner(detail[0])
+    return str(detail) if kind == Nodetype.NAME else ""
+
+
+def _spell(what: Any) -> str:
+    kind, detail = what
+    if kind == Nodetype.NAME:
+        return str(detail).replace("/msg/", "/")
+    if kind == Nodetype.BASE:
+        base, bound = detail
+        return f"{base}<{bound}>" if bound else _SPELLED.get(base, base)
+    inner, count = detail
+    if kind == Nodetype.ARRAY:
+        return f"{_spell(inner)}[{count}]"
+    return f"sequence<{_spell(inner)}{f', {count}' if count else ''}>"

@@ -26,12 +26,12 @@ from volery.components.programs import (
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost.instrumentation import StepCounter
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
 from volery.model.system import Instance as InstanceModel
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch
-from volery.ros.graph import Graph, Node, RosGraph
+from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.messages import define_imported
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
@@ -166,7 +166,9 @@ class Builder:
         self._part = part
         self._truth = airfield.truth if airfield else part.truth if part else None
         self._models = part.instances if part else system.instances
-        self._graph: RosGraph = part.graph if part else Graph(kernel, platform.price, platform.between)
+        self._graph: RosGraph = (
+            part.graph if part else EmbeddedGraph(kernel, platform.price, platform.between)
+        )
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._lands: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}
@@ -325,7 +327,7 @@ class Builder:
 
     def _serve(self, airfield: SimulatedFleet, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""
-        place = Place(node_name(name), self._platform.processors[processor] if processor else None)
+        place = ExecutionContext(node_name(name), self._platform.processors[processor] if processor else None)
         serve_on_graph(self._graph, airfield, name, graph_access(self._autopilot(name), name), place)
 
 

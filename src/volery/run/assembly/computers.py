@@ -26,17 +26,17 @@ from volery.base.seeds import stream
 from volery.base.time import MS, Ns, S
 from volery.components.instance import Allocation
 from volery.components.ports import Transfer
-from volery.cost import Price, ProcessorEntry, Tariff, catalogue, scale_energy, scale_time
+from volery.cost import Price, ProcessorEntry, Tariff, load_catalogue, scale_energy, scale_time
 from volery.cost.pricing import FREE, Cost, CountedPricing, Pricing, StatedPricing
 from volery.kernel.api import Action, Kernel
 from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
-from volery.ros.graph.node import NodeId, Way
+from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.cpp import core_of, ns_per_step
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def start_background_load(kernel: Kernel, processor: Processor, model: Processor
     if model.load <= 0.0:
         return
     for core in range(model.cores):
-        place = Place(load_name(model.name), processor, LOAD_PRIORITY)
+        place = ExecutionContext(load_name(model.name), processor, LOAD_PRIORITY)
         pieces = _CoreLoad(kernel, processor, place, model.load, seed, core)
         kernel.call_at(kernel.now() + LOAD_PERIOD * core // model.cores, pieces.begin)
 
@@ -68,7 +68,13 @@ class _CoreLoad:
     """The load of one core."""
 
     def __init__(
-        self, kernel: Kernel, processor: Processor, place: Place, share: float, seed: int, core: int
+        self,
+        kernel: Kernel,
+        processor: Processor,
+        place: ExecutionContext,
+        share: float,
+        seed: int,
+        core: int,
     ) -> None:
         self._kernel = kernel
         self._run = partial(processor.load, place)
@@ -125,7 +131,7 @@ class Platform:
         self._kernel = kernel
         self._fidelity = fidelity
         self._models = {model.name: model for model in system.processors}
-        known = catalogue(*system.catalogues)
+        known = load_catalogue(*system.catalogues)
         self._entries = {model.name: known.processor(model.kind) for model in system.processors}
         self.processors = {model.name: self._processor(model) for model in system.processors}
         for model in system.processors:
@@ -249,7 +255,7 @@ class Platform:
             if vehicle.processor is not None:
                 self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Way | None:
+    def between(self, sender: NodeId, receiver: NodeId) -> Route | None:
         """How messages get from node to node: over the network between their processors, if there is one."""
         network = self._network_between(sender.processor, receiver.processor)
         if network is None:

@@ -37,7 +37,7 @@ from volery.components.cpp.compiler import (
 )
 from volery.components.cpp.cpp_program import CppProgram
 from volery.components.cpp.framework import Counters, LoadedLibrary, StepMeter, ToSteps
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.kernel.api import Kernel
 from volery.model.system import (
@@ -76,7 +76,7 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
     counts = fidelity == "code" and component.path and component.language in CPP_LANGUAGES
     if not counts or instance.processor is None:
         return None
-    known = catalogue(*system.catalogues).processors.get(system.processor(instance.processor).kind)
+    known = load_catalogue(*system.catalogues).processors.get(system.processor(instance.processor).kind)
     return None if known is None or known.core_model is None else known.core_law()
 
 
@@ -115,9 +115,10 @@ class CountingCompiler:
 
     def _price(self, costs: Path) -> None:
         """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
+        from volery.cost.native import load_costs
 
         with np.load(costs) as found:
-            learnt = kept_costs(str(found["key"]))
+            learnt = load_costs(str(found["key"]))
             cycles, memory = (found["cycles"], found["memory"])
             self.estimated = str(found["estimated"])
             if learnt is not None:
@@ -125,7 +126,7 @@ class CountingCompiler:
             self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
 
     def _digest(self, plain: Sequence[Path]) -> str:
-        from volery.cost.native.compilation import METHOD
+        from volery.cost.native import METHOD
 
         contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
         told = " ".join((METHOD, self._law.model_dump_json(), *contents))
@@ -134,10 +135,10 @@ class CountingCompiler:
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
     ) -> None:
-        from volery.cost.native import block_costs
+        from volery.cost.native import instrument
 
         new = made.with_suffix(".new.o")
-        found = block_costs(sources, self._law, new, compiler_options(include, flags))
+        found = instrument(sources, self._law, new, compiler_options(include, flags))
         costs = found.costs
         theirs = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
         np.savez(
@@ -192,8 +193,9 @@ class TracingCompiler:
 
     def begin(self, library: LoadedLibrary, file: Path) -> None:
         """Have a library that was compiled so tell it to *file*, until its ``volery_end`` is called."""
+        from volery.cost.native import cache_settings
 
-        library.function("volery_model_caches")(in_words(self.law.memory).encode())
+        library.function("volery_model_caches")(cache_settings(self.law.memory).encode())
         each, of = ctypes.c_uint64(WINDOW), ctypes.c_uint64(STRIDE)
         library.function("volery_trace_into")(str(file).encode(), each, of)
 

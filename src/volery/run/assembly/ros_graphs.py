@@ -10,7 +10,7 @@ from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import RosGraph
-from volery.ros.transports.graph import TransportGraph
+from volery.ros.transports.transport_graph import TransportGraph
 
 
 def _ros1(kernel: Kernel, start_master: bool, epoch: Ns | None) -> TransportGraph:

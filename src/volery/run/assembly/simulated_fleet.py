@@ -20,7 +20,7 @@ from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.run.progress import VehicleProgress
 from volery.run.result import SAMPLING_PERIOD
 from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import Family, dialects
+from volery.simulation.autopilots.firmware import FirmwareFamily, firmwares
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.body_specs import Battery, BodySpec, Multirotor, Rover
 from volery.simulation.world.environment_models import Wind
@@ -54,11 +54,11 @@ class SimulatedFleet:
             self._world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, Autopilot] = {}
-        self._families: dict[str, Family] = {}
+        self._families: dict[str, FirmwareFamily] = {}
         ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
         for vehicle, flight in zip(vehicles, flights, strict=True):
             self.flights[vehicle.name] = flight
-            family = self._families[vehicle.name] = dialects.load(vehicle.autopilot)
+            family = self._families[vehicle.name] = firmwares.load(vehicle.autopilot)
             self.autopilots[vehicle.name] = Autopilot(
                 kernel,
                 flight,
@@ -76,7 +76,7 @@ class SimulatedFleet:
             raise UsageError("there is no vehicle in this run, and so no world")
         return self._world
 
-    def family(self, vehicle: str) -> Family:
+    def family(self, vehicle: str) -> FirmwareFamily:
         """The firmware that flies it."""
         return self._families[vehicle]
 

@@ -30,11 +30,11 @@ from volery.base.seeds import stream
 from volery.base.time import MS, Ns
 from volery.bridge import VehicleNodeOptions, serve_pprzros, serve_vehicle
 from volery.kernel.api import Action, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.links.wire_faults import REORDER_DELAY, WireFaults
-from volery.ros.graph import Graph, RosGraph
-from volery.ros.graph.node import NodeId, Way
+from volery.ros.graph import EmbeddedGraph, RosGraph
+from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle, link_to
 from volery.vehicles.driver import Driver, Opener, drivers
 
@@ -63,8 +63,8 @@ class GraphWire:
         """From now on this happens to what passes, in both directions."""
         self._faults = faults
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Way:
-        """See ``volery.ros.graph.Between``. Messages of a pair keep their order, unless faults say so."""
+    def between(self, sender: NodeId, receiver: NodeId) -> Route:
+        """See ``volery.ros.graph.Routing``. Messages of a pair keep their order, unless faults say so."""
         return partial(self._carry, sender.name, receiver.name)
 
     def _carry(
@@ -107,20 +107,22 @@ def _run_all(actions: list[Action]) -> None:
         action()
 
 
-def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Graph:
+def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> EmbeddedGraph:
     """A graph whose messages go over *wire*: as values, or as what is left of them after their bytes."""
-    return Graph(kernel, between=wire.between, unrecorded=True, as_bytes=as_bytes)
+    return EmbeddedGraph(kernel, between=wire.between, unrecorded=True, as_bytes=as_bytes)
 
 
-Serve = Callable[[RosGraph, Link, str, Place, LocalFrame], object]
+Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]
 """``serve(graph, link, vehicle, place, origin)``."""
 
 
-def _mavros(graph: RosGraph, link: Link, vehicle: str, place: Place, origin: LocalFrame) -> object:
+def _mavros(graph: RosGraph, link: Link, vehicle: str, place: ExecutionContext, origin: LocalFrame) -> object:
     return serve_vehicle(graph, link, vehicle, place, VehicleNodeOptions(origin=origin))
 
 
-def _pprzros(graph: RosGraph, link: Link, vehicle: str, place: Place, origin: LocalFrame) -> object:
+def _pprzros(
+    graph: RosGraph, link: Link, vehicle: str, place: ExecutionContext, origin: LocalFrame
+) -> object:
     return serve_pprzros(graph, link, vehicle, place)
 
 
@@ -151,7 +153,7 @@ def graph_access(autopilot: str, vehicle: str) -> GraphAccess:
 
 
 def serve_on_graph(
-    graph: RosGraph, airfield: SimulatedFleet, vehicle: str, how: GraphAccess, place: Place
+    graph: RosGraph, airfield: SimulatedFleet, vehicle: str, how: GraphAccess, place: ExecutionContext
 ) -> None:
     """Start the node that serves a simulated *vehicle*, computing at *place*."""
     codec = airfield.family(vehicle).codec
@@ -171,7 +173,7 @@ class PrivateGraph:
         self._how = replace(how, namespace=f"/{self._vehicle}/{wanted.names}") if wanted.names else how
         self._wire = GraphWire(kernel, stream(seed, f"wire/{self._vehicle}"), wanted.faults)
         self.graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
-        serve_on_graph(self.graph, airfield, self._vehicle, self._how, Place(self._vehicle))
+        serve_on_graph(self.graph, airfield, self._vehicle, self._how, ExecutionContext(self._vehicle))
 
     def suffer(self, faults: WireFaults) -> None:
         """From now on this happens to what passes, in both directions."""
@@ -179,7 +181,7 @@ class PrivateGraph:
 
     def open(self, commander: str = "commander", **options: str) -> Driver:
         """A driver of the vehicle, on a node called *commander*."""
-        place = Place(f"{commander} of {self._vehicle}")
+        place = ExecutionContext(f"{commander} of {self._vehicle}")
         node = self.graph.node(commander, f"/{self._vehicle}", place=place)
         stated = {"namespace": self._how.namespace, **options}
         return self._how.open_driver(self._kernel, node, self._vehicle, stated)

@@ -15,7 +15,7 @@ from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, eule
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
@@ -168,7 +168,9 @@ class RealGraphs:
         open_driver = drivers.load(address.driver).on_graph
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
-        node = self.graph(address.carrier).node(f"volery_{name}", anonymous=True, place=Place(name))
+        node = self.graph(address.carrier).node(
+            f"volery_{name}", anonymous=True, place=ExecutionContext(name)
+        )
         namespace = address.path.rstrip("/")
         stated = {"namespace": namespace} if namespace else {}
         return open_driver(self._kernel, node, name, {**stated, **address.options})

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.cost import catalogue
+from volery.cost import load_catalogue
 from volery.model.system import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
 from volery.run.assembly.faults import KINDS
-from volery.simulation.autopilots.firmware import dialects
+from volery.simulation.autopilots.firmware import firmwares
 
 LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
 """Languages of components that run today."""
@@ -16,7 +16,7 @@ LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
 
 def vocabulary() -> Vocabulary:
     """What a model is checked against."""
-    autopilots = frozenset(dialects.names())
+    autopilots = frozenset(firmwares.names())
     return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, frozenset(KINDS), _kinds)
 
 
@@ -28,5 +28,5 @@ def _kinds(*more: Path) -> dict[str, ProcessorKind]:
             entry.greatest_mhz * 1e6,
             tuple(one * 1e6 for one in entry.set_to()),
         )
-        for name, entry in catalogue(*more).processors.items()
+        for name, entry in load_catalogue(*more).processors.items()
     }

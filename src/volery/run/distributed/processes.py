@@ -18,8 +18,8 @@ from volery.base.errors import ComponentError, LinkSilent, choices
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Signal
 from volery.model.system import System
-from volery.ros.graph.clock import CLOCK_PERIOD
-from volery.ros.transports.abroad import under_way
+from volery.ros.graph.embedded_graph import CLOCK_PERIOD
+from volery.ros.transports.blocking_calls import pending_calls
 from volery.run.assembly.components import Builder, BuiltComponents, ProcessPart, Truth
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.ros_graphs import open_graph
@@ -214,7 +214,7 @@ class DistributedRun:
         """Let the nodes of this process join while time stands still; then let the processes begin."""
         end = time.monotonic() + READY_S
         self._kernel.run(0)
-        while under_way(self._kernel) and time.monotonic() < end:
+        while pending_calls(self._kernel) and time.monotonic() < end:
             time.sleep(GLANCE_S / 10)
             self._kernel.run(0)
         for process in self._processes:

@@ -22,12 +22,12 @@ from volery.components.instance import Instance
 from volery.components.loader import SHARED_MODULE_PREFIX, USER_MODULE_PREFIX
 from volery.components.ports import Port, invoke
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place, Scope, Task
+from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import current_task
 from volery.model.system import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
-from volery.ros.graph.group import Work
+from volery.ros.graph.callbacks import Work
 from volery.ros.messages import Message, request, service
 from volery.run.distributed.plan import NODE, operations, service_name
 
@@ -212,7 +212,7 @@ class PortServer:
             self._node.serve(service_name(model, operation), CALL, handler, self._group)
 
     def _start(self, work: Work) -> None:
-        self._kernel.spawn(work.run, f"{NODE} (call)", Place(NODE), self._scope)
+        self._kernel.spawn(work.run, f"{NODE} (call)", ExecutionContext(NODE), self._scope)
 
     def _answer(self, instance: Instance, operation: str, asked: Any) -> Message:
         respond = service(CALL).response

@@ -18,7 +18,7 @@ from types import ModuleType
 from volery.base.errors import VoleryError
 from volery.base.position import Position
 from volery.components.loader import Loader
-from volery.kernel.following import FollowingKernel
+from volery.kernel.wall import FollowingKernel
 from volery.requirements.record import Status
 from volery.run.assembly.components import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph

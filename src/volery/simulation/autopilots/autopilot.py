@@ -18,11 +18,11 @@ from volery.base.errors import UsageError, choices
 from volery.base.frames import Vector, ned_to_enu
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Handle, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
-from volery.simulation.autopilots.firmware import Dialect, Family
+from volery.simulation.autopilots.firmware import Firmware, FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import VehicleState
@@ -43,7 +43,7 @@ class Autopilot:
         self,
         kernel: Kernel,
         flight: Flight,
-        dialect: Dialect | Family,
+        firmware: Firmware | FirmwareFamily,
         *,
         system: int = 1,
         parameters: Mapping[str, float] | None = None,
@@ -52,8 +52,8 @@ class Autopilot:
     ) -> None:
         self._kernel = kernel
         self._flight = flight
-        chosen = _of_kind(dialect, "multirotor" if flight.flying else "rover")
-        self.dialect = chosen
+        chosen = _of_kind(firmware, "multirotor" if flight.flying else "rover")
+        self.firmware = chosen
         self.name = name or f"{chosen.name}_{system}"
         self.vehicle = Vehicle(kernel, flight, chosen, system=system, name=self.name, overrides=parameters)
         self.face: ProtocolEndpoint = chosen.face(self.vehicle)
@@ -84,19 +84,21 @@ class Autopilot:
         if switch_on:
             self.switch_on()
 
-    def join(self, graph: RosGraph, namespace: str, place: Place, *, switch_on: bool = True) -> None:
+    def join(
+        self, graph: RosGraph, namespace: str, place: ExecutionContext, *, switch_on: bool = True
+    ) -> None:
         """Serve on *graph* under *namespace*; the node's computing is spent at *place*. A cold vehicle is
         switched on, unless *switch_on* is False. Raises ``UsageError`` for a firmware that speaks on links.
         """
         if not isinstance(self.face, GraphEndpoint):
-            raise UsageError(f"{self.name}: a simulated {self.dialect.name} is reached over links")
+            raise UsageError(f"{self.name}: a simulated {self.firmware.name} is reached over links")
         self.face.join(graph, namespace, place)
         if switch_on:
             self.switch_on()
 
     def _on_links(self) -> LinkEndpoint:
         if not isinstance(self.face, LinkEndpoint):
-            raise UsageError(f"{self.name}: a simulated {self.dialect.name} is reached over a graph")
+            raise UsageError(f"{self.name}: a simulated {self.firmware.name} is reached over a graph")
         return self.face
 
     def switch_on(self) -> None:
@@ -127,41 +129,41 @@ class Autopilot:
         self.on_reboot()
 
     def _boot(self, age: Ns) -> None:
-        vehicle, dialect = self.vehicle, self.dialect
+        vehicle, firmware = self.vehicle, self.firmware
         vehicle.boot(age)
         self._ticks = 0
         if age:
             self._flight.set_origin()
-            dialect.on_warm(vehicle)
-            self._at(age + WARM_UP, lambda: dialect.on_warm_position(vehicle))
+            firmware.on_warm(vehicle)
+            self._at(age + WARM_UP, lambda: firmware.on_warm_position(vehicle))
         else:
-            for event in dialect.boot_events:
+            for event in firmware.boot_events:
                 self._at(event.after, partial(event.act, vehicle))
         self.face.start()
-        self._clocks.append(self._kernel.every(dialect.tick, self._tick))
-        phase = (dialect.each_second_from - age) % S
+        self._clocks.append(self._kernel.every(firmware.tick, self._tick))
+        phase = (firmware.each_second_from - age) % S
         self._at(
             age + phase,
-            lambda: self._clocks.append(self._kernel.every(S, lambda: dialect.each_second(vehicle))),
+            lambda: self._clocks.append(self._kernel.every(S, lambda: firmware.each_second(vehicle))),
         )
 
     def _at(self, uptime: Ns, action: Action) -> None:
         self._clocks.append(self._kernel.call_at(self.vehicle.boot_at + uptime, action))
 
     def _tick(self) -> None:
-        vehicle, dialect = self.vehicle, self.dialect
+        vehicle, firmware = self.vehicle, self.firmware
         self._ticks += 1
         if vehicle.armed:
             vehicle.watch_ground()
             vehicle.act()
-        dialect.on_step(vehicle)
-        if self._ticks % dialect.watch_every == 0:
+        firmware.on_step(vehicle)
+        if self._ticks % firmware.watch_every == 0:
             self._watch()
 
     def _watch(self) -> None:
         """Look whether a failsafe begins or ends."""
         vehicle = self.vehicle
-        for watch in self.dialect.watches:
+        for watch in self.firmware.watches:
             tripped, was = watch.tripped(vehicle), watch.name in vehicle.failsafes
             if tripped and not was:
                 vehicle.failsafes.add(watch.name)
@@ -205,14 +207,14 @@ class Autopilot:
         return ned_to_enu((position[0] + offset[0], position[1] + offset[1], position[2] + offset[2]))
 
 
-def _of_kind(dialect: Dialect | Family, kind: str) -> Dialect:
-    if isinstance(dialect, Dialect):
-        if dialect.kind != kind:
-            raise UsageError(f"{dialect.name} flies a {dialect.kind}, but the body is a {kind}")
-        return dialect
-    if kind not in dialect.kinds:
-        raise UsageError(f"{dialect.name} has no {kind}; it has {choices(dialect.kinds)}")
-    return dialect.kinds[kind]
+def _of_kind(firmware: Firmware | FirmwareFamily, kind: str) -> Firmware:
+    if isinstance(firmware, Firmware):
+        if firmware.kind != kind:
+            raise UsageError(f"{firmware.name} flies a {firmware.kind}, but the body is a {kind}")
+        return firmware
+    if kind not in firmware.kinds:
+        raise UsageError(f"{firmware.name} has no {kind}; it has {choices(firmware.kinds)}")
+    return firmware.kinds[kind]
 
 
 def _nothing() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.vehicle_state import VehicleOutput
@@ -46,5 +46,5 @@ class LinkEndpoint(ProtocolEndpoint, Protocol):
 class GraphEndpoint(ProtocolEndpoint, Protocol):
     """A protocol of topics and services on a graph."""
 
-    def join(self, graph: RosGraph, namespace: str, place: Place) -> None:
+    def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
         """Serve on that graph: all its names are under *namespace*, its computing is spent at *place*."""

@@ -14,32 +14,32 @@ from volery.links.link import Codec
 from volery.links.mavlink_codec import MAVLINK
 from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.autopilots.mode import Mode
 from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.vehicle_state import Mode
 
 if TYPE_CHECKING:
     from volery.simulation.autopilots.endpoint import ProtocolEndpoint
     from volery.simulation.autopilots.vehicle_state import Vehicle
 
-Act = Callable[["Vehicle"], None]
+VehicleAction = Callable[["Vehicle"], None]
 
 
-class Event(NamedTuple):
+class BootEvent(NamedTuple):
     """Something that happens at a fixed time after boot."""
 
     after: Ns
-    act: Act
+    act: VehicleAction
 
 
-class Watch(NamedTuple):
+class Failsafe(NamedTuple):
     """A failsafe: a condition that is looked at regularly, and what is done when it begins and when it
     ends.
     """
 
     name: str
     tripped: Callable[[Vehicle], bool]
-    begins: Act
-    ends: Act
+    begins: VehicleAction
+    ends: VehicleAction
 
 
 def _nothing(_vehicle: Vehicle) -> None:
@@ -60,7 +60,7 @@ def _no_memory(_vehicle: Vehicle) -> object:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dialect:
+class Firmware:
     """One firmware for one kind of vehicle: how it flies. What it says on the wire is its face's."""
 
     name: str
@@ -73,7 +73,7 @@ class Dialect:
 
     # -- boot
     boot_mode: Mode
-    boot_events: tuple[Event, ...] = ()
+    boot_events: tuple[BootEvent, ...] = ()
     ready_after: Ns
     """From then on it streams, and texts follow the answer that they belong to."""
     origin_after: Ns
@@ -84,16 +84,16 @@ class Dialect:
     """From then on the local position is sent."""
     warm_age: Ns = 60 * S
     """How long ago a vehicle that starts warm was switched on."""
-    on_warm: Act
+    on_warm: VehicleAction
     """Bring a vehicle to the state in which its boot leaves it, but for its position."""
-    on_warm_position: Act
+    on_warm_position: VehicleAction
     """A moment later there is a position."""
 
     # -- time
     tick: Ns = 100 * MS
     watch_every: int = 3
     """Failsafes are looked at each so many ticks."""
-    each_second: Act
+    each_second: VehicleAction
     each_second_from: Ns = 0
 
     # -- flight
@@ -107,23 +107,23 @@ class Dialect:
     takeoff_slew: Ns = 0
     resigns_after: Ns = 0
     """A vehicle that has not left the ground and no longer wants to counts as standing after that."""
-    watches: tuple[Watch, ...] = ()
-    on_step: Act
+    watches: tuple[Failsafe, ...] = ()
+    on_step: VehicleAction
     """At each tick, after the manoeuvre."""
-    on_disarmed: Act
+    on_disarmed: VehicleAction
     throttle_centred: bool = False
     """Whether the throttle stick rests in its middle."""
     first_item: int = 1
     """Number of the first mission item that is flown: 1 where item 0 is home."""
     actions_count: bool = False
     """Whether an item that does not navigate is told to be done, too."""
-    guided_arrived: Act = _nothing
+    guided_arrived: VehicleAction = _nothing
     """A rover has reached the point that it was sent to."""
-    guided_stale: Act = _nothing
+    guided_stale: VehicleAction = _nothing
     """A rover stops because no target came."""
     mission_item_done: Callable[[Vehicle, int, MissionItem], None] = _no_item
     mission_item_begins: Callable[[Vehicle, int, MissionItem], None] = _no_item
-    mission_ended: Act = _nothing
+    mission_ended: VehicleAction = _nothing
     mission_action: Callable[[Vehicle, MissionItem], None] = _no_action
     """Do an item that does not navigate."""
 
@@ -131,7 +131,7 @@ class Dialect:
     parameters: Callable[[], tuple[Parameter, ...]]
     own_parameters: Callable[[int, Flight], Mapping[str, float]]
     """Values that follow from the vehicle: its system id, its battery."""
-    honoured: Mapping[str, str]
+    supported_parameters: Mapping[str, str]
     """Parameters that change what the vehicle does, and what they change."""
 
 
@@ -147,17 +147,17 @@ GROUND_STATION = Station("udp://127.0.0.1:14550")
 
 
 @dataclass(frozen=True)
-class Family:
+class FirmwareFamily:
     """A firmware: its dialects by kind of vehicle, and the codec of its links; without one it is reached over
     a graph.
     """
 
     name: str
-    kinds: Mapping[str, Dialect]
+    kinds: Mapping[str, Firmware]
     codec: Codec | None = MAVLINK
     stations: tuple[Station, ...] = (GROUND_STATION,)
     """Where one that is served speaks, unless it is told otherwise."""
 
 
-dialects: Registry[Family] = Registry("volery.autopilots", "simulated autopilot")
+firmwares: Registry[FirmwareFamily] = Registry("volery.autopilots", "simulated autopilot")
 """Entry points of the group ``volery.simulation.autopilots``."""

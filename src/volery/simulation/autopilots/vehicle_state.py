@@ -1,4 +1,6 @@
-"""A vehicle as its autopilot's software knows it: mode, arming, home, sticks, parameters, mission, failsafes.
+"""What a mode is: a number and a name on the wire, and a manoeuvre that flies it.
+
+A vehicle as its autopilot's software knows it: mode, arming, home, sticks, parameters, mission, failsafes.
 
 The one state that all parts of the flight stack share. It speaks through an ``VehicleOutput`` and knows no
 protocol; what differs between firmwares it asks its dialect.
@@ -7,19 +9,105 @@ protocol; what differs between firmwares it asks its dialect.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import hypot
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.kernel.api import Action, Kernel
 from volery.simulation.autopilots.autopilot_parameters import Parameters
-from volery.simulation.autopilots.flight_stack.flight import Estimate, Flight, Setpoint
+from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import NEVER, RcChannels
-from volery.simulation.autopilots.mode import IDLE, OFF, Manoeuvre, Mode
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
 
 if TYPE_CHECKING:
-    from volery.simulation.autopilots.firmware import Dialect
+    pass
+    from volery.simulation.autopilots.firmware import Firmware
+
+
+class Manoeuvre:
+    """One way of flying. ``enter`` once, then ``step`` at every tick and whenever the sticks moved.
+
+    While the vehicle stands on the ground with its motors off or idling, the manoeuvre says whether it
+    wants to lift off (``wants_to_fly``); until the motors are up it gives no set-points that would lift it.
+    """
+
+    landing: bool = False
+    """Whether it is on its way down to the ground."""
+
+    taking_off: bool = False
+    """Whether it is climbing away from the ground to a stated height."""
+
+    slow_start: bool = False
+    """Whether the motors come up slowly."""
+
+    target: Vector | None = None
+    """Where it goes: north, east, down about the estimator's origin [m]; ``None`` where it has no such
+    point.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+
+    def enter(self) -> None:
+        """It begins now."""
+
+    def step(self) -> None:
+        """Look, decide, drive."""
+        raise NotImplementedError
+
+    def on_ground(self) -> None:
+        """Called at every tick while it stands on the ground with its motors running."""
+
+    def item_chosen(self) -> None:
+        """Another mission item has become current."""
+
+    def wants_to_fly(self) -> bool:
+        """Whether the motors should come up from idle while it stands on the ground."""
+        return False
+
+    def distance(self) -> float:
+        """Metres to the target in the plane; 0 without a target."""
+        if self.target is None:
+            return 0.0
+        here = self.vehicle.estimate.position
+        return hypot(self.target[0] - here[0], self.target[1] - here[1])
+
+    def drive(self, setpoint: Setpoint) -> None:
+        """Hand a set-point to the inner loops, unless they hold the same one already."""
+        self.vehicle.drive(setpoint)
+
+    def idle(self) -> None:
+        """Motors turn slowly, nothing is held."""
+        self.vehicle.drive(IDLE)
+
+
+OFF = Setpoint(Control.OFF)
+IDLE = Setpoint(Control.IDLE)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of a firmware.
+
+    ``base_mode`` holds the heartbeat's bits while disarmed. ``controls`` are the bits of SYS_STATUS that
+    are enabled and healthy in this mode only. ``pilot`` says that the sticks fly it, ``manual_throttle``
+    that they command thrust. ``user_takeoff`` says that a take-off command is accepted.
+    """
+
+    number: int
+    name: str
+    base_mode: int
+    manoeuvre: Callable[[Vehicle], Manoeuvre]
+    controls: int = 0
+    needs_position: bool = False
+    armable: bool = True
+    pilot: bool = False
+    manual_throttle: bool = False
+    user_takeoff: bool = False
+    starts_high: bool = False
+    """May be armed by a ground station with the throttle stick up."""
 
 
 class VehicleOutput(Protocol):
@@ -63,7 +151,7 @@ class Vehicle:
         self,
         kernel: Kernel,
         flight: Flight,
-        dialect: Dialect,
+        firmware: Firmware,
         *,
         system: int,
         name: str,
@@ -71,22 +159,22 @@ class Vehicle:
     ) -> None:
         self.kernel = kernel
         self.flight = flight
-        self.dialect = dialect
+        self.firmware = firmware
         self.system = system
         self.name = name
         self.outlet: VehicleOutput
         self.restart: Action
         """Switch the autopilot off and on again."""
         self.parameters = Parameters(
-            dialect.parameters(), {**dialect.own_parameters(system, flight), **(overrides or {})}
+            firmware.parameters(), {**firmware.own_parameters(system, flight), **(overrides or {})}
         )
-        self.tuning = dialect.tuning(self.parameters)
-        self.sticks = RcChannels(dialect.transmitter)
+        self.tuning = firmware.tuning(self.parameters)
+        self.sticks = RcChannels(firmware.transmitter)
         self.plan = OnboardMission()
-        self.memory: Any = dialect.memory(self)
+        self.memory: Any = firmware.memory(self)
         """What only its firmware knows of."""
         self.boot_at: Ns = kernel.now()
-        self.mode: Mode = dialect.boot_mode
+        self.mode: Mode = firmware.boot_mode
         self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
         self._reset()
 
@@ -142,7 +230,7 @@ class Vehicle:
         self.boot_at = self.kernel.now() - age
         self._reset()
         self.sticks.release()
-        self.mode = self.dialect.boot_mode
+        self.mode = self.firmware.boot_mode
         self.manoeuvre = self.mode.manoeuvre(self)
 
     @property
@@ -153,7 +241,7 @@ class Vehicle:
     @property
     def has_position(self) -> bool:
         """Whether modes that need a position may fly."""
-        return self.uptime() >= self.dialect.position_after and self.estimate.position_ok
+        return self.uptime() >= self.firmware.position_after and self.estimate.position_ok
 
     def set_home(self, latitude: float, longitude: float, amsl: float) -> None:
         """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
@@ -191,7 +279,7 @@ class Vehicle:
         changed = self.parameters.set(name, value)
         if changed is None:
             return False
-        self.tuning = self.dialect.tuning(self.parameters)
+        self.tuning = self.firmware.tuning(self.parameters)
         self.outlet.parameter(name)
         return True
 
@@ -247,9 +335,9 @@ class Vehicle:
         """Let the manoeuvre decide what the motors do; called at every tick and when the sticks moved."""
         if not self.armed:
             self.drive(OFF)
-        elif self.dialect.stands and self.landed:
+        elif self.firmware.stands and self.landed:
             self._stand()
-        elif self.dialect.stands and not self._lifted and not self.manoeuvre.wants_to_fly():
+        elif self.firmware.stands and not self._lifted and not self.manoeuvre.wants_to_fly():
             self.drive(IDLE)  # the wish to fly went before it had left the ground
         else:
             self.manoeuvre.step()
@@ -258,8 +346,8 @@ class Vehicle:
         """On the ground: motors rest, idle, and come up in the firmware's own time when the manoeuvre wants
         to fly.
         """
-        now, dialect = self.kernel.now(), self.dialect
-        if now - self.armed_at < dialect.motors_rest:
+        now, firmware = self.kernel.now(), self.firmware
+        if now - self.armed_at < firmware.motors_rest:
             self.drive(OFF)
             return
         self.manoeuvre.on_ground()
@@ -273,8 +361,8 @@ class Vehicle:
             self._wanted_at = now
         ready = self._wanted_at
         if self.manoeuvre.slow_start:
-            idling = self.armed_at + dialect.motors_rest + dialect.spool_time
-            ready = max(ready, idling) + dialect.takeoff_slew
+            idling = self.armed_at + firmware.motors_rest + firmware.spool_time
+            ready = max(ready, idling) + firmware.takeoff_slew
         if now < ready:
             self.drive(IDLE)
             return
@@ -284,14 +372,14 @@ class Vehicle:
 
     def watch_ground(self) -> None:
         """Notice that it has left the ground, come down, or given up the wish to fly."""
-        if not self.armed or self.landed or not self.dialect.stands:
+        if not self.armed or self.landed or not self.firmware.stands:
             return
         now = self.kernel.now()
         on_ground = self.estimate.landed
         self._lifted = self._lifted or not on_ground
         if not on_ground or self.manoeuvre.wants_to_fly():
             self._resigned_at = now
-        if on_ground and (self._lifted or now - self._resigned_at >= self.dialect.resigns_after):
+        if on_ground and (self._lifted or now - self._resigned_at >= self.firmware.resigns_after):
             self.landed = True
             self.landed_at = self.idle_since = now
             self._wanted_at = NEVER

@@ -10,12 +10,12 @@ import pytest
 from rigs.missions import carried_out
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new, request
 from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.dji import DIALECT
+from volery.simulation.autopilots.dji import FIRMWARE
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
 from volery.trace.events import Text
@@ -53,11 +53,11 @@ class Apron:
         body = Multirotor(sensors="rtk")
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
         self.autopilot = Autopilot(
-            self.kernel, self.flight, DIALECT, warm=warm, name="d", parameters=parameters
+            self.kernel, self.flight, FIRMWARE, warm=warm, name="d", parameters=parameters
         )
-        self.graph = Graph(self.kernel, unrecorded=True)
-        self.autopilot.join(self.graph, f"/d/{package}", Place("d"))
-        self.node = self.graph.node("program", place=Place("program"))
+        self.graph = EmbeddedGraph(self.kernel, unrecorded=True)
+        self.autopilot.join(self.graph, f"/d/{package}", ExecutionContext("d"))
+        self.node = self.graph.node("program", place=ExecutionContext("program"))
         self.seen: dict[str, Any] = {}
         self.counts: dict[str, int] = {}
         self._publishers: dict[str, Any] = {}

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from volery.base.errors import UsageError
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.ros.messages import new
 
 Make = Callable[..., Any]
@@ -490,10 +490,10 @@ def test_the_vehicle_node_of_4_1_has_its_services_beside_its_topics(apron: Make)
 def test_where_it_may_join_a_graph(apron: Make) -> None:
     yard = apron()
     with pytest.raises(UsageError, match="on a graph already"):
-        yard.autopilot.join(yard.graph, "/other/dji_sdk", Place("d"))
+        yard.autopilot.join(yard.graph, "/other/dji_sdk", ExecutionContext("d"))
     other = apron()
     other.autopilot.face.hang_up()
     with pytest.raises(UsageError, match="dji_sdk or dji_osdk_ros"):
-        other.autopilot.join(other.graph, "/d/mavros", Place("d"))
+        other.autopilot.join(other.graph, "/d/mavros", ExecutionContext("d"))
     with pytest.raises(UsageError, match="over a graph"):
         yard.autopilot.connect(None)

@@ -17,7 +17,7 @@ from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
-from volery.simulation.autopilots.px4 import DIALECT
+from volery.simulation.autopilots.px4 import FIRMWARE
 from volery.simulation.autopilots.px4.events import Checks, report
 from volery.simulation.autopilots.px4.joystick import Deflection, Joystick, deflection
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
@@ -127,7 +127,7 @@ def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
     kernel = VirtualKernel()
     spec = Multirotor() if kind == "multirotor" else Rover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
-    autopilot = Autopilot(kernel, flights[0], DIALECT, warm=True)
+    autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
     heard: list[tuple[Any, ...]] = []
     ours.receive(lambda frame: heard.append((kernel.now(), frame.name, repr(frame.fields))))

@@ -9,11 +9,11 @@ import pytest
 
 from rigs.missions import carried_out
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import message_class, new
-from volery.ros.messages.dji import SETPOINT, SETPOINT_TOPICS
+from volery.ros.messages.dji_constants import SETPOINT, SETPOINT_TOPICS
 from volery.vehicles import Drone
 from volery.vehicles.drivers.dji import open_driver
 
@@ -24,9 +24,9 @@ METRES = 111_195.0
 class FakeNode:
     """``dji_sdk`` 3.8 as a script. ``refuse``: names of services that say no; ``deaf``: that never answer."""
 
-    def __init__(self, graph: Graph, namespace: str, hardware: str = "A3") -> None:
+    def __init__(self, graph: EmbeddedGraph, namespace: str, hardware: str = "A3") -> None:
         self.kernel = graph.kernel
-        self.node = node = graph.node("dji_sdk", place=Place("aircraft"))
+        self.node = node = graph.node("dji_sdk", place=ExecutionContext("aircraft"))
         self.hardware = hardware
         self.status, self.mode, self.health, self.switch = (1 if hardware == "M100" else 0), 6, 5, 8000.0
         self.north = self.east = self.up = 0.0
@@ -55,7 +55,9 @@ class FakeNode:
         inbox = node.group(lambda work: work.run())
         for name, flag in {**SETPOINT_TOPICS, f"{SETPOINT}generic": -1}.items():
             node.subscribe(f"{namespace}/{name}", "sensor_msgs/Joy", self._setpoint(flag), group=inbox)
-        group = node.group(lambda work: self.kernel.spawn(work.run, "fake", Place("aircraft")) and None)
+        group = node.group(
+            lambda work: self.kernel.spawn(work.run, "fake", ExecutionContext("aircraft")) and None
+        )
         for name, kind in {
             "activation": "Activation",
             "sdk_control_authority": "SDKControlAuthority",
@@ -144,9 +146,9 @@ class Bench:
     def __init__(self, hardware: str = "A3", **options: str) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        self.graph = Graph(self.kernel, unrecorded=True)
+        self.graph = EmbeddedGraph(self.kernel, unrecorded=True)
         self.node = FakeNode(self.graph, "/dji_sdk", hardware)
-        commander = self.graph.node("commander", place=Place("commander"))
+        commander = self.graph.node("commander", place=ExecutionContext("commander"))
         self.driver = open_driver(self.kernel, commander, "d", {"namespace": "/dji_sdk", **options})
         self.drone = Drone(self.kernel, "d", self.driver)
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.wire_faults import WireFaults
 from volery.ros.graph import ServiceError
@@ -24,7 +24,7 @@ class Pair:
         self.kernel = VirtualKernel(record=self.events.append)
         self.wire = GraphWire(self.kernel, Random(5), faults)
         self.graph = private_graph(self.kernel, self.wire, as_bytes=faults is not None)
-        here = Place("here")
+        here = ExecutionContext("here")
         talker, listener = (self.graph.node(name, place=here) for name in ("talker", "listener"))
         self.heard: list[tuple[int, float]] = []
         group = listener.group(lambda work: work.run())
@@ -51,7 +51,7 @@ class Pair:
                 self.publisher.publish(new("std_msgs/Float32", data=number + 0.1))
                 self.kernel.sleep_until(self.kernel.now() + period)
 
-        self.kernel.spawn(flow, "talker", Place("talker"))
+        self.kernel.spawn(flow, "talker", ExecutionContext("talker"))
         self.kernel.run(self.kernel.now() + (count + 200) * period)
         return [number for _, number in self.heard]
 
@@ -66,7 +66,7 @@ class Pair:
             else:
                 outcome.append("")
 
-        self.kernel.spawn(flow, "asker", Place("asker"))
+        self.kernel.spawn(flow, "asker", ExecutionContext("asker"))
         self.kernel.call_at(self.kernel.now() + 10 * S, lambda: None)
         self.kernel.run(self.kernel.now() + 10 * S)
         return outcome[0]

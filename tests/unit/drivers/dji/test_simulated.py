@@ -13,7 +13,7 @@ from volery.base.errors import Failsafe, NotArrived, Overridden
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, S
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
 from volery.trace.events import Operation
@@ -224,7 +224,9 @@ def test_two_in_one_world_do_not_hear_each_other() -> None:
         ended.append(vehicle.name)
 
     for vehicle, height in zip(opened.vehicles, (4.0, 8.0), strict=True):
-        opened.kernel.spawn(lambda v=vehicle, h=height: flow(v, h), vehicle.name, Place(vehicle.name))
+        opened.kernel.spawn(
+            lambda v=vehicle, h=height: flow(v, h), vehicle.name, ExecutionContext(vehicle.name)
+        )
     opened.kernel.run(30 * S)
     assert sorted(ended) == ["one", "two"]
     heights = [vehicle.altitude.metres for vehicle in opened.vehicles]

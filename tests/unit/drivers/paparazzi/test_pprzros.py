@@ -12,14 +12,14 @@ from volery.base.errors import LinkSilent, UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS, S
 from volery.bridge import serve_pprzros
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzros_messages import TYPE, to_message
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new
 from volery.trace.events import Operation
 from volery.vehicles import Drone
@@ -37,9 +37,9 @@ class OnGraph:
         self.kernel = VirtualKernel(record=self.events.append)
         link, theirs = in_process_pair(self.kernel, MS, "radio", PPRZLINK)
         self.aircraft = peer(self.kernel, theirs)
-        self.graph = Graph(self.kernel, between=self._between)
+        self.graph = EmbeddedGraph(self.kernel, between=self._between)
         if bridged:
-            serve_pprzros(self.graph, link, "bee", Place("bridge"))
+            serve_pprzros(self.graph, link, "bee", ExecutionContext("bridge"))
 
     def _between(self, one: Any, other: Any) -> Any:
         return lambda size, sure, deliver, lost: self.kernel.call_at(self.kernel.now() + MS, deliver)
@@ -116,7 +116,7 @@ def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
             sleep(at.kernel, S)
             publisher.publish(new(TYPE, msg_name="NO_SUCH_MESSAGE", sender_id=7, data=[1, 2, 3]))
 
-    at.kernel.spawn(babble, "babbler", Place("babbler"))
+    at.kernel.spawn(babble, "babbler", ExecutionContext("babbler"))
     with pytest.raises(LinkSilent, match="is not understood: pprzlink has no message 'NO_SUCH_MESSAGE'"):
         at.fly(lambda drone: drone.wait_heard())
 
@@ -135,7 +135,7 @@ def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
             publisher.publish(to_message(status, at.kernel.now()))
             group.spin_once(0)
 
-    at.kernel.spawn(bridge, "bridge", Place("bridge"))
+    at.kernel.spawn(bridge, "bridge", ExecutionContext("bridge"))
     at.fly(lambda drone: drone.wait_heard(), namespace="/")
     assert heard[0].msg_name == "PING"
 

@@ -12,11 +12,11 @@ from volery.base.errors import Overridden, UsageError
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS
 from volery.bridge import serve_vehicle
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process_link import in_process_pair
-from volery.ros.graph import Graph
+from volery.ros.graph import EmbeddedGraph
 from volery.vehicles import Drone
 from volery.vehicles.drivers.mavros import MAVROS
 from volery.vehicles.drivers.px4.modes import HOLD
@@ -32,8 +32,8 @@ def flown(at: Any, mission: Callable[[Any], Any]) -> Any:
     link, theirs = in_process_pair(kernel, name="radio")
     at.autopilot = type(at.autopilot)(kernel, theirs)
     at.craft = at.autopilot.craft
-    graph = Graph(kernel)
-    serve_vehicle(graph, link, "craft_1", Place("vehicle node"))
+    graph = EmbeddedGraph(kernel)
+    serve_vehicle(graph, link, "craft_1", ExecutionContext("vehicle node"))
 
     def body() -> Any:
         open_driver = MAVROS.on_graph

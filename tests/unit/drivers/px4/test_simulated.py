@@ -20,7 +20,7 @@ from volery.vehicles.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD
 class Field(Airstrip):
     """A simulated PX4, its driver, and a pilot."""
 
-    dialect = "px4"
+    firmware = "px4"
     opener = staticmethod(open_driver)
 
     def pilot_chooses(self, mode: str, after_s: float = 0.0) -> None:

@@ -6,7 +6,7 @@ be installed, only rospy itself.
 """
 
 from volery.ros.transports.ros1.graph import ros1_graph
-from volery.ros.transports.ros1.roscore import Roscore, master_answers
+from volery.ros.transports.ros1.master import Roscore, master_answers
 from volery.ros.transports.ros1.rospy_copy import available
 
 __all__ = ["Roscore", "available", "master_answers", "ros1_graph"]

@@ -11,14 +11,20 @@ from typing import Any
 from volery.base.errors import LinkError, UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.ros.graph.context import Records
-from volery.ros.graph.graph import everything
-from volery.ros.graph.node import ServiceState, TopicState
+from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.graph_context import Records
+from volery.ros.graph.interface import ServiceState, TopicState
 from volery.ros.messages.ros1 import our_name
-from volery.ros.transports.graph import TransportGraph
-from volery.ros.transports.ros1.master import URI_VARIABLE, Master, TopicTypes, uri_of_master
-from volery.ros.transports.ros1.roscore import Roscore, master_answers
-from volery.ros.transports.ros1.wire import Ros1Wire, is_reachable
+from volery.ros.transports.ros1.master import (
+    URI_VARIABLE,
+    Master,
+    Roscore,
+    TopicTypes,
+    master_answers,
+    uri_of_master,
+)
+from volery.ros.transports.ros1.rospy_node import Ros1Node, is_reachable
+from volery.ros.transports.transport_graph import TransportGraph
 
 WATCH_S = 1.0
 LOGGERS = ("rosout", "rospy")
@@ -38,8 +44,8 @@ class _ToTrace(logging.Handler):
         self._say(f"{topic}: {text}" if topic.startswith("/") else text)
 
 
-class Ros1:
-    """See ``volery.ros.transports.wire.Library``.
+class Ros1Library:
+    """See ``volery.ros.transports.client_library.ClientLibrary``.
 
     A thread watches the master: one that comes back after its death has forgotten everything, and is told
     again who is here.
@@ -48,7 +54,7 @@ class Ros1:
     def __init__(self, master: Master, core: Roscore | None) -> None:
         self._master, self._core = master, core
         self._types = TopicTypes(master)
-        self._wires: list[Ros1Wire] = []
+        self._wires: list[Ros1Node] = []
         self._guard = threading.Lock()
         self._over = threading.Event()
         self._log: _ToTrace | None = None
@@ -65,9 +71,9 @@ class Ros1:
     def _pass_on(self, text: str) -> None:
         self.say(text)
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Wire:
+    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Node:
         """Register a node."""
-        made = Ros1Wire(self._types, name, namespace, lost)
+        made = Ros1Node(self._types, name, namespace, lost)
         with self._guard:
             self._wires.append(made)
         return made
@@ -137,7 +143,7 @@ def ros1_graph(
     *,
     master: str = "",
     start_master: bool = True,
-    records: Records = everything,
+    records: Records = record_all,
     epoch: Ns | None = None,
 ) -> TransportGraph:
     """The graph of the ROS master at *master* (``ROS_MASTER_URI`` or ROS's default if it is empty).
@@ -154,7 +160,7 @@ def ros1_graph(
             core.start()
         else:
             Master(uri, "/volery").value("getPid")
-    library = Ros1(Master(uri, "/volery"), core)
+    library = Ros1Library(Master(uri, "/volery"), core)
     made = TransportGraph(kernel, library, records=records, epoch=epoch)
     library.say = made.warn
     library.start()

@@ -3,6 +3,8 @@
 rospy keeps its node in module globals, so a process can have one. Importing its modules anew gives another
 set of globals that shares nothing with the first but the message classes; the modules hold on to each other
 from their import on, so both work side by side.
+
+Our message types as classes that rospy takes: they carry a message's bytes as they are.
 """
 
 from __future__ import annotations
@@ -12,12 +14,16 @@ import importlib
 import sys
 import threading
 from contextlib import suppress
+from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
+from io import BytesIO
 from socket import SHUT_RDWR
 from types import ModuleType
 from typing import Any
 
 from volery.base.errors import UsageError
+from volery.ros.messages import Ros1Type, ServiceType, ros1_service, ros1_type
 
 _importing = threading.Lock()
 _MISSING = (
@@ -86,3 +92,55 @@ class Listening:
 def _take_out() -> dict[str, ModuleType]:
     names = [name for name in sys.modules if name == "rospy" or name.startswith("rospy.")]
     return {name: sys.modules.pop(name) for name in names}
+
+
+@cache
+def _carrier() -> Any:
+    """The base of all of them. Made when first asked for, as genpy may not be there."""
+    genpy = import_module("genpy")
+
+    class Carrier(genpy.Message):  # type: ignore[misc,name-defined]  # genpy carries no types
+        """Bytes of ROS 1 under a type's name."""
+
+        __slots__ = ["data"]
+        _slot_types: tuple[str, ...] = ()
+        _has_header = False
+
+        def __init__(self, data: bytes = b"") -> None:
+            self.data = data
+
+        def serialize(self, buff: BytesIO) -> None:
+            """Write the bytes."""
+            buff.write(self.data)
+
+        def deserialize(self, data: bytes) -> Any:
+            """Keep the bytes."""
+            self.data = bytes(data)
+            return self
+
+    return Carrier
+
+
+def _made(kind: Ros1Type) -> Any:
+    base = _carrier()
+    names = {"__slots__": [], "_type": kind.name, "_md5sum": kind.md5, "_full_text": kind.text}
+    return type(kind.name.replace("/", "_"), (base,), names)
+
+
+@cache
+def raw_message_class(name: str) -> Any:
+    """The class that carries messages of type *name*. ``UsageError`` if ROS 1 has no such type."""
+    return _made(ros1_type(name))
+
+
+@cache
+def raw_service_class(kind: ServiceType) -> Any:
+    """The class that rospy takes for a service type."""
+    described = ros1_service(kind.name)
+    names = {
+        "_type": described.name,
+        "_md5sum": described.md5,
+        "_request_class": _made(described.request),
+        "_response_class": _made(described.response),
+    }
+    return type(described.name.replace("/", "_"), (), names)

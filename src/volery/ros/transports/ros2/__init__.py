@@ -5,6 +5,6 @@ choice, in services. rclpy knows the types that are installed as packages with i
 """
 
 from volery.ros.transports.ros2.graph import available, ros2_graph
-from volery.ros.transports.ros2.types import carried
+from volery.ros.transports.ros2.rclpy_types import carried
 
 __all__ = ["available", "carried", "ros2_graph"]

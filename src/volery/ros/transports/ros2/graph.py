@@ -15,22 +15,24 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.ros.graph import names
-from volery.ros.graph.context import Records
-from volery.ros.graph.graph import everything
-from volery.ros.graph.node import QoS, ServiceState, TopicState
+from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.graph_context import Records
+from volery.ros.graph.interface import QoS, ServiceState, TopicState
 from volery.ros.messages import ServiceType
-from volery.ros.transports.abroad import GLANCE_S
-from volery.ros.transports.graph import TransportGraph
-from volery.ros.transports.ros2.endpoints import (
+from volery.ros.transports.blocking_calls import POLL_S
+from volery.ros.transports.client_library import OnMessage, OnRequest
+from volery.ros.transports.ros2.rclpy_endpoints import (
     NoAnswerError,
-    Ros2Caller,
-    Ros2Inlet,
-    Ros2Outlet,
-    Ros2Served,
+    OtherParameters,
+    OwnParameters,
+    Ros2Publisher,
+    Ros2ServiceClient,
+    Ros2ServiceServer,
+    Ros2Subscription,
     check_type,
+    owner,
 )
-from volery.ros.transports.ros2.parameters import OtherParameters, OwnParameters, owner
-from volery.ros.transports.wire import Arrived, Asked
+from volery.ros.transports.transport_graph import TransportGraph
 
 DISCOVERY_S = 0.6
 """How long after its start a process is taken to know who is there already."""
@@ -52,34 +54,34 @@ def available() -> bool:
     return find_spec("rclpy") is not None
 
 
-class Ros2Wire:
-    """See ``volery.ros.transports.wire.Wire``."""
+class Ros2Node:
+    """See ``volery.ros.transports.client_library.LibraryNode``."""
 
-    def __init__(self, library: Ros2, name: str, namespace: str) -> None:
+    def __init__(self, library: Ros2Library, name: str, namespace: str) -> None:
         self.name = names.node_name(name, namespace)
         self._library = library
         self._node = library.make(name, namespace)
 
-    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros2Outlet:
+    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros2Publisher:
         """Publish to a topic."""
         check_type(self._node, topic, message_type, self.name)
-        return Ros2Outlet(self._node, topic, message_type, qos)
+        return Ros2Publisher(self._node, topic, message_type, qos)
 
-    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Ros2Inlet:
+    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> Ros2Subscription:
         """Receive a topic."""
         check_type(self._node, topic, message_type, self.name)
-        return Ros2Inlet(self._node, topic, message_type, qos, arrived)
+        return Ros2Subscription(self._node, topic, message_type, qos, arrived)
 
-    def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros2Served:
+    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> Ros2ServiceServer:
         """Offer a service."""
         for one in self._library.services():
             if one.name == name:
                 raise UsageError(f"node {self.name}: service {name} is served by {one.server} already")
-        return Ros2Served(self._node, name, kind, asked)
+        return Ros2ServiceServer(self._node, name, kind, asked)
 
-    def caller(self, name: str, kind: ServiceType) -> Ros2Caller:
+    def caller(self, name: str, kind: ServiceType) -> Ros2ServiceClient:
         """Call a service."""
-        return Ros2Caller(self._node, name, kind)
+        return Ros2ServiceClient(self._node, name, kind)
 
     def has_service(self, name: str) -> bool:
         """Whether somebody is known to serve it."""
@@ -118,8 +120,8 @@ class Ros2Wire:
         self._library.remove(self._node)
 
 
-class Ros2:
-    """See ``volery.ros.transports.wire.Library``."""
+class Ros2Library:
+    """See ``volery.ros.transports.client_library.ClientLibrary``."""
 
     def __init__(self, domain: int | None) -> None:
         if not available():
@@ -177,14 +179,14 @@ class Ros2:
                 said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
                 self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Wire:
+    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
         """Make a node."""
         full = names.node_name(name, namespace)
         if self._is_taken(full):
             raise UsageError(
                 f"a node named {full} is there already; choose another name or namespace for this one"
             )
-        return Ros2Wire(self, name, namespace)
+        return Ros2Node(self, name, namespace)
 
     def _is_taken(self, full: str) -> bool:
         """A node of ours that has just left is seen for a moment longer."""
@@ -192,7 +194,7 @@ class Ros2:
         while full in self.node_names():
             if full not in self._left or time.monotonic() > end:
                 return True
-            time.sleep(GLANCE_S)
+            time.sleep(POLL_S)
         return False
 
     def make(self, name: str, namespace: str) -> Any:
@@ -266,14 +268,14 @@ def ros2_graph(
     kernel: Kernel,
     *,
     domain: int | None = None,
-    records: Records = everything,
+    records: Records = record_all,
     epoch: Ns | None = None,
 ) -> TransportGraph:
     """The graph of ROS 2 nodes in *domain* (``ROS_DOMAIN_ID`` if it is not given).
 
     ``UsageError`` where this Python sees no rclpy.
     """
-    library = Ros2(domain)
+    library = Ros2Library(domain)
     made = TransportGraph(kernel, library, records=records, epoch=epoch)
     library.say = made.warn
     return made

@@ -4,9 +4,9 @@ think it is.
 
 from volery.simulation.autopilots.ardupilot.copter import COPTER
 from volery.simulation.autopilots.ardupilot.rover import ROVER
-from volery.simulation.autopilots.firmware import Family
+from volery.simulation.autopilots.firmware import FirmwareFamily
 
-DIALECT = Family("ardupilot", {"multirotor": COPTER, "rover": ROVER})
+FIRMWARE = FirmwareFamily("ardupilot", {"multirotor": COPTER, "rover": ROVER})
 """The firmware, by kind of vehicle."""
 
-__all__ = ["DIALECT"]
+__all__ = ["FIRMWARE"]

@@ -49,7 +49,7 @@ def needs_no_position(start: float, end: float) -> Callable[[Vehicle], bool]:
 
 def lost_position(vehicle: Vehicle) -> bool:
     """The mode needs a position, home is set, but there is no position."""
-    settled = vehicle.uptime() >= vehicle.dialect.origin_after
+    settled = vehicle.uptime() >= vehicle.firmware.origin_after
     return vehicle.mode.needs_position and settled and not vehicle.has_position
 
 
@@ -76,7 +76,7 @@ def not_armable(vehicle: Vehicle) -> list[str]:
     """The text that refuses the mode itself; copter names it, rover does not."""
     if vehicle.mode.armable:
         return []
-    name = f"{vehicle.mode.name} mode not armable" if vehicle.dialect.stands else "Mode not armable"
+    name = f"{vehicle.mode.name} mode not armable" if vehicle.firmware.stands else "Mode not armable"
     return [name]
 
 
@@ -102,11 +102,11 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
     """Disarm, in the air only by force; returns a MAV_RESULT."""
     if not vehicle.armed:
         return ACCEPTED
-    if vehicle.dialect.stands and not vehicle.landed and not force:
+    if vehicle.firmware.stands and not vehicle.landed and not force:
         return FAILED
     vehicle.disarm()
     vehicle.say(INFO, words)
-    vehicle.dialect.on_disarmed(vehicle)
+    vehicle.firmware.on_disarmed(vehicle)
     return ACCEPTED
 
 

@@ -10,7 +10,7 @@ from functools import partial
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.arming import INFO
-from volery.simulation.autopilots.firmware import Act, Event
+from volery.simulation.autopilots.firmware import BootEvent, VehicleAction
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -27,17 +27,17 @@ def banner(name: str) -> bytes:
     return BANNER.format(name=name).encode()
 
 
-def words(seconds: float, *texts: str, severity: int = INFO) -> Event:
+def words(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
     """Say these."""
 
     def act(vehicle: Vehicle) -> None:
         for text in texts:
             vehicle.say(severity, text)
 
-    return Event(round(seconds * S), act)
+    return BootEvent(round(seconds * S), act)
 
 
-def announced(seconds: float, *names: str) -> Event:
+def announced(seconds: float, *names: str) -> BootEvent:
     """Announce these parameters."""
 
     def act(vehicle: Vehicle) -> None:
@@ -45,17 +45,17 @@ def announced(seconds: float, *names: str) -> Event:
             if name in vehicle.parameters:
                 vehicle.outlet.parameter(name)
 
-    return Event(round(seconds * S), act)
+    return BootEvent(round(seconds * S), act)
 
 
-def measured(seconds: float, values: Sequence[tuple[str, float]]) -> Event:
+def measured(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
     """Set these parameters to what was measured, and announce them."""
 
     def act(vehicle: Vehicle) -> None:
         for name, value in values:
             vehicle.set_parameter(name, value)
 
-    return Event(round(seconds * S), act)
+    return BootEvent(round(seconds * S), act)
 
 
 def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
@@ -63,9 +63,9 @@ def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
 
 
-def at(seconds: float, act: Act) -> Event:
+def at(seconds: float, act: VehicleAction) -> BootEvent:
     """Do it then."""
-    return Event(round(seconds * S), act)
+    return BootEvent(round(seconds * S), act)
 
 
 def origin_set(vehicle: Vehicle) -> None:
@@ -135,7 +135,7 @@ def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
         vehicle.parameters.set(name, value)
 
 
-def copter_events(ready: Act) -> tuple[Event, ...]:
+def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
     """A copter's. *ready* is done when the set-up has ended."""
     return (
         announced(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
@@ -165,7 +165,7 @@ def copter_events(ready: Act) -> tuple[Event, ...]:
     )
 
 
-def rover_events(ready: Act) -> tuple[Event, ...]:
+def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
     """A rover's."""
     return (
         words(0.01, "Calibrating barometer"),

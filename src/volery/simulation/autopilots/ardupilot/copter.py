@@ -21,7 +21,6 @@ from volery.simulation.autopilots.ardupilot.arming import (
 )
 from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
 from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
-from volery.simulation.autopilots.ardupilot.honoured import COPTER as HONOURED
 from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, switch
 from volery.simulation.autopilots.ardupilot.status import (
     ACTIVE,
@@ -31,6 +30,7 @@ from volery.simulation.autopilots.ardupilot.status import (
     Z_CONTROL,
     Health,
 )
+from volery.simulation.autopilots.ardupilot.honoured import COPTER as HONOURED
 from volery.simulation.autopilots.ardupilot.tables import streams
 from volery.simulation.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
@@ -39,8 +39,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, 
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.mode import Mode
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -281,5 +280,5 @@ COPTER = ardupilot(
     on_disarmed=on_disarmed,
     mission_ended=missions.copter_ended,
     parameters=parameters,
-    honoured=HONOURED,
+    supported_parameters=HONOURED,
 )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 from volery.base.time import S, from_seconds
 from volery.simulation.autopilots.ardupilot.arming import CRITICAL, WARNING, disarm
-from volery.simulation.autopilots.firmware import Watch
+from volery.simulation.autopilots.firmware import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -100,19 +100,21 @@ class CopterFailsafes:
         self._switch = switch
         self._disarmed = disarmed
 
-    def watches(self) -> tuple[Watch, ...]:
+    def watches(self) -> tuple[Failsafe, ...]:
         """In the order in which they are looked at."""
         return (
-            Watch("station", station_lost, self.on_station_lost, lambda vehicle: self._clear(vehicle, "GCS")),
-            Watch("radio", radio_lost, self.on_radio_lost, lambda vehicle: self._clear(vehicle, "Radio")),
-            Watch("battery low", battery_low, lambda vehicle: self.on_battery(vehicle, "low"), _nothing),
-            Watch(
+            Failsafe(
+                "station", station_lost, self.on_station_lost, lambda vehicle: self._clear(vehicle, "GCS")
+            ),
+            Failsafe("radio", radio_lost, self.on_radio_lost, lambda vehicle: self._clear(vehicle, "Radio")),
+            Failsafe("battery low", battery_low, lambda vehicle: self.on_battery(vehicle, "low"), _nothing),
+            Failsafe(
                 "battery critical",
                 battery_critical,
                 lambda vehicle: self.on_battery(vehicle, "critical"),
                 _nothing,
             ),
-            Watch("estimator", estimator_lost, self.on_estimator_lost, self.on_estimator_back),
+            Failsafe("estimator", estimator_lost, self.on_estimator_lost, self.on_estimator_back),
         )
 
     def _clear(self, vehicle: Vehicle, what: str) -> None:
@@ -202,13 +204,13 @@ class RoverFailsafes:
         self._switch = switch
         self._disarmed = disarmed
 
-    def watches(self) -> tuple[Watch, ...]:
+    def watches(self) -> tuple[Failsafe, ...]:
         """In the order in which they are looked at."""
         return (
-            Watch("station", station_lost, lambda v: self._begin(v, "GCS"), lambda v: self._end(v, "GCS")),
-            Watch("radio", radio_lost, lambda v: self._begin(v, "Radio"), lambda v: self._end(v, "Radio")),
-            Watch("battery low", battery_low, lambda v: self._battery(v, "low"), _nothing),
-            Watch("battery critical", battery_critical, lambda v: self._battery(v, "critical"), _nothing),
+            Failsafe("station", station_lost, lambda v: self._begin(v, "GCS"), lambda v: self._end(v, "GCS")),
+            Failsafe("radio", radio_lost, lambda v: self._begin(v, "Radio"), lambda v: self._end(v, "Radio")),
+            Failsafe("battery low", battery_low, lambda v: self._battery(v, "low"), _nothing),
+            Failsafe("battery critical", battery_critical, lambda v: self._battery(v, "critical"), _nothing),
         )
 
     def _begin(self, vehicle: Vehicle, what: str) -> None:

@@ -11,10 +11,10 @@ from volery.simulation.autopilots.ardupilot.arming import INFO
 from volery.simulation.autopilots.ardupilot.modes import set_mode
 from volery.simulation.autopilots.ardupilot.status import Health
 from volery.simulation.autopilots.ardupilot.tables import BUILDERS, ORDER
-from volery.simulation.autopilots.firmware import Dialect
+from volery.simulation.autopilots.firmware import Firmware
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink.command import DENIED, FAILED
-from volery.simulation.autopilots.mavlink.firmware import Builder, MavlinkDialect
+from volery.simulation.autopilots.mavlink.firmware import Builder, MavlinkFirmware
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
@@ -64,7 +64,7 @@ HEARD = {
 """What every vehicle obeys of sticks and stations."""
 
 mavlink = partial(
-    MavlinkDialect,
+    MavlinkFirmware,
     deaf_until=100 * MS,
     message_order=ORDER,
     refuse_interval=refuse_interval,
@@ -78,14 +78,14 @@ mavlink = partial(
     mission_grew=missions.mission_grew,
     timesync_every=10 * S,
 )
-"""A ``MavlinkDialect`` but for what depends on the kind."""
+"""A ``MavlinkFirmware`` but for what depends on the kind."""
 
 ardupilot = partial(
-    Dialect,
+    Firmware,
     name="ardupilot",
     mission_item_done=missions.item_done,
     mission_item_begins=missions.item_begins,
     mission_action=missions.act,
     own_parameters=own_parameters,
 )
-"""A ``Dialect`` but for what depends on the kind."""
+"""A ``Firmware`` but for what depends on the kind."""

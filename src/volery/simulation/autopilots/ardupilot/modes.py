@@ -5,9 +5,8 @@ from __future__ import annotations
 from volery.simulation.autopilots.ardupilot.arming import CRITICAL, WARNING
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, FAILED
-from volery.simulation.autopilots.mode import Mode
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 CUSTOM_MODE_ENABLED = 1
 
@@ -24,7 +23,7 @@ def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
 
 def switch(vehicle: Vehicle, number: int) -> bool:
     """Enter that mode if it may be; else say why not."""
-    mode = vehicle.dialect.modes.get(number)
+    mode = vehicle.firmware.modes.get(number)
     if mode is None:
         vehicle.say(WARNING, f"No such mode {number}")
         return False
@@ -34,7 +33,7 @@ def switch(vehicle: Vehicle, number: int) -> bool:
     if reason:
         words = (
             f"Mode change to {mode.name} failed: {reason}"
-            if vehicle.dialect.stands
+            if vehicle.firmware.stands
             else "Flight mode change failed"
         )
         vehicle.say(WARNING, words)
@@ -49,7 +48,7 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
         return "requires position"
     if mode.name == "AUTO" and len(vehicle.plan) <= 1:
         return "init failed"
-    if vehicle.dialect.stands and vehicle.landed:
+    if vehicle.firmware.stands and vehicle.landed:
         return _refusal_on_ground(vehicle, mode)
     return ""
 

@@ -23,7 +23,7 @@ def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
 
 def each_second(vehicle: Vehicle, before_arming: Problems) -> None:
     """Readiness, and the counters of hours."""
-    if vehicle.uptime() < vehicle.dialect.ready_after:
+    if vehicle.uptime() < vehicle.firmware.ready_after:
         return
     look_before_arming(vehicle, before_arming)
     if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:

@@ -18,7 +18,6 @@ from volery.simulation.autopilots.ardupilot.arming import (
 )
 from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
 from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
-from volery.simulation.autopilots.ardupilot.honoured import ROVER as HONOURED
 from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, switch
 from volery.simulation.autopilots.ardupilot.motion import nav_controller
 from volery.simulation.autopilots.ardupilot.status import (
@@ -32,6 +31,7 @@ from volery.simulation.autopilots.ardupilot.status import (
     YAW_CONTROL,
     Health,
 )
+from volery.simulation.autopilots.ardupilot.honoured import ROVER as HONOURED
 from volery.simulation.autopilots.ardupilot.tables import ALL, streams
 from volery.simulation.autopilots.ardupilot.targets import rover_global, rover_local
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
@@ -45,8 +45,7 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 )
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.message_fields import Fields
-from volery.simulation.autopilots.mode import Mode
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -231,5 +230,5 @@ ROVER = ardupilot(
     guided_stale=guided_stale,
     mission_ended=missions.rover_ended,
     parameters=parameters,
-    honoured=HONOURED,
+    supported_parameters=HONOURED,
 )

@@ -5,9 +5,9 @@ for figures, ``parameters``.
 """
 
 from volery.simulation.autopilots.dji.copter import COPTER
-from volery.simulation.autopilots.firmware import Family
+from volery.simulation.autopilots.firmware import FirmwareFamily
 
-DIALECT = Family("dji", {"multirotor": COPTER}, codec=None)
+FIRMWARE = FirmwareFamily("dji", {"multirotor": COPTER}, codec=None)
 """The firmware, by kind of vehicle. It has no links: it is reached over a graph."""
 
-__all__ = ["DIALECT"]
+__all__ = ["FIRMWARE"]

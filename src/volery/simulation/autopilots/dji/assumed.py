@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.base.time import to_seconds
-from volery.ros.messages.dji import GO_HOME_ALTITUDES
+from volery.ros.messages.dji_constants import GO_HOME_ALTITUDES
 from volery.simulation.autopilots.dji.controller import F_ABOVE, FINISHED, P_BELOW, STARTING, SWITCH
 from volery.simulation.autopilots.dji.copter import ORIGIN, POSITION, READY
 from volery.simulation.autopilots.dji.missions import FEWEST, MOST, STAY

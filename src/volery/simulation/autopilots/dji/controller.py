@@ -9,7 +9,7 @@ from math import hypot, radians
 from typing import Any
 
 from volery.base.time import Ns, S, from_seconds
-from volery.ros.messages.dji import M100, DisplayMode, FlightStatus, M100Status
+from volery.ros.messages.dji_constants import M100, DisplayMode, FlightStatus, M100Status
 from volery.simulation.autopilots.dji import missions
 from volery.simulation.autopilots.dji.parameters import AIRCRAFT
 from volery.simulation.autopilots.dji.setpoints import Obey, command_of
@@ -365,7 +365,7 @@ class Controller:
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
         self._asked_by_sdk = by_sdk
-        self.vehicle.enter(self.vehicle.dialect.modes[mode])
+        self.vehicle.enter(self.vehicle.firmware.modes[mode])
 
 
 def controller_of(vehicle: Vehicle) -> Controller:

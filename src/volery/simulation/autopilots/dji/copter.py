@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from volery.base.time import MS, S
-from volery.ros.messages.dji import DisplayMode
+from volery.ros.messages.dji_constants import DisplayMode
 from volery.simulation.autopilots.dji.controller import Controller, controller_of
 from volery.simulation.autopilots.dji.face import DjiFace
 from volery.simulation.autopilots.dji.parameters import HONOURED, parameters, tuning
 from volery.simulation.autopilots.dji.setpoints import Obey
-from volery.simulation.autopilots.firmware import Dialect, Event, Watch
+from volery.simulation.autopilots.firmware import BootEvent, Failsafe, Firmware
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
 from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff
-from volery.simulation.autopilots.mode import Manoeuvre, Mode
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 READY, ORIGIN, POSITION = 3 * S, 15 * S, 25 * S
 """After it was switched on: when it speaks, when it knows where it is, when that may be trusted. Assumed."""
@@ -57,9 +56,9 @@ def _nothing(_vehicle: Vehicle) -> None:
     """Nothing is done then."""
 
 
-def _below(percent: str) -> Watch:
+def _below(percent: str) -> Failsafe:
     begins = {"LOW_BATTERY": Controller.low_battery, "CRITICAL_BATTERY": Controller.critical_battery}[percent]
-    return Watch(
+    return Failsafe(
         percent.lower().replace("_", " "),
         lambda vehicle: vehicle.estimate.battery_left * 100.0 < vehicle.parameters[percent],
         lambda vehicle: begins(controller_of(vehicle)),
@@ -72,13 +71,13 @@ def own_parameters(_system: int, _flight: Flight) -> dict[str, float]:
     return {}
 
 
-COPTER = Dialect(
+COPTER = Firmware(
     name="dji",
     kind="multirotor",
     face=DjiFace,
     memory=Controller,
     boot_mode=MODES[DisplayMode.P_GPS],
-    boot_events=(Event(READY, ready), Event(ORIGIN, lambda vehicle: vehicle.flight.set_origin())),
+    boot_events=(BootEvent(READY, ready), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())),
     ready_after=READY,
     origin_after=ORIGIN,
     position_after=POSITION,
@@ -103,5 +102,5 @@ COPTER = Dialect(
     mission_ended=lambda vehicle: controller_of(vehicle).mission_ended(),
     parameters=parameters,
     own_parameters=own_parameters,
-    honoured=HONOURED,
+    supported_parameters=HONOURED,
 )

@@ -12,9 +12,9 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Handle
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.ros.graph import Node, Publisher, RosGraph, Work
-from volery.ros.messages.dji import NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
+from volery.ros.messages.dji_constants import NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
 from volery.simulation.autopilots.dji.controller import Controller, controller_of
 from volery.simulation.autopilots.dji.services import Services
 from volery.simulation.autopilots.dji.telemetry import FAST, REFERENCE, SLOW, USUAL, Topic, topics
@@ -63,7 +63,7 @@ class DjiFace:
         self._graph: RosGraph | None = None
         self._node: Node | None = None
         self._reference: Publisher | None = None
-        self._place = Place(vehicle.name)
+        self._place = ExecutionContext(vehicle.name)
 
     @property
     def controller(self) -> Controller:
@@ -73,7 +73,7 @@ class DjiFace:
     @property
     def speaks(self) -> bool:
         """It is switched on and has booted."""
-        return self._on and self._vehicle.uptime() >= self._vehicle.dialect.ready_after
+        return self._on and self._vehicle.uptime() >= self._vehicle.firmware.ready_after
 
     def stamp(self) -> Ns:
         """ROS time."""
@@ -81,7 +81,7 @@ class DjiFace:
 
     # -- the graph
 
-    def join(self, graph: RosGraph, namespace: str, place: Place) -> None:
+    def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
         """Serve under *namespace*: ``/dji_sdk``, ``/drone_1/dji_sdk``, or one that ends in ``dji_osdk_ros``
         for the names of 4.1. The node's computing is spent at *place*.
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from volery.ros.messages.dji import MISSION_SPEEDS
+from volery.ros.messages.dji_constants import MISSION_SPEEDS
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
 
 FEWEST, MOST = 2, 99

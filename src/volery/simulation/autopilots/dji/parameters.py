@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import radians
 
-from volery.ros.messages.dji import HARDWARE
+from volery.ros.messages.dji_constants import HARDWARE
 from volery.simulation.autopilots.autopilot_parameters import (
     INT8,
     REAL32,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import heading_to_yaw
 from volery.ros.messages import message_class
-from volery.ros.messages.dji import (
+from volery.ros.messages.dji_constants import (
     GO_HOME_ALTITUDES,
     HARDWARE,
     HORIZONTAL,

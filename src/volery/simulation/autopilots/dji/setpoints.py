@@ -11,11 +11,11 @@ from math import cos, isfinite, pi, sin
 from typing import TYPE_CHECKING
 
 from volery.base.frames import Vector
-from volery.ros.messages.dji import HORIZONTAL, SETPOINT_HEIGHTS, VERTICAL, Flag
+from volery.ros.messages.dji_constants import HORIZONTAL, SETPOINT_HEIGHTS, VERTICAL, Flag
 from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
-from volery.simulation.autopilots.mode import Manoeuvre
+from volery.simulation.autopilots.vehicle_state import Manoeuvre
 
 if TYPE_CHECKING:
     from volery.simulation.autopilots.vehicle_state import Vehicle

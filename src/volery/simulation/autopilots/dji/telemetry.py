@@ -10,7 +10,7 @@ from volery.base.frames import attitude_ned_to_enu, frd_to_flu, ned_to_enu
 from volery.base.time import MS, Ns, S
 from volery.ros.graph import DEFAULT, LATCHED, QoS
 from volery.ros.messages import message_class
-from volery.ros.messages.dji import M100
+from volery.ros.messages.dji_constants import M100
 from volery.simulation.autopilots.dji.controller import Controller
 
 FAST, USUAL, SLOW = 10 * MS, 20 * MS, 200 * MS

@@ -8,8 +8,7 @@ from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import TakeOff, ToPoint
-from volery.simulation.autopilots.mode import Manoeuvre
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 
 class Turn(NamedTuple):

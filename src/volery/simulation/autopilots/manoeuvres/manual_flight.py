@@ -9,8 +9,7 @@ from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, root_speed
 from volery.simulation.autopilots.manual_control import StickPositions
-from volery.simulation.autopilots.mode import Manoeuvre
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 GRAVITY = 9.80665
 

@@ -16,7 +16,6 @@ from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff, ToPoint, bearing
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.onboard_mission import (
     CONDITION_DELAY,
     CONDITION_DISTANCE,
@@ -32,7 +31,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 FOREVER = -1
 
@@ -125,11 +124,11 @@ class FlyMission(Manoeuvre):
     def _begin_current(self) -> None:
         plan = self.vehicle.plan
         if len(plan) and not plan.complete:
-            self._advance_to(max(self.vehicle.dialect.first_item, plan.current))
+            self._advance_to(max(self.vehicle.firmware.first_item, plan.current))
 
     def _finish(self) -> None:
         index, item = self._flown
-        self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
+        self.vehicle.firmware.mission_item_done(self.vehicle, index, item)
         self._advance_to(index + 1)
 
     def _advance_to(self, index: int) -> None:
@@ -146,12 +145,12 @@ class FlyMission(Manoeuvre):
             index = self._act(index, item)
         plan.complete = True
         plan.current = 0
-        vehicle.dialect.mission_ended(vehicle)
+        vehicle.firmware.mission_ended(vehicle)
 
     def _begin(self, index: int, item: MissionItem) -> None:
         vehicle = self.vehicle
         vehicle.plan.current = index
-        vehicle.dialect.mission_item_begins(vehicle, index, item)
+        vehicle.firmware.mission_item_begins(vehicle, index, item)
         self._flown = index, item
         self._leg = self._make_leg(vehicle, item, self._goes_on(index))
         self._reached_at = None
@@ -177,8 +176,8 @@ class FlyMission(Manoeuvre):
             self._held.append(item)
         else:
             self._do(item)
-            if self.vehicle.dialect.actions_count:
-                self.vehicle.dialect.mission_item_done(self.vehicle, index, item)
+            if self.vehicle.firmware.actions_count:
+                self.vehicle.firmware.mission_item_done(self.vehicle, index, item)
         return index + 1
 
     def _jump(self, index: int, item: MissionItem) -> int:
@@ -186,10 +185,10 @@ class FlyMission(Manoeuvre):
         if item.param2 != FOREVER and done >= item.param2:
             return index + 1
         self._jumps[index] = done + 1
-        return max(self.vehicle.dialect.first_item, round(item.param1))
+        return max(self.vehicle.firmware.first_item, round(item.param1))
 
     def _do(self, item: MissionItem) -> None:
-        self.vehicle.dialect.mission_action(self.vehicle, item)
+        self.vehicle.firmware.mission_action(self.vehicle, item)
 
     def _run_held(self) -> None:
         while self._held:

@@ -9,7 +9,6 @@ from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FOREVER, Leg, item_point
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.onboard_mission import (
     LOITER_TIME,
     LOITER_UNLIMITED,
@@ -18,7 +17,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 AT_POINT = 1.0
 """Metres within which a rover that is to stop has arrived."""
@@ -125,10 +124,10 @@ class GuidedRover(Manoeuvre):
             return
         if isinstance(doing, DriveTo) and doing.arrived():
             self._told = True
-            self.vehicle.dialect.guided_arrived(self.vehicle)
+            self.vehicle.firmware.guided_arrived(self.vehicle)
         elif isinstance(doing, FollowSpeed) and doing.stale:
             self._told = True
-            self.vehicle.dialect.guided_stale(self.vehicle)
+            self.vehicle.firmware.guided_stale(self.vehicle)
 
     def go_to(self, point: Vector) -> None:
         """To a point north, east, down about the estimator's origin."""

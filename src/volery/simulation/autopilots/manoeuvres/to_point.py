@@ -7,8 +7,7 @@ from math import atan2, dist, hypot, sqrt
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.mode import Manoeuvre
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CLOSE = 0.1
 """Metres within which a height or a shaped target counts as there."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import Act
+from volery.simulation.autopilots.firmware import VehicleAction
 from volery.simulation.autopilots.mavlink.command import Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -76,7 +76,7 @@ class BootBytes(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MavlinkDialect:
+class MavlinkFirmware:
     """One firmware's MAVLink, for one kind of vehicle."""
 
     boot_bytes: tuple[BootBytes, ...] = ()
@@ -120,7 +120,7 @@ class MavlinkDialect:
     set_mode: Callable[[Vehicle, int, int], int]
     """SET_MODE: base mode, custom mode; returns a MAV_RESULT."""
     set_mode_ack: int
-    on_parameter_list: Act
+    on_parameter_list: VehicleAction
     mission_runs: Callable[[Vehicle], bool]
     """Whether it may not be cleared now."""
     stored_item: Callable[[MissionItem], MissionItem | int]

@@ -7,7 +7,7 @@ goes back while the reason is still there.
 from __future__ import annotations
 
 from volery.base.time import from_seconds
-from volery.simulation.autopilots.firmware import Watch
+from volery.simulation.autopilots.firmware import Failsafe
 from volery.simulation.autopilots.paparazzi import gps
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.modes import (
@@ -92,11 +92,11 @@ def stop_motors(vehicle: Vehicle) -> None:
 
 
 WATCHES = (
-    Watch("too far from home", too_far, go_home, _nothing),
-    Watch("too high", too_high, go_home, _nothing),
-    Watch("datalink", datalink_lost, go_home, _nothing),
-    Watch("radio", radio_lost, come_down, _nothing),
-    Watch("battery", battery_gone, come_down, _nothing),
-    Watch("satellites", satellites_lost, come_down, _nothing),
-    Watch("on the ground", came_down, stop_motors, _nothing),
+    Failsafe("too far from home", too_far, go_home, _nothing),
+    Failsafe("too high", too_high, go_home, _nothing),
+    Failsafe("datalink", datalink_lost, go_home, _nothing),
+    Failsafe("radio", radio_lost, come_down, _nothing),
+    Failsafe("battery", battery_gone, come_down, _nothing),
+    Failsafe("satellites", satellites_lost, come_down, _nothing),
+    Failsafe("on the ground", came_down, stop_motors, _nothing),
 )

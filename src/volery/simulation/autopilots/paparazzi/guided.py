@@ -7,8 +7,7 @@ from math import cos, sin
 
 from volery.base.frames import Vector, wrap
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.mode import Manoeuvre
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 OFFSET_PLANE, BODY, OFFSET_HEIGHT, OFFSET_YAW = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 VELOCITY_PLANE, VELOCITY_HEIGHT, YAW_RATE = 1 << 5, 1 << 6, 1 << 7

@@ -5,10 +5,9 @@ from __future__ import annotations
 from volery.base.frames import Vector, enu_to_ned
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Stabilize
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.paparazzi.memory import of
 from volery.simulation.autopilots.paparazzi.navigation import Demand, Vertical
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 LIFTS_M = 0.3
 """Standing on the ground it lifts off for a height that far above."""

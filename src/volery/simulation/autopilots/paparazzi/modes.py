@@ -46,7 +46,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     """
     if not aligned(vehicle):
         number = round(vehicle.parameters["MODE_STARTUP"])
-    mode = vehicle.dialect.modes.get(number)
+    mode = vehicle.firmware.modes.get(number)
     if mode is None:
         return False
     if mode is not vehicle.mode:

@@ -7,9 +7,8 @@ assumed stands in docs/paparazzi.md.
 from __future__ import annotations
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import Dialect, Event
+from volery.simulation.autopilots.firmware import BootEvent, Firmware
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
-from volery.simulation.autopilots.mode import Mode
 from volery.simulation.autopilots.paparazzi import airframe, gps
 from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
 from volery.simulation.autopilots.paparazzi.face import PaparazziFace
@@ -27,7 +26,7 @@ from volery.simulation.autopilots.paparazzi.manoeuvres import (
 from volery.simulation.autopilots.paparazzi.memory import Memory, of
 from volery.simulation.autopilots.paparazzi.modes import HOME, in_flight, set_mode
 from volery.simulation.autopilots.paparazzi.navigation import Navigation
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 TICK: Ns = S // 16
 """Navigation runs sixteen times a second; so does everything else here."""
@@ -87,13 +86,13 @@ def _nothing(_vehicle: Vehicle) -> None:
     """Nothing is done then."""
 
 
-ROTORCRAFT = Dialect(
+ROTORCRAFT = Firmware(
     name="paparazzi",
     kind="multirotor",
     face=PaparazziFace,
     memory=memory,
     boot_mode=MODES[0],
-    boot_events=(Event(READY, ready),),
+    boot_events=(BootEvent(READY, ready),),
     ready_after=READY,
     origin_after=gps.ACQUIRED_AFTER,
     position_after=0,
@@ -114,5 +113,5 @@ ROTORCRAFT = Dialect(
     on_disarmed=_nothing,
     parameters=airframe.parameters,
     own_parameters=airframe.own_parameters,
-    honoured={name: figure.what for name, figure in airframe.FIGURES.items()},
+    supported_parameters={name: figure.what for name, figure in airframe.FIGURES.items()},
 )

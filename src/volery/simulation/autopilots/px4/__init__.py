@@ -2,7 +2,7 @@
 it is.
 """
 
-from volery.simulation.autopilots.firmware import Family, Station
+from volery.simulation.autopilots.firmware import FirmwareFamily, Station
 from volery.simulation.autopilots.px4.copter import COPTER
 from volery.simulation.autopilots.px4.rover import ROVER
 from volery.simulation.autopilots.px4.tables import ONBOARD, STATION
@@ -10,7 +10,7 @@ from volery.simulation.autopilots.px4.tables import ONBOARD, STATION
 STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
 """As the firmware's own simulator has them: for programs, and for ground stations."""
 
-DIALECT = Family("px4", {"multirotor": COPTER, "rover": ROVER}, stations=STATIONS)
+FIRMWARE = FirmwareFamily("px4", {"multirotor": COPTER, "rover": ROVER}, stations=STATIONS)
 """The firmware, by kind of vehicle."""
 
-__all__ = ["DIALECT"]
+__all__ = ["FIRMWARE"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.base.time import MS, Ns
-from volery.simulation.autopilots.firmware import Event
+from volery.simulation.autopilots.firmware import BootEvent
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.px4.commander import READY_AFTER, Commander, of
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -39,10 +39,10 @@ def stand(vehicle: Vehicle) -> None:
 
 
 EVENTS = (
-    Event(0, stand),
-    Event(ORIGIN, _origin_set),
-    Event(HOME, home_set),
-    Event(READY_AFTER - 50 * MS, home_set),
+    BootEvent(0, stand),
+    BootEvent(ORIGIN, _origin_set),
+    BootEvent(HOME, home_set),
+    BootEvent(READY_AFTER - 50 * MS, home_set),
 )
 
 

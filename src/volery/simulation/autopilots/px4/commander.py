@@ -105,13 +105,13 @@ class Commander:
             sticks=self.joystick.valid,
             mission=len(vehicle.plan) > 0,
             offboard=self.stream_alive(),
-            mode=vehicle.armed or vehicle.dialect.modes[self.wished].armable,
+            mode=vehicle.armed or vehicle.firmware.modes[self.wished].armable,
         )
 
     def can_fly(self, number: int) -> bool:
         """Whether that mode has what it needs."""
         vehicle = self.vehicle
-        mode = vehicle.dialect.modes[number]
+        mode = vehicle.firmware.modes[number]
         if mode.needs_position and not vehicle.has_position:
             return False
         if number in modes.NEEDS_STICKS and not self.joystick.valid:
@@ -125,7 +125,7 @@ class Commander:
     def wish(self, number: int) -> int:
         """The user asks for a mode; returns a MAV_RESULT. Disarmed every mode is accepted."""
         vehicle = self.vehicle
-        if number not in vehicle.dialect.modes:
+        if number not in vehicle.firmware.modes:
             return ACCEPTED if not vehicle.armed else UNSUPPORTED
         if vehicle.armed and not self.can_fly(number):
             vehicle.say(CRITICAL, f"Switching to {modes.WORDS[number]} is currently not available\t")
@@ -138,14 +138,14 @@ class Commander:
     def _take_wish(self, number: int) -> None:
         vehicle = self.vehicle
         self.wished = number
-        if vehicle.dialect.modes[number].armable:
+        if vehicle.firmware.modes[number].armable:
             self.after_disarming = number
         self.end_failsafe()
         self.joystick.rest()
         self._fly(number)
 
     def _fly(self, number: int, anew: bool = False) -> None:
-        mode = self.vehicle.dialect.modes[number]
+        mode = self.vehicle.firmware.modes[number]
         if mode is not self.vehicle.mode or anew:
             self.vehicle.enter(mode)
 
@@ -159,7 +159,7 @@ class Commander:
     def follow_up(self, number: int) -> None:
         """A mode has ended; another one follows by itself."""
         self.wished = number
-        if self.vehicle.dialect.modes[number].armable:
+        if self.vehicle.firmware.modes[number].armable:
             self.after_disarming = number
         self.joystick.rest()
         self._fly(number)
@@ -229,7 +229,7 @@ class Commander:
     @property
     def armable(self) -> bool:
         """Whether the checks let it arm in the wished mode."""
-        mode = self.vehicle.dialect.modes[self.wished]
+        mode = self.vehicle.firmware.modes[self.wished]
         return self._fit(mode.needs_position) and mode.armable and self.can_fly(self.wished)
 
     def _fit(self, to_go_by_position: bool) -> bool:
@@ -242,7 +242,11 @@ class Commander:
     def _throttle_is_high(self) -> bool:
         if not self.joystick.valid or self.wished not in modes.NEEDS_STICKS:
             return False
-        by_thrust = self.vehicle.dialect.stands and self.wished in (modes.MANUAL, modes.STABILIZE, modes.ACRO)
+        by_thrust = self.vehicle.firmware.stands and self.wished in (
+            modes.MANUAL,
+            modes.STABILIZE,
+            modes.ACRO,
+        )
         return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
 
     def disarm(self, force: bool) -> int:
@@ -250,7 +254,7 @@ class Commander:
         vehicle = self.vehicle
         if not vehicle.armed:
             return ACCEPTED
-        if vehicle.dialect.stands and not vehicle.landed and not force:
+        if vehicle.firmware.stands and not vehicle.landed and not force:
             vehicle.say(CRITICAL, "Disarming denied! Not landed\t")
             self.log.tell(events.DISARM_REFUSED)
             return TEMPORARILY_REJECTED
@@ -263,7 +267,7 @@ class Commander:
         vehicle.disarm()
         vehicle.say(INFO, f"Disarmed by {words}\t")
         self.log.tell(events.DISARMED, reason)
-        vehicle.dialect.on_disarmed(vehicle)
+        vehicle.firmware.on_disarmed(vehicle)
         self.end_failsafe()
         self.takeoff_amsl = None
         self.wished = self.after_disarming

@@ -9,18 +9,17 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.mode import Manoeuvre, Mode
 from volery.simulation.autopilots.px4 import commands, missions, modes, radio, tuning
 from volery.simulation.autopilots.px4.commander import of
 from volery.simulation.autopilots.px4.firmware import px4
-from volery.simulation.autopilots.px4.honoured import COPTER as HONOURED
 from volery.simulation.autopilots.px4.mavlink import mavlink
 from volery.simulation.autopilots.px4.piloted import Position
 from volery.simulation.autopilots.px4.planned import Descent, Hold, Orbit, Return, TakeOff
 from volery.simulation.autopilots.px4.pursuit import Offboard
 from volery.simulation.autopilots.px4.returning import tell_stage
+from volery.simulation.autopilots.px4.honoured import COPTER as HONOURED
 from volery.simulation.autopilots.px4.watching import on_step
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -112,5 +111,5 @@ COPTER = px4(
     resigns_after=1500 * MS,
     on_step=_on_step,
     parameters=parameters,
-    honoured=HONOURED,
+    supported_parameters=HONOURED,
 )

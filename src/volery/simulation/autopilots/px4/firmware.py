@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from volery.simulation.autopilots.firmware import Dialect
+from volery.simulation.autopilots.firmware import Firmware
 from volery.simulation.autopilots.px4 import boot, missions
 from volery.simulation.autopilots.px4.commander import READY_AFTER
 
 STICKS_AT_REST = (1500,) * 4 + (0,) * 12
 
 px4 = partial(
-    Dialect,
+    Firmware,
     name="px4",
     memory=boot.memory,
     boot_events=boot.EVENTS,
@@ -34,4 +34,4 @@ px4 = partial(
     mission_action=missions.act,
     own_parameters=boot.own_parameters,
 )
-"""A ``Dialect`` but for what depends on the kind."""
+"""A ``Firmware`` but for what depends on the kind."""

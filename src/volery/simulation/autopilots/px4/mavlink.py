@@ -8,7 +8,7 @@ from typing import Any
 from volery.base.time import MS
 from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
 from volery.simulation.autopilots.mavlink.firmware import (
-    MavlinkDialect,
+    MavlinkFirmware,
     MissionUploadPolicy,
     ParameterPolicy,
     StatusTextPolicy,
@@ -42,9 +42,9 @@ def _refuse_interval(_vehicle: Vehicle, _number: int) -> int:
     return FAILED
 
 
-def mavlink(kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, Hear]) -> MavlinkDialect:
+def mavlink(kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, Hear]) -> MavlinkFirmware:
     """*kind* is the MAV_TYPE of the heartbeat; *commanded* and *heard* are what it obeys."""
-    return MavlinkDialect(
+    return MavlinkFirmware(
         heartbeat_from=boot.FIRST_HEARTBEAT,
         answer_delay=6 * MS,
         uses=USES,

@@ -12,7 +12,6 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
 )
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.command import Command
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     DELAY,
@@ -34,7 +33,7 @@ from volery.simulation.autopilots.px4 import events, modes
 from volery.simulation.autopilots.px4.commander import INFO, of
 from volery.simulation.autopilots.px4.commands import on_return
 from volery.simulation.autopilots.px4.planned import Descent, Hold, TakeOff
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
 """MAV_MISSION_RESULT."""

@@ -8,9 +8,8 @@ from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import ByPilot
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.px4.ramps import climb_share
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 SINK_BLIND = 0.7
 """MPC_LAND_SPEED: how it sinks in POSCTL without sticks [m/s]."""

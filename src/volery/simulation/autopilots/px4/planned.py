@@ -9,9 +9,8 @@ from math import atan2, cos, dist, hypot, pi, sin
 from volery.base.frames import Vector, wrap
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.px4.ramps import climb_share, interpolated
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 JERK_AUTO = 4.0
 """MPC_JERK_AUTO [m/s^3]."""

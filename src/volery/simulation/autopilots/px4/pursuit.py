@@ -13,10 +13,9 @@ from math import hypot, isfinite
 from volery.base.frames import Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.mode import Manoeuvre
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
 from volery.simulation.autopilots.px4.ramps import climb_share
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 JERK = 60.0
 """Of set-points that are flown as they come [m/s^3]."""

@@ -60,7 +60,7 @@ def _override(commander: Commander) -> None:
     number = vehicle.mode.number
     by_itself = number in modes.AUTOMATIC and may & OVERRIDE_AUTOMATIC
     by_computer = number == modes.OFFBOARD and may & OVERRIDE_OFFBOARD
-    resting = vehicle.dialect.stands and vehicle.landed
+    resting = vehicle.firmware.stands and vehicle.landed
     if resting or not (by_itself or by_computer):
         return
     if commander.joystick.moved(vehicle.parameters["COM_RC_STICK_OV"] / 100.0):
@@ -76,7 +76,7 @@ def _take(vehicle: Vehicle, target: offboard.Target | offboard.AttitudeTarget | 
         commander.give_back()
     if isinstance(vehicle.manoeuvre, Follower):
         vehicle.manoeuvre.take(target)
-        if vehicle.armed and not (vehicle.dialect.stands and vehicle.landed):
+        if vehicle.armed and not (vehicle.firmware.stands and vehicle.landed):
             vehicle.act()
 
 

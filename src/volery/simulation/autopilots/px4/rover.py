@@ -22,15 +22,14 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 )
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, UNSUPPORTED, Command, Handler
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.mode import Manoeuvre, Mode
 from volery.simulation.autopilots.px4 import commands, copter, modes, radio, tuning
 from volery.simulation.autopilots.px4.commander import of
 from volery.simulation.autopilots.px4.firmware import px4
-from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
 from volery.simulation.autopilots.px4.mavlink import mavlink
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
+from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
 from volery.simulation.autopilots.px4.watching import on_step
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -176,5 +175,5 @@ ROVER = px4(
     stands=False,
     on_step=on_step,
     parameters=parameters,
-    honoured=HONOURED,
+    supported_parameters=HONOURED,
 )

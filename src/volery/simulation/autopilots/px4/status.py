@@ -106,7 +106,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
     """EXTENDED_SYS_STATE."""
     manoeuvre = vehicle.manoeuvre
     state = IN_AIR
-    if not vehicle.dialect.stands or not of(vehicle).flying:
+    if not vehicle.firmware.stands or not of(vehicle).flying:
         state = ON_GROUND
     elif manoeuvre.taking_off:
         state = TAKING_OFF

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from volery.base.errors import UsageError, choices
 from volery.kernel.api import Kernel
 from volery.ros.graph import Node
-from volery.ros.messages.dji import NEW_NAMES, OLD_NAMES
+from volery.ros.messages.dji_constants import NEW_NAMES, OLD_NAMES
 from volery.vehicles.address import check_options, records_texts
 from volery.vehicles.driver import DriverFactory
 from volery.vehicles.drivers.dji.backend import DjiBackend

@@ -14,10 +14,10 @@ from typing import Any
 from volery.base.errors import LinkError, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal, sleep
 from volery.ros.graph import Node, ServiceError, Work
-from volery.ros.messages.dji import M100, DisplayMode
+from volery.ros.messages.dji_constants import M100, DisplayMode
 from volery.trace.events import LinkState
 from volery.vehicles.drivers.dji.decoder import DjiDecoder
 from volery.vehicles.drivers.dji.node_interfaces import NodeInterface, ServiceRequest
@@ -63,7 +63,7 @@ class DjiBackend:
         self._sent_at: Ns = -QUIET
         self._silent = False
         self._closed = False
-        self._place: Place = replace(node.place, deadline=None, on_release=None, meter=None)
+        self._place: ExecutionContext = replace(node.place, deadline=None, on_release=None, meter=None)
         self._scope = kernel.root.child(f"{name} (DJI)")
         self._spinner = node.group()
         inbox = node.group(self._take)

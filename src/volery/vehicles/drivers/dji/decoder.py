@@ -14,7 +14,14 @@ from volery.base.frames import attitude_enu_to_ned, enu_to_ned, quaternion_to_eu
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.ros.messages.dji import HEALTHY_GPS, M100, DisplayMode, FlightStatus, M100Status, display_name
+from volery.ros.messages.dji_constants import (
+    HEALTHY_GPS,
+    M100,
+    DisplayMode,
+    FlightStatus,
+    M100Status,
+    display_name,
+)
 from volery.trace.events import Text
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity

@@ -17,7 +17,7 @@ from volery.base.frames import heading_to_yaw
 from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.ros.messages.dji import HEALTHY_GPS, DisplayMode
+from volery.ros.messages.dji_constants import HEALTHY_GPS, DisplayMode
 from volery.vehicles.driver import Capability, ManualControl, Step
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, TAKEN_OVER_FOR

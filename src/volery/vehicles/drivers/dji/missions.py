@@ -13,7 +13,7 @@ from volery.base.errors import Refused, UsageError
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, S
 from volery.ros.messages import message_class
-from volery.ros.messages.dji import MISSION_SPEEDS, DisplayMode
+from volery.ros.messages.dji_constants import MISSION_SPEEDS, DisplayMode
 from volery.vehicles.driver import Step
 from volery.vehicles.drivers.dji import backend as key
 from volery.vehicles.drivers.dji.node_interfaces import START_MISSION

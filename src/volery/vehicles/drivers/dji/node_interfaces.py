@@ -15,7 +15,14 @@ from typing import Any, NamedTuple, Protocol
 from volery.base.frames import yaw_to_heading
 from volery.ros.graph import Client, Node, Publisher
 from volery.ros.messages import message_class, request
-from volery.ros.messages.dji import HORIZONTAL, NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS, Flag
+from volery.ros.messages.dji_constants import (
+    HORIZONTAL,
+    NEW_NAMES,
+    OLD_NAMES,
+    SETPOINT,
+    SETPOINT_TOPICS,
+    Flag,
+)
 
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
 """Tasks."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from volery.base.errors import OutOfBounds, Refused
 from volery.base.time import Ns, S
-from volery.ros.messages.dji import SETPOINT_HEIGHTS, DisplayMode
+from volery.ros.messages.dji_constants import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Step
 from volery.vehicles.drivers.dji import backend as key
 from volery.vehicles.drivers.dji.backend import DjiBackend

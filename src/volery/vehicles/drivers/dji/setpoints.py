@@ -13,7 +13,7 @@ from typing import NamedTuple
 from volery.base.frames import LocalFrame, heading_to_yaw
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.ros.messages.dji import (
+from volery.ros.messages.dji_constants import (
     ANGLE_YAW_RATE_CLIMB,
     ANGLE_YAW_RATE_THRUST,
     POSITION_YAW,

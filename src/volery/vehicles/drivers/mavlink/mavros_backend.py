@@ -25,7 +25,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, ServiceError
-from volery.ros.graph.group import Work
+from volery.ros.graph.callbacks import Work
 from volery.ros.messages import message_class, new, request
 from volery.vehicles.address import check_options
 from volery.vehicles.drivers.mavlink import backend as key

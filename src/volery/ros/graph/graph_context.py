@@ -1,18 +1,21 @@
-"""What all parts of one embedded graph share: the kernel, the two functions from above, and who is there."""
+"""What all parts of one embedded graph share: the kernel, the two functions from above, and who is there.
+
+Parameters: one tree of values. A node's own are those below its name.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, did_you_mean
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.node import Between, NodeId, Price
-from volery.ros.graph.parameters import Parameters
+from volery.ros.graph.interface import NodeId, Price, Routing
 from volery.ros.messages import Message, from_cdr, to_cdr
 from volery.trace.events import Charge, Record, ignore
 
@@ -20,12 +23,76 @@ if TYPE_CHECKING:
     from volery.ros.graph.services import EmbeddedService
     from volery.ros.graph.topics import Topic
 
+
+class Parameters:
+    """Values by absolute name; a namespace reads as a ``dict`` of what is below it."""
+
+    def __init__(self) -> None:
+        self._tree: dict[str, Any] = {}
+
+    @staticmethod
+    def _steps(name: str) -> list[str]:
+        return [step for step in name.split("/") if step]
+
+    def has(self, name: str) -> bool:
+        """Whether there is such a parameter or namespace."""
+        try:
+            self.get(name)
+        except UsageError:
+            return False
+        return True
+
+    def get(self, name: str) -> Any:
+        """A copy of the value, or ``UsageError``."""
+        value: Any = self._tree
+        for step in self._steps(name):
+            if not isinstance(value, dict) or step not in value:
+                hint = did_you_mean(name, self.names())
+                raise UsageError(f"no parameter {name!r}{hint}")
+            value = value[step]
+        return deepcopy(value)
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a value; a ``dict`` replaces a whole namespace."""
+        *path, last = self._steps(name) or [""]
+        if not last:
+            raise UsageError("the root of the parameters cannot be set; name a parameter")
+        branch = self._tree
+        for step in path:
+            inner = branch.get(step)
+            if not isinstance(inner, dict):
+                inner = branch[step] = {}
+            branch = inner
+        branch[last] = deepcopy(value)
+
+    def delete(self, name: str) -> None:
+        """Remove a value or a namespace; ``UsageError`` if there is none."""
+        self.get(name)
+        *path, last = self._steps(name)
+        branch = self._tree
+        for step in path:
+            branch = branch[step]
+        del branch[last]
+
+    def names(self) -> list[str]:
+        """The absolute names of all parameters, sorted."""
+        return sorted(_leaves("", self._tree))
+
+
+def _leaves(prefix: str, branch: dict[str, Any]) -> Iterator[str]:
+    for step, value in branch.items():
+        if isinstance(value, dict):
+            yield from _leaves(f"{prefix}/{step}", value)
+        else:
+            yield f"{prefix}/{step}"
+
+
 Records = Callable[[str], bool]
 """Whether the content of a topic's messages is recorded, by the topic's name."""
 
 
 @dataclass(eq=False)
-class Context:
+class GraphContext:
     """One graph, seen by its members. ``changed`` is notified whenever somebody comes or goes.
 
     ``unrecorded``: nothing of it goes to the stream of events. ``as_bytes``: what is sent has made the trip
@@ -34,7 +101,7 @@ class Context:
 
     kernel: Kernel
     price: Price
-    between: Between
+    between: Routing
     records: Records
     epoch: Ns
     changed: Signal
@@ -58,7 +125,9 @@ class Context:
         arriving: Message = from_cdr(message.__msgtype__, to_cdr(message))
         return arriving
 
-    def bring(self, sender: Member, receiver: Member, size: int, deliver: Action, lost: Action) -> None:
+    def bring(
+        self, sender: NodeContext, receiver: NodeContext, size: int, deliver: Action, lost: Action
+    ) -> None:
         """Bring a request or an answer from node to node, reliably."""
         way = self.between(sender.id, receiver.id)
         if way is None:
@@ -82,12 +151,12 @@ _KINDS = {call: f"ros:{call}" for call in _CALLS}
 """What is charged often, so that its text is made once."""
 
 
-class Member:
+class NodeContext:
     """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
 
     __slots__ = ("_awake", "_free", "_since", "_slept", "_waited", "closed", "context", "id", "name", "place")
 
-    def __init__(self, context: Context, name: str, place: Place) -> None:
+    def __init__(self, context: GraphContext, name: str, place: ExecutionContext) -> None:
         processor = place.processor.name if place.processor else ""
         self.context = context
         self.id = NodeId(name, place.component, processor)

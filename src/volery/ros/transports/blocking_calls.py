@@ -16,11 +16,11 @@ from volery.kernel.waiting import Signal
 T = TypeVar("T")
 PATIENCE: Ns = 10 * S
 _waiting: WeakKeyDictionary[Kernel, int] = WeakKeyDictionary()
-GLANCE_S = 0.05
+POLL_S = 0.05
 """How long after each look one looks again for what the client library does not announce."""
 
 
-def abroad(kernel: Kernel, what: str, work: Callable[[], T], within: Ns = PATIENCE) -> T:
+def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns = PATIENCE) -> T:
     """The result of *work*, which a thread of its own does; what it raises is raised here.
 
     In house code, which must not block, it is done on the spot. ``LinkSilent`` if it takes longer than
@@ -56,12 +56,12 @@ def abroad(kernel: Kernel, what: str, work: Callable[[], T], within: Ns = PATIEN
     return cast("T", value)
 
 
-def under_way(kernel: Kernel) -> int:
+def pending_calls(kernel: Kernel) -> int:
     """How many tasks of *kernel* wait for something that is done abroad."""
     return _waiting.get(kernel, 0)
 
 
-def until(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:
+def poll_in_thread(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:
     """Block the current task until *holds*, which a thread asks again and again; False after *within*."""
     seen = Signal(kernel, what)
     found: list[bool] = []
@@ -76,7 +76,7 @@ def until(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | Non
             if _succeeds(holds):
                 kernel.post(tell)
                 return
-            given_up.wait(GLANCE_S)
+            given_up.wait(POLL_S)
 
     threading.Thread(target=look, name=what, daemon=True).start()
     try:

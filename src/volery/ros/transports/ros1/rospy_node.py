@@ -11,13 +11,12 @@ from typing import Any
 
 from volery.base.errors import LinkError, UsageError
 from volery.ros.graph import names
-from volery.ros.graph.node import TRANSIENT_LOCAL, QoS
+from volery.ros.graph.interface import TRANSIENT_LOCAL, QoS
 from volery.ros.messages import Message, ServiceType, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.ros.messages.ros1 import cdr_to_ros1
-from volery.ros.transports.ros1.classes import message_carrier, service_carrier
+from volery.ros.transports.client_library import OnMessage, OnRequest, OnResponse, ReceivedMessage
 from volery.ros.transports.ros1.master import Master, TopicTypes, is_alive
-from volery.ros.transports.ros1.rospy_copy import Listening, rospy_copy
-from volery.ros.transports.wire import Arrived, Asked, Done, Parcel
+from volery.ros.transports.ros1.rospy_copy import Listening, raw_message_class, raw_service_class, rospy_copy
 
 GOODBYE_S = 2.0
 Aside = Callable[[Callable[[], object]], None]
@@ -26,12 +25,12 @@ ANY = "*"
 """The type of a subscriber that takes whatever comes."""
 
 
-class Ros1Outlet:
+class Ros1Publisher:
     """A rospy publisher. ROS 1 latches the last message only, whatever the depth."""
 
     def __init__(self, rospy: Any, topic: str, message_type: str, qos: QoS, aside: Aside) -> None:
         self._aside = aside
-        self._type, self._class = message_type, message_carrier(message_type)
+        self._type, self._class = message_type, raw_message_class(message_type)
         self._counts = ros1_type(message_type).has_header
         self._sent = 0
         self._publisher = rospy.Publisher(
@@ -59,18 +58,18 @@ class Ros1Outlet:
         self._aside(self._publisher.unregister)
 
 
-class Ros1Inlet:
+class Ros1Subscription:
     """A rospy subscriber."""
 
-    def __init__(self, rospy: Any, topic: str, message_type: str, arrived: Arrived, aside: Aside) -> None:
+    def __init__(self, rospy: Any, topic: str, message_type: str, arrived: OnMessage, aside: Aside) -> None:
         self._aside = aside
         read = partial(from_ros1, message_type)
 
         def take(carrier: Any) -> None:
             sender = carrier._connection_header.get("callerid", "")
-            arrived(Parcel(carrier.data, read, sender))
+            arrived(ReceivedMessage(carrier.data, read, sender))
 
-        self._subscriber = rospy.Subscriber(topic, message_carrier(message_type), take, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(topic, raw_message_class(message_type), take, tcp_nodelay=True)
 
     def connected(self) -> int:
         """How many connections there are."""
@@ -81,12 +80,12 @@ class Ros1Inlet:
         self._aside(self._subscriber.unregister)
 
 
-class Ros1Served:
+class Ros1ServiceServer:
     """A rospy service: each request holds a thread of rospy until it is answered."""
 
-    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: Asked, aside: Aside) -> None:
+    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: OnRequest, aside: Aside) -> None:
         self._aside = aside
-        carrier = service_carrier(kind)
+        carrier = raw_service_class(kind)
         wanted, given = kind.request.__msgtype__, carrier._response_class
 
         def handle(request: Any) -> Any:
@@ -114,15 +113,15 @@ class Ros1Served:
         self._aside(partial(self._service.shutdown, "closed"))
 
 
-class Ros1Caller:
+class Ros1ServiceClient:
     """A rospy service proxy for each call."""
 
     def __init__(self, rospy: Any, master: Master, name: str, kind: ServiceType) -> None:
         self._rospy, self._master, self._name, self._kind = rospy, master, name, kind
-        self._carrier = service_carrier(kind)
+        self._carrier = raw_service_class(kind)
         self._answer = kind.response.__msgtype__
 
-    def call(self, request: Message, done: Done) -> Callable[[], None]:
+    def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
         """Ask in a thread of its own; giving up closes its connection."""
         proxy = self._rospy.ServiceProxy(self._name, self._carrier)
         wanted = self._carrier._request_class(to_ros1(request))
@@ -165,8 +164,8 @@ def _aside(work: Callable[[], object]) -> None:
     threading.Thread(target=work, daemon=True).start()
 
 
-class Ros1Wire:
-    """See ``volery.ros.transports.wire.Wire``."""
+class Ros1Node:
+    """See ``volery.ros.transports.client_library.LibraryNode``."""
 
     def __init__(self, types: TopicTypes, name: str, namespace: str, lost: Callable[[str], None]) -> None:
         self._types, master = types, types.master
@@ -205,17 +204,17 @@ class Ros1Wire:
                 )
         self._types.note(topic, wanted)
 
-    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros1Outlet:
+    def advertise(self, topic: str, message_type: str, qos: QoS) -> Ros1Publisher:
         """Publish to a topic."""
         self._check_type(topic, message_type)
-        return Ros1Outlet(self.rospy, topic, message_type, qos, self._while_there)
+        return Ros1Publisher(self.rospy, topic, message_type, qos, self._while_there)
 
-    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Ros1Inlet:
+    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> Ros1Subscription:
         """Receive a topic. All that ROS 1 knows of QoS is the depth, which the house keeps."""
         self._check_type(topic, message_type)
-        return Ros1Inlet(self.rospy, topic, message_type, arrived, self._while_there)
+        return Ros1Subscription(self.rospy, topic, message_type, arrived, self._while_there)
 
-    def serve(self, name: str, kind: ServiceType, asked: Asked) -> Ros1Served:
+    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> Ros1ServiceServer:
         """Offer a service."""
         self.master.value("getPid")
         if self.master.find("lookupService", name) is not None:
@@ -224,11 +223,11 @@ class Ros1Wire:
             if any(is_alive(self.master.find("lookupNode", user) or "") for user in users):
                 raise UsageError(f"node {self.name}: service {name} is served by {', '.join(users)} already")
         ros1_service(kind.name)
-        return Ros1Served(self.rospy, name, kind, asked, self._while_there)
+        return Ros1ServiceServer(self.rospy, name, kind, asked, self._while_there)
 
-    def caller(self, name: str, kind: ServiceType) -> Ros1Caller:
+    def caller(self, name: str, kind: ServiceType) -> Ros1ServiceClient:
         """Call a service."""
-        return Ros1Caller(self.rospy, self.master, name, kind)
+        return Ros1ServiceClient(self.rospy, self.master, name, kind)
 
     def has_service(self, name: str) -> bool:
         """Whether the master knows a server."""

@@ -1,26 +1,28 @@
-"""A real ROS graph as this process sees it."""
+"""``/clock`` in both directions: telling others our time, and taking theirs.
+
+A real ROS graph as this process sees it.
+"""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from time import time_ns
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns
+from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.clock import CLOCK_PERIOD
-from volery.ros.graph.context import Context, Records
-from volery.ros.graph.graph import everything
-from volery.ros.graph.node import RosGraph, ServiceState, TopicState, at_once, free
-from volery.ros.transports import clock
-from volery.ros.transports.abroad import abroad
-from volery.ros.transports.node import TransportNode
-from volery.ros.transports.topics import WARNING
-from volery.ros.transports.wire import Library, Wire
+from volery.ros.graph.embedded_graph import CLOCK, CLOCK_PERIOD, CLOCK_TYPE, record_all
+from volery.ros.graph.graph_context import GraphContext, Records
+from volery.ros.graph.interface import BEST_AVAILABLE, QoS, RosGraph, ServiceState, TopicState, free, no_route
+from volery.ros.messages import new, to_cdr
+from volery.ros.transports.blocking_calls import run_in_thread
+from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage
+from volery.ros.transports.transport_node import WARNING, TransportNode
 from volery.trace.events import Text
 
 if TYPE_CHECKING:
@@ -30,6 +32,63 @@ if TYPE_CHECKING:
         return graph
 
 
+NEWEST = QoS(depth=1, reliability=BEST_AVAILABLE)
+
+
+@runtime_checkable
+class ExternallyClocked(Protocol):
+    """A kernel whose time can be told to go on."""
+
+    def advance(self, by: Ns) -> None:
+        """Let time pass."""
+
+
+def publish_clock(context: GraphContext, wire: LibraryNode, period: Ns = CLOCK_PERIOD) -> Callable[[], None]:
+    """Publish the kernel's time as ``/clock`` each *period* of it, whoever listens. Returns what ends it."""
+    outlet = wire.advertise(CLOCK, CLOCK_TYPE, QoS(depth=1))
+
+    def tick() -> None:
+        sec, nanosec = divmod(context.stamp(), S)
+        outlet.send(to_cdr(new(CLOCK_TYPE, clock={"sec": sec, "nanosec": nanosec})))
+
+    ticking = context.kernel.every(period, tick)
+
+    def end() -> None:
+        ticking.cancel()
+        outlet.close()
+
+    return end
+
+
+def follow_clock(context: GraphContext, wire: LibraryNode, since: Ns | None = None) -> Callable[[], None]:
+    """Let the kernel's time be what ``/clock`` says. Returns what ends it.
+
+    *since* is ROS time at the kernel's zero, where that is agreed; else it is what is heard first.
+
+    The kernel's time never goes back: where ``/clock`` does (a simulation or a recording begins anew), ROS
+    time does, and what waits goes on waiting for the time that is left. ``UsageError`` for a kernel whose
+    time passes by itself.
+    """
+    kernel = context.kernel
+    if not isinstance(kernel, ExternallyClocked):
+        raise UsageError(
+            f"a {type(kernel).__name__} keeps its own time; to follow {CLOCK} take a FollowingKernel"
+        )
+    guard = threading.Lock()
+    last = [] if since is None else [since]
+
+    def arrived(parcel: ReceivedMessage) -> None:
+        stamp = parcel.read(parcel.data).clock.to_nsec()
+        with guard:
+            if last and stamp >= last[0]:
+                kernel.advance(stamp - last[0])
+            else:
+                context.epoch = stamp - context.kernel.now()
+            last[:] = [stamp]
+
+    return wire.subscribe(CLOCK, CLOCK_TYPE, NEWEST, arrived).close
+
+
 class TransportGraph:
     """The nodes of this process on a real ROS graph.
 
@@ -37,13 +96,18 @@ class TransportGraph:
     """
 
     def __init__(
-        self, kernel: Kernel, library: Library, *, records: Records = everything, epoch: Ns | None = None
+        self,
+        kernel: Kernel,
+        library: ClientLibrary,
+        *,
+        records: Records = record_all,
+        epoch: Ns | None = None,
     ) -> None:
         self.kernel = kernel
         self._since = epoch
         if epoch is None:
             epoch = time_ns() - kernel.now()
-        self._context = Context(kernel, free, at_once, records, epoch, Signal(kernel, "the ROS graph"))
+        self._context = GraphContext(kernel, free, no_route, records, epoch, Signal(kernel, "the ROS graph"))
         self._library = library
         self._nodes: dict[str, TransportNode] = {}
         self._numbers = 0
@@ -60,7 +124,7 @@ class TransportGraph:
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: Place | None = None,
+        place: ExecutionContext | None = None,
     ) -> TransportNode:
         """Join the graph as *name*.
 
@@ -71,7 +135,7 @@ class TransportGraph:
             self._numbers += 1
             name = f"{name}_{time_ns() // 1000}_{self._numbers}"
         task = self.kernel.current()
-        here = place or (task.place if task is not None else Place(name))
+        here = place or (task.place if task is not None else ExecutionContext(name))
         made = TransportNode(self._context, name, namespace, remaps or {}, here)
         if made.name in self._nodes:
             raise UsageError(
@@ -81,7 +145,7 @@ class TransportGraph:
         self._nodes[made.name] = made
         try:
             made.join(
-                abroad(
+                run_in_thread(
                     self.kernel, f"joining as {made.name}", lambda: self._library.wire(name, namespace, lost)
                 )
             )
@@ -111,19 +175,19 @@ class TransportGraph:
         On ROS 1 ``/use_sim_time`` is set, which nodes read when they start; on ROS 2 each node is told by
         its own parameter ``use_sim_time``.
         """
-        self._keep_time(node, partial(clock.tell, period=period), self._library.announce_clock)
+        self._keep_time(node, partial(publish_clock, period=period), self._library.announce_clock)
 
     def follow_clock(self, node: TransportNode | str = "clock_listener") -> None:
         """Let the kernel's time be what ``/clock`` says, heard by *node* (or a new one of that name).
 
         Until it says something, time stands still. ``UsageError`` for a kernel that keeps its own time.
         """
-        self._keep_time(node, partial(clock.follow, since=self._since))
+        self._keep_time(node, partial(follow_clock, since=self._since))
 
     def _keep_time(
         self,
         where: TransportNode | str,
-        way: Callable[[Context, Wire], Callable[[], None]],
+        way: Callable[[GraphContext, LibraryNode], Callable[[], None]],
         before: Callable[[], None] = lambda: None,
     ) -> None:
         node = self.node(where) if isinstance(where, str) else where
@@ -132,7 +196,7 @@ class TransportGraph:
             before()
             return way(self._context, node.wire)
 
-        node.keep(abroad(self.kernel, "/clock", begin))
+        node.keep(run_in_thread(self.kernel, "/clock", begin))
 
     def warn(self, text: str) -> None:
         """Record what the client library says went wrong. From any thread."""
@@ -140,15 +204,15 @@ class TransportGraph:
 
     def node_names(self) -> list[str]:
         """Who is there, sorted."""
-        return abroad(self.kernel, "the nodes of the graph", self._library.node_names)
+        return run_in_thread(self.kernel, "the nodes of the graph", self._library.node_names)
 
     def topics(self) -> list[TopicState]:
         """The topics that somebody publishes or subscribes to, by name."""
-        return abroad(self.kernel, "the topics of the graph", self._library.topics)
+        return run_in_thread(self.kernel, "the topics of the graph", self._library.topics)
 
     def services(self) -> list[ServiceState]:
         """The services that somebody serves, by name."""
-        return abroad(self.kernel, "the services of the graph", self._library.services)
+        return run_in_thread(self.kernel, "the services of the graph", self._library.services)
 
     def close(self) -> None:
         """All nodes leave the graph."""

@@ -1,4 +1,7 @@
-"""Callback groups: what is ready waits here in the order of its arrival until somebody spins."""
+"""Callback groups: what is ready waits here in the order of its arrival until somebody spins.
+
+Timers and rates of a node.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,13 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 
-from volery.base.time import Ns
-from volery.kernel.waiting import Signal, current_task, end_activation
-from volery.ros.graph.context import Member
-from volery.ros.graph.node import Work
+from volery.base.errors import UsageError
+from volery.base.time import US, Ns
+from volery.kernel.api import Handle
+from volery.kernel.waiting import Rate, Signal, current_task, end_activation
+from volery.kernel.waiting import sleep as wait
+from volery.ros.graph.graph_context import NodeContext
+from volery.ros.graph.interface import Work
 
 __all__ = ["FIRST", "NEXT", "CallbackGroup", "Work"]
 
@@ -17,7 +23,7 @@ FIRST, NEXT = 1.0, 0.0
 
 
 class CallbackGroup:
-    """See ``volery.ros.graph.node.Group``.
+    """See ``volery.ros.graph.interface.Group``.
 
     A wait in ``spin_once`` ends the caller's activation; the callback that ends the wait is a new one,
     released when its message (request, timer) arrived. Polling (``within=0``) belongs to the activation that
@@ -27,7 +33,7 @@ class CallbackGroup:
     has become ready, and ``take``s it.
     """
 
-    def __init__(self, member: Member, label: str, start: Callable[[Work], None] | None = None) -> None:
+    def __init__(self, member: NodeContext, label: str, start: Callable[[Work], None] | None = None) -> None:
         self._member = member
         self._start = start
         self._ready: deque[Work] = deque()
@@ -108,3 +114,69 @@ class CallbackGroup:
         work = self._ready.popleft() if self._ready else None
         current_task(kernel).release(work.arrived if work else kernel.now())
         return work
+
+
+def sleep(member: NodeContext, duration: Ns) -> None:
+    """Block the current task for *duration*; what the sleep itself takes is executed meanwhile."""
+    with member.context.kernel as kernel:
+        member.pay("sleep", max(duration, 0) / US)
+        wait(kernel, duration)
+
+
+class NodeRate:
+    """See ``volery.ros.graph.interface.Rate``; a ``volery.kernel.waiting.Rate`` that is paid for."""
+
+    def __init__(self, member: NodeContext, period: Ns) -> None:
+        self._member = member
+        kernel = member.context.kernel
+        self._rate = Rate(kernel, period)
+        self._last = kernel.now()
+
+    def remaining(self) -> Ns:
+        """Until the next release; 0 for a loop that is late."""
+        with self._member.context.kernel as kernel:
+            return max(0, self._last + self._rate.period - kernel.now())
+
+    def sleep(self) -> None:
+        """Block until the next release."""
+        with self._member.context.kernel as kernel:
+            self._member.pay("sleep", self.remaining() / US)
+            self._rate.sleep()
+            released = current_task(kernel).released
+            self._last = kernel.now() if released is None else released
+
+
+class NodeTimer:
+    """See ``volery.ros.graph.interface.Timer``. A period that ends while its last callback still waits is left out."""
+
+    def __init__(
+        self, member: NodeContext, period: Ns, callback: Callable[[], None], group: CallbackGroup
+    ) -> None:
+        if period <= 0:
+            raise UsageError(f"node {member.name}: a timer's period of {period} ns; it must be above 0")
+        self._member, self._period, self._callback, self._group = member, period, callback, group
+        self._waits = False
+        self._due = member.context.kernel.now() + period
+        self._next: Handle | None = member.context.kernel.call_at(self._due, self._fire)
+
+    def _fire(self) -> None:
+        if self._member.closed:
+            self._next = None
+            return
+        if not self._waits:
+            self._waits = True
+            self._group.add(Work(self._due, self._run))
+        self._due += self._period
+        self._next = self._member.context.kernel.call_at(self._due, self._fire)
+
+    def _run(self) -> None:
+        self._waits = False
+        if self._next is not None:
+            self._callback()
+
+    def cancel(self) -> None:
+        """Call back no longer."""
+        with self._member.context.kernel.guard:
+            if self._next is not None:
+                self._next.cancel()
+                self._next = None

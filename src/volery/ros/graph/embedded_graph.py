@@ -2,6 +2,8 @@
 
 What a call costs and how a message travels are asked of two functions that are given from above; the graph
 knows neither laws nor networks.
+
+``/clock``: ticks while somebody listens, and costs nobody anything: it is no part of the system.
 """
 
 from __future__ import annotations
@@ -10,24 +12,52 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns
-from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.base.time import MS, Ns, S
+from volery.kernel.api import Handle, Kernel
+from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.clock import Clock
-from volery.ros.graph.context import Context, Records
-from volery.ros.graph.embedded import EmbeddedNode
-from volery.ros.graph.node import Between, Price, RosGraph, ServiceState, TopicState, at_once, free
-from volery.ros.graph.parameters import Parameters
+from volery.ros.graph.embedded_node import EmbeddedNode
+from volery.ros.graph.graph_context import GraphContext, Parameters, Records
+from volery.ros.graph.interface import Price, RosGraph, Routing, ServiceState, TopicState, free, no_route
+from volery.ros.messages import cdr_size, new
 
 if TYPE_CHECKING:
 
-    def _is_a(graph: Graph) -> RosGraph:
+    def _is_a(graph: EmbeddedGraph) -> RosGraph:
         """Checked by the type checker: it has all that a graph has."""
         return graph
 
 
-def everything(topic_name: str) -> bool:
+CLOCK = "/clock"
+CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
+CLOCK_PERIOD: Ns = 10 * MS
+
+
+class ClockPublisher:
+    """The publisher of ``/clock``."""
+
+    def __init__(self, context: GraphContext) -> None:
+        self._context = context
+        self._ticking: Handle | None = None
+
+    def listen(self) -> None:
+        """Somebody has subscribed: tick, if it does not tick already."""
+        if self._ticking is None:
+            self._ticking = self._context.kernel.every(CLOCK_PERIOD, self._tick)
+
+    def _tick(self) -> None:
+        listeners = self._context.topics[CLOCK].subscriptions
+        if not listeners and self._ticking is not None:
+            self._ticking.cancel()
+            self._ticking = None
+        now = self._context.kernel.now()
+        stamp = self._context.stamp()
+        for subscription in tuple(listeners):
+            message = new(CLOCK_TYPE, clock={"sec": stamp // S, "nanosec": stamp % S})
+            subscription.arrive(message, now, CLOCK, cdr_size(message))
+
+
+def record_all(topic_name: str) -> bool:
     """Record the content of all topics."""
     return True
 
@@ -36,7 +66,7 @@ def _nothing(topic_name: str) -> bool:
     return False
 
 
-class Graph:
+class EmbeddedGraph:
     """One ROS graph.
 
     *price* says what a call takes, *between* how messages get from node to node. *records* says for which
@@ -53,15 +83,15 @@ class Graph:
         self,
         kernel: Kernel,
         price: Price = free,
-        between: Between = at_once,
+        between: Routing = no_route,
         *,
-        records: Records = everything,
+        records: Records = record_all,
         epoch: Ns = 0,
         unrecorded: bool = False,
         as_bytes: bool = False,
     ) -> None:
         self.kernel = kernel
-        self._context = Context(
+        self._context = GraphContext(
             kernel,
             price,
             between,
@@ -71,7 +101,7 @@ class Graph:
             unrecorded=unrecorded,
             as_bytes=as_bytes,
         )
-        self._context.listen_to_clock = Clock(self._context).listen
+        self._context.listen_to_clock = ClockPublisher(self._context).listen
         self._nodes: dict[str, EmbeddedNode] = {}
 
     @property
@@ -91,7 +121,7 @@ class Graph:
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: Place | None = None,
+        place: ExecutionContext | None = None,
     ) -> EmbeddedNode:
         """Join the graph as *name*; priced as ``init`` and ``node_handle``.
 
@@ -114,9 +144,9 @@ class Graph:
             made.join()
             return made
 
-    def _here(self, name: str) -> Place:
+    def _here(self, name: str) -> ExecutionContext:
         task = self.kernel.current()
-        return task.place if task is not None else Place(name)
+        return task.place if task is not None else ExecutionContext(name)
 
     def _numbered(self, name: str, namespace: str) -> str:
         number = 1

@@ -2,6 +2,8 @@
 
 ``carrier.cpp`` is type support that reads nothing of what it carries. It is compiled once for an installation
 of ROS 2 (under a second) and kept in the user's cache folder. It serves Fast DDS, the usual middleware.
+
+Which of our types rclpy can carry, and their values as rclpy's in services.
 """
 
 from __future__ import annotations
@@ -11,16 +13,17 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
-from volery.ros.messages import ServiceType, type_hash
+from volery.ros.messages import Message, ServiceType, from_cdr, message_name, to_cdr, type_hash
+from volery.ros.messages.store import idl_fields, nested_types
 
 HEADERS = (
     "fastcdr",
@@ -48,19 +51,19 @@ HEADER = b"\x00\x01\x00\x00"
 """Before the bytes of each message: plain CDR, little endian."""
 
 
-def is_carrier(cls: type[Any]) -> bool:
+def is_raw_class(cls: type[Any]) -> bool:
     """Whether *cls* is one of these."""
     return cls.__module__ == __name__
 
 
-def message_carrier(name: str) -> type[Any]:
+def raw_message_class(name: str) -> type[Any]:
     """A class that rclpy takes for the message type *name*: its objects have as ``data`` the CDR bytes behind
     their header, and what arrives is such bytes. Raises ``UsageError`` where it cannot be built.
     """
     return _message_class(name, _message_support(name))
 
 
-def service_carrier(kind: ServiceType) -> type[Any]:
+def raw_service_class(kind: ServiceType) -> type[Any]:
     """The same for a service type: ``Request`` and ``Response`` are such classes."""
     names = kind.request.__msgtype__, kind.response.__msgtype__
     supports = [_message_support(name) for name in names]
@@ -155,3 +158,103 @@ def _compile(source: bytes, prefixes: Sequence[Path], made: Path) -> None:
         said = done.stderr.decode(errors="replace").partition("\n")[0]
         raise UsageError(f"no carrier could be built with {compiler}: {said}")
     fresh.rename(made)
+
+
+def distribution() -> str:
+    """``jazzy``, if the installation says so; else ``<distribution>``."""
+    return os.environ.get("ROS_DISTRO") or "<distribution>"
+
+
+@cache
+def rclpy_class(name: str) -> Any:
+    """rclpy's class of a message type, or a carrier of its bytes where the package is not installed.
+
+    ``UsageError`` if neither can be, or if its class has other fields.
+    """
+    full = message_name(name)
+    found = _installed(full)
+    if found is None:
+        return _carried_as_bytes(full, lambda: raw_message_class(full))
+    _compare(full, found)
+    return found
+
+
+def _carried_as_bytes(full: str, make: Callable[[], type[Any]]) -> type[Any]:
+    try:
+        return make()
+    except UsageError as error:
+        package = full.partition("/")[0]
+        ubuntu = f"ros-{distribution()}-{package.replace('_', '-')}"
+        raise UsageError(
+            f"rclpy has no type support for {full}: its package is not installed ({ubuntu}, or built with "
+            f"colcon), and it cannot be carried without: {error}"
+        ) from error
+
+
+def _installed(full: str) -> Any:
+    """rclpy's class, ``None`` if it has none."""
+    package, kind, label = full.split("/")
+    try:
+        return getattr(import_module(f"{package}.{kind}"), label)
+    except (ImportError, AttributeError):
+        return None
+
+
+def _compare(full: str, found: Any) -> None:
+    """Bytes are exchanged as they are, so both must mean the same by them."""
+    theirs, ours = found.get_fields_and_field_types(), idl_fields(full)
+    if list(theirs.items()) != list(ours.items()):
+        raise UsageError(
+            f"{full} has other fields in this ROS 2 ({', '.join(theirs)}) than in the definitions of Humble "
+            f"({', '.join(ours)}); it cannot be carried"
+        )
+    for inner in nested_types(full):
+        rclpy_class(inner)
+
+
+def carried(name: str) -> bool:
+    """Whether a message type is installed here, with our fields."""
+    try:
+        return _installed(message_name(name)) is not None and rclpy_class(name) is not None
+    except UsageError:
+        return False
+
+
+class Rclpyed(NamedTuple):
+    """A service type of rclpy, and what translates its two halves."""
+
+    type: Any
+    request: type[Any]
+    response: type[Any]
+
+
+@cache
+def rclpy_service(kind: ServiceType) -> Rclpyed:
+    """rclpy's class of a service type, or a carrier. ``UsageError`` as for messages."""
+    found = _installed(kind.name)
+    if found is None:
+        found = _carried_as_bytes(kind.name, lambda: raw_service_class(kind))
+        return Rclpyed(found, found.Request, found.Response)
+    for half, ours in ((found.Request, kind.request), (found.Response, kind.response)):
+        _compare(ours.__msgtype__, half)
+    return Rclpyed(found, found.Request, found.Response)
+
+
+def to_rclpy(message: Message, cls: type[Any]) -> Any:
+    """Our value as rclpy's."""
+    data = to_cdr(message)
+    if is_raw_class(cls):
+        return cls(data[len(HEADER) :])
+    return _serialization().deserialize_message(data, cls)
+
+
+def from_rclpy(name: str, message: Any) -> Any:
+    """rclpy's value as ours."""
+    if isinstance(message, bytes):
+        return from_cdr(name, HEADER + message)
+    return from_cdr(name, _serialization().serialize_message(message))
+
+
+@cache
+def _serialization() -> Any:
+    return import_module("rclpy.serialization")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 from volery.base.errors import UsageError, choices
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.kernel.task import Place
+from volery.kernel.task import ExecutionContext
 
 RELIABLE, BEST_EFFORT, BEST_AVAILABLE = "reliable", "best_effort", "best_available"
 VOLATILE, TRANSIENT_LOCAL = "volatile", "transient_local"
@@ -95,17 +95,17 @@ def free(node: NodeId, call: str, x: float) -> Cost:
     return _NO_COST
 
 
-Way = Callable[[int, bool, Callable[[], None], Callable[[], None]], None]
+Route = Callable[[int, bool, Callable[[], None], Callable[[], None]], None]
 """``way(size, reliable, deliver, lost)``: bring *size* bytes along it, then call *deliver*, or *lost* where
 they did not arrive. Never blocks and calls nothing before it has returned."""
 
-Between = Callable[[NodeId, NodeId], Way | None]
+Routing = Callable[[NodeId, NodeId], Route | None]
 """``between(sender, receiver)``: the way from node to node, asked once; ``None`` where nothing is between
 them, so that what one sends is with the other at once."""
 
 
-def at_once(sender: NodeId, receiver: NodeId) -> Way | None:
-    """``Between``: nothing is."""
+def no_route(sender: NodeId, receiver: NodeId) -> Route | None:
+    """``Routing``: nothing is."""
     return None
 
 
@@ -235,7 +235,7 @@ class Node(Protocol):
     namespace: str
 
     @property
-    def place(self) -> Place:
+    def place(self) -> ExecutionContext:
         """Where its computing is spent."""
 
     @property
@@ -346,7 +346,7 @@ class RosGraph(Protocol):
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: Place | None = None,
+        place: ExecutionContext | None = None,
     ) -> Node:
         """Join the graph as *name*. *anonymous* adds something to the name that makes it unique.
 

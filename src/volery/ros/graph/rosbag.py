@@ -1,16 +1,87 @@
-"""Playing a recording into a graph, at its own speed or another."""
+"""Recording a graph: every topic, as it appears, or those that are named.
+
+Playing a recording into a graph, at its own speed or another.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
-from volery.ros.graph.clock import CLOCK
-from volery.ros.graph.node import LATCHED, Node, Publisher, QoS
-from volery.ros.messages import new
+from volery.ros.graph.embedded_graph import CLOCK
+from volery.ros.graph.interface import AS_OFFERED, LATCHED, Node, Publisher, QoS, RosGraph
+from volery.ros.messages import Message, new
+from volery.ros.messages.bag_writer import BagWriter
 from volery.ros.messages.bags import Bag
+
+_LOOK: Ns = 500 * MS
+"""How often new topics are looked for."""
+_KEPT: QoS = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
+
+
+class Recorder:
+    """Writes what is said on a graph. ``run`` it in a task; ``stop`` it from anywhere.
+
+    *topics*: only these; ``None``: all, each from when it is first seen. ``counts`` says how many messages
+    were recorded, ``problems`` why a topic cannot be, both by topic. *told* is told each message's topic.
+    """
+
+    def __init__(
+        self,
+        graph: RosGraph,
+        node: Node,
+        writer: BagWriter,
+        *,
+        topics: Collection[str] | None = None,
+        told: Callable[[str], None] = lambda topic: None,
+    ) -> None:
+        self._graph, self._node, self._writer = graph, node, writer
+        self._topics = None if topics is None else frozenset(node.resolve(topic) for topic in topics)
+        self._told = told
+        self._seen: set[str] = set()
+        self._stopped = False
+        self.counts: dict[str, int] = {}
+        self.problems: dict[str, str] = {}
+
+    def run(self) -> None:
+        """Record until it is stopped."""
+        looked: Ns | None = None
+        while not self._stopped and not self._node.closed:
+            now = self._node.now()
+            if looked is None or now - looked >= _LOOK:
+                looked = now
+                self._look()
+            self._node.spin_once(_LOOK)
+
+    def stop(self) -> None:
+        """Record no more; ``run`` returns within half a second."""
+        self._stopped = True
+
+    def _look(self) -> None:
+        for topic in self._graph.topics():
+            wanted = topic.publishers and (self._topics is None or topic.name in self._topics)
+            if not wanted or topic.name in self._seen:
+                continue
+            self._seen.add(topic.name)
+            try:
+                self._node.subscribe(topic.name, topic.type, partial(self._hear, topic.name), _KEPT)
+            except UsageError as error:
+                self.problems[topic.name] = str(error)
+
+    def _hear(self, topic: str, message: Message) -> None:
+        if topic in self.problems:
+            return
+        try:
+            self._writer.write(topic, self._node.now(), message)
+        except UsageError as error:
+            self.problems[topic] = str(error)
+            return
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+        self._told(topic)
+
 
 _DEPTH = 100
 _CLOCK_PERIOD: Ns = 10 * MS
@@ -23,7 +94,7 @@ def nothing(played: int, at: Ns) -> None:
 
 
 @dataclass(frozen=True)
-class Playing:
+class PlayOptions:
     """How a recording is played.
 
     ``rate``: recorded seconds per second. ``topics``: only these; ``None``: all that can be read, but for
@@ -47,7 +118,7 @@ class Playing:
             raise UsageError(f"a delay of {self.delay:g}: give seconds, 0 or more")
 
 
-def play(node: Node, bag: Bag, how: Playing = Playing()) -> int:
+def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     """Publish what was recorded, in time; blocks until the end. Returns how many messages were published.
 
     Raises ``UsageError`` for a topic that was not recorded or cannot be read.
@@ -74,7 +145,7 @@ def play(node: Node, bag: Bag, how: Playing = Playing()) -> int:
     return played
 
 
-def _advertise(node: Node, bag: Bag, how: Playing) -> dict[str, Publisher]:
+def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
     there = {topic.name: topic.type for topic in bag.topics}
     for name in how.topics or ():
         if name not in there:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from volery.ros.graph.node import QoS, ServiceState, TopicState
+from volery.ros.graph.interface import QoS, ServiceState, TopicState
 from volery.ros.messages import Message, ServiceType
 
 
-class Parcel(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """A message as it arrived: its bytes, what reads them, and the node it came from ('' if unknown).
 
     ``read`` raises ``UsageError`` where the bytes are no message of the topic's type.
@@ -23,16 +23,16 @@ class Parcel(NamedTuple):
     publisher: str
 
 
-Arrived = Callable[[Parcel], None]
+OnMessage = Callable[[ReceivedMessage], None]
 
-Done = Callable[[Message | None, str], None]
+OnResponse = Callable[[Message | None, str], None]
 """The answer, or ``None`` and why there is none."""
 
-Asked = Callable[[Message, Done], None]
+OnRequest = Callable[[Message, OnResponse], None]
 """A request, and what is to be called with the answer, once, from any thread."""
 
 
-class Outlet(Protocol):
+class LibraryPublisher(Protocol):
     """Sends to one topic."""
 
     def send(self, data: bytes) -> None:
@@ -45,7 +45,7 @@ class Outlet(Protocol):
         """Send no more."""
 
 
-class Inlet(Protocol):
+class LibrarySubscription(Protocol):
     """Receives from one topic."""
 
     def connected(self) -> int:
@@ -55,17 +55,17 @@ class Inlet(Protocol):
         """Receive no more."""
 
 
-class Served(Protocol):
+class LibraryService(Protocol):
     """A service that is offered."""
 
     def close(self) -> None:
         """Offer it no longer."""
 
 
-class Caller(Protocol):
+class LibraryClient(Protocol):
     """Calls one service."""
 
-    def call(self, request: Message, done: Done) -> Callable[[], None]:
+    def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
         """Ask; *done* is told the answer. Returns what gives it up."""
 
     def ready(self) -> bool:
@@ -75,19 +75,19 @@ class Caller(Protocol):
         """Call no more."""
 
 
-class Wire(Protocol):
+class LibraryNode(Protocol):
     """One node of the client library. All names are absolute. Every call may block for a moment."""
 
-    def advertise(self, topic: str, message_type: str, qos: QoS) -> Outlet:
+    def advertise(self, topic: str, message_type: str, qos: QoS) -> LibraryPublisher:
         """Publish to a topic. ``UsageError`` if the topic carries another type."""
 
-    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: Arrived) -> Inlet:
+    def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> LibrarySubscription:
         """Receive a topic. ``UsageError`` if the topic carries another type."""
 
-    def serve(self, name: str, kind: ServiceType, asked: Asked) -> Served:
+    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> LibraryService:
         """Offer a service. ``UsageError`` if somebody else does."""
 
-    def caller(self, name: str, kind: ServiceType) -> Caller:
+    def caller(self, name: str, kind: ServiceType) -> LibraryClient:
         """Call a service."""
 
     def has_service(self, name: str) -> bool:
@@ -109,10 +109,10 @@ class Wire(Protocol):
         """Leave the graph."""
 
 
-class Library(Protocol):
+class ClientLibrary(Protocol):
     """A ROS client library as one process uses it."""
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Wire:
+    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> LibraryNode:
         """Join the graph as the node of that full name; *lost* is told why, should it be thrown out.
 
         ``UsageError`` if the name is taken, ``LinkError`` if the graph cannot be reached.

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, to_seconds
-from volery.ros.graph.node import AS_OFFERED, QoS, RosGraph, ServiceState
+from volery.ros.graph.interface import AS_OFFERED, QoS, RosGraph, ServiceState
 
 _LISTENING = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
 _PORTION: Ns = 100 * MS
 
 
-class TopicLine(NamedTuple):
+class TopicSnapshot(NamedTuple):
     """A topic: who publishes and who subscribes, and messages per second (``None``: not measured)."""
 
     name: str
@@ -24,11 +24,11 @@ class TopicLine(NamedTuple):
     rate: float | None
 
 
-class Portrait(NamedTuple):
+class GraphSnapshot(NamedTuple):
     """A graph at one moment. Everything is sorted by name."""
 
     nodes: tuple[str, ...]
-    topics: tuple[TopicLine, ...]
+    topics: tuple[TopicSnapshot, ...]
     services: tuple[ServiceState, ...]
 
     def as_dict(self) -> dict[str, Any]:
@@ -40,15 +40,15 @@ class Portrait(NamedTuple):
         }
 
 
-def portrait(graph: RosGraph, within: Ns = 0) -> Portrait:
+def snapshot(graph: RosGraph, within: Ns = 0) -> GraphSnapshot:
     """What is there now; with *within*, each topic is listened to for so long and its rate counted.
 
     Blocks for that long. The node that listens is not in the picture.
     """
     topics, nodes, services = graph.topics(), graph.node_names(), graph.services()
     rates = _rates(graph, within) if within > 0 else {}
-    lines = (TopicLine(*topic, rates.get(topic.name)) for topic in topics)
-    return Portrait(tuple(sorted(nodes)), tuple(sorted(lines)), tuple(sorted(services)))
+    lines = (TopicSnapshot(*topic, rates.get(topic.name)) for topic in topics)
+    return GraphSnapshot(tuple(sorted(nodes)), tuple(sorted(lines)), tuple(sorted(services)))
 
 
 def _rates(graph: RosGraph, within: Ns) -> dict[str, float]:
