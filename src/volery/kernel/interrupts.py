@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from volery.kernel.api import Kernel
     from volery.kernel.task import Task
 
-    pass
-    from volery.kernel.task import Task
-
 LONGEST_WAIT_S = 0.25
 """The main thread waits for nothing longer than this at a stretch: Python runs handlers between bytecodes,
 and a signal that arrives just before the thread falls asleep does not wake it."""

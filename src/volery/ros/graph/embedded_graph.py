@@ -12,13 +12,24 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
-from volery.base.time import MS, Ns, S
+from volery.base.time import Ns, S
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.embedded_node import EmbeddedNode
 from volery.ros.graph.graph_context import GraphContext, Parameters, Records
-from volery.ros.graph.interface import Price, RosGraph, Routing, ServiceState, TopicState, free, no_route
+from volery.ros.graph.interface import (
+    CLOCK,
+    CLOCK_PERIOD,
+    CLOCK_TYPE,
+    Price,
+    RosGraph,
+    Routing,
+    ServiceState,
+    TopicState,
+    free,
+    no_route,
+)
 from volery.ros.messages import cdr_size, new
 
 if TYPE_CHECKING:
@@ -26,11 +37,6 @@ if TYPE_CHECKING:
     def _is_a(graph: EmbeddedGraph) -> RosGraph:
         """Checked by the type checker: it has all that a graph has."""
         return graph
-
-
-CLOCK = "/clock"
-CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
-CLOCK_PERIOD: Ns = 10 * MS
 
 
 class ClockPublisher:

@@ -13,9 +13,8 @@ from volery.base.time import Ns
 from volery.kernel.task import ExecutionContext
 from volery.ros.graph import names
 from volery.ros.graph.callbacks import CallbackGroup, NodeRate, NodeTimer, Work, sleep
-from volery.ros.graph.embedded_graph import CLOCK
 from volery.ros.graph.graph_context import GraphContext, NodeContext
-from volery.ros.graph.interface import AS_OFFERED, DEFAULT, Callback, Group, Handler, Node, QoS
+from volery.ros.graph.interface import AS_OFFERED, CLOCK, DEFAULT, Callback, Group, Handler, Node, QoS
 from volery.ros.graph.services import EmbeddedClient, EmbeddedService
 from volery.ros.graph.topics import EmbeddedPublisher, EmbeddedSubscription, topic
 

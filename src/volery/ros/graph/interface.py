@@ -13,9 +13,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from volery.base.errors import UsageError, choices
-from volery.base.time import Ns
+from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
+
+CLOCK = "/clock"
+CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
+CLOCK_PERIOD: Ns = 10 * MS
 
 RELIABLE, BEST_EFFORT, BEST_AVAILABLE = "reliable", "best_effort", "best_available"
 VOLATILE, TRANSIENT_LOCAL = "volatile", "transient_local"

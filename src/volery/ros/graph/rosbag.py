@@ -11,8 +11,7 @@ from functools import partial
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
-from volery.ros.graph.embedded_graph import CLOCK
-from volery.ros.graph.interface import AS_OFFERED, LATCHED, Node, Publisher, QoS, RosGraph
+from volery.ros.graph.interface import AS_OFFERED, CLOCK, LATCHED, Node, Publisher, QoS, RosGraph
 from volery.ros.messages import Message, new
 from volery.ros.messages.bag_writer import BagWriter
 from volery.ros.messages.bags import Bag

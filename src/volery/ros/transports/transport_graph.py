@@ -16,9 +16,20 @@ from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.embedded_graph import CLOCK, CLOCK_PERIOD, CLOCK_TYPE, record_all
+from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import GraphContext, Records
-from volery.ros.graph.interface import BEST_AVAILABLE, QoS, RosGraph, ServiceState, TopicState, free, no_route
+from volery.ros.graph.interface import (
+    BEST_AVAILABLE,
+    CLOCK,
+    CLOCK_PERIOD,
+    CLOCK_TYPE,
+    QoS,
+    RosGraph,
+    ServiceState,
+    TopicState,
+    free,
+    no_route,
+)
 from volery.ros.messages import new, to_cdr
 from volery.ros.transports.blocking_calls import run_in_thread
 from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage

@@ -18,7 +18,7 @@ from volery.base.errors import ComponentError, LinkSilent, choices
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Signal
 from volery.model.system import System
-from volery.ros.graph.embedded_graph import CLOCK_PERIOD
+from volery.ros.graph.interface import CLOCK_PERIOD
 from volery.ros.transports.blocking_calls import pending_calls
 from volery.run.assembly.components import Builder, BuiltComponents, ProcessPart, Truth
 from volery.run.assembly.computers import Platform
