@@ -17,7 +17,7 @@ from time import process_time
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "properties"))
 from test_hostile_bytes import EARLY, MANY, SOME, Growth, frames_for
 
-from volery.testing.hostile import besiege
+from volery.testing.fuzzing import fuzz
 
 DRIVERS = ("ardupilot", "px4", "paparazzi")
 
@@ -31,11 +31,11 @@ def main() -> None:
     for driver in DRIVERS:
         frames = frames_for(driver)
         start = process_time()
-        siege = besiege(driver, frames, SOME)
+        siege = fuzz(driver, frames, SOME)
         each = (process_time() - start) / SOME
         growth = Growth(count)
         tracemalloc.start()
-        besiege(driver, frames, count, after=growth.look)
+        fuzz(driver, frames, count, after=growth.look)
         tracemalloc.stop()
         kept = growth.late - growth.early
         print(

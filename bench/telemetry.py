@@ -37,7 +37,7 @@ from volery.links.udp_link import UdpLink
 from volery.links.wire_faults import FaultyLink
 from volery.run.assembly.simulated_fleet import fleet_of
 from volery.run.assembly.simulated_vehicles import link_to, parse_simulated
-from volery.testing.hostile import Besieged
+from volery.testing.fuzzing import FuzzTarget
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
 from volery.vehicles.driver import drivers
@@ -99,7 +99,7 @@ def ours(chunks: Chunks) -> Callable[[], int]:
 
     def run() -> int:
         kernel = VirtualKernel()
-        link = Besieged(kernel, "link", MAVLINK)
+        link = FuzzTarget(kernel, "link", MAVLINK)
         drone = Drone(kernel, "craft", open_driver(kernel, link, "craft", {"texts": "unrecorded"}))
         seen = drone.telemetry
         woken = [0]

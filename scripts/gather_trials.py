@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from volery.testing.driver_conformance import conformance
-from volery.testing.fault_trials import try_fault
+from volery.testing.fault_trials import PHASES, try_fault
 from volery.testing.faults import FAULTS
-from volery.testing.phases import PHASES
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 KEPT = Path(__file__).parent.parent / "docs" / "reference" / "trials.json"

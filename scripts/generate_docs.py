@@ -24,8 +24,8 @@ from volery.simulation.autopilots.firmware import FirmwareFamily
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
+from volery.testing.fault_trials import PHASES
 from volery.testing.faults import FAULTS
-from volery.testing.phases import PHASES
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"

@@ -16,7 +16,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type_of
-from volery.testing.hostile import SEALS, Besieged, Mutator, besiege
+from volery.testing.fuzzing import SEALS, FuzzTarget, Mutator, fuzz
 from volery.vehicles.driver import drivers
 
 RECORDED = Path(__file__).parents[1] / "golden" / "frames" / "mavlink.txt"
@@ -61,7 +61,7 @@ def test_a_siege_ends_as_it_began(driver: str, count: int) -> None:
     growth = Growth(count)
     tracemalloc.start()
     try:
-        siege = besiege(driver, frames_for(driver), count, after=growth.look)
+        siege = fuzz(driver, frames_for(driver), count, after=growth.look)
     finally:
         tracemalloc.stop()
     assert siege.fed == count
@@ -100,7 +100,7 @@ def test_no_frames_break_a_driver(driver: str) -> None:
     @given(st.lists(spoiled(factory.codec.name, frames), min_size=1, max_size=6))
     def holds(arriving: list[bytes]) -> None:
         kernel = VirtualKernel()
-        link = Besieged(kernel, "link", factory.codec)
+        link = FuzzTarget(kernel, "link", factory.codec)
         opened = open_driver(kernel, link, "craft", {})
         for data in frames[:3]:
             link.arrived(data)

@@ -1,4 +1,7 @@
-"""How programs reach a simulated vehicle: each on a link of its own, or each as a node of one graph."""
+"""A link with a hand on it: what passes, in either direction, and who else is heard on it.
+
+How programs reach a simulated vehicle: each on a link of its own, or each as a node of one graph.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from typing import Protocol
 from volery.base.seeds import stream
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Link
+from volery.links.link import Frame, Link, Receiver
 from volery.links.wire_faults import FaultyLink, WireFaults
 from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.simulated_fleet import SimulatedFleet
@@ -24,12 +27,65 @@ from volery.run.assembly.vehicle_nodes import (
     reached_over_links,
     serve_on_graph,
 )
-from volery.testing.checks import ImpossibleError
-from volery.testing.tap import Tap
+from volery.testing.checks import NotPossibleError
 from volery.vehicles.driver import Driver, drivers
 
 
-class Hand(Protocol):
+class ControlledLink:
+    """Stands between a driver and its link, simulated or real. ``hears`` and ``speaks`` say what passes."""
+
+    def __init__(self, link: Link) -> None:
+        self.name = link.name
+        self.hears = True
+        self.speaks = True
+        self._link = link
+        self._others: list[Link] = []
+        self._receiver: Receiver | None = None
+        link.receive(self._arrived)
+
+    def cut(self) -> None:
+        """Nothing passes any more, in either direction."""
+        self.hears = self.speaks = False
+
+    def mend(self) -> None:
+        """All passes again."""
+        self.hears = self.speaks = True
+
+    def share(self, other: Link) -> None:
+        """The same air: what is said goes to *other*, too, and what *other* says is heard here."""
+        self._others.append(other)
+        other.receive(self._arrived)
+
+    def send(self, frame: Frame) -> None:
+        """Send, unless it is cut."""
+        if self.speaks:
+            for link in (self._link, *self._others):
+                link.send(frame)
+
+    def receive(self, receiver: Receiver) -> None:
+        """From now on hand every frame that arrives to *receiver*, unless it is cut."""
+        self._receiver = receiver
+
+    def _arrived(self, frame: Frame) -> None:
+        if self.hears and self._receiver is not None:
+            self._receiver(frame)
+
+    def problem(self) -> str:
+        """What is wrong with the wire below."""
+        return self._link.problem()
+
+    @property
+    def heard(self) -> object:
+        """What the link below has heard, if it counts that."""
+        return getattr(self._link, "heard", None)
+
+    def close(self) -> None:
+        """Close all links."""
+        for link in (self._link, *self._others):
+            link.close()
+
+
+class LinkControl(Protocol):
     """A hand on the wire of the first program: what passes, in either direction."""
 
     hears: bool
@@ -45,7 +101,7 @@ class Hand(Protocol):
 class Access(ABC):
     """Opens drivers. ``hand`` is on the wire of the first; ``link`` is that wire, where there is one."""
 
-    hand: Hand
+    hand: LinkControl
     link: Link | None = None
     protocol = ""
 
@@ -55,7 +111,7 @@ class Access(ABC):
 
     @abstractmethod
     def suffer(self, faults: WireFaults) -> None:
-        """From now on this happens to what passes. Raises ``ImpossibleError`` where nothing can."""
+        """From now on this happens to what passes. Raises ``NotPossibleError`` where nothing can."""
 
     @abstractmethod
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
@@ -73,7 +129,7 @@ class ByLink(Access):
         self._factory = drivers.load(wanted.vehicle.autopilot)
         self.protocol = self._factory.codec.name
         self.link = link_to(kernel, airfield, wanted, seed)
-        self._tap = self.hand = Tap(self.link)
+        self._tap = self.hand = ControlledLink(self.link)
         if sharing:
             self._tap.share(airfield.link(sharing))
 
@@ -89,7 +145,7 @@ class ByLink(Access):
     def suffer(self, faults: WireFaults) -> None:
         """On a link through bytes."""
         if not isinstance(self.link, FaultyLink):
-            raise ImpossibleError("nothing can happen to values; add wire=bytes to the address")
+            raise NotPossibleError("nothing can happen to values; add wire=bytes to the address")
         self.link.suffer(faults)
 
     def _open(self, link: Link, vehicle: str, options: dict[str, str]) -> Driver:

@@ -9,7 +9,7 @@ def takeoff(stage: Stage) -> None:
 ```
 
 A check that finds fault says so by ``demand``; any other error that leaves it is a fault, too. One whose
-circumstances cannot be had here raises ``ImpossibleError``. What it returns, if anything, is noted beside
+circumstances cannot be had here raises ``NotPossibleError``. What it returns, if anything, is noted beside
 "passed".
 """
 
@@ -18,22 +18,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.vehicles import Capability
 
-if TYPE_CHECKING:
-    from volery.testing.stage import Stage
-
-Body = Callable[["Stage"], str | None]
+Body = Callable[[Any], str | None]
+"""Runs a check on a ``Stage``; the stage's module imports this one, so its type is not named here."""
 
 
-class BrokenError(Exception):
+class CheckFailedError(Exception):
     """What was demanded was not so."""
 
 
-class ImpossibleError(Exception):
+class NotPossibleError(Exception):
     """The circumstances of this check cannot be had on this link or with this vehicle."""
 
 
@@ -61,6 +59,11 @@ CHECKS: list[Check] = []
 """All that have been registered; within a group in the order in which they are run."""
 
 
+def group_of(module: str) -> str:
+    """Return the group of the checks in a module: ``manual-control`` for ``...manual_control_checks``."""
+    return module.rpartition(".")[2].removesuffix("_checks").replace("_", "-")
+
+
 def check(
     *,
     needs: tuple[Capability, ...] = (),
@@ -74,7 +77,7 @@ def check(
 
     def register(body: Body) -> Body:
         name = body.__name__.replace("_", "-")
-        group = body.__module__.rpartition(".")[2].replace("_", "-")
+        group = group_of(body.__module__)
         demands = " ".join((body.__doc__ or "").split())
         CHECKS.append(Check(name, group, demands, body, needs, flies, kind, lets_fall, cold, neighbour))
         return body
@@ -83,9 +86,9 @@ def check(
 
 
 def demand(holds: object, otherwise: str) -> None:
-    """Raise ``BrokenError`` saying what was seen *otherwise*, unless it *holds*."""
+    """Raise ``CheckFailedError`` saying what was seen *otherwise*, unless it *holds*."""
     if not holds:
-        raise BrokenError(otherwise)
+        raise CheckFailedError(otherwise)
 
 
 class Caught:
@@ -111,5 +114,5 @@ def raising(*kinds: type[VoleryError], naming: str) -> Iterator[Caught]:
         caught.error = error
         return
     except VoleryError as error:
-        raise BrokenError(f"{type(error).__name__} instead of {expected}: {error}") from error
-    raise BrokenError(f"nothing was raised; expected {expected}")
+        raise CheckFailedError(f"{type(error).__name__} instead of {expected}: {error}") from error
+    raise CheckFailedError(f"nothing was raised; expected {expected}")

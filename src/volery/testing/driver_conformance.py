@@ -21,11 +21,10 @@ from typing import Any
 
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import to_seconds
-from volery.testing.checks import CHECKS, BrokenError, Check, ImpossibleError
+from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
-from volery.testing.stage import Stage, kind_of
-from volery.testing.stage_real import RealStage
-from volery.testing.stage_simulated import SimulatedStage
+from volery.testing.simulated_stage import SimulatedStage
+from volery.testing.stage import RealStage, Stage, kind_of
 from volery.vehicles.address import Address, parse
 
 
@@ -190,9 +189,9 @@ def _judged(one: Check, stage: Stage, play: Callable[[], str | None]) -> Result:
         outcome = Outcome.PASSED
     except _LackingError as lacking:
         outcome, detail = Outcome.LACKING, f"cannot {lacking}"
-    except ImpossibleError as error:
+    except NotPossibleError as error:
         outcome, detail = Outcome.IMPOSSIBLE, str(error)
-    except BrokenError as error:
+    except CheckFailedError as error:
         detail = str(error)
     except Exception as error:
         detail = f"{type(error).__name__}: {error}"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from volery.links.wire_faults import WireFaults
 from volery.simulation.world.environment_models import Wind
-from volery.testing.stage_simulated import SimulatedStage
+from volery.testing.simulated_stage import SimulatedStage
 
-WHOLE = WireFaults()
+NO_WIRE_FAULTS = WireFaults()
 
 GALE = Wind(east=12.0, gust=1.5)
 """The strongest in which this airframe still goes against it: at 30 degrees of tilt its drag holds 13 m/s."""

@@ -1,7 +1,9 @@
 """What a check plays on: one vehicle behind a link that can be cut, and whoever else has a hand in it.
 
 A simulated stage is new for every check and lives in virtual time. A real one is the same aircraft for all
-checks, in real time; what nobody can do to a real aircraft from here raises ``ImpossibleError``.
+checks, in real time; what nobody can do to a real aircraft from here raises ``NotPossibleError``.
+
+The one stage of a real vehicle, in real time, for all checks.
 """
 
 from __future__ import annotations
@@ -11,20 +13,24 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from volery.base.errors import UsageError, VehicleError, VoleryError
+from volery.base.errors import CapabilityError, UsageError, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Altitude, Position
 from volery.base.time import S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
+from volery.kernel.wall import WallKernel
 from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import constant
+from volery.run.assembly.ros_graphs import GRAPHS
+from volery.run.assembly.vehicles import EMBEDDED
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.testing.access import Hand
-from volery.testing.checks import ImpossibleError, demand
+from volery.testing.access import ControlledLink, LinkControl
+from volery.testing.checks import NotPossibleError, demand
 from volery.vehicles import Drone, Rover, Vehicle
-from volery.vehicles.driver import Driver
+from volery.vehicles.address import Address, open_link, parse
+from volery.vehicles.driver import Driver, drivers
 from volery.vehicles.executor import StepExecutor
 from volery.vehicles.telemetry import Telemetry
 
@@ -53,7 +59,7 @@ class Commander:
         self._performer.perform("land", lambda: self._driver.land(300 * S))
 
     def sender_to(self, place: Position) -> Callable[[], None]:
-        """What has it go to *place*. ``ImpossibleError`` where nobody else can."""
+        """What has it go to *place*. ``NotPossibleError`` where nobody else can."""
         return lambda: self._performer.perform("go", lambda: self._driver.goto(place, None, 300 * S))
 
     def disarms_it(self) -> None:
@@ -61,9 +67,9 @@ class Commander:
         self._performer.perform("disarm", lambda: self._driver.disarm(True))
 
     def moves_home(self, place: Position) -> None:
-        """Have it return to *place* (AMSL) from now on. ``ImpossibleError`` if nobody can ask for that."""
+        """Have it return to *place* (AMSL) from now on. ``NotPossibleError`` if nobody can ask for that."""
         if self._protocol != "MAVLink" or self._link is None:
-            raise ImpossibleError(f"home cannot be moved over {self._protocol}")
+            raise NotPossibleError(f"home cannot be moved over {self._protocol}")
         fields = {
             "target_system": self.seen.system,
             "command": constant("MAV_CMD_DO_SET_HOME"),
@@ -111,7 +117,7 @@ class Stage(ABC):
         self.sleep(seconds)
         try:
             action()
-        except (VoleryError, ImpossibleError):
+        except (VoleryError, NotPossibleError):
             return
 
     def at(self, north: float, east: float, height: float = 10.0, *, amsl: bool = False) -> Position:
@@ -148,11 +154,11 @@ class Stage(ABC):
 
     @property
     @abstractmethod
-    def tap(self) -> Hand:
+    def tap(self) -> LinkControl:
         """The hand on the wire."""
 
     def other(self) -> Commander:
-        """A second commander, who hears the vehicle. Raises ``ImpossibleError`` where there can be none."""
+        """A second commander, who hears the vehicle. Raises ``NotPossibleError`` where there can be none."""
         commander = self._commander()
         self._others.append(commander)
         commander.waits_until_heard()
@@ -199,3 +205,74 @@ def kind_of(name: str) -> type[Vehicle]:
     if name not in kinds:
         raise UsageError(f"no kind of vehicle {name!r}; there is drone or rover")
     return kinds[name]
+
+
+class RealStage(Stage):
+    """See ``Stage``. *second* is the address of another link to the same vehicle, for other commanders."""
+
+    def __init__(self, address: Address, kind: type[Vehicle], second: str) -> None:
+        super().__init__()
+        self.kernel: WallKernel = WallKernel()
+        self._address, self._kind = address, kind
+        self._second = parse(second) if second else None
+        if self._second is not None and self._second.driver != address.driver:
+            raise UsageError(f"{second} is not a second link to {address}: it names another driver")
+        self._tap, self.driver = self._open(address)
+        self.drone = kind(self.kernel, address.driver, self.driver)
+
+    def _open(self, address: Address, **more: str) -> tuple[ControlledLink, Driver]:
+        if address.carrier in (EMBEDDED, *GRAPHS):
+            raise CapabilityError(f"{address}: the checks reach real vehicles over bytes only")
+        factory = drivers.load(address.driver)
+        if factory.on_link is None:
+            raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
+        tap = ControlledLink(open_link(self.kernel, address, factory.codec))
+        options = {name: value for name, value in address.options.items() if name != "baud"} | more
+        return tap, factory.on_link(self.kernel, tap, address.driver, options)
+
+    @property
+    def tap(self) -> ControlledLink:
+        """The hand on our end of the link: the vehicle's end is as it is."""
+        return self._tap
+
+    def _at_second(self, **more: str) -> tuple[ControlledLink, Driver]:
+        if self._second is None:
+            raise NotPossibleError("needs a second link to the vehicle: state one with --second URL")
+        return self._open(self._second, **more)
+
+    def _commander(self) -> Commander:
+        tap, driver = self._at_second()
+        return Commander(self.kernel, driver, tap, drivers.load(self._address.driver).codec.name)
+
+    def another_program(self) -> Any:
+        """On the second link."""
+        return self._kind(self.kernel, self._address.driver, self._at_second()[1])
+
+    def of_system(self, system: int) -> Any:
+        """On the second link. Raises ``NotPossibleError`` for drivers that do not ask for a system id."""
+        try:
+            driver = self._at_second(system=str(system))[1]
+        except UsageError as error:
+            raise NotPossibleError(f"the driver takes no system id: {error}") from None
+        return self._kind(self.kernel, self._address.driver, driver)
+
+    @property
+    def flight(self) -> Flight:
+        """Nobody can break a real one from here."""
+        raise NotPossibleError("only a simulated vehicle can be broken from here")
+
+    @property
+    def neighbour(self) -> Any:
+        """Nobody knows of one."""
+        raise NotPossibleError("needs a second vehicle on the same link")
+
+    def rest(self) -> None:
+        """The wire is mended and the vehicle brought down, unless somebody else has it."""
+        self._tap.mend()
+        super().rest()
+        self.drone.come_to_rest()
+
+    def close(self) -> None:
+        """Hang up."""
+        self.drone.close()
+        self.kernel.close()

@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 
 from volery.testing import conformance
-from volery.testing.fault_trials import try_fault
+from volery.testing.fault_trials import PHASES, try_fault
 from volery.testing.faults import FAULTS
-from volery.testing.phases import PHASES
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 TOLD = Path(__file__).parents[3] / "docs" / "reference" / "trials.json"

@@ -21,7 +21,7 @@ from volery.ros.graph import LATCHED, QoS
 from volery.ros.messages import new, request, service
 from volery.ros.transports.ros2 import carried, ros2_graph
 from volery.testing.checks import demand, raising
-from volery.testing.transports import ROS2, Site, no_fault, run_checks
+from volery.testing.transport_conformance import ROS2, Site, no_fault, run_checks
 from volery.trace.events import Text
 
 STRING = "std_msgs/msg/String"

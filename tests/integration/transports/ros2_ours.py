@@ -14,7 +14,7 @@ from volery.kernel.wall import WallKernel
 from volery.ros.graph import QoS
 from volery.ros.messages import request, service, types
 from volery.ros.transports.ros2 import carried, ros2_graph
-from volery.testing.transports_topics import PUBLISHED
+from volery.testing.transport_topic_checks import PUBLISHED
 
 SET_BOOL = "std_srvs/srv/SetBool"
 

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.ros.messages import ros1_type
-from volery.testing.transports import CHECKS, ROS1, Site
+from volery.testing.transport_conformance import CHECKS, ROS1, Site
 
 from .conftest import Ours
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from volery.testing.transports import CHECKS
+from volery.testing.transport_conformance import CHECKS
 
 from .conftest import HERE, python_of, surroundings
 

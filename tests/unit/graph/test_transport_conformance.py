@@ -4,7 +4,7 @@ import pytest
 
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.graph import EmbeddedGraph
-from volery.testing.transports import CHECKS, EMBEDDED, Site
+from volery.testing.transport_conformance import CHECKS, EMBEDDED, Site
 
 
 @pytest.mark.parametrize("check", CHECKS)

@@ -16,7 +16,7 @@ from volery.cli.main import app
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.firmware import firmwares
 from volery.testing import Outcome, conformance
-from volery.testing.checks import BrokenError, demand, raising
+from volery.testing.checks import CheckFailedError, demand, raising
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import try_fault
 from volery.vehicles import Capability
@@ -123,14 +123,14 @@ def test_names_that_are_none() -> None:
 
 def test_demands() -> None:
     demand(True, "never said")
-    with pytest.raises(BrokenError, match="said"):
+    with pytest.raises(CheckFailedError, match="said"):
         demand(False, "said")
     with raising(UsageError, naming="x") as caught:
         raise UsageError("x is none")
     assert caught.text == "x is none"
-    with pytest.raises(BrokenError, match="nothing was raised"), raising(UsageError, naming="x"):
+    with pytest.raises(CheckFailedError, match="nothing was raised"), raising(UsageError, naming="x"):
         pass
-    with pytest.raises(BrokenError, match="does not name y"), raising(UsageError, naming="y"):
+    with pytest.raises(CheckFailedError, match="does not name y"), raising(UsageError, naming="y"):
         raise UsageError("x")
 
 
@@ -154,7 +154,7 @@ def test_the_command_line_says_what_was_found(tmp_path: Path) -> None:
 
 
 def test_the_command_line_lists_them_and_refuses_others() -> None:
-    listed = run("--list", "--only", "wire", "--json")
+    listed = run("--list", "--only", "link", "--json")
     assert listed.exit_code == 0
     assert "link-lost" in [one["check"] for one in json.loads(listed.output)]
     assert run("sim:ardupilot", "--only", "nothing").exit_code == 2

@@ -12,7 +12,7 @@ from volery.base.time import MS, S
 from volery.ros.graph.interface import BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, Node, Publisher, QoS
 from volery.ros.messages import message_class, new, types
 from volery.testing.checks import demand, raising
-from volery.testing.transports_site import Site, check
+from volery.testing.transport_site import Site, check
 
 STRING = "std_msgs/msg/String"
 PATIENT = QoS(depth=None)

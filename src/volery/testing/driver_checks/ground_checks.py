@@ -8,7 +8,7 @@ from math import inf, isfinite, nan
 from volery.base.errors import CapabilityError, NotArrived, Refused, UsageError, VehicleError
 from volery.base.position import AboveGround, Ellipsoidal, Position
 from volery.base.time import to_seconds
-from volery.testing.checks import BrokenError, ImpossibleError, check, demand, raising
+from volery.testing.checks import CheckFailedError, NotPossibleError, check, demand, raising
 from volery.testing.stage import Stage
 from volery.vehicles import Capability
 
@@ -93,11 +93,11 @@ def arming_refused(stage: Stage) -> str:
     can do what lacks by itself, the call returns armed.
     """
     if stage.drone.telemetry.armable:
-        raise ImpossibleError("it can be armed as soon as it is heard")
+        raise NotPossibleError("it can be armed as soon as it is heard")
     try:
         with raising(Refused, NotArrived, naming=stage.name) as caught:
             stage.drone.arm()
-    except BrokenError:
+    except CheckFailedError:
         demand(stage.drone.armed, "it was not refused, and it is not armed")
         return "armed: the driver has done what lacked"
     demand(not stage.drone.armed, "it is armed nevertheless")

@@ -17,8 +17,8 @@ from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.run.assembly.vehicles import KINDS
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.testing.access import Hand, access_to
-from volery.testing.checks import ImpossibleError
+from volery.testing.access import LinkControl, access_to
+from volery.testing.checks import NotPossibleError
 from volery.testing.stage import Commander, Stage
 from volery.trace.events import Event
 from volery.vehicles import Vehicle
@@ -37,7 +37,7 @@ AWAY_DEG = 0.0005
 """How far east of the vehicle its neighbour stands: about 40 m."""
 
 
-class Pilot(Commander):
+class SafetyPilot(Commander):
     """Where all programs share one node, the other party is the pilot: he takes the vehicle by his mode
     switch and brings it down by his throttle.
     """
@@ -52,8 +52,8 @@ class Pilot(Commander):
         self._channels[THROTTLE] = THROTTLE_DOWN
 
     def sender_to(self, place: Position) -> Callable[[], None]:
-        """Raises ``ImpossibleError``: set-points of all nodes are one stream to the vehicle's."""
-        raise ImpossibleError(f"programs share one node, which cannot tell who sent it to {place}")
+        """Raises ``NotPossibleError``: set-points of all nodes are one stream to the vehicle's."""
+        raise NotPossibleError(f"programs share one node, which cannot tell who sent it to {place}")
 
 
 class SimulatedStage(Stage):
@@ -108,7 +108,7 @@ class SimulatedStage(Stage):
         return found
 
     @property
-    def tap(self) -> Hand:
+    def tap(self) -> LinkControl:
         """The hand on the wire."""
         return self._access.hand
 
@@ -119,7 +119,7 @@ class SimulatedStage(Stage):
     def _commander(self) -> Commander:
         if self.link is None:
             driver, _ = self._access.another(self.name_of_vehicle)
-            return Pilot(self.kernel, driver, self.airfield.autopilots[self.name_of_vehicle])
+            return SafetyPilot(self.kernel, driver, self.airfield.autopilots[self.name_of_vehicle])
         driver, link = self._access.another(self.name_of_vehicle)
         return Commander(self.kernel, driver, link, self._access.protocol)
 
@@ -128,11 +128,11 @@ class SimulatedStage(Stage):
         return self._program()
 
     def of_system(self, system: int) -> Any:
-        """Raises ``ImpossibleError`` for drivers that do not ask for a system id."""
+        """Raises ``NotPossibleError`` for drivers that do not ask for a system id."""
         try:
             return self._program(system=str(system))
         except UsageError as error:
-            raise ImpossibleError(f"the driver takes no system id: {error}") from None
+            raise NotPossibleError(f"the driver takes no system id: {error}") from None
 
     def _program(self, **options: str) -> Any:
         driver, _ = self._access.another(self.name_of_vehicle, **options)
@@ -147,7 +147,7 @@ class SimulatedStage(Stage):
     def neighbour(self) -> Any:
         """On a link of its own, or as a node of its own."""
         if not self._neighbour:
-            raise ImpossibleError("it is alone")
+            raise NotPossibleError("it is alone")
         driver, _ = self._access.another(self._neighbour)
         self._others.append(Commander(self.kernel, driver))
         return self._kind(self.kernel, self._neighbour, driver)

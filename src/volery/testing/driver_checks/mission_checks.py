@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from volery.base.errors import OutOfBounds, UsageError
 from volery.testing.checks import check, demand, raising
-from volery.testing.driver_checks.flight import demand_there
+from volery.testing.driver_checks.flight_checks import demand_there
 from volery.testing.stage import Stage
 from volery.vehicles import Capability, ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 

@@ -1,6 +1,6 @@
 """Hostile bytes: frames spoiled in every way that noise, bugs or malice might, from a seeded stream.
 
-Most have a right checksum nevertheless: what only noise has spoiled never gets past a parser. ``besiege``
+Most have a right checksum nevertheless: what only noise has spoiled never gets past a parser. ``fuzz``
 hands them to a driver whose program goes on flying; nothing but errors of this project may come of it.
 """
 
@@ -162,7 +162,7 @@ class Mutator:
         return self._seal(frame[: self._payload + keep] + frame[places.stop :])
 
 
-class Besieged(CodedLink):
+class FuzzTarget(CodedLink):
     """A link on which nobody listens, and everything arrives."""
 
     def _transmit(self, data: bytes) -> None:
@@ -183,7 +183,7 @@ AT_ONCE = 20
 PASSES = 100 * MS
 
 
-def besiege(
+def fuzz(
     driver: str,
     frames: Sequence[bytes],
     count: int,
@@ -199,7 +199,7 @@ def besiege(
     kernel = VirtualKernel()
     factory = drivers.load(driver)
     assert factory.on_link is not None, "hostile bytes need a link"
-    link = Besieged(kernel, "siege", factory.codec)
+    link = FuzzTarget(kernel, "siege", factory.codec)
     opened = factory.on_link(kernel, link, "craft", {})
     drone = Drone(kernel, "craft", opened)
     random = stream(seed, f"hostile/{driver}")
@@ -223,7 +223,7 @@ def besiege(
     return result
 
 
-def _arrive(link: Besieged, data: bytes, random: Random) -> None:
+def _arrive(link: FuzzTarget, data: bytes, random: Random) -> None:
     """In portions that know nothing of frames."""
     place = 0
     while place < len(data):

@@ -6,7 +6,7 @@ from math import hypot
 
 from volery.base.errors import Failsafe, LinkGarbled, LinkSilent, NotArrived, Overridden, VehicleError
 from volery.base.time import S
-from volery.testing.checks import ImpossibleError, check, demand, raising
+from volery.testing.checks import NotPossibleError, check, demand, raising
 from volery.testing.stage import Stage
 from volery.vehicles import Capability
 
@@ -158,7 +158,7 @@ def home_moved_by_another(stage: Stage) -> str:
 
     stage.until(moved, 10.0, "the program still sees the old home")
     if Capability.RETURN_HOME not in stage.drone.capabilities:
-        raise ImpossibleError("it cannot return home")
+        raise NotPossibleError("it cannot return home")
     stage.drone.return_home()
     north, east, _ = stage.offset(there, stage.drone.position)
     demand(north * north + east * east < 16.0, f"it came down {north:.1f}, {east:.1f} m from there")

@@ -1,7 +1,7 @@
 """Conformance of transports: named checks of what the node interface must do on any ROS graph.
 
 ```python
-from volery.testing.transports import CHECKS, Site
+from volery.testing.transport_conformance import CHECKS, Site
 
 with kernel.adopt("checks"):
     for name, check in CHECKS.items():
@@ -9,7 +9,7 @@ with kernel.adopt("checks"):
             check(site)
 ```
 
-A check that finds fault raises ``BrokenError``. Where graphs differ on purpose, ``Traits`` says how, and the
+A check that finds fault raises ``CheckFailedError``. Where graphs differ on purpose, ``Traits`` says how, and the
 check demands what the trait promises.
 """
 
@@ -20,13 +20,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from volery.ros.graph.interface import RosGraph
-from volery.testing import transports_graph, transports_services, transports_topics
-from volery.testing.checks import BrokenError
-from volery.testing.transports_site import CHECKS, EMBEDDED, ROS1, ROS2, Site, Traits, check
+from volery.testing import transport_node_checks, transport_topic_checks
+from volery.testing.checks import CheckFailedError
+from volery.testing.transport_site import CHECKS, EMBEDDED, ROS1, ROS2, Site, Traits, check
 
 __all__ = [
     "CHECKS", "EMBEDDED", "ROS1", "ROS2", "Site", "Traits", "check", "run_checks",
-    "transports_graph", "transports_services", "transports_topics",
+    "transport_node_checks", "transport_topic_checks",
 ]  # fmt: skip
 
 
@@ -36,7 +36,7 @@ def no_fault(name: str) -> Iterator[list[str]]:
     faults: list[str] = []
     try:
         yield faults
-    except BrokenError as error:
+    except CheckFailedError as error:
         faults.append(f"{name}: {error}")
     except Exception:
         faults.append(f"{name}: {traceback.format_exc()}")
