@@ -222,4 +222,4 @@ def _in_the_air(kernel: Kernel, address: Address, seed: int, reach: Callable[...
     """What *reach* makes of a simulated vehicle in a world of its own."""
 
     wanted = parse_simulated(address, address.driver)
-    return reach(kernel, airfield_of(kernel, [wanted], seed), wanted, seed)
+    return reach(kernel, fleet_of(kernel, [wanted], seed), wanted, seed)

@@ -46,7 +46,7 @@ def bridge(
     from volery.cli import bridge as command
 
     output = Output(quiet, False, debug)
-    wanted = Bridging(
+    wanted = BridgeOptions(
         url=url,
         graph=graph,
         names=names,

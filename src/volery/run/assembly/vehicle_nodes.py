@@ -59,7 +59,7 @@ class GraphWire:
         self._together: list[Action] = []  # what was sent at this instant
         self._sent: Ns = -1
 
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """From now on this happens to what passes, in both directions."""
         self._faults = faults
 
@@ -175,9 +175,9 @@ class PrivateGraph:
         self.graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
         serve_on_graph(self.graph, airfield, self._vehicle, self._how, ExecutionContext(self._vehicle))
 
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """From now on this happens to what passes, in both directions."""
-        self._wire.suffer(faults)
+        self._wire.set_faults(faults)
 
     def open(self, commander: str = "commander", **options: str) -> Driver:
         """A driver of the vehicle, on a node called *commander*."""

@@ -94,7 +94,7 @@ def _open_simulated(
     for one in wanted:
         _check_home(one, stated.fence)
     kernel = VirtualKernel(pace=stated.pace)
-    airfield = airfield_of(kernel, wanted, stated.seed)
+    airfield = fleet_of(kernel, wanted, stated.seed)
     vehicles = [_simulated_vehicle(kernel, airfield, one, kinds[one.vehicle.name], stated) for one in wanted]
     return OpenedVehicles(kernel, tuple(vehicles), airfield)
 
