@@ -63,7 +63,7 @@ def free_port() -> int:
 def measure(
     rate: int, seconds: float, surroundings: dict[str, str]
 ) -> dict[str, tuple[float, list[int], int]]:
-    """By way: the share of a core, the delays, how many messages were heard."""
+    """Return for each way the share of a core, the delays and the number of messages."""
     ports = {way: free_port() for way in WAYS}
     script = "from volery.cli.main import main; main()"
     bridge = ("-c", script, "bridge", f"ardupilot+udp://:{ports['volery']}", "--rate", "0", "--quiet")
@@ -80,20 +80,20 @@ def measure(
         assert listener.stdout.readline() == "ready\n"
         before = {way: processor_seconds(process) for way, process in processes.items()}
         began = time.monotonic()
-        heard = json.loads(listener.stdout.readline())
+        received = json.loads(listener.stdout.readline())
         passed = time.monotonic() - began
         shares = {way: (processor_seconds(one) - before[way]) / passed for way, one in processes.items()}
-    return {way: (shares[way], sorted(heard["delays"][way]), heard["heard"][way]) for way in WAYS}
+    return {way: (shares[way], sorted(received["delays"][way]), received["received"][way]) for way in WAYS}
 
 
 def show(rate: int, found: dict[str, tuple[float, list[int], int]]) -> None:
     print(f"{rate} Hz, {rate * FRAMES} frames/s, {rate * MESSAGES} messages/s")
     reference = found["blocking"][0]
-    for way, (share, delays, heard) in found.items():
+    for way, (share, delays, received) in found.items():
         half, late = delays[len(delays) // 2], delays[len(delays) * 99 // 100]
         print(
             f"  {way:9} {share * 100:5.1f} % of a core, {share / reference:5.2f} x the blocking loop; "
-            f"delay {half / 1000:5.2f} ms, p99 {late / 1000:5.2f} ms; {heard} messages heard"
+            f"delay {half / 1000:5.2f} ms, p99 {late / 1000:5.2f} ms; {received} messages received"
         )
     added = found["volery"][1], found["blocking"][1]
     for name, place in (("median", 50), ("p99", 99)):

@@ -135,7 +135,7 @@ def simpy_handover(events: int) -> float:
 
 
 def baton(processes: int, events: int) -> float:
-    """The sleepers as threads: whoever sleeps hands the baton to the thread that is due next."""
+    """The sleepers as threads: a sleeping thread wakes the thread that is due next."""
     each = events // processes
     due = [(0, number) for number in range(processes)]
     turns = [threading.Semaphore(0) for _ in due]

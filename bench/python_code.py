@@ -4,7 +4,7 @@ The twelve programs in ``bench/python_programs`` were written before any cost wa
 in calibrating. In one campaign the calibration's own statements and programs are timed, round about, with the
 twelve as they are and the twelve with counters in them. ``fresh`` is by the costs of this very campaign,
 ``shipped`` by the table that comes with volery, times how much slower this machine is by the calibration's
-programs. No cost is fitted to the twelve, but which operations are told apart was chosen after a first look.
+programs. No cost is fitted to the twelve, but the classes of operations were chosen after a first look.
 
     python bench/python_code.py [MOST ROUNDS]
 """

@@ -3,7 +3,7 @@
 The same functions talk and listen everywhere: on the embedded graph as components that import our ``rospy``
 and ``rclpy``, on real ROS as two processes that import the real ones. Latency is the wall's time from just
 before ``publish`` to the begin of the callback, one message at a time; throughput is how many of a burst are
-heard a second; CPU is what a message of the burst takes of both processes' time, which a busy machine
+received a second; CPU is what a message of the burst takes of both processes' time, which a busy machine
 disturbs least. Medians over rounds that take turns. What is not installed is left out, and said.
 
     python bench/transports.py [--quick]
@@ -41,7 +41,7 @@ DISTRIBUTIONS = ("jazzy", "kilted")
 
 
 class Taken(NamedTuple):
-    """Median latency in us; messages heard per second; us of CPU time per message."""
+    """Median latency in us; messages received per second; us of CPU time per message."""
 
     latency: float
     throughput: float
@@ -49,7 +49,7 @@ class Taken(NamedTuple):
 
 
 @dataclass
-class Heard:
+class Received:
     """What a listener notes: seconds from publish to callback, a burst's times of arrival, its CPU time."""
 
     latencies: list[float] = field(default_factory=list)
@@ -58,7 +58,7 @@ class Heard:
     cpu: float = 0.0
     ended: bool = False
 
-    def hear(self, message: Any) -> None:
+    def add(self, message: Any) -> None:
         now, sent, phase = perf_counter(), message.pose.position.x, message.header.frame_id
         if phase == "single":
             self.latencies.append(now - sent)
@@ -72,8 +72,8 @@ class Heard:
 
     def result(self, cpu: float) -> Taken:
         """*cpu*: seconds that the burst took of all processes."""
-        heard, lasted = len(self.burst), self.burst[-1] - self.begun
-        return Taken(median(self.latencies) * 1e6, heard / lasted, cpu / heard * 1e6)
+        received, lasted = len(self.burst), self.burst[-1] - self.begun
+        return Taken(median(self.latencies) * 1e6, received / lasted, cpu / received * 1e6)
 
 
 def talk(
@@ -83,7 +83,7 @@ def talk(
     pause: Callable[[float], None],
     count: int,
 ) -> float:
-    """Singles, a burst, and the end, while somebody listens; gives the CPU seconds of the burst."""
+    """Singles, a burst, and the end, while there is a subscriber; gives the CPU seconds of the burst."""
     while not listeners():
         pause(0.05)
     pause(0.5)
@@ -109,10 +109,10 @@ def rospy_talker(rospy: Any, kind: Any, count: int) -> float:
     return talk(kind(), publisher.publish, publisher.get_num_connections, rospy.sleep, count)
 
 
-def rospy_listener(rospy: Any, kind: Any, heard: Heard, count: int) -> None:
+def rospy_listener(rospy: Any, kind: Any, received: Received, count: int) -> None:
     rospy.init_node("listener", disable_signals=True)
-    subscriber = rospy.Subscriber("pose", kind, heard.hear, queue_size=count, tcp_nodelay=True)
-    while not heard.ended:
+    subscriber = rospy.Subscriber("pose", kind, received.add, queue_size=count, tcp_nodelay=True)
+    while not received.ended:
         rospy.sleep(0.05)
     subscriber.unregister()
 
@@ -129,11 +129,11 @@ def rclpy_talker(rclpy: Any, kind: Any, count: int) -> float:
     return talk(kind(), publisher.publish, publisher.get_subscription_count, pause, count)
 
 
-def rclpy_listener(rclpy: Any, kind: Any, heard: Heard, count: int) -> None:
+def rclpy_listener(rclpy: Any, kind: Any, received: Received, count: int) -> None:
     rclpy.init()
     node = rclpy.create_node("listener")
-    node.create_subscription(kind, "pose", heard.hear, count)
-    while not heard.ended:
+    node.create_subscription(kind, "pose", received.add, count)
+    while not received.ended:
         rclpy.spin_once(node, timeout_sec=0.5)
     node.destroy_node()
 
@@ -146,18 +146,22 @@ def embedded(library: str, recorded: bool, count: int) -> Taken:
     """Both as components of one run in virtual time, so that the talker's CPU time is that of both."""
     kernel = VirtualKernel()
     graph = EmbeddedGraph(kernel, unrecorded=not recorded)
-    face = importable_modules(graph)[library]
-    kind, heard = message_class("geometry_msgs/msg/PoseStamped"), Heard()
+    module = importable_modules(graph)[library]
+    kind, received = message_class("geometry_msgs/msg/PoseStamped"), Received()
     kernel.spawn(
-        lambda: LISTENERS[library](face, kind, heard, count), "listener", ExecutionContext("listener")
+        lambda: LISTENERS[library](module, kind, received, count),
+        "listener",
+        ExecutionContext("listener"),
     )
     used: list[float] = []
     kernel.spawn(
-        lambda: used.append(TALKERS[library](face, kind, count)), "talker", ExecutionContext("talker")
+        lambda: used.append(TALKERS[library](module, kind, count)),
+        "talker",
+        ExecutionContext("talker"),
     )
     kernel.call_at(TIMEOUT_S * S + 1, lambda: None)  # the listener's threads wait for ever: no deadlock
     kernel.run(TIMEOUT_S * S)
-    return heard.result(used[0])
+    return received.result(used[0])
 
 
 def peer(library: str, role: str, count: int) -> None:
@@ -167,9 +171,9 @@ def peer(library: str, role: str, count: int) -> None:
     if role == "talker":
         print(TALKERS[library](real, kind, count), flush=True)
     else:
-        heard = Heard()
-        LISTENERS[library](real, kind, heard, count)
-        print(json.dumps(heard.result(heard.cpu)), flush=True)
+        received = Received()
+        LISTENERS[library](real, kind, received, count)
+        print(json.dumps(received.result(received.cpu)), flush=True)
     os._exit(0)  # the libraries' own ends take seconds and are not measured
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from volery.base.egm96 import FILE, Egm96Grid, packed
+from volery.base.geoid import GRID_FILE, Egm96Grid, pack
 
 FINER = 3
 """5' in a quarter of a degree."""
@@ -23,8 +23,8 @@ def main(source: Path) -> None:
     steps = np.load(source)["undulation_d2"]
     metres = np.cumsum(np.cumsum(steps, axis=0, dtype=np.int64), axis=1) / 100.0
     coarse = np.round(metres[::FINER, :-1:FINER] * 10.0).astype(np.int16)
-    target = Path(__file__).parents[1] / "src" / "volery" / "base" / FILE
-    target.write_bytes(packed(coarse))
+    target = Path(__file__).parents[1] / "src" / "volery" / "base" / GRID_FILE
+    target.write_bytes(pack(coarse))
     grid, drawn = Egm96Grid(coarse), np.random.default_rng(1)
     rows, columns = (drawn.integers(0, size, TRIED) for size in metres.shape)
     errors = np.array(

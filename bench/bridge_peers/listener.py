@@ -28,26 +28,26 @@ TOPICS = {
 def listen(settle: float, seconds: float, ways: list[str]) -> None:
     rospy.init_node("listener", anonymous=True)
     delays: dict[str, list[int]] = {way: [] for way in ways}
-    heard: dict[str, int] = dict.fromkeys(ways, 0)
+    received: dict[str, int] = dict.fromkeys(ways, 0)
 
     def hear(message: Any, which: tuple[str, str]) -> None:
         way, topic = which
-        heard[way] += 1
+        received[way] += 1
         if topic == "raw_imu":
             delays[way].append(time.monotonic_ns() // 1000 - message.time_usec)
 
     for way in ways:
         for topic, kind in TOPICS.items():
             rospy.Subscriber(f"/{way}/{topic}", kind, hear, (way, topic), tcp_nodelay=True)
-    while not all(heard.values()):
+    while not all(received.values()):
         time.sleep(0.1)
     time.sleep(settle)
     print("ready", flush=True)
     for way in ways:
         delays[way].clear()
-        heard[way] = 0
+        received[way] = 0
     time.sleep(seconds)
-    print(json.dumps({"delays": delays, "heard": heard}), flush=True)
+    print(json.dumps({"delays": delays, "received": received}), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Jobs given to vehicles by bids, round after round, until nobody offers less."""
+"""Assign jobs to vehicles by auction, round after round, until no vehicle bids less."""
 
 from math import hypot
 from random import Random

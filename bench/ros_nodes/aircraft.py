@@ -4,7 +4,7 @@ import rospy
 from std_msgs.msg import Float64MultiArray
 
 
-def ignore(heard):
+def ignore(message):
     pass
 
 

@@ -6,8 +6,8 @@ namespace {
 const double goal[3] = {40.0, -25.0, 12.0};
 double position[3] = {0.0, 0.0, 0.0};
 
-void onPosition(const std_msgs::Float64MultiArray::ConstPtr& heard) {
-  for (int axis = 0; axis < 3; ++axis) position[axis] = heard->data[axis];
+void onPosition(const std_msgs::Float64MultiArray::ConstPtr& message) {
+  for (int axis = 0; axis < 3; ++axis) position[axis] = message->data[axis];
 }
 }  // namespace
 

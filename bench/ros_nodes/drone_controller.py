@@ -7,8 +7,8 @@ GOAL = (40.0, -25.0, 12.0)
 position = [0.0, 0.0, 0.0]
 
 
-def on_position(heard):
-    position[:] = heard.data[:3]
+def on_position(message):
+    position[:] = message.data[:3]
 
 
 rospy.init_node("drone_controller")

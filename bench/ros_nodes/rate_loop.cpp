@@ -1,11 +1,11 @@
-// Fifty times a second: follow the set-point that was heard last, say how the motors should turn.
+// Fifty times a second: follow the latest set-point, publish motor commands.
 #include <ros/ros.h>
 #include <std_msgs/Float64MultiArray.h>
 
 namespace {
 double wanted = 0.0;
 
-void onSetpoint(const std_msgs::Float64MultiArray::ConstPtr& heard) { wanted = heard->data[0]; }
+void onSetpoint(const std_msgs::Float64MultiArray::ConstPtr& message) { wanted = message->data[0]; }
 }  // namespace
 
 int main(int argc, char** argv) {

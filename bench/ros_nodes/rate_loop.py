@@ -1,4 +1,4 @@
-"""Fifty times a second: follow the set-point that was heard last, say how the motors should turn."""
+"""Fifty times a second: follow the latest set-point, publish motor commands."""
 
 import rospy
 from std_msgs.msg import Float64MultiArray
@@ -6,8 +6,8 @@ from std_msgs.msg import Float64MultiArray
 wanted = [0.0]
 
 
-def on_setpoint(heard):
-    wanted[0] = heard.data[0]
+def on_setpoint(message):
+    wanted[0] = message.data[0]
 
 
 rospy.init_node("rate_loop")

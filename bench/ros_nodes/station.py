@@ -4,7 +4,7 @@ import rospy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 
-def ignore(heard):
+def ignore(message):
     pass
 
 

@@ -1,4 +1,4 @@
-// Twenty times a second attitude, twice a second the battery; asks nobody anything.
+// Publish the attitude at 20 Hz and the battery at 2 Hz; subscribe to nothing.
 #include <cmath>
 
 #include <ros/ros.h>

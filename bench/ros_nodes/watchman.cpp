@@ -8,9 +8,9 @@
 namespace {
 ros::Publisher verdicts;
 
-void onAttitude(const std_msgs::Float64MultiArray::ConstPtr& heard) {
+void onAttitude(const std_msgs::Float64MultiArray::ConstPtr& message) {
   std_msgs::Bool safe;
-  safe.data = std::fabs(heard->data[0]) < 0.5 && std::fabs(heard->data[1]) < 0.5;
+  safe.data = std::fabs(message->data[0]) < 0.5 && std::fabs(message->data[1]) < 0.5;
   verdicts.publish(safe);
 }
 }  // namespace

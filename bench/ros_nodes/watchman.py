@@ -7,8 +7,8 @@ rospy.init_node("watchman")
 verdicts = rospy.Publisher("safe", Bool, queue_size=10)
 
 
-def on_attitude(heard):
-    verdicts.publish(Bool(abs(heard.data[0]) < 0.5 and abs(heard.data[1]) < 0.5))
+def on_attitude(message):
+    verdicts.publish(Bool(abs(message.data[0]) < 0.5 and abs(message.data[1]) < 0.5))
 
 
 rospy.Subscriber("attitude", Float64MultiArray, on_attitude, queue_size=10)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.base.errors import Location, VoleryError
-from volery.base.units import PLAIN, TIME, UNITS, NotAQuantity, parse, read, read_ns, unit
+from volery.base.units import PLAIN, TIME, UNITS, QuantityError, parse, read, read_ns, unit
 from volery.model.assembly import Change, apply_changes, change_from_option, split_path
 from volery.model.text import Node, Problems, parse_value
 from volery.model.text import parse as parse_text
@@ -52,7 +52,7 @@ def test_nanoseconds_come_back_as_they_are(ns):
 
 @given(st.text(max_size=30))
 def test_any_text_is_a_quantity_or_refused(text):
-    assert "a time such as" in refusal(lambda: read(text, TIME), NotAQuantity, "a time such as")
+    assert "a time such as" in refusal(lambda: read(text, TIME), QuantityError, "a time such as")
 
 
 VALUES = st.recursive(

@@ -22,9 +22,9 @@ mavros_msgs::State state;
 sensor_msgs::NavSatFix fix;
 geometry_msgs::PoseStamped pose;
 
-void state_heard(const mavros_msgs::State::ConstPtr& heard) { state = *heard; }
-void fix_heard(const sensor_msgs::NavSatFix::ConstPtr& heard) { fix = *heard; }
-void pose_heard(const geometry_msgs::PoseStamped::ConstPtr& heard) { pose = *heard; }
+void on_state(const mavros_msgs::State::ConstPtr& message) { state = *message; }
+void on_fix(const sensor_msgs::NavSatFix::ConstPtr& message) { fix = *message; }
+void on_pose(const geometry_msgs::PoseStamped::ConstPtr& message) { pose = *message; }
 
 double metres_to(double latitude, double longitude) {
     double const north = (latitude - fix.latitude) * METRES_PER_DEGREE;
@@ -64,9 +64,9 @@ void go(ros::Publisher& setpoints, ros::Rate& rate, double latitude, double long
 int main(int argc, char** argv) {
     ros::init(argc, argv, "by_hand");
     ros::NodeHandle node;
-    ros::Subscriber states = node.subscribe("mavros/state", 10, state_heard);
-    ros::Subscriber fixes = node.subscribe("mavros/global_position/global", 10, fix_heard);
-    ros::Subscriber poses = node.subscribe("mavros/local_position/pose", 10, pose_heard);
+    ros::Subscriber states = node.subscribe("mavros/state", 10, on_state);
+    ros::Subscriber fixes = node.subscribe("mavros/global_position/global", 10, on_fix);
+    ros::Subscriber poses = node.subscribe("mavros/local_position/pose", 10, on_pose);
     ros::Publisher setpoints = node.advertise<mavros_msgs::GlobalPositionTarget>("mavros/setpoint_raw/global", 10);
     ros::ServiceClient set_mode = node.serviceClient<mavros_msgs::SetMode>("mavros/set_mode");
     ros::ServiceClient arming = node.serviceClient<mavros_msgs::CommandBool>("mavros/cmd/arming");

@@ -75,7 +75,7 @@ class Parcel:
 
 @dataclass
 class Vehicle:
-    """A vehicle with its controller, as last heard."""
+    """A vehicle with its controller and its last reported state."""
 
     name: str
     kind: str
@@ -212,7 +212,7 @@ class DeliveryCentral:
         self._enter(parcel, STRANDED, f"{vehicle.name} failed with it")
 
     def _release(self, leg):
-        """Whoever was to serve *leg* is free for another one."""
+        """Release the vehicle that was assigned to *leg*."""
         for vehicle in self._vehicles:
             if vehicle.serves is leg:
                 vehicle.serves = None

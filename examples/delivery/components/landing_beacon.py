@@ -19,7 +19,7 @@ NOISE_PER_METRE = 0.01
 
 
 class LandingBeacon:
-    """Part of the surroundings: it knows where the vehicle really is, which nobody on board does."""
+    """Part of the environment: it has the true position of the vehicle, which is not available on board."""
 
     def __init__(self, body, city, pad_east_m=0.0):
         self._body = body

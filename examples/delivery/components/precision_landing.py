@@ -32,7 +32,7 @@ LET_GO_OFFSET_M = 0.1
 SMOOTHING = 0.4
 """Share of a new picture in the running estimate of the offset."""
 GIVE_UP_S = 8.0
-"""So long without a beacon, the drone lands by its own position."""
+"""Without a beacon for this time, the drone lands by its own position."""
 
 IMAGE_MHZ = 1500
 
@@ -58,7 +58,7 @@ class PrecisionLanding:
 
     def outcome(self, job):
         """Empty while it lands, then ``done`` or what went wrong."""
-        return self._outcomes.get(job, "nobody asked for this landing")
+        return self._outcomes.get(job, "this landing was not requested")
 
     def run(self):
         """Land the drone as often as it is asked for."""

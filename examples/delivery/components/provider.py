@@ -1,4 +1,4 @@
-"""The provider of the service: is told of every parcel at any time and keeps the log."""
+"""The provider of the service: receives every parcel event and keeps the log."""
 
 from __future__ import annotations
 

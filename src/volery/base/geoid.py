@@ -1,4 +1,11 @@
-"""Between metres above mean sea level (the geoid) and metres above the WGS-84 ellipsoid.
+"""EGM96: how far mean sea level is above the WGS-84 ellipsoid, from a grid of a quarter of a degree.
+
+Source: Lemoine et al., The Development of the Joint NASA GSFC and NIMA Geopotential Model EGM96,
+NASA/TP-1998-206861; public domain. ``egm96.xz`` is made by ``scripts/egm96_grid.py`` from the 5' grid:
+whole decimetres, bicubic in between. Against that grid it errs by at most 0.19 m, by 0.06 m at 99 % of
+all places and by 0.025 m root mean square; EGM96 itself errs by 0.5 to 1 m.
+
+Between metres above mean sea level (the geoid) and metres above the WGS-84 ellipsoid.
 
 Law: ellipsoidal = AMSL + N, where N is how far the geoid is above the ellipsoid at that place. Receivers and
 autopilots say AMSL, MAVROS says ellipsoidal; both sides must mean the same N, and by default it is EGM96's.
@@ -6,17 +13,79 @@ autopilots say AMSL, MAVROS says ellipsoidal; both sides must mean the same N, a
 
 from __future__ import annotations
 
+import lzma
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
+from math import floor, isfinite
 
-from volery.base.egm96 import Egm96Grid, read_grid
+import numpy as np
+import numpy.typing as npt
+
 from volery.base.errors import UsageError
 
-LEAST, GREATEST = -107.0, 86.0
+PER_DEGREE = 4
+ROWS, COLUMNS = 180 * PER_DEGREE + 1, 360 * PER_DEGREE
+"""From the south pole to the north pole, and eastwards from 180 degrees west."""
+DECIMETRE = 0.1
+GRID_FILE = "egm96.xz"
+
+
+def pack(decimetres: npt.NDArray[np.int16]) -> bytes:
+    """A grid as the file has it: differences of differences, low bytes before high bytes, compressed."""
+    steps = np.diff(np.diff(decimetres, axis=1, prepend=np.int16(0)), axis=0, prepend=np.int16(0))
+    octets = np.frombuffer(steps.astype("<i2").tobytes(), np.uint8).reshape(-1, 2)
+    return lzma.compress(octets.T.tobytes(), preset=9)
+
+
+def unpack(data: bytes) -> npt.NDArray[np.int16]:
+    """The other way round."""
+    octets = np.frombuffer(lzma.decompress(data), np.uint8).reshape(2, -1)
+    steps = np.ascontiguousarray(octets.T).view("<i2").reshape(ROWS, COLUMNS)
+    return np.cumsum(np.cumsum(steps, axis=0, dtype=np.int16), axis=1, dtype=np.int16)
+
+
+class Egm96Grid:
+    """Heights of the geoid, at places between the grid's too."""
+
+    def __init__(self, decimetres: npt.NDArray[np.int16]) -> None:
+        self._decimetres = decimetres
+
+    def height(self, latitude: float, longitude: float) -> float:
+        """Metres above the ellipsoid, by Catmull and Rom's cubics; 0 for a place that is none."""
+        if not (isfinite(longitude) and abs(latitude) <= 90.0):
+            return 0.0
+        up, along = (latitude + 90.0) * PER_DEGREE, (longitude + 180.0) * PER_DEGREE
+        row, column = min(floor(up), ROWS - 2), floor(along)
+        across = _weights(along - column)
+        columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
+        height = 0.0
+        for step, weight in zip((-1, 0, 1, 2), _weights(up - row), strict=True):
+            line = self._decimetres[min(max(row + step, 0), ROWS - 1)]
+            height += weight * sum(w * int(line[at]) for w, at in zip(across, columns, strict=True))
+        return height * DECIMETRE
+
+
+def _weights(f: float) -> tuple[float, float, float, float]:
+    """Of four neighbours, for a place at *f* (0..1) between the middle two."""
+    return (
+        -0.5 * f * (1.0 - f) ** 2,
+        1.0 - 2.5 * f * f + 1.5 * f**3,
+        0.5 * f + 2.0 * f * f - 1.5 * f**3,
+        0.5 * f * f * (f - 1.0),
+    )
+
+
+def read_grid() -> Egm96Grid:
+    """The grid of the package."""
+    return Egm96Grid(unpack(files("volery.base").joinpath(GRID_FILE).read_bytes()))
+
+
+LOWEST_SEPARATION, HIGHEST_SEPARATION = -107.0, 86.0
 """The separations there are on Earth, metres (EGM96)."""
 
-BY_NAME = "egm96"
+EGM96_NAME = "egm96"
 
 
 class Geoid(ABC):
@@ -45,9 +114,9 @@ class LevelGeoid(Geoid):
     metres: float = 0.0
 
     def __post_init__(self) -> None:
-        if not LEAST <= self.metres <= GREATEST:
+        if not LOWEST_SEPARATION <= self.metres <= HIGHEST_SEPARATION:
             raise UsageError(
-                f"a geoid {self.metres:g} m above the ellipsoid: on Earth it is {LEAST:g} to {GREATEST:g} m"
+                f"a geoid {self.metres:g} m above the ellipsoid: on Earth it is {LOWEST_SEPARATION:g} to {HIGHEST_SEPARATION:g} m"
             )
 
     def separation(self, latitude: float, longitude: float) -> float:
@@ -76,13 +145,13 @@ SEA_LEVEL: Geoid = LevelGeoid()
 """The ellipsoid itself is sea level."""
 
 
-def geoid_of(text: str) -> Geoid:
+def parse_geoid(text: str) -> Geoid:
     """``egm96``, or metres of a ``LevelGeoid``. Raises ``UsageError``."""
-    if text == BY_NAME:
+    if text == EGM96_NAME:
         return EGM96
     try:
         return LevelGeoid(float(text))
     except ValueError:
         raise UsageError(
-            f"geoid={text!r}: it is {BY_NAME}, or a number of metres above the ellipsoid"
+            f"geoid={text!r}: it is {EGM96_NAME}, or a number of metres above the ellipsoid"
         ) from None

@@ -36,7 +36,7 @@ _PREFIXES = {
 _DEGREE = Fraction(math.pi) / 180
 
 
-class NotAQuantity(ValueError):  # noqa: N818 - the field's errors are ModelError and UsageError, which quote this one
+class QuantityError(ValueError):  # noqa: N818 - the field's errors are ModelError and UsageError, which quote this one
     """A text that is no quantity, or one of another kind than is expected. The message says what would do."""
 
 
@@ -117,7 +117,7 @@ def unit(text: str) -> Quantity:
     while position < len(text):
         factor = _FACTOR.match(text, position)
         if factor is None or (position > 0 and not factor.group(1)):
-            raise NotAQuantity(f"{text!r} is not a unit")
+            raise QuantityError(f"{text!r} is not a unit")
         sign = (-1 if factor.group(1) == "/" else 1) * int(factor.group(3) or 1)
         symbol = _symbol(factor.group(2))
         size *= symbol.value**sign
@@ -129,15 +129,15 @@ def unit(text: str) -> Quantity:
 
 def _symbol(name: str) -> Quantity:
     if name not in UNITS:
-        raise NotAQuantity(f"there is no unit {name!r}{did_you_mean(name, UNITS)}")
+        raise QuantityError(f"there is no unit {name!r}{did_you_mean(name, UNITS)}")
     return UNITS[name]
 
 
 def parse(text: str) -> Quantity:
-    """A number and its unit; ``NotAQuantity`` says why not."""
+    """A number and its unit; ``QuantityError`` says why not."""
     split = _NUMBER.match(text)
     if split is None:
-        raise NotAQuantity(f"{text!r} is not a number with a unit")
+        raise QuantityError(f"{text!r} is not a number with a unit")
     size = unit(split.group(2))
     return Quantity(Fraction(split.group(1).replace("_", "")) * size.value, size.dimension)
 
@@ -145,12 +145,12 @@ def parse(text: str) -> Quantity:
 def read(written: object, kind: Kind) -> float:
     """What was *written*, a text or a number, in the unit of its *kind*.
 
-    A bare number is a ratio or a count; zero alone needs no unit. ``NotAQuantity`` names what is expected.
+    A bare number is a ratio or a count; zero alone needs no unit. ``QuantityError`` names what is expected.
     """
     try:
         return float(_exact(written, kind) / unit(kind.unit).value)
     except OverflowError:
-        raise NotAQuantity(f"{written!r} is too large") from None
+        raise QuantityError(f"{written!r} is too large") from None
 
 
 def read_ns(written: object) -> Ns:
@@ -161,19 +161,19 @@ def read_ns(written: object) -> Ns:
 def _exact(written: object, kind: Kind) -> Fraction:
     expected = f"{_article(kind.noun)} such as {kind.examples} is expected"
     if isinstance(written, bool) or not isinstance(written, int | float | str):
-        raise NotAQuantity(f"{expected}, not {written!r}")
+        raise QuantityError(f"{expected}, not {written!r}")
     try:
         quantity = parse(written) if isinstance(written, str) else _bare(written)
-    except NotAQuantity as error:
-        raise NotAQuantity(f"{error}; {expected}") from None
+    except QuantityError as error:
+        raise QuantityError(f"{error}; {expected}") from None
     if quantity.dimension != kind.dimension and not (quantity.value == 0 and quantity.dimension == PLAIN):
-        raise NotAQuantity(f"{str(written)!r} is {describe(quantity.dimension)}; {expected}")
+        raise QuantityError(f"{str(written)!r} is {describe(quantity.dimension)}; {expected}")
     return quantity.value
 
 
 def _bare(number: float) -> Quantity:
     if not math.isfinite(number):
-        raise NotAQuantity(f"{number} is not finite")
+        raise QuantityError(f"{number} is not finite")
     return Quantity(Fraction(number), PLAIN)
 
 

@@ -140,7 +140,7 @@ class StatusPublisher:
     def _text(self, said: Fields, at: Ns) -> None:
         """A long one, which comes in pieces, is published whole."""
         self._text_at = at
-        self._texts.hear(said)
+        self._texts.add(said)
 
     def _say(self, severity: int, text: str) -> None:
         header = stamped(self._text_at)

@@ -10,7 +10,7 @@ from volery.cli.folders import example
 from volery.cli.outcome import unmet
 from volery.cli.side_by_side import Job, Outcome, run_all
 from volery.model.reader import load
-from volery.report.comparison import write_comparison
+from volery.report.document import write_comparison
 from volery.report.terminal import short_comparison
 from volery.requirements.record import RunRecord
 from volery.run.assembly.vocabulary import vocabulary

@@ -11,8 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import from_seconds
 from volery.cli.console import Output, table
 from volery.cli.endings import OK
-from volery.report.graph_of_run import graph_of_run
-from volery.report.graph_picture import picture
+from volery.report.graph_picture import graph_of_run, graph_svg
 from volery.ros.graph.snapshot import GraphSnapshot, snapshot
 from volery.run.assembly.ros_graphs import GRAPHS, on_graph
 
@@ -35,7 +34,7 @@ def graph(output: Output, wanted: Wanted) -> int:
     output.show(*_tables(seen))
     if wanted.svg is not None:
         try:
-            wanted.svg.write_text(picture(seen), encoding="utf-8")
+            wanted.svg.write_text(graph_svg(seen), encoding="utf-8")
         except OSError as error:
             raise UsageError(f"{wanted.svg} cannot be written: {error.strerror or error}") from error
         output.note(f"drawn in {wanted.svg}")

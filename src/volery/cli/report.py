@@ -7,7 +7,7 @@ from pathlib import Path
 
 from volery.cli.console import Output
 from volery.cli.endings import OK
-from volery.report.recovery import recover
+from volery.report.document import recover
 from volery.report.terminal import comparison_table, summary_table
 
 

@@ -1,5 +1,6 @@
-"""Links: byte and message streams to autopilots. Connections, codecs, recording tap, fault injection.
+"""Links to autopilots: connections (UDP, TCP, serial, in process) and codecs (MAVLink, pprzlink).
 
-Knows the kernel (delivery, time-outs) and wire formats; must not know what a message means to a vehicle. The
-only room that imports pymavlink, pyserial and, for a Paparazzi aircraft's files, lxml.
+A link moves frames, which are named messages with fields; a codec converts frames to bytes and back. This
+package knows the kernel (delivery, time-outs) and the wire formats. It does not know what a message means to a
+vehicle. It is the only package that imports pymavlink, pyserial and lxml.
 """

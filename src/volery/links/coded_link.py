@@ -1,11 +1,7 @@
-"""A link whose peer is reached by bytes: the codec on top of whatever moves them.
+"""Base classes of links over bytes: a codec on top of a connection, and streams that reconnect.
 
-The thread behind a carrier: it waits until a file can be read and hands what it reads to the house.
-
-A link over a stream of bytes that may break and return: a TCP connection or a serial line.
-
-A thread opens it and reads; everything else is house code. After a break it is opened again, first after half
-a second and then at growing intervals.
+A connection waits for bytes in a thread of its own (``ReaderThread``), which posts them to the kernel. All other
+code of these classes runs as framework callbacks and needs no locks.
 """
 
 from __future__ import annotations
@@ -24,9 +20,15 @@ from volery.links.link import Codec, Frame, Receiver, ReceiveStatistics
 from volery.links.mavlink_codec import MAVLINK
 from volery.trace.events import LinkState
 
+FIRST_RETRY: Ns = 500 * MS
+LONGEST_RETRY: Ns = 5 * S
+MAX_UNSENT = 65_536
+"""Bytes that wait for a slow connection. Data beyond this is dropped, as a radio drops it."""
+_JOIN_S = 5.0
+
 
 class CodedLink(ABC):
-    """Frames out as bytes, bytes in as frames. A subclass moves the bytes and calls ``arrived``."""
+    """A link that encodes frames to bytes. A subclass moves the bytes and calls ``arrived``."""
 
     def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
         self.name = name
@@ -38,12 +40,12 @@ class CodedLink(ABC):
         self._closed = False
 
     @property
-    def heard(self) -> ReceiveStatistics:
-        """What has arrived so far: frames, text, garbage."""
-        return self._parser.heard
+    def statistics(self) -> ReceiveStatistics:
+        """Counts of the frames, text and garbage received so far."""
+        return self._parser.statistics
 
     def send(self, frame: Frame) -> None:
-        """Send at once; a link that is down or full drops it."""
+        """Send *frame* at once. A link that is down or full drops the frame."""
         if self._closed:
             return
         data = self._codec.encode(frame, self._sequence)
@@ -51,16 +53,16 @@ class CodedLink(ABC):
         self._transmit(data)
 
     def send_bytes(self, data: bytes) -> None:
-        """Put *data* on the wire as it is, such as the plain text that an autopilot writes while it boots."""
+        """Send *data* as it is, for example the plain text that an autopilot writes while it boots."""
         if not self._closed:
             self._transmit(data)
 
     def receive(self, receiver: Receiver) -> None:
-        """From now on hand every frame that arrives to *receiver*."""
+        """Call *receiver* with every frame that arrives from now on."""
         self._receiver = receiver
 
     def arrived(self, data: bytes) -> None:
-        """House code: these bytes have come in."""
+        """Decode received bytes. Framework callback."""
         if self._closed:
             return
         for frame in self._parser.feed(data):
@@ -68,58 +70,47 @@ class CodedLink(ABC):
                 self._receiver(frame)
 
     def problem(self) -> str:
-        """What is wrong with the carrier, else with what it carries; empty if nothing is."""
-        return self._trouble() or self._parser.problem()
+        """Return what is wrong with the connection, else with the received bytes; ``""`` if nothing is."""
+        return self._connection_problem() or self._parser.problem()
 
     def close(self) -> None:
-        """Nothing goes out or comes in any more."""
+        """Send and receive nothing from now on."""
         self._closed = True
 
     @abstractmethod
     def _transmit(self, data: bytes) -> None:
         """Send bytes without waiting."""
 
-    def _trouble(self) -> str:
-        """What is wrong with the carrier, in words."""
+    def _connection_problem(self) -> str:
         return "the link was closed" if self._closed else ""
 
-    def _tell(self, state: str, detail: str) -> None:
+    def _record(self, state: str, detail: str) -> None:
         self._kernel.record(LinkState(self._kernel.now(), self.name, state, detail))
 
 
-_JOIN_S = 5.0
-
-
 class ReaderThread:
-    """Runs *body* in a thread of its own from ``start`` to ``stop``. *body* waits only in ``readable``.
+    """A thread that runs *body* from ``start`` to ``stop``. *body* may block only in ``readable``.
 
-    What *body* hands to the house may be looked at before ``start`` returns: let go of it when all is in
-    place.
+    *body* may post to the kernel before ``start`` has returned, so start the thread when its owner is complete.
     """
 
     def __init__(self, name: str, body: Callable[[ReaderThread], None]) -> None:
         self._wake_read, self._wake_write = os.pipe()
         self._stopped = threading.Event()
-        self._body = body
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-
-    @property
-    def stopped(self) -> bool:
-        """It was told to stop."""
-        return self._stopped.is_set()
+        self._thread = threading.Thread(target=body, args=(self,), name=name, daemon=True)
 
     def start(self) -> None:
-        """Let it go, once."""
+        """Start the thread; call once."""
         self._thread.start()
 
     def readable(self, file: int) -> bool:
-        """Wait until *file* (a descriptor) can be read, or has ended; False: stop."""
+        """Wait until descriptor *file* can be read or has ended; return False if the thread must stop."""
         ready, _, _ = select.select([file, self._wake_read], [], [])
-        return not self.stopped and file in ready
+        return not self._stopped.is_set() and file in ready
 
     def stop(self) -> None:
-        """Ask it to end, and wait for that. From any thread but its own."""
-        if self.stopped:
+        """Stop the thread and wait for its end. Must not be called from the thread itself."""
+        if self._stopped.is_set():
             return
         self._stopped.set()
         os.write(self._wake_write, b"!")
@@ -128,73 +119,68 @@ class ReaderThread:
             os.close(self._wake_read)
             os.close(self._wake_write)
 
-    def _run(self) -> None:
-        self._body(self)
-
-
-FIRST_RETRY: Ns = 500 * MS
-LONGEST_RETRY: Ns = 5 * S
-MOST_UNSENT = 65_536
-"""Bytes that wait for a slow carrier; what comes on top is dropped, as a radio does."""
-
 
 class ByteStream(Protocol):
-    """An open stream. All calls but ``read`` return at once; ``OSError`` says that it broke."""
+    """An open stream of bytes. All methods but ``read`` return at once; ``OSError`` means that it broke."""
 
     def fileno(self) -> int:
-        """The descriptor to wait on."""
+        """Return the descriptor to wait on."""
 
     def read(self) -> bytes:
-        """What has arrived; empty if the other side has ended it."""
+        """Return the received bytes; ``b""`` if the other side has closed the stream."""
 
     def write(self, data: bytes) -> int:
-        """How many bytes were taken."""
+        """Return how many bytes were accepted."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the stream."""
 
 
 class StreamLink(CodedLink):
-    """Keeps one stream open."""
+    """A link over a stream that may break and return: a TCP connection or a serial line.
+
+    The stream is opened in the reader thread. After a break it is opened again, first after ``FIRST_RETRY`` and
+    then at intervals that double up to ``LONGEST_RETRY``.
+    """
 
     def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
         super().__init__(kernel, name, codec)
-        self._pipe: ByteStream | None = None
+        self._stream: ByteStream | None = None
         self._unsent = bytearray()
-        self._wrong = "not connected yet"
+        self._stream_problem = "not connected yet"
         self._retry = FIRST_RETRY
         self._was_up = False
-        self._pump = ReaderThread(name, self._live)
-        self._pump.start()
+        self._reader = ReaderThread(name, self._open_and_read)
+        self._reader.start()
 
     @abstractmethod
     def _open(self) -> ByteStream:
-        """Open the stream, in the reader's thread. Raises ``OSError``."""
+        """Open the stream. Runs in the reader thread and raises ``OSError``."""
 
     @abstractmethod
     def _explain(self, error: OSError) -> str:
-        """Why it could not be opened or broke, and what to do."""
+        """Return why the stream could not be opened or broke, and the remedy."""
 
-    def _trouble(self) -> str:
-        return super()._trouble() or self._wrong
+    def _connection_problem(self) -> str:
+        return super()._connection_problem() or self._stream_problem
 
-    # -- the reader's thread
+    # -- reader thread
 
-    def _live(self, pump: ReaderThread) -> None:
+    def _open_and_read(self, reader: ReaderThread) -> None:
         try:
-            pipe = self._open()
+            stream = self._open()
         except OSError as error:
-            wrong = self._explain(error)
-            self._kernel.post(lambda: self._down(pump, None, wrong))
+            problem = self._explain(error)
+            self._kernel.post(lambda: self._on_down(reader, None, problem))
             return
-        self._kernel.post(lambda: self._up(pump, pipe))
-        wrong = self._read(pump, pipe)
-        self._kernel.post(lambda: self._down(pump, pipe, wrong))
+        self._kernel.post(lambda: self._on_up(reader, stream))
+        problem = self._read(reader, stream)
+        self._kernel.post(lambda: self._on_down(reader, stream, problem))
 
-    def _read(self, pump: ReaderThread, pipe: ByteStream) -> str:
+    def _read(self, reader: ReaderThread, stream: ByteStream) -> str:
         try:
-            while pump.readable(pipe.fileno()):
-                data = pipe.read()
+            while reader.readable(stream.fileno()):
+                data = stream.read()
                 if not data:
                     return "the other side closed the connection"
                 self._kernel.post(partial(self.arrived, data))
@@ -202,51 +188,51 @@ class StreamLink(CodedLink):
             return self._explain(error)
         return "closed"
 
-    # -- house code
+    # -- framework callbacks
 
-    def _up(self, pump: ReaderThread, pipe: ByteStream) -> None:
-        if self._closed or pump is not self._pump:
+    def _on_up(self, reader: ReaderThread, stream: ByteStream) -> None:
+        if self._closed or reader is not self._reader:
             return
-        self._pipe = pipe
-        self._wrong = ""
+        self._stream = stream
+        self._stream_problem = ""
         self._retry = FIRST_RETRY
-        self._tell("back" if self._was_up else "up", self.name)
+        self._record("back" if self._was_up else "up", self.name)
         self._was_up = True
 
-    def _down(self, pump: ReaderThread, pipe: ByteStream | None, wrong: str) -> None:
-        if pipe is not None:
-            pipe.close()
-        if self._closed or pump is not self._pump:
+    def _on_down(self, reader: ReaderThread, stream: ByteStream | None, problem: str) -> None:
+        if stream is not None:
+            stream.close()
+        if self._closed or reader is not self._reader:
             return
-        if self._pipe is not None:
-            self._tell("lost", wrong)
-        self._pipe = None
-        self._wrong = wrong
+        if self._stream is not None:
+            self._record("lost", problem)
+        self._stream = None
+        self._stream_problem = problem
         self._unsent.clear()
         self._parser.reset()
-        pump.stop()
-        self._kernel.call_at(self._kernel.now() + self._retry, self._again)
+        reader.stop()
+        self._kernel.call_at(self._kernel.now() + self._retry, self._reconnect)
         self._retry = min(2 * self._retry, LONGEST_RETRY)
 
-    def _again(self) -> None:
+    def _reconnect(self) -> None:
         if not self._closed:
-            self._pump = ReaderThread(self.name, self._live)
-            self._pump.start()
+            self._reader = ReaderThread(self.name, self._open_and_read)
+            self._reader.start()
 
     def _transmit(self, data: bytes) -> None:
-        if self._pipe is None or len(self._unsent) + len(data) > MOST_UNSENT:
+        if self._stream is None or len(self._unsent) + len(data) > MAX_UNSENT:
             return
         self._unsent += data
         try:
-            taken = self._pipe.write(bytes(self._unsent))
+            taken = self._stream.write(bytes(self._unsent))
         except OSError:
-            return  # full: later; broken: the reader sees it, too, and says so
+            return  # the buffer is full, or the stream broke, which the reader thread reports
         del self._unsent[:taken]
 
     def close(self) -> None:
-        """Let go of the stream and the thread."""
+        """Close the stream and stop the thread."""
         super().close()
-        self._pump.stop()
-        if self._pipe is not None:
-            self._pipe.close()
-            self._pipe = None
+        self._reader.stop()
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None

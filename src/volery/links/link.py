@@ -1,7 +1,7 @@
-"""Links and codecs: messages to and from one peer, as values.
+"""Interfaces of links and codecs, and the statistics that a frame parser keeps.
 
-Within one process frames travel as values; on a wire a codec converts them to bytes and back. This module defines the
-interfaces only; the connections and the two codecs (MAVLink, pprzlink) have modules of their own.
+Within one process frames travel as values; on a wire a codec converts them to bytes and back. The connections
+and the two codecs (MAVLink, pprzlink) have modules of their own.
 """
 
 from __future__ import annotations
@@ -11,11 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+_KEPT_LINES = 20
+_PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
+_LONGEST_LINE = 120
+
 
 class Frame(NamedTuple):
     """A message: its name and fields as the protocol defines them (``HEARTBEAT``, ``custom_mode`` ...).
 
-    ``system`` and ``component`` are the sender's ids. Fields are never changed after sending.
+    ``system`` and ``component`` are the ids of the sender. Fields are never changed after sending.
     """
 
     name: str
@@ -28,42 +32,42 @@ Receiver = Callable[[Frame], None]
 
 
 class Link(Protocol):
-    """A two-way stream of frames. Never blocks; what arrives is handed over as house code."""
+    """A two-way stream of frames. No method blocks; receivers are called as framework callbacks."""
 
     name: str
 
     def send(self, frame: Frame) -> None:
-        """Send, without waiting for anything. A link that is down drops it."""
+        """Send *frame* without waiting. A link that is down drops the frame."""
 
     def receive(self, receiver: Receiver) -> None:
-        """From now on hand every frame that arrives to *receiver*."""
+        """Call *receiver* with every frame that arrives from now on."""
 
     def problem(self) -> str:
-        """What is wrong with the wire, in words for the user (``only text arrives: ...``); else empty."""
+        """Return what is wrong with the connection, for the user (``only text arrives: ...``), or ``""``."""
 
     def close(self) -> None:
-        """Let go of sockets and threads."""
+        """Release sockets and threads."""
 
 
 @runtime_checkable
 class ByteLink(Protocol):
-    """A link that is bytes on a wire, and so can carry some that are no frame: a greeting, noise."""
+    """A link over bytes, which can also carry bytes that are no frame: a greeting, noise."""
 
     def send_bytes(self, data: bytes) -> None:
-        """Put *data* on the wire as it is."""
+        """Send *data* as it is."""
 
 
-_KEPT_LINES = 20
+# -- codecs
 
 
 @dataclass
 class ReceiveStatistics:
-    """What a parser has seen so far. ``lines`` are the last text lines that were no frame."""
+    """Counts of what a parser has received. ``lines`` holds the last text lines that were no frame."""
 
     octets: int = 0
     frames: int = 0
     frames_v1: int = 0
-    """Of the protocol's older version, which is understood but not spoken."""
+    """Frames of the older protocol version, which is decoded but never sent."""
     unknown: int = 0
     corrupt: int = 0
     text: int = 0
@@ -72,66 +76,71 @@ class ReceiveStatistics:
 
 
 class FrameParser(Protocol):
-    """A stream of bytes taken apart into frames."""
+    """Splits a stream of bytes into frames."""
 
-    heard: ReceiveStatistics
+    statistics: ReceiveStatistics
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames completed by *data*, in order. Never raises, whatever arrives."""
+        """Return the frames completed by *data*, in order. Never raises, whatever *data* contains."""
 
     def reset(self) -> None:
-        """Forget a half-received frame: the connection behind it is gone."""
+        """Drop a half-received frame, because the connection has broken."""
 
     def problem(self) -> str:
-        """What is wrong with what arrives, in words; empty if nothing is, or if nothing arrived."""
+        """Return what is wrong with the received bytes; ``""`` if nothing is, or if nothing was received."""
 
 
 class Codec(Protocol):
-    """A protocol's wire form. Frames that cannot be written raise ``UsageError`` naming message and field."""
+    """Wire format of one protocol."""
 
     @property
     def name(self) -> str:
-        """``MAVLink``, ``pprzlink``: for messages to people."""
+        """Name of the protocol for messages to the user: ``MAVLink``, ``pprzlink``."""
 
     def encode(self, frame: Frame, sequence: int) -> bytes:
-        """The frame as bytes; *sequence* counts the frames of one sender, from 0, modulo 256."""
+        """Return *frame* as bytes.
+
+        Args:
+            frame: The message to encode.
+            sequence: Number of frames that this sender has sent before, modulo 256.
+
+        Raises:
+            UsageError: A field does not exist or does not fit; the error names message and field.
+        """
 
     def parser(self) -> FrameParser:
-        """A new parser, for one stream of bytes."""
+        """Return a new parser for one stream of bytes."""
 
     def quantised(self, frame: Frame) -> Frame:
-        """The frame as it arrives after a trip over the wire: widths of numbers, lengths of strings, all
-        fields present.
+        """Return *frame* as it arrives after encoding and decoding.
+
+        Floats have wire precision, strings are cut to their field, and all fields are present.
         """
 
 
-_PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
-_LONGEST_LINE = 120
-
-
 class NonFrameBytes:
-    """Sorts the bytes between frames into text and garbage, and notes them in *heard*."""
+    """Sorts the bytes between frames into text and garbage and counts them in *statistics*."""
 
-    def __init__(self, heard: ReceiveStatistics) -> None:
-        self._heard = heard
+    def __init__(self, statistics: ReceiveStatistics) -> None:
+        self._statistics = statistics
         self._line = bytearray()
 
-    def note(self, octet: int) -> None:
-        """A byte that belongs to no frame."""
+    def add(self, octet: int) -> None:
+        """Record one byte that belongs to no frame."""
         if octet not in _PRINTABLE:
-            self._heard.garbage += 1
+            self._statistics.garbage += 1
             return
-        self._heard.text += 1
+        self._statistics.text += 1
         ends = octet in b"\r\n"
         if self._line and (ends or len(self._line) >= _LONGEST_LINE):
-            self._heard.lines.append(self._line.decode("ascii"))
+            self._statistics.lines.append(self._line.decode("ascii"))
             self._line.clear()
         if not ends:
             self._line.append(octet)
 
     def only_text(self) -> str:
-        """``only text arrives: '...'`` if that is so; else empty."""
-        if self._heard.text <= 4 * self._heard.garbage:
+        """Return ``only text arrives: '...'`` if at least 80 % of the bytes are text, else ``""``."""
+        if self._statistics.text <= 4 * self._statistics.garbage:
             return ""
-        lines = [line for line in self._heard.lines if line.strip()]
+        lines = [line for line in self._statistics.lines if line.strip()]
         return f"only text arrives: {lines[0] if lines else self._line.decode('ascii')!r}"

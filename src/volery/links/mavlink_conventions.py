@@ -1,12 +1,7 @@
-"""MAVLink's status texts, which go in chunks of 50 characters when they are longer.
+"""MAVLink conventions above single messages, which both ends of a link implement.
 
-Values of parameters in PARAM_VALUE and PARAM_SET, where the firmware puts whole numbers into the bytes
-of the float (MAVLink's "bytewise" encoding: PX4). ArduPilot writes the number itself, as a real one.
-
-What one link is sent regularly: a period for each message, messages of one period in one burst.
-
-Asking is remembered while the autopilot boots; nothing is sent before ``start``. Knows names and periods, not
-what a message holds.
+Status texts longer than 50 characters are sent in chunks; some firmwares send integer parameters as the bytes of
+a float; telemetry streams have a period per message.
 """
 
 from __future__ import annotations
@@ -18,57 +13,75 @@ from typing import Any
 from volery.base.time import Ns
 from volery.kernel.api import Handle, Kernel
 
+# -- status texts
+
 CHUNK = 50
 
-Say = Callable[[int, str], None]
+OnText = Callable[[int, str], None]
+"""Called with severity and text."""
 
 
 def status_text_chunks(severity: int, text: str, number: int) -> list[dict[str, Any]]:
-    """The fields of the STATUSTEXTs that carry *text*; *number* tells those of one text from others'."""
+    """Return the fields of the STATUSTEXT messages that carry *text*.
+
+    Args:
+        severity: MAV_SEVERITY.
+        text: Text of any length.
+        number: Id that distinguishes the chunks of this text from those of others; 0 for a single chunk.
+    """
     return [
-        {"severity": severity, "text": text[start : start + CHUNK], "id": number, "chunk_seq": place}
-        for place, start in enumerate(range(0, max(1, len(text)), CHUNK))
+        {"severity": severity, "text": text[start : start + CHUNK], "id": number, "chunk_seq": sequence}
+        for sequence, start in enumerate(range(0, max(1, len(text)), CHUNK))
     ]
 
 
 class StatusTextAssembler:
-    """Puts chunks together. A text whose end is lost is told when the next one begins."""
+    """Joins chunks to texts. A text whose last chunk is lost is reported when the next text begins."""
 
-    def __init__(self, say: Say) -> None:
-        self._say = say
+    def __init__(self, on_text: OnText) -> None:
+        self._on_text = on_text
         self._number = 0
         self._severity = 0
         self._parts: dict[int, str] = {}
 
-    def hear(self, fields: Mapping[str, Any]) -> None:
-        """A STATUSTEXT: ``id`` 0 is a whole text; chunks of one text share another."""
+    def add(self, fields: Mapping[str, Any]) -> None:
+        """Add a STATUSTEXT. Its ``id`` is 0 for a whole text; the chunks of one text share another id."""
         number: int = fields["id"]
         if self._parts and number != self._number:
-            self._tell()
+            self._report()
         if number == 0:
-            self._say(fields["severity"], fields["text"])
+            self._on_text(fields["severity"], fields["text"])
             return
         self._number = number
         self._severity = fields["severity"]
         self._parts[fields["chunk_seq"]] = fields["text"]
         if len(fields["text"]) < CHUNK:
-            self._tell()
+            self._report()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         parts = self._parts
         text = "".join(parts.get(number, " ... ") for number in range(max(parts) + 1))
         self._parts = {}
-        self._say(self._severity, text)
+        self._on_text(self._severity, text)
 
+
+# -- parameter values
 
 REAL32 = 9
 """MAV_PARAM_TYPE."""
 
-_REAL, _WHOLE, _UNSIGNED = struct.Struct("<f"), struct.Struct("<i"), struct.Struct("<I")
+_REAL, _SIGNED, _UNSIGNED = struct.Struct("<f"), struct.Struct("<i"), struct.Struct("<I")
 
 
 def to_bytewise(kind: int, value: float) -> float:
-    """The real number whose bytes are those of an integer; a real number is itself."""
+    """Return a parameter value in MAVLink's "bytewise" encoding, which PX4 uses.
+
+    The result is the float whose bytes are those of the integer. ArduPilot sends the number itself instead.
+
+    Args:
+        kind: MAV_PARAM_TYPE; a value of type REAL32 is returned unchanged.
+        value: The number.
+    """
     if kind == REAL32:
         return value
     number: float = _REAL.unpack(_UNSIGNED.pack(int(value) & 0xFFFF_FFFF))[0]
@@ -76,19 +89,28 @@ def to_bytewise(kind: int, value: float) -> float:
 
 
 def from_bytewise(kind: int, value: float) -> float:
-    """What ``to_bytewise`` was given."""
+    """Return the number that ``to_bytewise`` encoded."""
     if kind == REAL32:
         return value
-    return float(_WHOLE.unpack(_REAL.pack(value))[0])
+    return float(_SIGNED.unpack(_REAL.pack(value))[0])
 
+
+# -- telemetry streams
 
 Burst = Callable[[Sequence[str]], None]
 """Sends the named messages, in that order."""
 
 
 class MessageStreams:
-    """The streams of one link. ``order`` is the order of messages within a burst; no period is shorter than
-    ``least``.
+    """Telemetry streams of one link: a period for each message; messages of one period are sent in one burst.
+
+    Requests are stored while the autopilot boots; nothing is sent before ``start``.
+
+    Args:
+        kernel: Clock of the streams.
+        order: Names of messages in their order within a burst.
+        burst: Sends the messages of one burst.
+        least: Shortest period in ns.
     """
 
     def __init__(self, kernel: Kernel, order: Sequence[str], burst: Burst, *, least: Ns = 1) -> None:
@@ -102,13 +124,15 @@ class MessageStreams:
         self._started = False
 
     def period(self, name: str) -> Ns:
-        """Nanoseconds between two of that message; 0 if it is not streamed."""
+        """Return the period of a message in ns; 0 if it is not streamed."""
         return self._periods.get(name, 0)
 
     def set(self, names: Sequence[str], period: Ns) -> None:
-        """Stream these from now on with that period; 0 stops them.
+        """Stream messages with a new period; the first burst is sent one period from now.
 
-        The first burst comes one period from now.
+        Args:
+            names: Names of the messages.
+            period: Period in ns; 0 stops the messages.
         """
         for name in names:
             self._periods.pop(name, None)
@@ -117,12 +141,12 @@ class MessageStreams:
         self._regroup()
 
     def start(self) -> None:
-        """The autopilot has booted: send what was asked for."""
+        """Start the requested streams, because the autopilot has booted."""
         self._started = True
         self._regroup()
 
     def stop(self) -> None:
-        """Send nothing any more and forget what was asked for."""
+        """Stop all streams and forget the requests."""
         self._started = False
         self._periods.clear()
         self._regroup()
@@ -141,9 +165,9 @@ class MessageStreams:
         if self._started:
             for period in groups:
                 if period not in self._handles:
-                    self._begin(period)
+                    self._start_group(period)
 
-    def _begin(self, period: Ns) -> None:
+    def _start_group(self, period: Ns) -> None:
         first = self._kernel.now()
 
         def due() -> None:

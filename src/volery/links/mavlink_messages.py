@@ -23,7 +23,6 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError, did_you_mean
-from volery.links.link import Frame
 
 _CODES: Mapping[str, str] = {
     "uint8_t": "B",
@@ -110,15 +109,6 @@ RESPONSE_EVENT_ERROR = Definition(
 )
 
 NEWER = (EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT, RESPONSE_EVENT_ERROR)
-
-
-STX = 0xFD
-STX_V1 = 0xFE
-HEADER = struct.Struct("<BBBBBBBHB")  # STX, length, two flags, sequence, system, component, id low, high
-HEADER_V1 = struct.Struct("<BBBBBB")  # STX, length, sequence, system, component, id
-CHECKSUM = struct.Struct("<H")
-SIGNED = 0x01
-SIGNATURE_LENGTH = 13
 
 
 class _Field(NamedTuple):
@@ -269,21 +259,3 @@ def entry_name(enumeration: str, value: int) -> str:
     if entry is None:
         return str(value)
     return str(entry.name).removeprefix(f"{enumeration}_")
-
-
-def quantised(frame: Frame) -> Frame:
-    """The frame as it arrives after a trip over the wire: 32-bit floats, strings cut to length, all fields
-    present.
-    """
-    kind = message_type(frame.name)
-    return Frame(frame.name, kind.unpack(kind.pack(frame.fields)), frame.system, frame.component)
-
-
-def encode(frame: Frame, sequence: int) -> bytes:
-    """The frame in MAVLink 2 wire form; *sequence* counts the frames of one sender (taken modulo 256)."""
-    kind = message_type(frame.name)
-    payload = kind.pack(frame.fields).rstrip(b"\0") or b"\0"
-    low, high = kind.id & 0xFFFF, kind.id >> 16
-    sender = frame.system, frame.component
-    header = HEADER.pack(STX, len(payload), 0, 0, sequence % 256, *sender, low, high)
-    return header + payload + CHECKSUM.pack(kind.checksum(header[1:] + payload))

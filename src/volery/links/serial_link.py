@@ -1,4 +1,4 @@
-"""A serial line: a radio modem, a USB cable, or a pseudo terminal."""
+"""Links over a serial line: a radio modem, a USB cable or a pseudo terminal."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from volery.links.coded_link import ByteStream, StreamLink
 from volery.links.link import Codec
 from volery.links.mavlink_codec import MAVLINK
 
-_PORTION = 4096
+_READ_SIZE = 4096
 
 
-class _SerialPipe:
-    """An open port; pyserial's errors are ``OSError``s."""
+class _SerialStream:
+    """An open serial port as a ``ByteStream``; pyserial's errors are ``OSError``s."""
 
     def __init__(self, port: serial.Serial) -> None:
         self._port = port
@@ -22,7 +22,7 @@ class _SerialPipe:
         return int(self._port.fileno())
 
     def read(self) -> bytes:
-        return bytes(self._port.read(_PORTION))
+        return bytes(self._port.read(_READ_SIZE))
 
     def write(self, data: bytes) -> int:
         return int(self._port.write(data) or 0)
@@ -32,7 +32,7 @@ class _SerialPipe:
 
 
 class SerialLink(StreamLink):
-    """Opens *device* at *baud*, and again whenever it goes away (a plug that is pulled and put back)."""
+    """Opens *device* at *baud*, and again whenever the device returns (an unplugged and replugged adapter)."""
 
     def __init__(
         self, kernel: Kernel, device: str, baud: int, name: str = "", codec: Codec = MAVLINK
@@ -41,7 +41,7 @@ class SerialLink(StreamLink):
         super().__init__(kernel, name or f"serial://{device}", codec)
 
     def _open(self) -> ByteStream:
-        return _SerialPipe(serial.Serial(self._device, self._baud, timeout=0, write_timeout=0))
+        return _SerialStream(serial.Serial(self._device, self._baud, timeout=0, write_timeout=0))
 
     def _explain(self, error: OSError) -> str:
         if isinstance(error, serial.SerialException) and error.errno is None:
@@ -52,8 +52,8 @@ class SerialLink(StreamLink):
             return f"no permission to open {self._device}; add yourself to its group, usually dialout"
         return f"{self._device}: {error.strerror or error}"
 
-    def _trouble(self) -> str:
-        wrong = super()._trouble()
-        if not wrong and not self.heard.octets:
+    def _connection_problem(self) -> str:
+        problem = super()._connection_problem()
+        if not problem and not self.statistics.octets:
             return f"{self._device} is open at {self._baud} baud, but nothing arrives"
-        return wrong
+        return problem

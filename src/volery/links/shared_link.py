@@ -1,4 +1,4 @@
-"""One link, several vehicles behind it: a radio, or a port to which more than one autopilot speaks."""
+"""One link shared by several vehicles: a radio, or a port at which more than one autopilot sends."""
 
 from __future__ import annotations
 
@@ -6,33 +6,33 @@ from volery.links.link import Frame, Link, Receiver
 
 
 class SharedLink:
-    """Hands every frame that arrives to all who share it: whose it is they see by the sender's system id."""
+    """Delivers every frame to all shares. Vehicles recognise their frames by the sender's system id."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._shares: list[Share] = []
-        link.receive(self._arrived)
+        self._shares: list[LinkShare] = []
+        link.receive(self._on_frame)
 
-    def share(self) -> Share:
-        """A link of one's own to what is behind it."""
-        made = Share(self, self._link)
+    def share(self) -> LinkShare:
+        """Return a new link to the vehicles behind the shared link."""
+        made = LinkShare(self, self._link)
         self._shares.append(made)
         return made
 
-    def _arrived(self, frame: Frame) -> None:
+    def _on_frame(self, frame: Frame) -> None:
         for share in tuple(self._shares):
             share.deliver(frame)
 
-    def left(self, share: Share) -> None:
-        """One of those who share it has closed; the last one closes it."""
+    def leave(self, share: LinkShare) -> None:
+        """Remove a share that was closed; the last one closes the shared link."""
         if share in self._shares:
             self._shares.remove(share)
             if not self._shares:
                 self._link.close()
 
 
-class Share:
-    """One vehicle's part of a shared link."""
+class LinkShare:
+    """One vehicle's share of a shared link."""
 
     def __init__(self, owner: SharedLink, link: Link) -> None:
         self.name = link.name
@@ -42,29 +42,29 @@ class Share:
         self._closed = False
 
     def send(self, frame: Frame) -> None:
-        """Over the shared link; everybody behind it hears it."""
+        """Send *frame* over the shared link; every vehicle behind the link receives it."""
         if not self._closed:
             self._link.send(frame)
 
     def receive(self, receiver: Receiver) -> None:
-        """From now on hand every frame that arrives to *receiver*."""
+        """Call *receiver* with every frame that arrives from now on."""
         self._receiver = receiver
 
     def deliver(self, frame: Frame) -> None:
-        """A frame has arrived."""
+        """Hand a frame that has arrived to the receiver. Framework callback."""
         if self._receiver is not None and not self._closed:
             self._receiver(frame)
 
     def problem(self) -> str:
-        """What is wrong with the shared link."""
+        """Return what is wrong with the shared link, or ``""``."""
         return "the link was closed" if self._closed else self._link.problem()
 
     @property
-    def heard(self) -> object:
-        """What the shared link has heard, if it counts that."""
-        return getattr(self._link, "heard", None)
+    def statistics(self) -> object:
+        """Receive statistics of the shared link, or None if it keeps none."""
+        return getattr(self._link, "statistics", None)
 
     def close(self) -> None:
-        """Let go of it."""
+        """Leave the shared link."""
         self._closed = True
-        self._owner.left(self)
+        self._owner.leave(self)

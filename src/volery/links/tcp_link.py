@@ -1,4 +1,4 @@
-"""TCP: a client that connects and reconnects, a server that several clients share."""
+"""Links over TCP: a client that reconnects, and a server that several clients share."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from functools import partial
 
 from volery.base.errors import UsageError
 from volery.kernel.api import Kernel
-from volery.links.coded_link import MOST_UNSENT, ByteStream, CodedLink, ReaderThread, StreamLink
+from volery.links.coded_link import MAX_UNSENT, ByteStream, CodedLink, ReaderThread, StreamLink
 from volery.links.link import Codec, FrameParser
 from volery.links.mavlink_codec import MAVLINK
 
 _CONNECT_S = 3.0
-_PORTION = 65_536
+_READ_SIZE = 65_536
 
 
-class _SocketPipe:
-    """A connected socket."""
+class _SocketStream:
+    """A connected socket as a ``ByteStream``."""
 
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
@@ -29,7 +29,7 @@ class _SocketPipe:
         return self._socket.fileno()
 
     def read(self) -> bytes:
-        return self._socket.recv(_PORTION)
+        return self._socket.recv(_READ_SIZE)
 
     def write(self, data: bytes) -> int:
         return self._socket.send(data)
@@ -46,7 +46,7 @@ class TcpClient(StreamLink):
         super().__init__(kernel, name or f"tcp://{host}:{port}", codec)
 
     def _open(self) -> ByteStream:
-        return _SocketPipe(socket.create_connection((self._host, self._port), _CONNECT_S))
+        return _SocketStream(socket.create_connection((self._host, self._port), _CONNECT_S))
 
     def _explain(self, error: OSError) -> str:
         where = f"{self._host}:{self._port}"
@@ -60,48 +60,56 @@ class TcpClient(StreamLink):
 
 
 class _Client:
-    """One of those who are connected to a server: its own thread, its own half-received frame."""
+    """One client of a server, with its own reader thread and its own half-received frame."""
 
     def __init__(
-        self, server: TcpServer, kernel: Kernel, connected: socket.socket, who: str, parser: FrameParser
+        self, server: TcpServer, kernel: Kernel, connected: socket.socket, peer: str, parser: FrameParser
     ) -> None:
-        self.who = who
+        self.peer = peer
         self._server = server
         self._kernel = kernel
-        self._pipe = _SocketPipe(connected)
+        self._stream = _SocketStream(connected)
         self._parser = parser
         self._unsent = bytearray()
-        self._pump = ReaderThread(f"tcp {who}", self._read)
-        self._pump.start()
+        self._reader = ReaderThread(f"tcp {peer}", self._read)
+        self._reader.start()
 
-    def _read(self, pump: ReaderThread) -> None:
+    def _read(self, reader: ReaderThread) -> None:
         with suppress(OSError):
-            while pump.readable(self._pipe.fileno()):
-                data = self._pipe.read()
+            while reader.readable(self._stream.fileno()):
+                data = self._stream.read()
                 if not data:
                     break
-                self._kernel.post(partial(self._server.said, self._parser, data))
-        self._kernel.post(partial(self._server.left, self))
+                self._kernel.post(partial(self._server.received, self._parser, data))
+        self._kernel.post(partial(self._server.disconnected, self))
 
     def transmit(self, data: bytes) -> None:
-        """Send without waiting; one who does not read loses what does not fit."""
-        if len(self._unsent) + len(data) > MOST_UNSENT:
+        """Send *data* without waiting. A client that does not read loses what does not fit."""
+        if len(self._unsent) + len(data) > MAX_UNSENT:
             return
         self._unsent += data
         with suppress(OSError):
-            taken = self._pipe.write(bytes(self._unsent))
+            taken = self._stream.write(bytes(self._unsent))
             del self._unsent[:taken]
 
     def close(self) -> None:
-        self._pump.stop()
-        self._pipe.close()
+        self._reader.stop()
+        self._stream.close()
 
 
 class TcpServer(CodedLink):
-    """Listens at ``host:port``. All clients hear what is sent; what any of them says arrives.
+    """Listens at ``host:port``. Frames are sent to all clients, and frames of all clients are received.
 
-    ``port`` 0 takes a free one, which ``self.port`` then names. *joined* is called, as house code, for each
-    client that connects. Raises ``UsageError`` if one cannot listen there.
+    Args:
+        kernel: Delivers what the threads receive.
+        host: Address to listen at.
+        port: Port to listen at; 0 chooses a free one, which ``self.port`` then holds.
+        name: Name of the link in messages and in the trace.
+        on_connect: Framework callback for each client that connects.
+        codec: Protocol of the link.
+
+    Raises:
+        UsageError: The address cannot be used.
     """
 
     def __init__(
@@ -111,7 +119,7 @@ class TcpServer(CodedLink):
         port: int,
         name: str = "",
         *,
-        joined: Callable[[], None] | None = None,
+        on_connect: Callable[[], None] | None = None,
         codec: Codec = MAVLINK,
     ) -> None:
         try:
@@ -120,51 +128,33 @@ class TcpServer(CodedLink):
             raise UsageError(f"cannot listen at tcp {host}:{port}: {error.strerror or error}") from None
         self.port: int = self._listener.getsockname()[1]
         super().__init__(kernel, name or f"tcp://{host}:{self.port}", codec)
-        self._joined = joined
+        self._on_connect = on_connect
         self._clients: list[_Client] = []
-        self._pump = ReaderThread(self.name, self._accept)
-        self._pump.start()
+        self._reader = ReaderThread(self.name, self._accept)
+        self._reader.start()
 
     @property
     def clients(self) -> int:
-        """How many are connected."""
+        """Number of connected clients."""
         return len(self._clients)
 
-    def _accept(self, pump: ReaderThread) -> None:
-        while pump.readable(self._listener.fileno()):
+    def _accept(self, reader: ReaderThread) -> None:
+        while reader.readable(self._listener.fileno()):
             with suppress(OSError):
                 connected, address = self._listener.accept()
-                self._kernel.post(partial(self._join, connected, f"{address[0]}:{address[1]}"))
+                self._kernel.post(partial(self._connected, connected, f"{address[0]}:{address[1]}"))
 
-    def _join(self, connected: socket.socket, who: str) -> None:
+    def _connected(self, connected: socket.socket, peer: str) -> None:
         if self._closed:
             connected.close()
             return
-        self._clients.append(_Client(self, self._kernel, connected, who, self._codec.parser()))
-        self._tell("up", f"{who} has connected")
-        if self._joined is not None:
-            self._joined()
+        self._clients.append(_Client(self, self._kernel, connected, peer, self._codec.parser()))
+        self._record("up", f"{peer} has connected")
+        if self._on_connect is not None:
+            self._on_connect()
 
-    def _trouble(self) -> str:
-        if self._clients or self._closed:
-            return super()._trouble()
-        return f"nobody has connected to {self.name}"
-
-    def _transmit(self, data: bytes) -> None:
-        for client in self._clients:
-            client.transmit(data)
-
-    def close(self) -> None:
-        """Let go of all sockets and threads."""
-        super().close()
-        self._pump.stop()
-        self._listener.close()
-        for client in self._clients:
-            client.close()
-        self._clients.clear()
-
-    def said(self, parser: FrameParser, data: bytes) -> None:
-        """House code: one of the clients, whose parser this is, has said something."""
+    def received(self, parser: FrameParser, data: bytes) -> None:
+        """Decode bytes of the client that *parser* belongs to. Framework callback."""
         if self._closed:
             return
         frames = parser.feed(data)
@@ -172,9 +162,27 @@ class TcpServer(CodedLink):
             for frame in frames:
                 self._receiver(frame)
 
-    def left(self, client: _Client) -> None:
-        """House code: a client has gone."""
+    def disconnected(self, client: _Client) -> None:
+        """Remove a client whose connection has ended. Framework callback."""
         if client in self._clients:
             self._clients.remove(client)
             client.close()
-            self._tell("lost", f"{client.who} has gone")
+            self._record("lost", f"{client.peer} has disconnected")
+
+    def _connection_problem(self) -> str:
+        if self._clients or self._closed:
+            return super()._connection_problem()
+        return f"no client has connected to {self.name}"
+
+    def _transmit(self, data: bytes) -> None:
+        for client in self._clients:
+            client.transmit(data)
+
+    def close(self) -> None:
+        """Close all sockets and stop all threads."""
+        super().close()
+        self._reader.stop()
+        self._listener.close()
+        for client in self._clients:
+            client.close()
+        self._clients.clear()

@@ -1,7 +1,8 @@
-"""Telemetry logs as ground stations write them: 8 bytes big-endian microseconds, a raw frame, and so on.
+"""Telemetry logs as ground stations write them: records of a time stamp and a raw MAVLink frame.
 
-QGroundControl, MAVExplorer and ``mavlogdump.py`` read them. The stamp is Unix time where the clock is real;
-in virtual time it counts from the start of the run.
+The stamp is a big-endian number of 8 bytes in microseconds. QGroundControl, MAVExplorer and ``mavlogdump.py``
+read such files. The stamp is Unix time where the clock is real; in virtual time it counts from the start of the
+run.
 """
 
 from __future__ import annotations
@@ -13,15 +14,21 @@ from typing import NamedTuple
 
 from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.link import Frame, Link, Receiver, ReceiveStatistics
-from volery.links.mavlink_codec import MavlinkParser, whole_frame
-from volery.links.mavlink_messages import encode
+from volery.links.link import Frame, Link, Receiver
+from volery.links.mavlink_codec import MavlinkParser, encode, frame_length
 
 _STAMP = struct.Struct(">Q")
 
 
 class TlogTap:
-    """A link that writes every frame, both ways, to a file. ``epoch_us`` is Unix time at the run's start."""
+    """A link that writes every sent and received frame to a file.
+
+    Args:
+        kernel: Clock of the stamps.
+        link: The link to record.
+        path: File to write.
+        epoch_us: Unix time at the start of the run, in microseconds.
+    """
 
     def __init__(self, kernel: Kernel, link: Link, path: Path, epoch_us: int = 0) -> None:
         self.name = link.name
@@ -33,31 +40,30 @@ class TlogTap:
         self._flushed: Ns = 0
 
     @property
-    def heard(self) -> ReceiveStatistics | None:
-        """What the link has heard so far, if it is one of bytes."""
-        heard: ReceiveStatistics | None = getattr(self._link, "heard", None)
-        return heard
+    def statistics(self) -> object:
+        """Receive statistics of the recorded link, or None if it keeps none."""
+        return getattr(self._link, "statistics", None)
 
     def send(self, frame: Frame) -> None:
-        """Send and write down."""
+        """Record and send *frame*."""
         self._write(frame)
         self._link.send(frame)
 
     def receive(self, receiver: Receiver) -> None:
-        """From now on hand what arrives to *receiver*, and write it down."""
+        """Record every frame that arrives from now on and call *receiver* with it."""
 
-        def write_and_hand_over(frame: Frame) -> None:
+        def write_and_deliver(frame: Frame) -> None:
             self._write(frame)
             receiver(frame)
 
-        self._link.receive(write_and_hand_over)
+        self._link.receive(write_and_deliver)
 
     def problem(self) -> str:
-        """What is wrong with the wire."""
+        """Return what is wrong with the recorded link, or ``""``."""
         return self._link.problem()
 
     def close(self) -> None:
-        """Close the link and finish the file."""
+        """Close the link and the file."""
         self._link.close()
         self._file.close()
 
@@ -75,23 +81,23 @@ class TlogTap:
 
 
 class Entry(NamedTuple):
-    """One frame of a log; ``at_us`` as it stands there."""
+    """One frame of a log, with its stamp in microseconds."""
 
     at_us: int
     frame: Frame
 
 
 def read_tlog(path: Path) -> Iterator[Entry]:
-    """The known frames of a log in order. A cut end and damaged places are passed over."""
+    """Yield the frames of known messages of a log in order. Damaged parts and a cut end are skipped."""
     data = path.read_bytes()
-    place = 0
-    while place + _STAMP.size < len(data):
-        length = whole_frame(data, place + _STAMP.size)
+    at = 0
+    while at + _STAMP.size < len(data):
+        length = frame_length(data, at + _STAMP.size)
         if not length:
-            place += 1
+            at += 1
             continue
-        start = place + _STAMP.size
+        start = at + _STAMP.size
         frames = MavlinkParser().feed(data[start : start + length])
         if frames:
-            yield Entry(_STAMP.unpack_from(data, place)[0], frames[0])
-        place = start + length
+            yield Entry(_STAMP.unpack_from(data, at)[0], frames[0])
+        at = start + length

@@ -1,7 +1,4 @@
-"""UDP: bind and answer the first who speaks, or send to a stated peer and hear its answers.
-
-UDP for several peers at one port: all who have spoken lately hear what is sent.
-"""
+"""Links over UDP: to one peer, or a server for several peers at one port."""
 
 from __future__ import annotations
 
@@ -17,8 +14,8 @@ from volery.links.coded_link import CodedLink, ReaderThread
 from volery.links.link import Codec, FrameParser
 from volery.links.mavlink_codec import MAVLINK
 
-PEER_GONE: Ns = 10 * S
-"""After so much silence of the peer, another who speaks takes its place: an autopilot that was restarted."""
+PEER_TIMEOUT: Ns = 10 * S
+"""After this time without a datagram another sender replaces the peer: an autopilot that was restarted."""
 
 _DATAGRAM = 65_536
 Endpoint = tuple[str, int]
@@ -27,10 +24,18 @@ Endpoint = tuple[str, int]
 class UdpLink(CodedLink):
     """Datagrams to and from one peer.
 
-    With *peer* ``None`` it binds ``host:port`` and waits: the first who speaks is the peer, and is answered
-    where it speaks from, or at port *answers_to* there. Else it sends to *peer* from any free port (``port``
-    0) and hears whoever answers from that host.
-    ``self.port`` is the local port. Raises ``UsageError`` if one cannot bind there or there is no such host.
+    Args:
+        kernel: Delivers what the thread receives.
+        host: Local address to bind.
+        port: Local port to bind; 0 chooses a free one. ``self.port`` holds the port in use.
+        peer: Address to send to; answers from any port of that host are received. None waits for a peer: the
+            first sender becomes the peer.
+        name: Name of the link in messages and in the trace.
+        codec: Protocol of the link.
+        answers_to: Port of the peer to send to, instead of the port that the peer sends from.
+
+    Raises:
+        UsageError: The address cannot be bound, or the host does not exist.
     """
 
     def __init__(
@@ -58,28 +63,28 @@ class UdpLink(CodedLink):
         where = f"udp://{host}:{self.port}" if peer is None else f"udp://{peer[0]}:{peer[1]}"
         super().__init__(kernel, name or where, codec)
         self._peer = self._fixed
-        self._heard_at: Ns = -1
-        self._pump = ReaderThread(self.name, self._read)
-        self._pump.start()
+        self._last_received: Ns = -1
+        self._reader = ReaderThread(self.name, self._read)
+        self._reader.start()
 
-    def _read(self, pump: ReaderThread) -> None:
-        while pump.readable(self._socket.fileno()):
+    def _read(self, reader: ReaderThread) -> None:
+        while reader.readable(self._socket.fileno()):
             with suppress(OSError):
                 data, sender = self._socket.recvfrom(_DATAGRAM)
-                self._kernel.post(partial(self._came, data, (sender[0], sender[1])))
+                self._kernel.post(partial(self._on_datagram, data, (sender[0], sender[1])))
 
-    def _came(self, data: bytes, sender: Endpoint) -> None:
-        if self._closed or not self._belongs(sender):
+    def _on_datagram(self, data: bytes, sender: Endpoint) -> None:
+        if self._closed or not self._accepts(sender):
             return
-        if self._heard_at < 0:
-            self._tell("up", f"{sender[0]}:{sender[1]} speaks")
-        self._heard_at = self._kernel.now()
+        if self._last_received < 0:
+            self._record("up", f"first datagram from {sender[0]}:{sender[1]}")
+        self._last_received = self._kernel.now()
         self.arrived(data)
 
-    def _belongs(self, sender: Endpoint) -> bool:
+    def _accepts(self, sender: Endpoint) -> bool:
         if self._fixed is not None:
             return sender[0] == self._fixed[0]
-        if self._peer is None or self._kernel.now() - self._heard_at > PEER_GONE:
+        if self._peer is None or self._kernel.now() - self._last_received > PEER_TIMEOUT:
             self._peer = sender
         return sender == self._peer
 
@@ -92,32 +97,33 @@ class UdpLink(CodedLink):
         with suppress(OSError):
             self._socket.sendto(data, (host, port))
 
-    def _trouble(self) -> str:
-        if self._closed or self._heard_at >= 0:
-            return super()._trouble()
+    def _connection_problem(self) -> str:
+        if self._closed or self._last_received >= 0:
+            return super()._connection_problem()
         if self._fixed is not None:
-            return f"nobody at udp {self._fixed[0]}:{self._fixed[1]} answers"
-        return f"nobody speaks to udp port {self.port}"
+            return f"no answer from udp {self._fixed[0]}:{self._fixed[1]}"
+        return f"nothing arrives at udp port {self.port}"
 
     def close(self) -> None:
-        """Let go of the socket and the thread."""
+        """Close the socket and stop the thread."""
         super().close()
-        self._pump.stop()
+        self._reader.stop()
         self._socket.close()
 
 
 @dataclass
 class _Peer:
-    """One who has spoken: when, and its own half-received frame."""
+    """A peer of a server: its half-received frame, and the time of its last datagram."""
 
     parser: FrameParser
-    heard_at: Ns
+    last_received: Ns
 
 
 class UdpServer(UdpLink):
-    """Binds ``host:port``. What any peer says arrives; a peer that is silent for ``PEER_GONE`` is forgotten.
+    """A link to all peers that have sent a datagram within ``PEER_TIMEOUT``.
 
-    Raises ``UsageError`` if one cannot bind there.
+    Raises:
+        UsageError: ``host:port`` cannot be bound.
     """
 
     def __init__(
@@ -128,18 +134,18 @@ class UdpServer(UdpLink):
 
     @property
     def peers(self) -> int:
-        """How many have spoken lately."""
+        """Number of peers that have sent a datagram lately."""
         return len(self._peers)
 
-    def _came(self, data: bytes, sender: Endpoint) -> None:
+    def _on_datagram(self, data: bytes, sender: Endpoint) -> None:
         if self._closed:
             return
-        self._heard_at = now = self._kernel.now()
+        self._last_received = now = self._kernel.now()
         peer = self._peers.get(sender)
         if peer is None:
             peer = self._peers[sender] = _Peer(self._codec.parser(), now)
-            self._tell("up", f"{sender[0]}:{sender[1]} speaks")
-        peer.heard_at = now
+            self._record("up", f"first datagram from {sender[0]}:{sender[1]}")
+        peer.last_received = now
         for frame in peer.parser.feed(data):
             if self._receiver is not None:
                 self._receiver(frame)
@@ -147,14 +153,14 @@ class UdpServer(UdpLink):
     def _transmit(self, data: bytes) -> None:
         now = self._kernel.now()
         for endpoint, peer in tuple(self._peers.items()):
-            if now - peer.heard_at > PEER_GONE:
+            if now - peer.last_received > PEER_TIMEOUT:
                 del self._peers[endpoint]
-                self._tell("lost", f"{endpoint[0]}:{endpoint[1]} is silent")
+                self._record("lost", f"{endpoint[0]}:{endpoint[1]} is silent")
                 continue
             with suppress(OSError):
                 self._socket.sendto(data, endpoint)
 
     def problem(self) -> str:
-        """What is wrong with the socket, else with what one of the peers says."""
-        wrong = (peer.parser.problem() for peer in self._peers.values())
-        return self._trouble() or next(filter(None, wrong), "")
+        """Return what is wrong with the socket, else with the bytes of a peer; ``""`` if nothing is."""
+        problems = (peer.parser.problem() for peer in self._peers.values())
+        return self._connection_problem() or next(filter(None, problems), "")

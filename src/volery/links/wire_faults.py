@@ -1,6 +1,7 @@
-"""A link within one process that goes through real bytes, and the faults that a wire or a radio adds to them.
+"""Faults of a wire or a radio, and a link within one process whose bytes suffer from them.
 
-Every fault is drawn from one seeded stream in the order of sending, so a run with faults repeats exactly.
+All faults are drawn from one seeded stream of random numbers in the order of sending, so a run with faults
+repeats exactly.
 """
 
 from __future__ import annotations
@@ -17,23 +18,27 @@ from volery.links.link import Codec
 from volery.links.mavlink_codec import MAVLINK
 
 BURST_LENGTH = 40
-"""Bytes that a burst of noise overwrites, from where it begins."""
+"""Bytes that a burst of noise overwrites."""
 
 REORDER_DELAY: Ns = 60 * MS
-"""How much later a frame arrives that is overtaken by others: longer than between two of a fast stream."""
+"""Delay of a reordered frame: longer than the period of a fast telemetry stream, so that others overtake it."""
 
 PROBABILITIES = ("burst", "drop", "duplicate", "flip", "reorder", "truncate")
 
 
 @dataclass(frozen=True)
 class WireFaults:
-    """What happens to bytes on their way. Probabilities are 0..1.
+    """What happens to bytes on their way. Probabilities are in 0..1.
 
-    ``drop``: that a frame vanishes. ``flip``: that a bit of a byte is turned, for each byte. ``burst``: that
-    noise begins with a frame and overwrites ``BURST_LENGTH`` bytes. ``truncate``: that a frame ends too
-    early. ``duplicate``: that a frame arrives twice. ``reorder``: that a frame is overtaken by those sent in
-    the next 60 ms. ``jitter``: up to so much later, in order. ``cuts``: from, to; in between nothing passes
-    in either direction.
+    Args:
+        drop: Probability that a frame is lost.
+        flip: Probability, per byte, that one of its bits is inverted.
+        burst: Probability, per frame, that noise begins with it and overwrites ``BURST_LENGTH`` bytes.
+        truncate: Probability that a frame ends too early.
+        duplicate: Probability that a frame arrives twice.
+        reorder: Probability that a frame is delayed by ``REORDER_DELAY``, so that later ones overtake it.
+        jitter: Largest additional delay in ns; the order of frames is kept.
+        cuts: Intervals (from, to) in ns in which nothing passes in either direction.
     """
 
     drop: float = 0.0
@@ -52,7 +57,7 @@ class WireFaults:
                 raise UsageError(f"wire faults: {name}={value} is no probability; 0 to 1")
 
     def cut_at(self, now: Ns) -> bool:
-        """Nothing passes at this time."""
+        """Return whether the connection is cut at time *now*."""
         return any(start <= now < end for start, end in self.cuts)
 
 
@@ -60,18 +65,23 @@ FAULT_OPTIONS = (*PROBABILITIES, "cut", "jitter")
 
 
 def parse_wire_faults(options: Mapping[str, str]) -> WireFaults:
-    """Faults as an address states them: ``drop=0.01&flip=1e-5&burst=0.001&jitter=0.05&cut=20-25,60-70``.
+    """Return the faults that the options of an address state.
 
-    Also ``truncate``, ``duplicate`` and ``reorder``. ``jitter`` and ``cut`` (from-to) in seconds. Raises
-    ``UsageError`` for anything else.
+    Example: ``drop=0.01&flip=1e-5&burst=0.001&jitter=0.05&cut=20-25,60-70``.
+
+    Args:
+        options: Values by name, one of ``FAULT_OPTIONS``. ``jitter`` and ``cut`` (FROM-TO) are in seconds.
+
+    Raises:
+        UsageError: An option is unknown or its value is no number, no interval or no probability.
     """
     numbers: dict[str, float] = {}
     cuts: tuple[tuple[Ns, Ns], ...] = ()
     for name, given in options.items():
         if name == "cut":
-            cuts = tuple(_span(part) for part in given.split(","))
+            cuts = tuple(_parse_interval(part) for part in given.split(","))
         elif name in FAULT_OPTIONS:
-            numbers[name] = _number(name, given)
+            numbers[name] = _parse_number(name, given)
         else:
             hint = did_you_mean(name, FAULT_OPTIONS)
             raise UsageError(f"no wire fault {name!r}{hint}; there is {choices(FAULT_OPTIONS)}")
@@ -79,22 +89,22 @@ def parse_wire_faults(options: Mapping[str, str]) -> WireFaults:
     return WireFaults(jitter=jitter, cuts=cuts, **numbers)
 
 
-def _number(name: str, given: str) -> float:
+def _parse_number(name: str, given: str) -> float:
     try:
         return float(given)
     except ValueError:
         raise UsageError(f"wire faults: {name}={given!r} is not a number") from None
 
 
-def _span(text: str) -> tuple[Ns, Ns]:
+def _parse_interval(text: str) -> tuple[Ns, Ns]:
     start, dash, end = text.partition("-")
     if not dash:
         raise UsageError(f"wire faults: cut={text!r} should be FROM-TO in seconds, as in cut=20-25")
-    return from_seconds(_number("cut", start)), from_seconds(_number("cut", end))
+    return from_seconds(_parse_number("cut", start)), from_seconds(_parse_number("cut", end))
 
 
 class FaultyLink(CodedLink):
-    """One end. What it sends arrives as bytes at the peer, or does not."""
+    """One end of a link within one process that carries bytes, with faults."""
 
     def __init__(
         self, kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns, codec: Codec
@@ -104,11 +114,11 @@ class FaultyLink(CodedLink):
         self._delay = delay
         self._faults = faults
         self._random = random
-        self._noise = 0  # bytes that the burst under way will still overwrite
-        self._latest: Ns = 0  # nothing overtakes, unless faults say so
+        self._noise = 0  # bytes that the burst in progress will still overwrite
+        self._last_arrival: Ns = 0
 
-    def suffer(self, faults: WireFaults) -> None:
-        """From now on this happens to what passes, in both directions."""
+    def set_faults(self, faults: WireFaults) -> None:
+        """Apply *faults* from now on, in both directions."""
         self._faults = self.peer._faults = faults
 
     def _transmit(self, data: bytes) -> None:
@@ -119,35 +129,35 @@ class FaultyLink(CodedLink):
         if faults.burst and random.random() < faults.burst:
             self._noise = BURST_LENGTH
         if faults.flip or self._noise:
-            data = self._garbled(data)
+            data = self._corrupted(data)
         if faults.truncate and random.random() < faults.truncate:
             data = data[: random.randrange(len(data))]
         if faults.cut_at(now):
             return
-        for late in self._delays():
-            self._kernel.call_at(late, lambda: self.peer.arrived(data))
+        for arrival in self._arrivals():
+            self._kernel.call_at(arrival, lambda: self.peer.arrived(data))
 
-    def _delays(self) -> list[Ns]:
-        """When what is sent now arrives: twice, it may be."""
+    def _arrivals(self) -> list[Ns]:
+        """Return the times at which data that is sent now arrives; there are two if it is duplicated."""
         faults, random = self._faults, self._random
-        late = int(random.random() * faults.jitter) if faults.jitter else 0
-        self._latest = max(self._latest, self._kernel.now() + self._delay + late)
-        arrives = self._latest
+        jitter = int(random.random() * faults.jitter) if faults.jitter else 0
+        self._last_arrival = max(self._last_arrival, self._kernel.now() + self._delay + jitter)
+        arrival = self._last_arrival
         if faults.reorder and random.random() < faults.reorder:
-            arrives += REORDER_DELAY
+            arrival += REORDER_DELAY
         if faults.duplicate and random.random() < faults.duplicate:
-            return [arrives, arrives + self._delay]
-        return [arrives]
+            return [arrival, arrival + self._delay]
+        return [arrival]
 
-    def _garbled(self, data: bytes) -> bytes:
-        garbled = bytearray(data)
-        for place in range(len(garbled)):
+    def _corrupted(self, data: bytes) -> bytes:
+        corrupted = bytearray(data)
+        for at in range(len(corrupted)):
             if self._noise:
                 self._noise -= 1
-                garbled[place] = self._random.randrange(256)
+                corrupted[at] = self._random.randrange(256)
             elif self._random.random() < self._faults.flip:
-                garbled[place] ^= 1 << self._random.randrange(8)
-        return bytes(garbled)
+                corrupted[at] ^= 1 << self._random.randrange(8)
+        return bytes(corrupted)
 
 
 def faulty_pair(
@@ -159,7 +169,16 @@ def faulty_pair(
     delay: Ns = MS,
     codec: Codec = MAVLINK,
 ) -> tuple[FaultyLink, FaultyLink]:
-    """The vehicle's and the autopilot's side of a link through bytes; *random* is a named, seeded stream."""
+    """Return the vehicle's end and the autopilot's end of a link over bytes with faults.
+
+    Args:
+        kernel: Delivers the bytes.
+        name: Name of the link in messages and in the trace.
+        faults: What happens to the bytes.
+        random: Named, seeded stream of random numbers.
+        delay: Time of flight in ns.
+        codec: Protocol of the link.
+    """
     ours = FaultyLink(kernel, name, faults, random, delay=delay, codec=codec)
     theirs = FaultyLink(kernel, f"{name} (autopilot)", faults, random, delay=delay, codec=codec)
     ours.peer, theirs.peer = theirs, ours

@@ -1,29 +1,70 @@
-"""What surrounds the system in one run: places, ways, zones, air, vehicles, workload. Frozen data, all of it.
+"""The surroundings of the system in one run: places, ways, zones, air, vehicles, workload, faults. Frozen data.
 
 Every point is given twice, as WGS-84 degrees with metres AMSL and as metres east and north of the origin, so
-that nobody above converts frames for themselves.
+that no other package converts frames. Most classes declare how they are written in a model; points, ways and
+prisms are written differently from what they become, so each of them has a text form beside it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+from math import cos, hypot, inf, pi, sin
+from typing import Annotated, Any
 
 from volery.base.errors import Location
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
+from volery.model.faults import FAULT, Fault
+from volery.model.fields import (
+    AUTOPILOT,
+    CHARGE,
+    DISTANCE,
+    HEADING,
+    LATITUDE,
+    LENGTH,
+    LONGITUDE,
+    NUMBER,
+    RATE,
+    SHARE,
+    SPEED,
+    TEXT,
+    TIME,
+    VOLTAGE,
+    Key,
+    ListOf,
+    MapOf,
+    OneOf,
+    Record,
+    Schema,
+    Shorter,
+    Syntax,
+    Whole,
+    WrongValueError,
+    read_child,
+)
+from volery.model.reading import Reading
+from volery.model.text import Node, Path
 
 VEHICLE_KINDS = ("multirotor", "rover")
 SENSOR_SETS = ("consumer", "rtk")
 STARTS = ("warm", "cold")
 
+CIRCLE_CORNERS = 32
+FARTHEST_M = 100_000.0
+"""A local frame is a tangent plane: farther away the ground has curved away by hundreds of metres."""
+
+_ENVIRONMENT: Path = ("environment",)
+
+
+# -- points
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A named point on the ground. ``role`` is free text that components may choose by: ``hospital``,
-    ``port``.
-    """
+    """A named point on the ground. ``role`` is free text that components may choose places by."""
 
     name: str
     latitude: float
@@ -35,8 +76,148 @@ class Place:
 
     @property
     def position(self) -> Position:
-        """The same as a position with a typed altitude."""
+        """The place as a position with a typed altitude."""
         return Position(self.latitude, self.longitude, AMSL(self.amsl_m))
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """The origin of the local frame. The ground is flat at its altitude."""
+
+    latitude: Annotated[float, LATITUDE, "WGS-84 latitude."] = 0.0
+    longitude: Annotated[float, LONGITUDE, "WGS-84 longitude."] = 0.0
+    amsl: Annotated[float, LENGTH, "Altitude of the ground above mean sea level."] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point on the ground: the name of a place, metres from the origin, or WGS-84 degrees."""
+
+    place: Annotated[str | None, TEXT, "Name of a place of the environment."] = None
+    east_m: Annotated[float | None, LENGTH, "Distance east of the origin."] = None
+    north_m: Annotated[float | None, LENGTH, "Distance north of the origin."] = None
+    latitude: Annotated[float | None, LATITUDE, "WGS-84 latitude."] = None
+    longitude: Annotated[float | None, LONGITUDE, "WGS-84 longitude."] = None
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPoint(Point):
+    """A named point on the ground."""
+
+    role: Annotated[str, TEXT, "Free text that components may choose places by, such as `hospital`."] = ""
+
+
+class Geography:
+    """The local frame and the named places of a model that is being read. Use with ``Reading.once``."""
+
+    def __init__(self, reading: Reading) -> None:
+        origin = Origin()
+        node = reading.root.at((*_ENVIRONMENT, "origin"))
+        if node is not None:
+            right, found = read_child(Record(Origin), node, (*_ENVIRONMENT, "origin"), reading)
+            origin = found if right else origin
+        self.reading = reading
+        self.frame = LocalFrame(origin.latitude, origin.longitude, origin.amsl)
+        self.places: dict[str, Place] = {}
+        node = reading.root.at((*_ENVIRONMENT, "places"))
+        if node is not None:
+            self._read_places(node)
+
+    def _read_places(self, node: Node) -> None:
+        """Read the named places. A place may stand where another one does; those are read last."""
+        path = (*_ENVIRONMENT, "places")
+        right, points = read_child(MapOf(Record(NamedPoint)), node, path, self.reading)
+        if not right:
+            return
+        later = [name for name, point in points.items() if point.place is not None]
+        for name in [*(name for name in points if name not in later), *later]:
+            point = points[name]
+            found = self.place((*path, name), name, point)
+            if found is not None:
+                at = found.latitude, found.longitude, found.amsl_m, found.east_m, found.north_m
+                self.places[name] = Place(name, *at, point.role)
+        self.places = {name: self.places[name] for name in points if name in self.places}
+
+    def place(self, path: Path, name: str, point: Point) -> Place | None:
+        """Return where the *point* at *path* is; None after reporting a problem."""
+        stated = {one.name for one in fields(Point) if getattr(point, one.name) is not None}
+        frame = self.frame
+        if stated == {"place"} and point.place is not None:
+            known = self.reading.known(path, point.place, "place", self.places)
+            return self.places[point.place] if known else None
+        if stated == {"latitude", "longitude"} and point.latitude is not None and point.longitude is not None:
+            east, north, _ = frame.to_enu(point.latitude, point.longitude, frame.amsl)
+            latitude, longitude = point.latitude, point.longitude
+        elif stated <= {"east_m", "north_m"} and stated:
+            east, north = point.east_m or 0.0, point.north_m or 0.0
+            latitude, longitude, _ = frame.from_enu((east, north, 0.0))
+        else:
+            what = "a point is {east, north} from the origin, {latitude, longitude}, or the name of a place"
+            self.reading.problems.add(path, what)
+            return None
+        if hypot(east, north) > FARTHEST_M:
+            away = hypot(east, north) / 1000.0
+            what = f"{away:.0f} km from the origin; at most {FARTHEST_M / 1000:.0f} km make sense"
+            self.reading.problems.add(path, what)
+        return Place(name, latitude, longitude, frame.amsl, east, north)
+
+
+@dataclass(frozen=True)
+class _Resolved(Syntax):
+    """What is written as a record ``text`` and becomes what ``resolve`` makes of it."""
+
+    text: Syntax
+    resolve: Callable[[Any, Path, Reading], Any]
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        made = self.resolve(self.text.read(node, path, reading), path, reading)
+        if made is None:  # its problem has been reported
+            raise WrongValueError("")
+        return made
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return self.text.schema(definitions)
+
+
+def _place(point: Point, path: Path, reading: Reading) -> Place | None:
+    return reading.once(Geography).place(path, str(path[-2]), point)
+
+
+def _junction(point: Point, path: Path, reading: Reading) -> Place | None:
+    return reading.once(Geography).place(path, str(path[-1]), point)
+
+
+PLACE = _Resolved(Shorter(Record(Point), key="place"), _place)
+"""A point that belongs to something, and is named after it."""
+
+
+class _AllPlaces(Syntax):
+    """All named places of the model, which are read only once."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Place]:
+        """See ``Syntax``."""
+        return reading.once(Geography).places
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return MapOf(Record(NamedPoint)).schema(definitions)
+
+
+class _Frame(Syntax):
+    """The local frame of the model, which is read only once."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> LocalFrame:
+        """See ``Syntax``."""
+        return reading.once(Geography).frame
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return Record(Origin).schema(definitions)
+
+
+# -- ways and volumes
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +234,40 @@ class Ways:
 
 
 @dataclass(frozen=True, slots=True)
+class WaysText:
+    """A graph of roads or air corridors."""
+
+    height_m: Annotated[float, DISTANCE, "Height above ground; 0 for roads."] = 0.0
+    junctions: Annotated[
+        Mapping[str, Place], MapOf(_Resolved(Record(Point), _junction)), "Points that only join ways."
+    ] = field(default_factory=dict)
+    ways: Annotated[
+        tuple[tuple[str, ...], ...],
+        ListOf(ListOf(TEXT)),
+        "Each way is a list of places and junctions, joined one after another in both directions.",
+    ] = ()
+
+
+def _ways(text: WaysText, path: Path, reading: Reading) -> Ways:
+    known = {**reading.once(Geography).places, **text.junctions}
+    edges: list[tuple[str, str, float]] = []
+    for number, way in enumerate(text.ways):
+        here: Path = (*path, "ways", number)
+        if len(way) < 2:
+            reading.problems.add(here, "a way joins at least two places or junctions")
+        ends = [known[name] for name in way if reading.known(here, name, "place or junction", known)]
+        edges += [
+            (one.name, other.name, hypot(other.east_m - one.east_m, other.north_m - one.north_m))
+            for one, other in pairwise(ends)
+        ]
+    used = {name for edge in edges for name in edge[:2]}
+    nodes = {name: place for name, place in known.items() if name in used}
+    return Ways(nodes, tuple(edges), text.height_m)
+
+
+@dataclass(frozen=True, slots=True)
 class Prism:
-    """An upright volume over a polygon: a no-fly zone or a building. Corners are (east, north) metres, in
-    order.
+    """An upright volume over a polygon: a no-fly zone or a building. Corners are (east, north) metres.
 
     It reaches from ``floor_m`` to ``ceiling_m`` above the origin's ground.
     """
@@ -63,93 +275,161 @@ class Prism:
     name: str
     corners: tuple[tuple[float, float], ...]
     floor_m: float = 0.0
-    ceiling_m: float = float("inf")
+    ceiling_m: float = inf
+
+
+@dataclass(frozen=True, slots=True)
+class PrismText:
+    """An upright volume over a polygon of corners, or over a circle."""
+
+    corners: Annotated[tuple[Place, ...], ListOf(PLACE), "Corners of the polygon, in order."] = ()
+    centre: Annotated[Place | None, PLACE, "Centre of the circle."] = None
+    radius_m: Annotated[float | None, DISTANCE, "Radius of the circle."] = None
+    floor_m: Annotated[float, DISTANCE, "Lower end, above the origin's ground."] = 0.0
+    ceiling_m: Annotated[float | None, DISTANCE, "Upper end; unlimited if it is not given."] = None
+
+
+def _prism(text: PrismText, path: Path, reading: Reading) -> Prism | None:
+    ceiling = text.ceiling_m if text.ceiling_m is not None else inf
+    if ceiling <= text.floor_m:
+        what = f"its ceiling ({ceiling:g} m) is not above its floor ({text.floor_m:g} m)"
+        reading.problems.add(path, what)
+    if text.centre is not None and text.radius_m and not text.corners:
+        corners = _circle(text.centre, text.radius_m)
+    elif len(text.corners) >= 3 and text.centre is None and text.radius_m is None:
+        corners = tuple((corner.east_m, corner.north_m) for corner in text.corners)
+    else:
+        reading.problems.add(path, "give at least three corners, or a centre and a radius")
+        return None
+    return Prism(str(path[-1]), corners, text.floor_m, ceiling)
+
+
+def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:
+    """Return the regular polygon around a circle: no part of the circle is outside it."""
+    outer = radius / cos(pi / CIRCLE_CORNERS)
+    angles = [2.0 * pi * corner / CIRCLE_CORNERS for corner in range(CIRCLE_CORNERS)]
+    return tuple(
+        (centre.east_m + outer * cos(angle), centre.north_m + outer * sin(angle)) for angle in angles
+    )
+
+
+WAYS = _Resolved(Record(WaysText), _ways)
+PRISMS = MapOf(_Resolved(Record(PrismText), _prism), values_only=True)
+
+
+# -- air, vehicles, workload
 
 
 @dataclass(frozen=True, slots=True)
 class Wind:
-    """``direction_deg``: where it blows *from*, clockwise from north. ``gusts_m_s``: standard deviation."""
+    """Wind: a mean and gusts. Written as its mean speed alone, or as a mapping."""
 
-    speed_m_s: float = 0.0
-    direction_deg: float = 0.0
-    gusts_m_s: float = 0.0
+    speed_m_s: Annotated[float, SPEED, "Mean speed."] = 0.0
+    direction_deg: Annotated[float, HEADING, "Where it blows from, clockwise from north."] = 0.0
+    gusts_m_s: Annotated[float, SPEED, "Standard deviation of the gusts."] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """``charge`` is 0..1 at the start; ``voltage_v`` nominal, ``None`` for the usual one of the vehicle's
-    kind.
-    """
+    """A battery. Written as its capacity alone, or as a mapping."""
 
-    capacity_coulomb: float
-    charge: float = 1.0
-    voltage_v: float | None = None
+    capacity_coulomb: Annotated[float, CHARGE, "Capacity when full."]
+    charge: Annotated[float, SHARE, "Share of the capacity that is left at the start."] = 1.0
+    voltage_v: Annotated[
+        float | None, VOLTAGE, "Nominal voltage; that of the vehicle's kind if it is not given."
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """A drone or a rover with its autopilot.
 
-    ``at`` is where it stands at the start, ``heading_deg`` clockwise from north. ``battery`` is ``None`` for
-    the usual one of its kind. ``sensors`` is ``consumer`` or ``rtk``; ``started`` ``warm`` (estimator
-    settled, GPS fixed) or ``cold``. ``parameters`` are the autopilot's own, by its own names. ``processor``
-    is where the node runs that serves it under MAVROS's names, ``None`` where no computer of the model does.
+    ``processor`` is where the node runs that serves it under MAVROS's names, None where no computer of the
+    model does.
     """
 
     name: str
-    kind: str
-    autopilot: str
-    at: Place
-    heading_deg: float = 0.0
-    battery: Battery | None = None
-    sensors: str = "consumer"
-    started: str = "warm"
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    kind: Annotated[str, OneOf(VEHICLE_KINDS), "Kind of vehicle."]
+    autopilot: Annotated[str, AUTOPILOT, "Firmware that flies it, such as `ardupilot`."]
+    at: Annotated[Place, PLACE, "Where it stands at the start."]
+    heading_deg: Annotated[float, HEADING, "Heading at the start, clockwise from north."] = 0.0
+    battery: Annotated[
+        Battery | None,
+        Shorter(Record(Battery), key="capacity"),
+        "Its battery; that of its kind if it is not given.",
+    ] = None
+    sensors: Annotated[
+        str,
+        OneOf(SENSOR_SETS),
+        "Grade of its sensors: `consumer`, or `rtk` with a satellite receiver to 2 cm.",
+    ] = "consumer"
+    started: Annotated[
+        str, OneOf(STARTS), "`warm`: estimator settled, satellites fixed. `cold`: just switched on."
+    ] = "warm"
+    parameters: Annotated[
+        Mapping[str, float], MapOf(NUMBER, free=True), "Parameters of the autopilot, by its own names."
+    ] = field(default_factory=dict)
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Workload:
-    """What is asked of the system: ``rate_hz`` orders a second on average, ``count`` in all (``None``: no
-    end).
+class Orders:
+    """Orders that requesters place."""
 
-    ``stream`` names the random stream that the orders are drawn from.
-    """
-
-    requesters: int = 1
-    rate_hz: float = 0.0
-    count: int | None = None
-    first_ns: Ns = 0
-    stream: str = "workload"
+    rate_hz: Annotated[float, RATE, "Orders a second, on average."] = 0.0
+    count: Annotated[int | None, Whole(least=0), "Number of orders in all; no end if it is not given."] = None
+    first_ns: Annotated[Ns, TIME, "Time of the first order."] = 0
+    stream: Annotated[str, Key("seed"), TEXT, "Name of the random stream that orders are drawn from."] = (
+        "workload"
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
-    """Something that breaks at a stated time; ``duration_ns`` ``None`` means for good."""
+class WorkloadText:
+    """What is requested from the system."""
 
-    name: str
-    kind: str
-    vehicle: str
-    at_ns: Ns
-    duration_ns: Ns | None = None
+    requesters: Annotated[int, Whole(least=0), "Number of requesters."] = 1
+    orders: Annotated[Orders, Record(Orders), "Orders that the requesters place."] = Orders()
+
+
+@dataclass(frozen=True, slots=True)
+class Workload(Orders):
+    """What is requested from the system: the orders of a number of requesters."""
+
+    requesters: int = 1
+
+
+def _workload(text: WorkloadText, path: Path, reading: Reading) -> Workload:
+    orders = text.orders
+    return Workload(orders.rate_hz, orders.count, orders.first_ns, orders.stream, text.requesters)
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """The surroundings. The terrain is flat at the origin's altitude."""
+    """The surroundings of the system. The terrain is flat at the origin's altitude."""
 
-    origin: LocalFrame = field(default_factory=lambda: LocalFrame(0.0, 0.0, 0.0))
-    places: Mapping[str, Place] = field(default_factory=dict)
-    roads: Ways = Ways()
-    corridors: Ways = Ways()
-    no_fly_zones: tuple[Prism, ...] = ()
-    buildings: tuple[Prism, ...] = ()
-    wind: Wind = Wind()
-    vehicles: tuple[Vehicle, ...] = ()
-    workload: Workload = Workload()
-    faults: tuple[Fault, ...] = ()
+    origin: Annotated[LocalFrame, _Frame(), "Origin of the local frame."] = field(
+        default_factory=lambda: LocalFrame(0.0, 0.0, 0.0)
+    )
+    places: Annotated[Mapping[str, Place], _AllPlaces(), "Named points on the ground."] = field(
+        default_factory=dict
+    )
+    roads: Annotated[Ways, WAYS, "Roads, for rovers."] = Ways()
+    corridors: Annotated[Ways, WAYS, "Air corridors, for drones."] = Ways()
+    no_fly_zones: Annotated[tuple[Prism, ...], PRISMS, "Volumes that drones must not enter."] = ()
+    buildings: Annotated[tuple[Prism, ...], PRISMS, "Buildings."] = ()
+    wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
+    vehicles: Annotated[
+        tuple[Vehicle, ...], MapOf(Record(Vehicle), values_only=True), "Drones and rovers, by name."
+    ] = ()
+    workload: Annotated[
+        Workload, _Resolved(Record(WorkloadText), _workload), "What is requested from the system."
+    ] = Workload()
+    faults: Annotated[
+        tuple[Fault, ...], MapOf(FAULT, values_only=True), "What breaks, and when. See the list of faults."
+    ] = ()
 
     def places_with(self, role: str) -> tuple[Place, ...]:
-        """The places of one role, in the order of the model."""
+        """Return the places of one role, in the order of the model."""
         return tuple(place for place in self.places.values() if place.role == role)

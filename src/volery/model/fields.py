@@ -1,229 +1,564 @@
-"""The kinds of values that stand in a model's text, as pydantic annotations: what they become and how they
-read.
+"""How a field of the model's classes is written: the one declaration behind parser, JSON Schema and reference.
 
-Each says in the JSON Schema what an editor may offer.
+A frozen dataclass declares each field that a model file may state as ``Annotated[type, syntax, description]``.
+The syntax parses what is written and describes itself in the JSON Schema; the default of the field is its
+default in the file. The key in the file is the name of the field without its unit (``latency_ns`` is written
+``latency``), or a ``Key``. Fields without a syntax (``name``, ``where``) are filled in by the reader.
+
+Why not pydantic: it would need a second class per entity for the units, the source lines and the names that
+come from keys, and its messages would have to be rewritten. This is a third of that code.
 """
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
-
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, StringConstraints
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import core_schema
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from volery.base import units
-from volery.base.time import Ns
-from volery.base.units import Kind, NotAQuantity
-from volery.model.text import Quoted
+from volery.base.errors import choices, did_you_mean
+from volery.base.time import Ns, S
+from volery.base.units import Kind, QuantityError
+from volery.model.reading import Reading
+from volery.model.text import Node, Path, Quoted
+
+Schema = dict[str, Any]
+
+SHORT = "x-short"
+"""Marks, in the JSON Schema, a mapping that may be written as the value of this key alone."""
+
+_NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
+_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|j)$")
 
 
-class Form(BaseModel):
-    """A mapping of the text with known keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+class WrongValueError(ValueError):
+    """The written value does not fit its field. An empty message: the problem has been reported already."""
 
 
-class _Reader(ABC):
-    """What stands in the text becomes what ``read`` makes of it."""
+def expected(what: str, node: Node) -> WrongValueError:
+    """Return the error for a *node* that is something else than *what*."""
+    return WrongValueError(f"{what} is expected, not {shown(node)}")
+
+
+def shown(node: Node) -> str:
+    """Return the value of *node* for a message."""
+    if isinstance(node.value, dict | list):
+        return "a mapping" if isinstance(node.value, dict) else "a list"
+    if node.value is None:
+        return "nothing"
+    return repr(node.value) if isinstance(node.value, str) else str(node.value)
+
+
+class Syntax(ABC):
+    """How a value is written in a model."""
 
     @abstractmethod
-    def read(self, written: object) -> object:
-        """The value; ``NotAQuantity`` if it is none."""
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """Return the value of *node*, which stands at *path*.
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-
-class _Rewriter(ABC):
-    """What may be written shorter: it is validated as what ``meant`` makes of it."""
+        Raises:
+            WrongValueError, NotAQuantity: the node is not written in this syntax.
+        """
 
     @abstractmethod
-    def meant(self, written: object) -> object:
-        """The longer form."""
+    def schema(self, definitions: Schema) -> Schema:
+        """Return the JSON Schema. Schemas of records are added to *definitions*."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(self.meant, handler(source))
+    def written(self, value: Any) -> Any:
+        """Return *value*, a default, as it would be written; None if it is not worth stating."""
+        return value if isinstance(value, bool | int | float | str) else None
+
+
+def read_child(syntax: Syntax, node: Node, path: Path, reading: Reading) -> tuple[bool, Any]:
+    """Return (True, the value of *node*), or (False, None) after reporting what is wrong with it."""
+    try:
+        return True, syntax.read(node, path, reading)
+    except (WrongValueError, QuantityError) as error:
+        if str(error):
+            reading.problems.add(path, str(error), node.where)
+        return False, None
+
+
+# -- scalars
+
+
+class Text(Syntax):
+    """Any text."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        return node.value
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
+
+    def written(self, value: Any) -> Any:
+        """See ``Syntax``. An empty text is no default worth stating."""
+        return value or None
 
 
 @dataclass(frozen=True)
-class Written(_Reader):
-    """A quantity as people write it. ``least`` and ``most`` are in the unit of its kind."""
+class Whole(Syntax):
+    """A whole number of at least ``least`` and at most ``most``."""
+
+    least: int | None = None
+    most: int | None = None
+
+    def read(self, node: Node, path: Path, reading: Reading) -> int:
+        """See ``Syntax``."""
+        value = node.value
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise expected("a whole number", node)
+        if self.least is not None and value < self.least:
+            raise WrongValueError(f"{value} is too little: at least {self.least}")
+        if self.most is not None and value > self.most:
+            raise WrongValueError(f"{value} is too much: at most {self.most}")
+        return value
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        bounds = {"minimum": self.least, "maximum": self.most}
+        return {"type": "integer", **{key: value for key, value in bounds.items() if value is not None}}
+
+
+class Number(Syntax):
+    """A number without a unit."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> float:
+        """See ``Syntax``."""
+        if isinstance(node.value, dict | list) or node.value is None:
+            raise expected("a number", node)
+        try:
+            return float(node.value)
+        except (ValueError, OverflowError):
+            raise expected("a number", node) from None
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "number"}
+
+
+@dataclass(frozen=True)
+class OneOf(Syntax):
+    """One of a few fixed values."""
+
+    values: tuple[str | int, ...]
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str | int:
+        """See ``Syntax``."""
+        for value in self.values:
+            if type(value) is type(node.value) and value == node.value:
+                return value
+        names = [str(value) for value in self.values]
+        raise WrongValueError(
+            f"{shown(node)} is not one of {choices(names)}{did_you_mean(str(node.value), names)}"
+        )
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"enum": list(self.values)}
+
+
+@dataclass(frozen=True)
+class Quantity(Syntax):
+    """A number with a unit, such as ``3 m/s``. The bounds are in the unit of its ``kind``."""
 
     kind: Kind
     least: float | None = None
     above: float | None = None
     most: float | None = None
 
-    def read(self, written: object) -> float:
-        """The number; ``NotAQuantity`` if it is none or outside what is possible."""
+    def read(self, node: Node, path: Path, reading: Reading) -> float:
+        """See ``Syntax``. The value is in the unit of its kind."""
+        written, unit = node.value, "" if self.kind.unit == "1" else f" {self.kind.unit}"
         value = units.read(written, self.kind)
-        unit = "" if self.kind.unit == "1" else f" {self.kind.unit}"
         if self.least is not None and value < self.least:
-            raise NotAQuantity(f"{written} is too little: at least {self.least:g}{unit}")
+            raise QuantityError(f"{written} is too little: at least {self.least:g}{unit}")
         if self.above is not None and value <= self.above:
-            raise NotAQuantity(f"{written} is too little: more than {self.above:g}{unit}")
+            raise QuantityError(f"{written} is too little: more than {self.above:g}{unit}")
         if self.most is not None and value > self.most:
-            raise NotAQuantity(f"{written} is too much: at most {self.most:g}{unit}")
+            raise QuantityError(f"{written} is too much: at most {self.most:g}{unit}")
         return value
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        noun = self.kind.noun
-        return {"type": ["string", "number"], "description": f"a {noun}, such as {self.kind.examples}"}
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        bounds = {"x-minimum": self.least, "x-above": self.above, "x-maximum": self.most}
+        stated = {key: value for key, value in bounds.items() if value is not None}
+        return {"type": ["string", "number"], "x-unit": self.kind.unit, "x-quantity": self.hint(), **stated}
+
+    def hint(self) -> str:
+        """Return what is to be written, with examples."""
+        return f"{self.kind.noun}, such as {self.kind.examples}"
+
+    def written(self, value: Any) -> Any:
+        """See ``Syntax``."""
+        return f"{value:g} {self.kind.unit}".removesuffix(" 1") if isinstance(value, int | float) else None
+
+
+class Duration(Quantity):
+    """A time, read to whole nanoseconds. The bounds are in seconds."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Ns:
+        """See ``Syntax``. The value is in nanoseconds."""
+        super().read(node, path, reading)
+        return units.read_ns(node.value)
+
+    def written(self, value: Any) -> Any:
+        """See ``Syntax``."""
+        return f"{value / S:g} s" if isinstance(value, int) else None
 
 
 @dataclass(frozen=True)
-class WrittenTime(Written):
-    """A time, in nanoseconds; the bounds are in seconds."""
-
-    def read(self, written: object) -> Ns:
-        """Nanoseconds."""
-        super().read(written)
-        return units.read_ns(written)
-
-
-@dataclass(frozen=True)
-class Degrees(_Reader):
-    """An angle in degrees: a bare number, or one with a unit."""
+class Angle(Syntax):
+    """An angle: a bare number of degrees, or a number with a unit. ``turn`` wraps it to 0..360 degrees."""
 
     most: float
+    turn: bool = False
 
-    def read(self, written: object) -> float:
-        """Degrees; ``NotAQuantity`` if beyond what there is."""
+    def read(self, node: Node, path: Path, reading: Reading) -> float:
+        """See ``Syntax``. The value is in degrees."""
+        written = node.value
         bare = isinstance(written, int | float) and not isinstance(written, bool)
         value = units.read(f"{written!r} deg" if bare else written, units.ANGLE)
         if abs(value) > self.most:
-            raise NotAQuantity(f"{written} is off the globe: {-self.most:g} to {self.most:g} degrees")
-        return value
+            raise QuantityError(f"{written} is off the globe: {-self.most:g} to {self.most:g} degrees")
+        return value % 360.0 if self.turn else value
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"type": ["number", "string"], "description": "degrees"}
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        bounds = {"x-minimum": -self.most, "x-maximum": self.most}
+        return {"type": ["number", "string"], "x-unit": "deg", "x-quantity": "degrees", **bounds}
 
-
-SHORT = "x-short"
-"""Marks, in the schema, a mapping that may be written as the value of this key alone."""
-
-
-@dataclass(frozen=True)
-class Short(_Rewriter):
-    """A mapping that may be written as the value of its main key alone: ``battery: 5 Ah``."""
-
-    key: str
-
-    def meant(self, written: object) -> object:
-        """The mapping that is meant."""
-        return written if isinstance(written, dict) or written is None else {self.key: written}
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"anyOf": [{"type": ["string", "number"]}, handler(schema)], SHORT: self.key}
+    def written(self, value: Any) -> Any:
+        """See ``Syntax``."""
+        return f"{value:g} deg" if isinstance(value, int | float) else None
 
 
-@dataclass(frozen=True)
-class Listed(_Rewriter):
-    """A list that may be written without brackets if it has one item."""
+class Anything(Syntax):
+    """Whatever YAML can state; an unquoted number with a unit becomes a number in SI units."""
 
-    def meant(self, written: object) -> object:
-        """The list that is meant."""
-        return written if isinstance(written, list) else [written]
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``. Lists become tuples."""
+        return _si(node.plain())
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        described = handler(schema)
-        return {"anyOf": [described["items"], described]}
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"x-quantity": "any value; an unquoted `6 / h` or `10 m` becomes a number in SI units"}
 
 
-@dataclass(frozen=True)
-class OrNothing(_Rewriter):
-    """A mapping whose key may stand with nothing behind it."""
-
-    def meant(self, written: object) -> object:
-        """The mapping that is meant."""
-        return {} if written is None else written
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"anyOf": [handler(schema), {"type": "null"}]}
-
-
-@dataclass(frozen=True)
-class Switch(_Rewriter):
-    """A mapping that may be written ``true`` (all by default) or ``false`` (as if it were not there)."""
-
-    def meant(self, written: object) -> object:
-        """The mapping that is meant, or nothing."""
-        return ({} if written else None) if isinstance(written, bool) else written
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"anyOf": [{"type": "boolean"}, handler(schema)]}
-
-
-class _Parameter(_Reader):
-    """Whatever YAML can say; an unquoted number with a unit becomes a number in SI units."""
-
-    def read(self, written: object) -> object:
-        """See ``parameter``."""
-        return parameter(written)
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"description": "any value; an unquoted `6 / h` or `10 m` becomes a number in SI units"}
-
-
-def parameter(written: Any) -> Any:
-    """The value of a parameter: see ``volery.model.system.Value``."""
+def _si(written: Any) -> Any:
     if isinstance(written, Mapping):
-        return {key: parameter(value) for key, value in written.items()}
+        return {key: _si(value) for key, value in written.items()}
     if isinstance(written, list):
-        return tuple(parameter(value) for value in written)
+        return tuple(_si(value) for value in written)
     if isinstance(written, Quoted):
         return str(written)
-    if isinstance(written, str):
-        return _number_or_text(written)
-    return written
-
-
-def _number_or_text(written: str) -> float | str:
+    if not isinstance(written, str):
+        return written
     try:
         return float(units.parse(written).value)
-    except NotAQuantity:
+    except QuantityError:
         return written
 
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
-Parameters = dict[str, Annotated[Any, _Parameter()]]
-Time = Annotated[Ns, WrittenTime(units.TIME, least=0)]
-Period = Annotated[Ns, WrittenTime(units.TIME, above=0)]
-Energy = Annotated[float, Written(units.ENERGY, least=0)]
-Frequency = Annotated[float, Written(units.FREQUENCY, above=0)]
-Rate = Annotated[float, Written(units.RATE, least=0)]
-Bandwidth = Annotated[float, Written(units.BANDWIDTH, above=0)]
-Length = Annotated[float, Written(units.LENGTH)]
-Distance = Annotated[float, Written(units.LENGTH, least=0)]
-Speed = Annotated[float, Written(units.SPEED, least=0)]
-Charge = Annotated[float, Written(units.CHARGE, above=0)]
-Voltage = Annotated[float, Written(units.VOLTAGE, above=0)]
-Loss = Annotated[float, Written(units.RATIO, least=0, most=0.99)]
-Load = Annotated[float, Written(units.RATIO, least=0, most=0.99)]
-Share = Annotated[float, Written(units.RATIO, least=0, most=1)]
-Latitude = Annotated[float, Degrees(90.0)]
-Longitude = Annotated[float, Degrees(180.0)]
-Heading = Annotated[float, Degrees(360.0)]
-Provenance = Literal["estimated", "measured", "calculated", "required"]
+@dataclass(frozen=True)
+class Reference(Syntax):
+    """The name of something that ``valid`` lists. ``none`` is a word that stands for no such thing."""
+
+    noun: str
+    valid: Callable[[Reading], Iterable[str]]
+    none: str = ""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str | None:
+        """See ``Syntax``. An unknown name is reported and returned."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        if self.none and node.value == self.none:
+            return None
+        reading.known(path, node.value, self.noun, self.valid(reading))
+        return node.value
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        other = f", or `{self.none}`" if self.none else ""
+        return {"type": "string", "x-quantity": f"the name of: {self.noun}{other}"}
+
+
+# -- collections
+
+
+@dataclass(frozen=True)
+class ListOf(Syntax):
+    """A list of at least ``least`` items. ``bare``: a single item may be written without brackets."""
+
+    item: Syntax
+    least: int = 0
+    bare: bool = False
+
+    def read(self, node: Node, path: Path, reading: Reading) -> tuple[Any, ...]:
+        """See ``Syntax``."""
+        if not isinstance(node.value, list):
+            if self.bare:
+                return (self.item.read(node, path, reading),)
+            raise expected("a list", node)
+        if len(node.value) < self.least:
+            raise WrongValueError(f"at least {self.least} are needed here, not {len(node.value)}")
+        found = [read_child(self.item, one, (*path, place), reading) for place, one in enumerate(node.value)]
+        if not all(right for right, _ in found):
+            raise WrongValueError("")
+        return tuple(value for _, value in found)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        items = self.item.schema(definitions)
+        listed = {"type": "array", "items": items, **({"minItems": self.least} if self.least else {})}
+        return {"anyOf": [items, listed]} if self.bare else listed
+
+
+@dataclass(frozen=True)
+class MapOf(Syntax):
+    """A mapping of names, or of any keys (``free``), to values. Entries that are wrong are left out.
+
+    ``values_only`` returns a tuple of the values, for records that carry their names.
+    """
+
+    item: Syntax
+    free: bool = False
+    values_only: bool = False
+
+    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Any] | tuple[Any, ...]:
+        """See ``Syntax``."""
+        if not isinstance(node.value, dict):
+            raise expected("a mapping of keys", node)
+        found = {}
+        for name, one in node.items.items():
+            if not self.free and re.search(_NAME, name) is None:
+                what = f"{name!r} is no name: letters, digits, _ and -, starting with a letter"
+                reading.problems.add((*path, name), what, one.where)
+                continue
+            right, value = read_child(self.item, one, (*path, name), reading)
+            if right:
+                found[name] = value
+        return tuple(found.values()) if self.values_only else found
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        item = self.item.schema(definitions)
+        below = {"additionalProperties": item} if self.free else {"patternProperties": {_NAME: item}}
+        return {"type": "object", **below, **({} if self.free else {"additionalProperties": False})}
+
+
+@dataclass(frozen=True)
+class Shorter(Syntax):
+    """A record that may be written shorter: as the value of its main key ``key`` alone, as ``true`` (all by
+    default) or ``false`` (absent) if it is a ``switch``, or as nothing (all by default) if it may be ``empty``.
+    """
+
+    record: Syntax
+    key: str = ""
+    switch: bool = False
+    empty: bool = False
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        if isinstance(node.value, bool) and self.switch:
+            return self.record.read(Node({}, node.where), path, reading) if node.value else None
+        if node.value is None and self.empty:
+            node = Node({}, node.where)
+        if self.key and not isinstance(node.value, dict) and node.value is not None:
+            node = Node({self.key: node}, node.where)
+        return self.record.read(node, path, reading)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        short: list[Schema] = []
+        short += [{"type": ["string", "number"]}] if self.key else []
+        short += [{"type": "boolean"}] if self.switch else []
+        short += [{"type": "null"}] if self.empty else []
+        marked = {SHORT: self.key} if self.key else {}
+        return {"anyOf": [*short, self.record.schema(definitions)], **marked}
+
+
+# -- records
+
+
+@dataclass(frozen=True)
+class Key:
+    """The key of a field, where it differs from the name of the field without its unit."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Others:
+    """Marks the field that takes all keys that no other field has, as a mapping."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A declared field: where it is written, how, what it means and what it is if it is not stated."""
+
+    attribute: str
+    key: str
+    syntax: Syntax
+    description: str
+    default: Any = MISSING
+    others: bool = False
+
+    @property
+    def required(self) -> bool:
+        """True if a model must state the field."""
+        return self.default is MISSING and not self.others
+
+
+@cache
+def entries(cls: type[Any]) -> tuple[Entry, ...]:
+    """Return the declared fields of a dataclass."""
+    hints = get_type_hints(cls, include_extras=True)
+    found = []
+    for one in fields(cls):
+        hint = hints[one.name]
+        meta = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+        syntax = next((each for each in meta if isinstance(each, Syntax)), None)
+        if syntax is None:
+            continue
+        key = next((each.name for each in meta if isinstance(each, Key)), _UNIT_SUFFIX.sub("", one.name))
+        default = one.default if one.default_factory is MISSING else one.default_factory()
+        others = any(isinstance(each, Others) for each in meta)
+        text = next((each for each in meta if isinstance(each, str)), "")
+        found.append(Entry(one.name, key, syntax, text, default, others))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Record(Syntax):
+    """A mapping with the declared keys of a dataclass.
+
+    ``prepare`` may add entries to the mapping before it is read: defaults that stand elsewhere. ``kind`` is
+    the value of the key ``kind``, where the mapping is one of several.
+    """
+
+    cls: type[Any]
+    prepare: Callable[[Node, Path, Reading], Node] | None = None
+    kind: str = ""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``. ``name`` is the last step of *path*, ``where`` the line of the mapping."""
+        if not isinstance(node.value, dict):
+            raise expected("a mapping of keys", node)
+        if self.prepare is not None:
+            node = self.prepare(node, path, reading)
+        declared = entries(self.cls)
+        keys = {one.key: one for one in declared if not one.others}
+        others = next((one for one in declared if one.others), None)
+        rest: dict[str, Node] = {}
+        values: dict[str, Any] = {}
+        right = True
+        for key, below in node.items.items():
+            entry = keys.get(key)
+            if entry is None and (others is not None or (self.kind and key == "kind")):
+                rest[key] = below
+            elif entry is None:
+                known = [*keys, "kind"] if self.kind else list(keys)
+                what = f"unknown key{did_you_mean(key, known)}; valid here: {choices(known)}"
+                reading.problems.add((*path, key), what, below.where)
+                right = False
+            elif not (below.value is None and entry.default is None):
+                fits, values[entry.attribute] = read_child(entry.syntax, below, (*path, key), reading)
+                right = right and fits
+        for entry in keys.values():
+            if entry.required and entry.key not in node.items:
+                reading.problems.add((*path, entry.key), "this key is missing", node.where)
+                right = False
+        if others is not None:
+            fits, values[others.attribute] = read_child(others.syntax, Node(rest, node.where), path, reading)
+            right = right and fits
+        if not right:
+            raise WrongValueError("")
+        own = {one.name for one in fields(self.cls)} - {one.attribute for one in declared}
+        if "name" in own:
+            values["name"] = str(path[-1])
+        if "where" in own:
+            values["where"] = node.where
+        return self.cls(**values)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        name = self.cls.__name__
+        if name not in definitions:
+            definitions[name] = {}  # a record may contain itself
+            definitions[name] = self._definition(definitions)
+        return {"$ref": f"#/$defs/{name}"}
+
+    def _definition(self, definitions: Schema) -> Schema:
+        properties: Schema = {}
+        if self.kind:
+            properties["kind"] = {"const": self.kind, "description": "The kind of fault."}
+        below: Schema | bool = False
+        for entry in entries(self.cls):
+            described = property_schema(entry, definitions)
+            if entry.others:
+                below = described["additionalProperties"]
+            else:
+                properties[entry.key] = described
+        required = ["kind"] if self.kind else []
+        required += [entry.key for entry in entries(self.cls) if entry.required]
+        return {
+            "type": "object",
+            "description": summary(self.cls),
+            "properties": properties,
+            **({"required": required} if required else {}),
+            "additionalProperties": below,
+        }
+
+
+def property_schema(entry: Entry, definitions: Schema) -> Schema:
+    """Return the JSON Schema of a declared field: its syntax, its meaning and its default."""
+    made = entry.syntax.schema(definitions)
+    hint = made.pop("x-quantity", "")
+    sentence = f" {hint[0].upper()}{hint[1:]}." if hint else ""
+    default = None if entry.default is MISSING else entry.syntax.written(entry.default)
+    return {
+        **made,
+        "description": f"{entry.description}{sentence}",
+        **({} if default is None else {"default": default}),
+    }
+
+
+def summary(cls: type[Any]) -> str:
+    """Return the first paragraph of a class's docstring on one line, without its markup."""
+    first = (cls.__doc__ or "").split("\n\n")[0]
+    return " ".join(first.split()).replace("``", "`")
+
+
+TEXT = Text()
+NUMBER = Number()
+ANYTHING = Anything()
+TIME = Duration(units.TIME, least=0)
+PERIOD = Duration(units.TIME, above=0)
+ENERGY = Quantity(units.ENERGY, least=0)
+FREQUENCY = Quantity(units.FREQUENCY, above=0)
+RATE = Quantity(units.RATE, least=0)
+BANDWIDTH = Quantity(units.BANDWIDTH, above=0)
+LENGTH = Quantity(units.LENGTH)
+DISTANCE = Quantity(units.LENGTH, least=0)
+SPEED = Quantity(units.SPEED, least=0)
+CHARGE = Quantity(units.CHARGE, above=0)
+VOLTAGE = Quantity(units.VOLTAGE, above=0)
+LOSS = Quantity(units.RATIO, least=0, most=0.99)
+SHARE = Quantity(units.RATIO, least=0, most=1)
+LATITUDE = Angle(90.0)
+LONGITUDE = Angle(180.0)
+HEADING = Angle(360.0, turn=True)
+
+VEHICLE = Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")))
+PROCESSOR = Reference("processor", lambda reading: reading.names(("platform", "processors")))
+NETWORK = Reference("network", lambda reading: reading.names(("platform", "networks")))
+AUTOPILOT = Reference("autopilot", lambda reading: sorted(reading.vocabulary.autopilots))
+PROCESSOR_KIND = Reference("processor in the catalogue", lambda reading: reading.vocabulary.processors)

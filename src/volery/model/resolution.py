@@ -25,7 +25,7 @@ from typing import Any
 from volery.base import units
 from volery.base.errors import Location, ModelError
 from volery.base.frames import LocalFrame
-from volery.base.units import Kind, NotAQuantity
+from volery.base.units import Kind, QuantityError
 from volery.model.document import (
     ActivityForm,
     BoundForm,
@@ -855,7 +855,7 @@ def bound(context: Context, path: Path, name: str, form: BoundForm) -> Bound | N
     relation, value = said[0]
     try:
         number = units.read(value, _kind(observable))
-    except NotAQuantity as error:
+    except QuantityError as error:
         context.problems.add((*path, relation), f"{form.observe} is {_measured(observable)}: {error}")
         return None
     where = context.where(path)

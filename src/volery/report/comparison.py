@@ -1,82 +1,239 @@
-"""Runs side by side in one HTML file: allocations, frequencies, scenarios of the same system."""
+"""Runs side by side: one table per question, one column per run."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 
-from rich.console import RenderableType
-
-from volery.base.errors import UsageError
-from volery.report.comparison_grids import all_comparisons
-from volery.report.document import REPORT_FILE, environment, gather
-from volery.report.grids import labels
-from volery.report.terminal import comparison_table
-from volery.requirements.record import RUN_FILE, RunRecord, read_record
-
-COMPARISON_FILE = "comparison.html"
-
-
-class Comparison(NamedTuple):
-    """Runs side by side: as an HTML document and as a table for the terminal."""
-
-    html: str
-    table: RenderableType
+from volery.report.grids import (
+    NOTHING,
+    Cell,
+    Column,
+    Grid,
+    bound,
+    brief,
+    count,
+    energy,
+    figure,
+    milliseconds,
+    number,
+    total,
+    verdict,
+    widest_band,
+)
+from volery.requirements.record import ComponentRecord, LatencyRecord, RunRecord, VehicleRecord
 
 
-def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
-    """Compare the runs in *folders*; links to their reports are relative to the folder *beside*.
+def _names(dictionaries: Iterable[Iterable[str]]) -> list[str]:
+    """All keys, in the order in which they first occur."""
+    return list(dict.fromkeys(name for names in dictionaries for name in names))
 
-    Raises ``UsageError`` if there are fewer than two, or one holds no run.
-    """
-    if len(folders) < 2:
-        raise UsageError(f"a comparison takes at least two run folders, not {len(folders)}")
-    records = [_record(folder) for folder in folders]
-    names = [folder.resolve().name for folder in folders]
-    called = labels(records, names)
-    html = (
-        environment()
-        .get_template("comparison.html.j2")
-        .render(
-            title=" and ".join(dict.fromkeys(record.system or "a run" for record in records)),
-            subtitle=" · ".join(called),
-            grids=all_comparisons(called, records),
-            runs=[
-                {
-                    "label": label,
-                    "link": _link(folder, beside),
-                    "not_counted": record.not_counted,
-                    "warnings": record.warnings,
-                }
-                for label, folder, record in zip(called, folders, records, strict=True)
-            ],
-            footer="volery: one model, simulated, priced and flown",
-        )
+
+def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """How each run ended and what it came to as a whole."""
+    rows = [
+        ("outcome", [_outcome(record) for record in records]),
+        ("requirements met", [_met(record) for record in records]),
+        ("fidelity", [Cell(record.fidelity or NOTHING) for record in records]),
+        ("scenario", [Cell(record.scenario or NOTHING) for record in records]),
+        ("seed", [Cell(str(record.seed)) for record in records]),
+        ("simulated s", [Cell(number(record.sim_s, 1)) for record in records]),
+        ("faster than real time", [Cell(number(record.real_time_factor, 0, "×")) for record in records]),
+        ("parcels", [Cell(_parcels(record)) for record in records]),
+        ("energy of computers", [Cell(_of_computers(record)) for record in records]),
+        ("energy of vehicles", [Cell(energy(total(_vehicles(record)))) for record in records]),
+    ]
+    columns = (Column(""), *(Column(label, True) for label in labels))
+    return Grid("The runs", columns, tuple((Cell(name), *cells) for name, cells in rows))
+
+
+def _of_computers(record: RunRecord) -> str:
+    return " ".join(filter(None, (energy(total(_computers(record))), widest_band(record))))
+
+
+def _outcome(record: RunRecord) -> Cell:
+    good = record.outcome.status == "completed"
+    return Cell(record.outcome.status, status="good" if good else "bad")
+
+
+def _met(record: RunRecord) -> Cell:
+    judged = [one for one in record.requirements.values() if one.met is not None]
+    met = sum(1 for one in judged if one.met)
+    return Cell(
+        f"{met} of {len(record.requirements)}", status="good" if met == len(record.requirements) else "bad"
     )
-    return Comparison(html, comparison_table(records, names))
 
 
-def write_comparison(folders: Sequence[Path], into: Path) -> Path:
-    """Write ``comparison.html`` into the folder *into* and say where it is; ``UsageError`` as ``compare``."""
-    path = into / COMPARISON_FILE
-    text = compare(folders, into).html
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
+def _parcels(record: RunRecord) -> str:
+    states = Counter(parcel.state for parcel in record.parcels.values())
+    return ", ".join(f"{amount} {state}" for state, amount in states.most_common()) or NOTHING
 
 
-def _record(folder: Path) -> RunRecord:
-    if (folder / RUN_FILE).exists():
-        return read_record(folder)
-    return gather(folder).record
+def _computers(record: RunRecord) -> list[float | None]:
+    return [one.energy_j for one in record.processors.values()]
 
 
-def _link(folder: Path, beside: Path | None) -> str:
-    report = folder / REPORT_FILE
-    if beside is None or not report.exists():
-        return ""
-    return Path(os.path.relpath(report.resolve(), beside.resolve())).as_posix()
+def _vehicles(record: RunRecord) -> list[float | None]:
+    return [one.energy_j for one in record.vehicles.values()]
+
+
+def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each requirement: what every run observed, and whether it met the bound."""
+    rows = []
+    for name in _names(record.requirements for record in records):
+        first = next(record.requirements[name] for record in records if name in record.requirements)
+        cells = [Cell(name), Cell(bound(first), status="quiet")]
+        for record in records:
+            one = record.requirements.get(name)
+            if one is None:
+                cells.append(Cell("not required", status="quiet"))
+            else:
+                judged = verdict(one)
+                cells.append(Cell(f"{figure(one.observed, one.unit)}  {judged.text}", status=judged.status))
+        rows.append(tuple(cells))
+    columns = (Column("requirement"), Column("bound", True), *(Column(label, True) for label in labels))
+    return Grid("Requirements", columns, tuple(rows))
+
+
+Take = Callable[[ComponentRecord], Cell]
+_QUESTIONS: tuple[tuple[str, Take], ...] = (
+    ("execution s", lambda one: Cell(brief(one.cpu_s), share=one.cpu_s)),
+    ("of it ROS s", lambda one: Cell(brief(one.ros_cpu_s), share=one.ros_cpu_s)),
+    ("response p95 ms", lambda one: Cell(milliseconds(one.response_s.p95), share=one.response_s.p95)),
+    ("response max ms", lambda one: Cell(milliseconds(one.response_s.max), share=one.response_s.max)),
+    (
+        "deadline misses",
+        lambda one: (
+            Cell(count(one.deadline_misses), status="bad" if one.deadline_misses else "")
+            if one.activations
+            else Cell(NOTHING)
+        ),
+    ),
+    ("energy", lambda one: Cell(energy(one.energy_j), share=one.energy_j)),
+)
+_IN_SHORT: tuple[tuple[str, Take], ...] = (
+    ("exec s", _QUESTIONS[0][1]),
+    ("p95 ms", _QUESTIONS[2][1]),
+    ("late", _QUESTIONS[4][1]),
+    ("J", lambda one: Cell(number(one.energy_j, 2), share=one.energy_j)),
+)
+"""For 80 columns."""
+
+
+def _on_computers(records: Sequence[RunRecord]) -> list[str]:
+    """The components that a run has on a computer: the others take none of its time in any of them."""
+    names = _names(record.components for record in records)
+    everywhere = [(name, record.components.get(name)) for name in names for record in records]
+    placed = {name for name, one in everywhere if one is not None and one.processor}
+    return [name for name in names if name in placed]
+
+
+def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each component: where it ran and what it cost there, run beside run."""
+    rows = []
+    for name in _on_computers(records):
+        found = [record.components.get(name) for record in records]
+        places = [Cell(one.processor or "none", status="quiet") if one else Cell(NOTHING) for one in found]
+        rows.append((Cell(name), Cell("processor", status="quiet"), *places))
+        for question, take in _QUESTIONS:
+            cells = [take(one) if one else Cell(NOTHING) for one in found]
+            if any(cell.text != NOTHING for cell in cells):
+                rows.append((Cell(""), Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("component"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("What each component costs", columns, tuple(rows))
+
+
+def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """The same in short: one row per component, the runs beside each other for each question."""
+    rows = []
+    for name in _on_computers(records):
+        cells = [Cell(name)]
+        for _, take in _IN_SHORT:
+            found = [record.components.get(name) for record in records]
+            cells += _relative([take(one) if one else Cell(NOTHING) for one in found])
+        rows.append(tuple(cells))
+    columns = [Column(f"{question}\n{label}", True) for question, _ in _IN_SHORT for label in labels]
+    return Grid("What each component costs", (Column("component"), *columns), tuple(rows))
+
+
+def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each processor: what it was and how busy, run beside run."""
+    rows = []
+    for name in _names(record.processors for record in records):
+        found = [record.processors.get(name) for record in records]
+        kinds = [
+            Cell(f"{one.kind} at {number(one.frequency_mhz, 0, 'MHz')}", status="quiet")
+            if one
+            else Cell(NOTHING)
+            for one in found
+        ]
+        loads = [
+            Cell(number(100.0 * one.utilisation, 2, "%"), share=one.utilisation) if one else Cell(NOTHING)
+            for one in found
+        ]
+        taken = [Cell(energy(one.energy_j), share=one.energy_j) if one else Cell(NOTHING) for one in found]
+        rows.append((Cell(name), Cell("kind", status="quiet"), *kinds))
+        rows.append((Cell(""), Cell("utilisation", status="quiet"), *loads))
+        rows.append((Cell(""), Cell("energy", status="quiet"), *_relative(taken)))
+    columns = (Column("processor"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Processors", columns, tuple(rows))
+
+
+def chain_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each chain of topics: how old what arrives is, run beside run."""
+    rows = []
+    for name in _names(record.chains for record in records):
+        found = [record.chains.get(name) for record in records]
+        latencies = [one.latency_s if one else LatencyRecord() for one in found]
+        for first, question, values in (
+            (name, "p95 ms", [one.p95 for one in latencies]),
+            ("", "max ms", [one.max for one in latencies]),
+        ):
+            cells = [Cell(milliseconds(value), share=value) for value in values]
+            rows.append((Cell(first), Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("chain"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Latency along chains of topics", columns, tuple(rows))
+
+
+_VEHICLE_QUESTIONS: tuple[tuple[str, Callable[[VehicleRecord], Cell]], ...] = (
+    ("distance m", lambda one: Cell(number(one.distance_m), share=one.distance_m)),
+    ("airborne s", lambda one: Cell(number(one.airborne_s), share=one.airborne_s)),
+    ("energy", lambda one: Cell(energy(one.energy_j), share=one.energy_j)),
+)
+
+
+def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
+    """Each vehicle: how far, how long, with what energy, run beside run."""
+    rows = []
+    for name in _names(record.vehicles for record in records):
+        found = [record.vehicles.get(name) for record in records]
+        for index, (question, take) in enumerate(_VEHICLE_QUESTIONS):
+            cells = [take(one) if one else Cell(NOTHING) for one in found]
+            first = Cell("" if index else name)
+            rows.append((first, Cell(question, status="quiet"), *_relative(cells)))
+    columns = (Column("vehicle"), Column(""), *(Column(label, True) for label in labels))
+    return Grid("Vehicles", columns, tuple(rows))
+
+
+def _relative(cells: list[Cell]) -> list[Cell]:
+    """Shares become fractions of the largest among the runs; where all are the same, no bars."""
+    shares = [cell.share for cell in cells if cell.share is not None]
+    largest = max(shares, default=0.0)
+    if largest <= 0.0 or min(shares) > 0.99 * largest:
+        return [Cell(cell.text, None, cell.status) for cell in cells]
+    return [
+        Cell(cell.text, None if cell.share is None else cell.share / largest, cell.status) for cell in cells
+    ]
+
+
+def all_comparisons(labels: Sequence[str], records: Sequence[RunRecord]) -> list[Grid]:
+    """All tables that have rows, in reading order."""
+    made = (
+        outcome_comparison(labels, records),
+        requirements_comparison(labels, records),
+        cost_comparison(labels, records),
+        chain_comparison(labels, records),
+        processor_comparison(labels, records),
+        vehicle_comparison(labels, records),
+    )
+    return [grid for grid in made if grid]

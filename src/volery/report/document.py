@@ -2,21 +2,28 @@
 
 If the folder has a ``run.json`` its figures are shown, since it alone knows the wall time; else the accounts
 are kept anew from the trace.
+
+Runs side by side in one HTML file: allocations, frequencies, scenarios of the same system.
+
+The documents of a run folder, made anew: also of one whose run was killed and left its trace alone.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
+from rich.console import RenderableType
 
 from volery.base.errors import UsageError
 from volery.report.digest import Digest, Json
+from volery.report.document import all_comparisons
 from volery.report.grids import (
     Cell,
     CellStatus,
@@ -25,6 +32,7 @@ from volery.report.grids import (
     chains_grid,
     cost_grid,
     energy,
+    labels,
     laws_grid,
     moment,
     number,
@@ -37,13 +45,15 @@ from volery.report.grids import (
     vehicles_grid,
     widest_band,
 )
+from volery.report.terminal import comparison_table
 from volery.requirements.accounts import Accounts
 from volery.requirements.observables import DELIVERED, Observers, bounds_of
-from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record
+from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record, write_record
 from volery.trace.attachments import WORLD_ATTACHMENT, scenery_from_json
 from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME
 from volery.trace.reader import Reading
+from volery.trace.timeline import TimelineWriter
 
 TRACE_FILE = "trace.mcap"
 REPORT_FILE = "report.html"
@@ -60,7 +70,7 @@ class Fact:
 
 
 @dataclass(frozen=True)
-class Material:
+class ReportContent:
     """Everything a report is made of."""
 
     record: RunRecord
@@ -68,7 +78,7 @@ class Material:
     lost: str = ""
 
 
-def gather(folder: Path, *taps: Record) -> Material:
+def gather(folder: Path, *taps: Record) -> ReportContent:
     """Read the trace of *folder*, and its ``run.json`` if it has one.
 
     Without a ``run.json`` the accounts are kept anew, *taps* are told every event as well, and requirements
@@ -85,7 +95,7 @@ def gather(folder: Path, *taps: Record) -> Material:
                 digest(event)
         else:
             record = _account(reading, (digest, *taps))
-    return Material(record, digest.data(record.sim_s), reading.lost)
+    return ReportContent(record, digest.data(record.sim_s), reading.lost)
 
 
 def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
@@ -114,7 +124,7 @@ def write_report(folder: Path) -> Path:
     return write_document(gather(folder), folder)
 
 
-def write_document(material: Material, folder: Path) -> Path:
+def write_document(material: ReportContent, folder: Path) -> Path:
     """The same for what has been gathered already."""
     path = folder / REPORT_FILE
     try:
@@ -135,7 +145,7 @@ def environment() -> Environment:
     )
 
 
-def render(material: Material) -> str:
+def render(material: ReportContent) -> str:
     """The document."""
     record, data = material.record, material.data
     states = _states(record)
@@ -297,3 +307,100 @@ def _remarks(remarks: list[Json]) -> Grid:
 def _footer(record: RunRecord) -> str:
     made = [f"{name} {version}" for name, version in record.versions.items()]
     return " · ".join(["volery: one model, simulated, priced and flown", *made])
+
+
+COMPARISON_FILE = "comparison.html"
+
+
+class Comparison(NamedTuple):
+    """Runs side by side: as an HTML document and as a table for the terminal."""
+
+    html: str
+    table: RenderableType
+
+
+def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
+    """Compare the runs in *folders*; links to their reports are relative to the folder *beside*.
+
+    Raises ``UsageError`` if there are fewer than two, or one holds no run.
+    """
+    if len(folders) < 2:
+        raise UsageError(f"a comparison takes at least two run folders, not {len(folders)}")
+    records = [_read_record(folder) for folder in folders]
+    names = [folder.resolve().name for folder in folders]
+    called = labels(records, names)
+    html = (
+        environment()
+        .get_template("comparison.html.j2")
+        .render(
+            title=" and ".join(dict.fromkeys(record.system or "a run" for record in records)),
+            subtitle=" · ".join(called),
+            grids=all_comparisons(called, records),
+            runs=[
+                {
+                    "label": label,
+                    "link": _link(folder, beside),
+                    "not_counted": record.not_counted,
+                    "warnings": record.warnings,
+                }
+                for label, folder, record in zip(called, folders, records, strict=True)
+            ],
+            footer="volery: one model, simulated, priced and flown",
+        )
+    )
+    return Comparison(html, comparison_table(records, names))
+
+
+def write_comparison(folders: Sequence[Path], into: Path) -> Path:
+    """Write ``comparison.html`` into the folder *into* and say where it is; ``UsageError`` as ``compare``."""
+    path = into / COMPARISON_FILE
+    text = compare(folders, into).html
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+    return path
+
+
+def _read_record(folder: Path) -> RunRecord:
+    if (folder / RUN_FILE).exists():
+        return read_record(folder)
+    return gather(folder).record
+
+
+def _link(folder: Path, beside: Path | None) -> str:
+    report = folder / REPORT_FILE
+    if beside is None or not report.exists():
+        return ""
+    return Path(os.path.relpath(report.resolve(), beside.resolve())).as_posix()
+
+
+TIMELINE_FILE = "timeline.json"
+
+
+class Recovered(NamedTuple):
+    """What was made: the record, the report, and in words what of the trace is missing (empty: nothing)."""
+
+    record: RunRecord
+    report: Path
+    lost: str
+
+
+def recover(folder: Path) -> Recovered:
+    """Write ``report.html``, and ``run.json`` and ``timeline.json`` too if the run did not.
+
+    A recovered record has no wall time and no versions, for these stand nowhere but in ``run.json``. Raises
+    ``UsageError`` as ``gather`` does.
+    """
+    if (folder / RUN_FILE).exists():
+        material = gather(folder)
+    else:
+        with Reading(folder / TRACE_FILE):
+            pass  # raises before a file is made
+        timeline = TimelineWriter(folder / TIMELINE_FILE)
+        try:
+            material = gather(folder, timeline)
+        finally:
+            timeline.close()
+        write_record(material.record, folder)
+    return Recovered(material.record, write_document(material, folder), material.lost)

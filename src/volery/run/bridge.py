@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from volery.base.errors import CapabilityError, UsageError, choices, did_you_mean
-from volery.base.geoid import BY_NAME, geoid_of
+from volery.base.geoid import EGM96_NAME, parse_geoid
 from volery.base.time import Ns
 from volery.bridge import (
     MAVROS,
@@ -58,7 +58,7 @@ class BridgeOptions:
     """What is wanted. ``names`` and ``namespace`` are the usual ones if they are empty.
 
     ``rate`` in hertz is what the autopilot is asked for, ``system`` the id that the bridge speaks as;
-    ``control``: roscopter's ``send_rc`` is taken. ``geoid``: see ``geoid_of``.
+    ``control``: roscopter's ``send_rc`` is taken. ``geoid``: see ``parse_geoid``.
     """
 
     url: str
@@ -68,7 +68,7 @@ class BridgeOptions:
     rate: int = 10
     control: bool = False
     system: int = 255
-    geoid: str = BY_NAME
+    geoid: str = EGM96_NAME
     speed: float = 1.0
     seed: int = 1
 
@@ -135,7 +135,7 @@ class Bridge:
             streams=dict.fromkeys(names.streams, wanted.rate) if wanted.rate else {},
             system=wanted.system,
             vehicle=0 if self._interpreted else int(address.number("system", 0)),
-            geoid=geoid_of(wanted.geoid),
+            geoid=parse_geoid(wanted.geoid),
             control=wanted.control,
         )
         return VehicleNode(graph, self._link, self.namespace, options)
@@ -171,7 +171,7 @@ def _check(wanted: BridgeOptions) -> None:
         raise UsageError(f"{wanted.system} is no system id; 1 to {MOST_IDS} are")
     if not 0.0 < wanted.speed < float("inf"):
         raise UsageError(f"a speed of {wanted.speed:g}: simulated seconds per second, above 0")
-    geoid_of(wanted.geoid)
+    parse_geoid(wanted.geoid)
 
 
 def _own_names(address: Address) -> tuple[str, ...]:
@@ -220,6 +220,8 @@ def _check_where(address: Address, wanted: str) -> None:
 
 def _in_the_air(kernel: Kernel, address: Address, seed: int, reach: Callable[..., T]) -> T:
     """What *reach* makes of a simulated vehicle in a world of its own."""
+
+    from volery.run.assembly.simulated_fleet import fleet_of
 
     wanted = parse_simulated(address, address.driver)
     return reach(kernel, fleet_of(kernel, [wanted], seed), wanted, seed)

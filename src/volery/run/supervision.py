@@ -40,7 +40,7 @@ _PR_SET_PDEATHSIG = 1
 class Supervision:
     """What a supervisor needs to know: the runtime of C++ components, and how long one may compute."""
 
-    house: Path
+    framework: Path
     libraries: dict[str, Path]
     patience_s: float
 
@@ -123,7 +123,7 @@ def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connectio
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    framework_runtime(supervision.house).supervise(told, supervision.patience_s)
+    framework_runtime(supervision.framework).supervise(told, supervision.patience_s)
 
     def show(progress: Progress) -> None:
         to.send(("show", progress))

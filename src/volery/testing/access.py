@@ -110,7 +110,7 @@ class Access(ABC):
         """That of the program under test."""
 
     @abstractmethod
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """From now on this happens to what passes. Raises ``NotPossibleError`` where nothing can."""
 
     @abstractmethod
@@ -142,11 +142,11 @@ class ByLink(Access):
         link = self._airfield.link(vehicle)
         return self._open(link, vehicle, options), link
 
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """On a link through bytes."""
         if not isinstance(self.link, FaultyLink):
             raise NotPossibleError("nothing can happen to values; add wire=bytes to the address")
-        self.link.suffer(faults)
+        self.link.set_faults(faults)
 
     def _open(self, link: Link, vehicle: str, options: dict[str, str]) -> Driver:
         open_driver = self._factory.on_link
@@ -207,9 +207,9 @@ class ByGraph(Access):
                 ExecutionContext(vehicle),
             )
 
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """From now on this happens to what passes, in both directions."""
-        self._wire.suffer(faults)
+        self._wire.set_faults(faults)
 
     def first(self) -> Driver:
         """With the hand on its node."""

@@ -259,7 +259,7 @@ class _Trying:
         stage = self._stage
         if self._caller == "done":
             self._demand_done()
-        stage.suffer(NO_WIRE_FAULTS)
+        stage.set_faults(NO_WIRE_FAULTS)
         program = stage.drone
         if self._fault.deadly:
             stage.sleep(LOST_S)

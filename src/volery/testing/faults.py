@@ -36,7 +36,7 @@ def _cut(seconds: float) -> Callable[[SimulatedStage], None]:
 
 
 def _suffers(faults: WireFaults) -> Callable[[SimulatedStage], None]:
-    return lambda stage: stage.suffer(faults)
+    return lambda stage: stage.set_faults(faults)
 
 
 def _another_station(stage: SimulatedStage) -> None:

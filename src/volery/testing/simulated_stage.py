@@ -112,9 +112,9 @@ class SimulatedStage(Stage):
         """The hand on the wire."""
         return self._access.hand
 
-    def suffer(self, faults: WireFaults) -> None:
+    def set_faults(self, faults: WireFaults) -> None:
         """From now on this happens to what passes on the wire of the program under test."""
-        self._access.suffer(faults)
+        self._access.set_faults(faults)
 
     def _commander(self) -> Commander:
         if self.link is None:

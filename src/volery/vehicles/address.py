@@ -223,7 +223,7 @@ def listen(
     """
     if address.carrier == "tcp":
         address.only()
-        return TcpServer(kernel, address.host, _port(address), address.text, joined=joined, codec=codec)
+        return TcpServer(kernel, address.host, _port(address), address.text, on_connect=joined, codec=codec)
     address.only(LOCAL_PORT)
     return _udp(kernel, address, codec)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import S, from_seconds
-from volery.simulation.autopilots.px4.boot import FIRST_HEARTBEAT
+from volery.simulation.autopilots.px4.firmware import FIRST_HEARTBEAT
 
 USES = {
     "ground-api": "onboard",

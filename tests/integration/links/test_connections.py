@@ -110,7 +110,7 @@ def test_a_client_and_a_server_talk_both_ways(bench: Bench) -> None:
 
 def test_a_server_serves_several_clients_and_survives_one_that_leaves(bench: Bench) -> None:
     joined: list[str] = []
-    server = TcpServer(bench.kernel, HERE, 0, joined=lambda: joined.append("one"))
+    server = TcpServer(bench.kernel, HERE, 0, on_connect=lambda: joined.append("one"))
     bench.add(server)
     assert "nobody has connected" in server.problem()
     first = bench.add(TcpClient(bench.kernel, HERE, server.port))

@@ -1,7 +1,7 @@
 import pytest
 
 from volery.base.errors import UsageError
-from volery.base.geoid import EGM96, SEA_LEVEL, LevelGeoid, geoid_of
+from volery.base.geoid import EGM96, SEA_LEVEL, LevelGeoid, parse_geoid
 
 PUBLISHED = [
     (38.6281550, 269.7791550, -31.628),
@@ -43,7 +43,7 @@ def test_egm96_at_the_poles_and_where_there_is_no_place() -> None:
 
 
 def test_a_geoid_by_its_name() -> None:
-    assert geoid_of("egm96") is EGM96
-    assert geoid_of("-12.5") == LevelGeoid(-12.5)
+    assert parse_geoid("egm96") is EGM96
+    assert parse_geoid("-12.5") == LevelGeoid(-12.5)
     with pytest.raises(UsageError, match="egm96, or a number of metres"):
-        geoid_of("egm08")
+        parse_geoid("egm08")

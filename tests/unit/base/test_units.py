@@ -3,7 +3,7 @@
 import pytest
 
 from volery.base import units
-from volery.base.units import NotAQuantity, parse, read, read_ns
+from volery.base.units import QuantityError, parse, read, read_ns
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ from volery.base.units import NotAQuantity, parse, read, read_ns
 )
 def test_reading(written, kind, value):
     if value is None:
-        with pytest.raises(NotAQuantity, match="is not a unit"):
+        with pytest.raises(QuantityError, match="is not a unit"):
             read(written, kind)
     else:
         assert read(written, kind) == pytest.approx(value, rel=1e-15)
@@ -76,7 +76,7 @@ def test_times_are_exact_nanoseconds(written, ns):
     ],
 )
 def test_what_is_refused(written, pieces):
-    with pytest.raises(NotAQuantity) as caught:
+    with pytest.raises(QuantityError) as caught:
         read(written, units.TIME)
     for piece in pieces:
         assert piece in str(caught.value)

@@ -91,7 +91,7 @@ def test_faults_that_begin_and_end_while_it_is_in_use() -> None:
     seen: list[int] = []
     ours.receive(lambda frame: seen.append(frame.fields["seq"]))
     for number, faults in enumerate((WireFaults(), WireFaults(drop=1.0), WireFaults())):
-        ours.suffer(faults)
+        ours.set_faults(faults)
         theirs.send(Frame("MISSION_CURRENT", {"seq": number}, 1, 1))
         kernel.run(kernel.now() + S)
     assert seen == [0, 2]

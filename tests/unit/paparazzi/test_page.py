@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.simulation.autopilots.paparazzi.airframe import FIGURES
-from volery.simulation.autopilots.paparazzi.assumed import ASSUMED
+from volery.simulation.autopilots.paparazzi.firmware import ASSUMED
+from volery.simulation.autopilots.paparazzi.parameters import FIGURES
 
 PAGE = Path(__file__).parents[3] / "docs" / "paparazzi.md"
 

@@ -8,8 +8,7 @@ import pytest
 from lxml import etree
 
 from volery.base.errors import UsageError
-from volery.report.graph_of_run import graph_of_run
-from volery.report.graph_picture import picture
+from volery.report.graph_picture import graph_of_run, graph_svg
 from volery.ros.graph.interface import ServiceState
 from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.testing.sample_run import sample_events, sample_setup
@@ -31,7 +30,7 @@ def test_every_node_topic_and_rate_is_in_the_picture() -> None:
         ),
         (ServiceState("/start", "std_srvs/srv/Empty", "/camera"),),
     )
-    svg = picture(seen)
+    svg = graph_svg(seen)
     found = words(svg)
     assert {"/camera", "/viewer", "/lonely", "/image", "/odd<&>", "30 Hz"} <= set(found)
     assert found.count("/viewer") == 2  # it publishes and subscribes
@@ -39,7 +38,7 @@ def test_every_node_topic_and_rate_is_in_the_picture() -> None:
 
 
 def test_an_empty_graph() -> None:
-    assert words(picture(GraphSnapshot((), (), ()))) == ["publishes", "topic", "subscribes"]
+    assert words(graph_svg(GraphSnapshot((), (), ()))) == ["publishes", "topic", "subscribes"]
 
 
 def test_the_graph_of_a_run(tmp_path: Path) -> None:

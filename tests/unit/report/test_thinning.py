@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.report.thinning import thin_curve, thin_track
+from volery.report.digest import thin_curve, thin_track
 
 WALKS = st.lists(st.tuples(*[st.floats(-5, 5)] * 3), min_size=1, max_size=200)
 

@@ -44,6 +44,7 @@ def bridge(
     breaks is opened again.
     """
     from volery.cli import bridge as command
+    from volery.run.bridge import BridgeOptions
 
     output = Output(quiet, False, debug)
     wanted = BridgeOptions(

@@ -1,6 +1,7 @@
-"""The host of C++ components: their sources become a shared object, and its code runs in virtual time.
+"""C++ components: their sources become a shared library whose code runs in virtual time.
 
-Each component has flows of control on stacks of their own. What the code asks of the house (publish, sleep,
-the time, a required port) switches back to Python, which does it as the component's task, and goes on with
-the answer. ``runtime/`` is the C++ side of that.
+Each caller of a component has a fiber, a flow of control with a stack of its own. A request of the code
+(publish, sleep, read the clock, call a required port) switches back to Python, which serves the request as the
+component's task and resumes the fiber with the reply. ``runtime/`` is the C++ side; the ABI between the two
+is declared in ``volery/ros/client_libraries/include/volery/abi.h``, since client libraries include it.
 """

@@ -1,11 +1,9 @@
-"""Types that may cross the border in the operations of a model's interfaces: in Python, in C++, on the wire.
+"""C++ text that is generated from a model: its interfaces as abstract classes, and the glue of a component.
 
-A model writes ``bool``, ``int``, ``float``, ``str``, ``bytes``, ``Position``, and ``T[]`` for many of them.
-
-C++ text that is generated from a model: its interfaces as abstract classes, and the glue of a component.
-
-``interfaces.h`` is what a component's file includes. The glue joins the user's class to the border: it
-constructs it from its required ports, in the order of the model, and calls its operations.
+``interfaces.h`` is included by a component's file. The glue connects the user's class to the framework ABI:
+it constructs the class from its required ports, in the order of the model, and calls its operations. Values
+of the model's types (``bool``, ``int``, ``float``, ``str``, ``bytes``, ``Position`` and ``T[]``) are encoded
+as ``abi_codec`` says.
 """
 
 from __future__ import annotations
@@ -20,12 +18,18 @@ from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Posi
 from volery.model.system import Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
 
+HEADER = "volery/interfaces.h"
+DRONE = "Drone"
+"""The interface of a vehicle that C++ components may require; its C++ class is ``I_RosDron``."""
+
 _ALTITUDES = (AMSL, Ellipsoidal, AboveHome, AboveGround)
 """In the order of ``volery::Reference``."""
 
+_PASSED_BY_VALUE = ("bool", "std::int64_t", "double")
+
 
 class CppType(NamedTuple):
-    """A type: its name in C++, and how a value of it is written and read."""
+    """A type: its name in C++, and the functions that encode and decode a value."""
 
     cpp: str
     write: Callable[[Writer, Any], object]
@@ -33,11 +37,8 @@ class CppType(NamedTuple):
 
     @property
     def as_argument(self) -> str:
-        """As C++ takes it: what is small by value, the rest by reference."""
-        return self.cpp if self.cpp in _SMALL else f"const {self.cpp}&"
-
-
-_SMALL = ("bool", "std::int64_t", "double")
+        """The parameter type in C++: small types by value, others by reference."""
+        return self.cpp if self.cpp in _PASSED_BY_VALUE else f"const {self.cpp}&"
 
 
 def _write_position(writer: Writer, value: Position) -> None:
@@ -50,16 +51,8 @@ def _read_position(reader: Reader) -> Position:
     return Position(latitude, longitude, _ALTITUDES[reader.integer()](metres))
 
 
-def _write_nothing(writer: Writer, value: object) -> None:
-    """An operation that returns nothing."""
-
-
-def _read_nothing(reader: Reader) -> None:
-    """See ``_write_nothing``."""
-
-
-_KINDS: Mapping[str, CppType] = {
-    "": CppType("void", _write_nothing, _read_nothing),
+_TYPES: Mapping[str, CppType] = {
+    "": CppType("void", lambda writer, value: None, lambda reader: None),
     "bool": CppType("bool", Writer.flag, Reader.flag),
     "int": CppType("std::int64_t", Writer.integer, Reader.integer),
     "float": CppType("double", Writer.real, Reader.real),
@@ -70,36 +63,35 @@ _KINDS: Mapping[str, CppType] = {
 
 
 def cpp_type(written: str, where: str) -> CppType:
-    """The type that a model writes; ``ModelError`` naming *where* if C++ has no such type."""
+    """Return the C++ type for a type as the model writes it.
+
+    Raises:
+        ModelError: C++ has no such type; the error names ``where``.
+    """
     name = written.strip()
     if name.endswith("[]"):
-        return _many(cpp_type(name.removesuffix("[]"), where))
-    if name not in _KINDS:
-        known = choices([one for one in _KINDS if one])
+        return _vector_of(cpp_type(name.removesuffix("[]"), where))
+    if name not in _TYPES:
+        known = choices([one for one in _TYPES if one])
         raise ModelError(f"C++ components know no {name!r}, but {known}, and lists of them", where)
-    return _KINDS[name]
+    return _TYPES[name]
 
 
-def _many(of: CppType) -> CppType:
+def _vector_of(element: CppType) -> CppType:
     def write(writer: Writer, values: Any) -> None:
         writer.integer(len(values))
         for value in values:
-            of.write(writer, value)
+            element.write(writer, value)
 
     def read(reader: Reader) -> list[Any]:
-        return [of.read(reader) for _ in range(reader.integer())]
+        return [element.read(reader) for _ in range(reader.integer())]
 
-    return CppType(f"std::vector<{of.cpp}>", write, read)
-
-
-HEADER = "volery/interfaces.h"
-DRONE = "Drone"
-"""The interface of a vehicle that C++ components may require: ``I_RosDron`` to them."""
+    return CppType(f"std::vector<{element.cpp}>", write, read)
 
 
 @dataclass(frozen=True)
 class CppOperation:
-    """An operation of an interface with the types of what crosses the border."""
+    """An operation of an interface with the C++ types of its arguments and result."""
 
     name: str
     arguments: tuple[tuple[str, CppType], ...]
@@ -107,13 +99,17 @@ class CppOperation:
 
     @property
     def declaration(self) -> str:
-        """As a member function."""
-        taken = ", ".join(f"{kind.as_argument} {name}" for name, kind in self.arguments)
-        return f"{self.returns.cpp} {self.name}({taken})"
+        """The operation as a member function."""
+        parameters = ", ".join(f"{kind.as_argument} {name}" for name, kind in self.arguments)
+        return f"{self.returns.cpp} {self.name}({parameters})"
 
 
 def operation(interface: str, signature: Signature) -> CppOperation:
-    """*signature* with its types; ``ModelError`` for one that C++ cannot take or give."""
+    """Return an operation with its C++ types.
+
+    Raises:
+        ModelError: C++ has no counterpart of a type.
+    """
     where = f"interfaces.{interface}.{signature.name}"
     arguments = tuple(
         (one.name, cpp_type(one.type, f"{where}.args.{one.name}")) for one in signature.arguments
@@ -122,27 +118,31 @@ def operation(interface: str, signature: Signature) -> CppOperation:
 
 
 def operations(interface: Interface) -> tuple[CppOperation, ...]:
-    """All of them, in the order of the model."""
+    """Return all operations of an interface, in the order of the model."""
     return tuple(operation(interface.name, one) for one in interface.operations.values())
 
 
 @dataclass(frozen=True)
 class RequiredPort:
-    """A required port: its name, the name of its interface, and whether any number may be connected."""
+    """A required port: its name, its interface, and whether it may be connected to several components."""
 
     port: str
     interface: str
     many: bool = False
 
     @property
-    def cpp(self) -> str:
-        """What the constructor takes for it."""
-        name = "I_RosDron" if self.interface == DRONE else self.interface
-        return f"const std::vector<{name}*>&" if self.many else f"{name}&"
+    def cpp_class(self) -> str:
+        """Class of the objects at the port."""
+        return "I_RosDron" if self.interface == DRONE else self.interface
+
+    @property
+    def parameter(self) -> str:
+        """Parameter type of the component's constructor."""
+        return f"const std::vector<{self.cpp_class}*>&" if self.many else f"{self.cpp_class}&"
 
 
 def interfaces_header(interfaces: Iterable[Interface]) -> str:
-    """The text of ``interfaces.h``."""
+    """Return the text of ``interfaces.h``."""
     lines = ["// Generated from the model: its interfaces.", "#pragma once", '#include "volery/types.h"', ""]
     for one in interfaces:
         lines.append(f"class {one.name} {{")
@@ -160,23 +160,23 @@ def glue(
     provided: Sequence[CppOperation],
     interfaces: Mapping[str, Interface],
 ) -> str:
-    """The text that makes *class_name*, defined in *file*, a component."""
+    """Return the text that makes ``class_name``, defined in ``file``, a component."""
     used = dict.fromkeys(one.interface for one in requires if one.interface != DRONE)
-    lines = ["// Generated: joins the component's class to the border.", f'#include "{file}"', ""]
+    lines = ["// Generated: connects the component's class to the framework ABI.", f'#include "{file}"', ""]
     lines += ['#include "volery/glue.h"', f'#include "{HEADER}"', "", "namespace {"]
     for name in used:
         lines += _port_class(interfaces[name])
     lines += [f"volery::Component<{class_name}> component;", ""]
-    lines += ["bool const enlisted = [] {"]
+    lines += ["bool const registered = [] {"]
     lines += [f"    {line}" for line in _construction(class_name, requires)]
     for number, one in enumerate(provided):
-        lines += [f"    {line}" for line in _served(number, one)]
+        lines += [f"    {line}" for line in _operation_callable(number, one)]
     lines += ["    return true;", "}();", "}  // namespace", ""]
     return "\n".join(lines)
 
 
 def _port_class(interface: Interface) -> list[str]:
-    """The interface as seen by who requires it: each call is a question."""
+    """Return the class behind a required port: each member function is a request."""
     name = interface.name
     lines = [f"class {name}_port final : public {name}, public volery::Port {{", "public:"]
     lines.append("    using volery::Port::Port;")
@@ -189,25 +189,24 @@ def _port_class(interface: Interface) -> list[str]:
 
 
 def _construction(class_name: str, requires: Sequence[RequiredPort]) -> list[str]:
-    made = []
+    ports = []
     for one in requires:
-        label = "I_RosDron" if one.interface == DRONE else f"{one.interface}_port"
-        known = "I_RosDron" if one.interface == DRONE else one.interface
-        many = "many" if one.many else "one"
-        made.append(f'volery::{many}<{known}, {label}>("{one.port}")')
-    taken = "".join(f", {one.cpp}" for one in requires)
+        implementation = one.cpp_class if one.interface == DRONE else f"{one.interface}_port"
+        template = "many" if one.many else "one"
+        ports.append(f'volery::{template}<{one.cpp_class}, {implementation}>("{one.port}")')
+    parameters = "".join(f", {one.parameter}" for one in requires)
     return [
-        "volery::enlist_as(volery::MAKE, [](volery::Reader, volery::Writer&) {",
-        f"    volery::check_constructor<{class_name}{taken}>();",
-        f"    component.make({', '.join(made)});",
+        "volery::register_callable_as(volery::MAKE, [](volery::Reader, volery::Writer&) {",
+        f"    volery::check_constructor<{class_name}{parameters}>();",
+        f"    component.make({', '.join(ports)});",
         "});",
-        "volery::enlist_as(volery::RUN, [](volery::Reader, volery::Writer&) { component.run(); });",
+        "volery::register_callable_as(volery::RUN, [](volery::Reader, volery::Writer&) { component.run(); });",
     ]
 
 
-def _served(number: int, one: CppOperation) -> list[str]:
+def _operation_callable(number: int, one: CppOperation) -> list[str]:
     lines = [
-        f"volery::enlist_as(volery::OPERATIONS + {number}, "
+        f"volery::register_callable_as(volery::OPERATIONS + {number}, "
         "[]([[maybe_unused]] volery::Reader in, [[maybe_unused]] volery::Writer& out) {"
     ]
     lines += [f"    auto const {name} = volery::get<{kind.cpp}>(in);" for name, kind in one.arguments]

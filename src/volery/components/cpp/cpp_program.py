@@ -27,35 +27,37 @@ from volery.ros.client_libraries.abi_codec import Reader, RequestHandlers, Write
 from volery.trace.events import Text
 
 MAKE, RUN, OPERATIONS = range(3)
-"""The first callables of a library, as in ``<volery/border.h>``."""
+"""Numbers of a library's first callables, as in ``<volery/abi.h>``."""
 
 
 class CppObject:
-    """A component's object as the rest of the house sees it: one method for each provided operation."""
+    """A component's object with one Python method for each provided operation."""
 
-    def __init__(self, flows: FiberPool, provided: Sequence[CppOperation]) -> None:
-        self.flows = flows
+    def __init__(self, fibers: FiberPool, provided: Sequence[CppOperation]) -> None:
+        self.fibers = fibers
         for number, operation in enumerate(provided):
-            setattr(self, operation.name, partial(_call, flows, OPERATIONS + number, operation))
+            setattr(self, operation.name, partial(self._call, OPERATIONS + number, operation))
 
-
-def _call(flows: FiberPool, number: int, operation: CppOperation, *args: Any, **kwargs: Any) -> Any:
-    names = [name for name, _ in operation.arguments]
-    given = dict(zip(names, args, strict=False)) | kwargs
-    if len(args) > len(names) or given.keys() != set(names):
-        raise TypeError(f"{operation.name}() takes {', '.join(names) or 'nothing'}")
-    written = Writer()
-    for name, kind in operation.arguments:
-        kind.write(written, given[name])
-    return operation.returns.read(Reader(flows.call(number, written.done())))
+    def _call(self, number: int, operation: CppOperation, *args: Any, **kwargs: Any) -> Any:
+        names = [name for name, _ in operation.arguments]
+        given = dict(zip(names, args, strict=False)) | kwargs
+        if len(args) > len(names) or given.keys() != set(names):
+            raise TypeError(f"{operation.name}() takes {', '.join(names) or 'nothing'}")
+        encoded = Writer()
+        for name, kind in operation.arguments:
+            kind.write(encoded, given[name])
+        return operation.returns.read(Reader(self.fibers.call(number, encoded.done())))
 
 
 class CppProgram:
-    """See ``Program``. Made of a component that was compiled for the instance called *name*.
+    """The ``Program`` of an instance in C++.
 
-    *more* is what a client library answers beside what any component may ask. *on_end* is called when a
-    program of its own has returned from ``main``, as a process's end would be noticed. *meter* and *worth*
-    count what it computes, where its library counts itself.
+    Args:
+        kernel: The run's kernel.
+        name: Name of the instance.
+        compiled: The component, compiled for this instance.
+        client_library: Request handlers of a client library, added to those of every component.
+        on_exit: Called when ``main`` has returned, as the end of a process is noticed by others.
     """
 
     def __init__(
@@ -63,27 +65,27 @@ class CppProgram:
         kernel: Kernel,
         name: str,
         compiled: CompiledComponent,
-        more: RequestHandlers | None = None,
-        on_end: Callable[[], None] | None = None,
+        client_library: RequestHandlers | None = None,
+        on_exit: Callable[[], None] | None = None,
     ) -> None:
         self._kernel = kernel
         self._name = name
         self._compiled = compiled
-        self._more = more or {}
-        self._on_end = on_end
+        self._client_library = client_library or {}
+        self._on_exit = on_exit
         self._meter: tuple[StepMeter, ToSteps] | None = None
         self._on_load: Callable[[LoadedLibrary], None] = lambda library: None
 
-    def count(self, meter: StepMeter, worth: ToSteps) -> None:
-        """Have *meter* read what the code counts, as *worth* says."""
-        self._meter = (meter, worth)
+    def count(self, meter: StepMeter, to_steps: ToSteps) -> None:
+        """Let ``meter`` read the counters of the library, converted by ``to_steps``."""
+        self._meter = (meter, to_steps)
 
-    def when_loaded(self, told: Callable[[LoadedLibrary], None]) -> None:
-        """*told* is given the library before any of its code has run."""
-        self._on_load = told
+    def when_loaded(self, call: Callable[[LoadedLibrary], None]) -> None:
+        """Call ``call`` with the library before any of its code runs."""
+        self._on_load = call
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """See ``Program``. What a class must have is the compiler's to say."""
+        """See ``Program``. The compiler has already checked what a class must have."""
         component = self._compiled.component
         if component.class_name:
             return
@@ -95,20 +97,21 @@ class CppProgram:
             raise ModelError(what, self._name, component.where)
 
     def make(self, given: Mapping[str, Any]) -> CppObject:
-        """See ``Program``: loads the library and constructs the user's object."""
+        """See ``Program``: load the library and construct the object."""
         component = self._compiled.component
         ports = {one.port for one in component.requires}
         parameters = {name: value for name, value in given.items() if name not in ports}
-        known = request_handlers(self._kernel, self._name, parameters, self._connected(given))
-        runtime = framework_runtime(self._compiled.house)
+        handlers = request_handlers(self._kernel, self._name, parameters, self._connected(given))
+        runtime = framework_runtime(self._compiled.framework)
         library = LoadedLibrary(self._compiled.library, self._name)
         self._on_load(library)
         if self._meter is not None:
-            meter, worth = self._meter
-            meter.read_from(library.counters, worth)
-        flows = FiberPool(runtime, self._name, library.dispatch, {**known, **self._more}, self._hear)
-        flows.call(MAKE)
-        return CppObject(flows, component.provided)
+            meter, to_steps = self._meter
+            meter.read_from(library.counters, to_steps)
+        handlers.update(self._client_library)
+        fibers = FiberPool(runtime, self._name, library.dispatch, handlers, self._record_output)
+        fibers.call(MAKE)
+        return CppObject(fibers, component.provided)
 
     def _connected(self, given: Mapping[str, Any]) -> dict[str, ConnectedPort]:
         component = self._compiled.component
@@ -116,13 +119,13 @@ class CppProgram:
         for port in component.requires:
             interface = (component.interfaces or {}).get(port.interface)
             known = {one.name: one for one in operations(interface)} if interface else {}
-            there = given.get(port.port, ())
-            targets = list(there) if isinstance(there, (PortList, list)) else [there]
+            connected = given.get(port.port, ())
+            targets = list(connected) if isinstance(connected, (PortList, list)) else [connected]
             found[port.port] = ConnectedPort(known, targets)
         return found
 
-    def _hear(self, text: str) -> None:
-        """What it prints becomes lines of the trace, and goes to the standard error stream."""
+    def _record_output(self, text: str) -> None:
+        """Record printed lines in the trace and write them to the standard error stream."""
         sys.stderr.write(text)
         now, record = self._kernel.now(), self._kernel.record
         for line in filter(str.strip, text.splitlines()):
@@ -132,19 +135,15 @@ class CppProgram:
         """See ``Program``."""
         assert isinstance(thing, CppObject)
         try:
-            status = _status(thing.flows.call(RUN, Writer().text(self._name).done()))
-        except ProcessExit as left:
-            status = left.status
+            returned = thing.fibers.call(RUN, Writer().text(self._name).done())
+            status = Reader(returned).integer() if returned else 0  # run() of a class returns nothing
+        except ProcessExit as exited:
+            status = exited.status
         except CppException as error:
             if self._compiled.component.class_name:
                 raise
             raise ComponentError(self._name, f"main() raised {error}") from error
-        if self._on_end is not None:
-            self._on_end()
+        if self._on_exit is not None:
+            self._on_exit()
         if status:
             raise ComponentError(self._name, f"ended with exit status {status}")
-
-
-def _status(returned: bytes) -> int:
-    """What ``main`` returned; a class's ``run`` returns nothing."""
-    return Reader(returned).integer() if returned else 0

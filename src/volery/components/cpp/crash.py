@@ -1,4 +1,4 @@
-"""What a crash in a component was, from the one line that its dying process wrote."""
+"""Report of a crash in a C++ component, from the one line that its dying process has written."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from volery import components
 from volery.base.errors import ComponentError
 from volery.ros import client_libraries
 
-_LINE = 4096
-_OURS = tuple(
+_LINE_BYTES = 4096
+_FRAMEWORK_FOLDERS = tuple(
     f"{Path(package.__file__).parent}/" for package in (components, client_libraries) if package.__file__
 )
-_WORDS = {
+_DESCRIPTIONS = {
     "stack": "its stack is full: it recurses without end, or keeps too much in local variables",
-    "frozen": "virtual time is frozen: it computes and asks nothing any more",
+    "frozen": "virtual time is frozen: it computes and makes no request any more",
     str(int(signal.SIGSEGV)): "segmentation fault",
     str(int(signal.SIGBUS)): "bus error",
     str(int(signal.SIGFPE)): "arithmetic fault, such as a division of whole numbers by zero",
@@ -31,50 +31,51 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Crash:
-    """Whose doing it was, what happened, where in the source and with which last words (empty: not known)."""
+    """A crash: the component, what happened, the source line and the last output (empty: not known)."""
 
     component: str
     what: str
-    where: str = ""
-    said: str = ""
+    source_line: str = ""
+    last_output: str = ""
 
     def error(self) -> ComponentError:
-        """It in words."""
-        where = f", in {self.where}" if self.where else ""
-        said = f"; it said: {self.said}" if self.said else ""
-        return ComponentError(self.component, f"{self.what}{where}{said}")
+        """Return the crash as an error of the component."""
+        where = f", in {self.source_line}" if self.source_line else ""
+        output = f"; it said: {self.last_output}" if self.last_output else ""
+        return ComponentError(self.component, f"{self.what}{where}{output}")
 
 
 def read_crash(report: int, libraries: Mapping[str, Path]) -> Crash | None:
-    """The crash that was reported to the file descriptor *report*, ``None`` if none was.
+    """Read the crash report, or return None if there is none.
 
-    *libraries* are the components' by the instances' names, to find source lines in. The other end must be
-    closed.
+    Args:
+        report: File descriptor of the report; its other end must be closed.
+        libraries: Library of each instance by its name, to look source lines up in.
     """
-    line = os.read(report, _LINE).decode(errors="replace").removesuffix("\n")
+    line = os.read(report, _LINE_BYTES).decode(errors="replace").removesuffix("\n")
     if not line:
         return None
-    component, what, address, frames, said = line.split("\t", 4)
-    words = _WORDS.get(what, f"signal {what}")
+    component, what, address, frames, output = line.split("\t", 4)
+    description = _DESCRIPTIONS.get(what, f"signal {what}")
     if what == str(int(signal.SIGSEGV)):
-        words = f"{words} at address {'0' if address == '(nil)' else address}"
+        description = f"{description} at address {'0' if address == '(nil)' else address}"
     library = libraries.get(component)
-    where = _source_line(library, frames.split()) if library else ""
-    return Crash(component, words, where, " ".join(said.split()))
+    source_line = _source_line(library, frames.split()) if library else ""
+    return Crash(component, description, source_line, " ".join(output.split()))
 
 
 def _source_line(library: Path, frames: list[str]) -> str:
-    """``Pilot::run() (pilot.cpp:12)``, of the innermost frame that is the user's.
+    """Return ``Pilot::run() (pilot.cpp:12)`` for the innermost frame in the component's own files.
 
-    Empty without ``addr2line`` or where that knows nothing.
+    Empty without ``addr2line`` or without debug information.
     """
     program = shutil.which("addr2line")
     if program is None or not frames:
         return ""
     command = [program, "-C", "-f", "-i", "-e", str(library), *(f"0x{frame}" for frame in frames)]
-    said = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
-    for function, place in zip(said[::2], said[1::2], strict=False):
+    lines = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
+    for function, place in zip(lines[::2], lines[1::2], strict=False):
         file, _, line = place.partition(" ")[0].rpartition(":")
-        if not file.startswith(("?", "/usr/", *_OURS)):
+        if not file.startswith(("?", "/usr/", *_FRAMEWORK_FOLDERS)):
             return f"{function} ({Path(file).name}:{line})"
     return ""

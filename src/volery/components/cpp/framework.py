@@ -1,13 +1,7 @@
-"""What can go wrong at the border to C++ code.
+"""The C++ framework library in this process: fibers, loaded component libraries and their counters.
 
-Flows of control of C++ code, seen from Python: let one go on, do what it asks, let it go on.
-
-A component's compiled code in this process: each instance has a copy, and so globals, of its own.
-
-What C++ code has computed, by its own counters.
-
-A library that counts itself exports an array (``library.COUNTERS``). What a count costs is a law's to say:
-whoever builds the run gives a function from the array to an amount, for instance cycles on the target.
+ctypes with ``PyDLL`` keeps Python's lock during a call, so exactly one fiber runs at a time. A thread per
+caller was rejected: a switch between threads takes fifty times as long and its order is not deterministic.
 """
 
 from __future__ import annotations
@@ -15,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 
@@ -23,9 +17,29 @@ from volery.base.errors import ComponentError, UsageError, choices, did_you_mean
 from volery.components.instance import ForeignError
 from volery.ros.client_libraries.abi_codec import Reader, RequestHandlers
 
+STACK_BYTES = 8 * 1024 * 1024
+"""Stack of a fiber, as large as that of a process's main thread. Memory is committed as it is used."""
+
+MAX_REQUESTS_AFTER_CANCEL = 1000
+"""Requests that cancelled code may make in destructors before its fiber is abandoned."""
+
+COUNTERS, COUNTERS_LENGTH = "volery_counters", "volery_counters_length"
+"""Symbols of an instrumented library: an array of ``uint64_t``, one counter a basic block, and its length."""
+
+_CALL, _REPLY, _FAIL, _CANCEL = range(4)
+_ZEROS = bytes(64)  # reads as zero, false or an empty text
+_RETURNED, _FAILED, _THREW, _CANCELLED = b"returned", b"failed", b"threw", b"cancelled"
+
+OnOutput = Callable[[str], None]
+"""Receives what the code has printed."""
+
+Counters = ctypes.Array[ctypes.c_uint64]
+ToSteps = Callable[[Counters], int]
+"""Converts all counts since the start into the steps that a ``Pricing`` prices."""
+
 
 class ProcessExit(BaseException):
-    """The code called ``exit``. Its flow is left as it is, as a process would be."""
+    """The code called ``exit``. Its fiber is abandoned, as the stack of an exiting process is."""
 
     def __init__(self, status: int) -> None:
         self.status = status
@@ -39,32 +53,11 @@ class CppException(ForeignError):
         super().__init__(f"{kind}: {what}" if what else kind)
 
 
-def unknown_request(question: str, known: Iterable[str]) -> UsageError:
-    """What C++ code is told that asks for something that is not offered where it runs."""
-    return UsageError(f"{question!r} is not offered here{did_you_mean(question, known)}: {choices(known)}")
-
-
-_CALL, _ANSWER, _FAIL, _END = range(4)
-STACK_BYTES = 8 * 1024 * 1024
-"""As a process's main thread has. Memory is taken as it is used."""
-
-OnOutput = Callable[[str], None]
-"""Told what the code has printed."""
-
-MAX_REQUESTS_AFTER_CANCEL = 1000
-"""So often may code ask something after it was ended before it is left where it stands."""
-
-_NO = bytes(64)
-"""Zeros, false, empty text: an answer to any question."""
-
-_RETURNED, _FAILED, _THREW, _ENDED = b"returned", b"failed", b"threw", b"ended"
-
-
-class _Shared(ctypes.Structure):
-    """``volery_flow`` of ``<volery/house.h>``."""
+class _FiberState(ctypes.Structure):
+    """``volery_fiber`` of ``<volery/framework.h>``."""
 
     _fields_ = (
-        ("question", ctypes.c_char_p),
+        ("request", ctypes.c_char_p),
         ("data", ctypes.c_void_p),
         ("size", ctypes.c_uint64),
         ("cannot_throw", ctypes.c_int32),
@@ -72,67 +65,76 @@ class _Shared(ctypes.Structure):
         ("reply", ctypes.c_char_p),
         ("reply_size", ctypes.c_uint64),
         ("callable", ctypes.c_int64),
-        ("said", ctypes.c_void_p),
-        ("said_size", ctypes.c_uint64),
+        ("output", ctypes.c_void_p),
+        ("output_size", ctypes.c_uint64),
     )
 
 
 class FrameworkRuntime:
-    """The runtime, loaded once a process. Its functions keep Python's lock: one flow runs at a time."""
+    """The functions of the framework library at ``path``."""
 
     def __init__(self, path: Path) -> None:
         library = ctypes.PyDLL(str(path), mode=ctypes.RTLD_GLOBAL)
-        self._new = library.volery_flow_new
+        self._new = library.volery_fiber_new
         self._new.argtypes = (ctypes.c_char_p, ctypes.c_void_p, ctypes.c_uint64)
-        self._new.restype = ctypes.POINTER(_Shared)
+        self._new.restype = ctypes.POINTER(_FiberState)
         self.resume = library.volery_resume
-        self.resume.argtypes = (ctypes.POINTER(_Shared),)
+        self.resume.argtypes = (ctypes.POINTER(_FiberState),)
         self.resume.restype = None
         self._supervise = library.volery_supervise
         self._supervise.argtypes = (ctypes.c_int32, ctypes.c_double)
 
-    def flow(self, component: str, dispatch: int) -> ctypes._Pointer[_Shared]:
-        """A new flow of *component*, whose library runs callables with the function at *dispatch*."""
-        made: ctypes._Pointer[_Shared] = self._new(component.encode(), dispatch, STACK_BYTES)
+    def new_fiber(self, component: str, dispatch: int) -> ctypes._Pointer[_FiberState]:
+        """Create a fiber of ``component``, whose library runs callables with the function at ``dispatch``."""
+        made: ctypes._Pointer[_FiberState] = self._new(component.encode(), dispatch, STACK_BYTES)
         if not made:
             raise MemoryError(f"{component}: no memory for another stack of {STACK_BYTES} bytes")
         return made
 
     def supervise(self, report: int, patience_s: float) -> None:
-        """From now on a crash in a component is told to the file descriptor *report* and ends the process.
+        """Capture what components print, and report fatal errors.
 
-        So does code that asks nothing for *patience_s* seconds on the wall. What components print is taken.
+        A crash, or code that makes no request for ``patience_s`` seconds on the wall clock, ends the process.
+
+        Args:
+            report: File descriptor that receives one line about a fatal error.
+            patience_s: Longest time between two requests, s.
         """
         self._supervise(report, patience_s)
 
 
 @cache
 def framework_runtime(path: Path) -> FrameworkRuntime:
-    """The runtime at *path*."""
+    """Load the framework library at ``path``, once a process."""
     return FrameworkRuntime(path)
 
 
 class Fiber:
-    """One flow of control. See ``volery.ros.client_libraries.abi_codec.CppFlow``."""
+    """One flow of control of a component. See ``abi_codec.CppFiber``."""
 
     def __init__(
-        self, owner: FrameworkRuntime, component: str, dispatch: int, answers: RequestHandlers, hear: OnOutput
+        self,
+        runtime: FrameworkRuntime,
+        component: str,
+        dispatch: int,
+        handlers: RequestHandlers,
+        on_output: OnOutput,
     ) -> None:
-        self._hear = hear
-        self._owner = owner
-        self._handle = owner.flow(component, dispatch)
-        self._shared = self._handle.contents
-        self._answers = answers
-        self._error: Exception | None = None  # why its last question failed
-        self._end: BaseException | None = None  # why it is ended
-        self._refusals = 0
+        self._runtime = runtime
+        self._handle = runtime.new_fiber(component, dispatch)
+        self._state = self._handle.contents
+        self._handlers = handlers
+        self._on_output = on_output
+        self._error: Exception | None = None  # why its last request failed
+        self._cancellation: BaseException | None = None
+        self._requests_after_cancel = 0
         self._depth = 0
-        self.lost = False  # it was left where it stands and never runs again
+        self.abandoned = False  # its stack is left as it is; it never runs again
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:
-        """Run a callable to its end, doing what it asks on the way."""
+        """Run a callable to its end and serve its requests; return its result."""
         if not self._depth:
-            self._end, self._refusals = None, 0
+            self._cancellation, self._requests_after_cancel = None, 0
         self._depth += 1
         try:
             return self._run(callable_number, argument)
@@ -140,98 +142,96 @@ class Fiber:
             self._depth -= 1
 
     def _run(self, callable_number: int, argument: bytes) -> bytes:
-        shared, handle, resume = self._shared, self._handle, self._owner.resume
-        shared.callable = callable_number
+        state, handle, resume = self._state, self._handle, self._runtime.resume
+        state.callable = callable_number
         directive, reply = _CALL, argument
         while True:
-            shared.directive, shared.reply, shared.reply_size = directive, reply, len(reply)
+            state.directive, state.reply, state.reply_size = directive, reply, len(reply)
             resume(handle)
-            if shared.said_size:
-                self._hear(ctypes.string_at(shared.said, shared.said_size).decode(errors="replace"))
-            question = shared.question
-            data = ctypes.string_at(shared.data, shared.size) if shared.size else b""
-            if question == _RETURNED:
+            if state.output_size:
+                self._on_output(ctypes.string_at(state.output, state.output_size).decode(errors="replace"))
+            request = state.request
+            data = ctypes.string_at(state.data, state.size) if state.size else b""
+            if request == _RETURNED:
                 return data
-            if question in _WAYS_OUT:
-                raise self._what_came_out(question, data)
-            directive, reply = self._do(question.decode(), data)
+            if request in (_FAILED, _THREW, _CANCELLED):
+                raise self._exception(request, data)
+            directive, reply = self._serve(request.decode(), data)
 
-    def _do(self, question: str, data: bytes) -> tuple[int, bytes]:
-        """Answer a question: how to go on, and the reply. Raises where there is no going on."""
-        if self._end is not None:
-            return self._put_off(self._end)
-        cannot_throw = self._shared.cannot_throw
-        answer = self._answers.get(question)
+    def _serve(self, request: str, data: bytes) -> tuple[int, bytes]:
+        """Serve a request; return the directive and the reply. Raises where the fiber cannot continue."""
+        if self._cancellation is not None:
+            return self._serve_after_cancel(self._cancellation)
+        cannot_throw = self._state.cannot_throw
+        handler = self._handlers.get(request)
         try:
-            if answer is None:
-                raise unknown_request(question, self._answers)
-            return _ANSWER, answer(self, Reader(data))
+            if handler is None:
+                known = self._handlers
+                raise UsageError(
+                    f"{request!r} is not offered here{did_you_mean(request, known)}: {choices(known)}"
+                )
+            return _REPLY, handler(self, Reader(data))
         except Exception as error:
-            self.lost = self.lost or (cannot_throw and isinstance(error, ComponentError))
-            if self.lost:
+            self.abandoned = self.abandoned or (cannot_throw and isinstance(error, ComponentError))
+            if self.abandoned:
                 raise
             self._error = error
             return _FAIL, str(error).encode()
         except BaseException as end:
-            self.lost = self.lost or bool(cannot_throw) or isinstance(end, ProcessExit)
-            if self.lost:
+            self.abandoned = self.abandoned or bool(cannot_throw) or isinstance(end, ProcessExit)
+            if self.abandoned:
                 raise
-            self._end = end
-            return _END, b""
+            self._cancellation = end
+            return _CANCEL, b""
 
-    def _put_off(self, end: BaseException) -> tuple[int, bytes]:
-        """It asks although it was ended, as destructors do, or as code that swallows everything: nothing is
-        done, all answers are no.
-        """
-        self._refusals += 1
-        if self._refusals > MAX_REQUESTS_AFTER_CANCEL:
-            self.lost = True
-            raise end
-        return _ANSWER, _NO
+    def _serve_after_cancel(self, cancellation: BaseException) -> tuple[int, bytes]:
+        """Reply with zeros to a request of cancelled code: of a destructor, or after a ``catch (...)``."""
+        self._requests_after_cancel += 1
+        if self._requests_after_cancel > MAX_REQUESTS_AFTER_CANCEL:
+            self.abandoned = True
+            raise cancellation
+        return _REPLY, _ZEROS
 
-    def _what_came_out(self, how: bytes, data: bytes) -> BaseException:
-        if how == _ENDED and self._end is not None:
-            return self._end
-        if how == _ENDED:
-            return CppException("volery::Ended", "")
-        told = Reader(data)
-        kind, what = told.text(), told.text()
-        if how == _FAILED and self._error is not None and str(self._error) == what:
+    def _exception(self, outcome: bytes, data: bytes) -> BaseException:
+        """Return the exception that a callable ended with, the original one where it came from Python."""
+        if outcome == _CANCELLED:
+            return self._cancellation or CppException("volery::Cancelled", "")
+        reader = Reader(data)
+        kind, what = reader.text(), reader.text()
+        if outcome == _FAILED and self._error is not None and str(self._error) == what:
             return self._error
         return CppException(kind, what)
 
 
-_WAYS_OUT = (_FAILED, _THREW, _ENDED)
-
-
 class FiberPool:
-    """The flows of one component: each of its callers has one to itself for as long as its call lasts."""
+    """The fibers of one component: each concurrent caller has one for the duration of its call."""
 
     def __init__(
-        self, owner: FrameworkRuntime, component: str, dispatch: int, answers: RequestHandlers, hear: OnOutput
+        self,
+        runtime: FrameworkRuntime,
+        component: str,
+        dispatch: int,
+        handlers: RequestHandlers,
+        on_output: OnOutput,
     ) -> None:
-        self._make = partial(Fiber, owner, component, dispatch, answers, hear)
+        self._new_fiber = partial(Fiber, runtime, component, dispatch, handlers, on_output)
         self._idle: list[Fiber] = []
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:
-        """Run a callable on a stack of its own."""
-        flow = self._idle.pop() if self._idle else self._make()
+        """Run a callable on a fiber of its own; return its result."""
+        fiber = self._idle.pop() if self._idle else self._new_fiber()
         try:
-            return flow.call(callable_number, argument)
+            return fiber.call(callable_number, argument)
         finally:
-            if not flow.lost:
-                self._idle.append(flow)
-
-
-COUNTERS, COUNTERS_LENGTH = "volery_counters", "volery_counters_length"
-"""What a library exports if its code counts itself: an array of ``uint64_t`` and its length."""
+            if not fiber.abandoned:
+                self._idle.append(fiber)
 
 
 class LoadedLibrary:
-    """The library at *path*, loaded for the instance called *name*.
+    """The library at ``path``, loaded for the instance ``name``.
 
-    ``dispatch`` is the address of what runs its callables. ``counters`` is the array that its code counts in,
-    empty if it does not.
+    Each instance loads a copy of the file and so has globals of its own. ``dispatch`` is the address of the
+    function that runs callables. ``counters`` is empty unless the library is instrumented.
     """
 
     def __init__(self, path: Path, name: str) -> None:
@@ -240,48 +240,46 @@ class LoadedLibrary:
             copy = Path(folder, f"{name.replace('/', '_')}.so")
             shutil.copyfile(path, copy)
             try:
-                self._loaded = ctypes.PyDLL(str(copy))
+                self._library = ctypes.PyDLL(str(copy))
             except OSError as error:
                 raise ComponentError(name, f"its compiled code cannot be loaded: {error}") from error
-        entry = self._loaded.volery_component_dispatch
+        entry = self._library.volery_component_dispatch
         self.dispatch: int = ctypes.cast(entry, ctypes.c_void_p).value or 0
         self.counters = self._counters()
 
     def function(self, name: str) -> Callable[..., object]:
-        """A function of its own runtime, by its C name."""
-        found: Callable[..., object] = getattr(self._loaded, name)
+        """Return an exported function by its C name."""
+        found: Callable[..., object] = getattr(self._library, name)
         return found
 
-    def _counters(self) -> ctypes.Array[ctypes.c_uint64]:
+    def _counters(self) -> Counters:
         try:
-            length = ctypes.c_uint64.in_dll(self._loaded, COUNTERS_LENGTH).value
-            return (ctypes.c_uint64 * length).in_dll(self._loaded, COUNTERS)
+            length = ctypes.c_uint64.in_dll(self._library, COUNTERS_LENGTH).value
+            return (ctypes.c_uint64 * length).in_dll(self._library, COUNTERS)
         except ValueError:
             return (ctypes.c_uint64 * 0)()
 
 
-Counters = ctypes.Array[ctypes.c_uint64]
-ToSteps = Callable[[Counters], int]
-"""What all that was counted since the start amounts to, in the steps that a ``Pricing`` prices."""
-
-
 class StepMeter:
-    """A ``StepCounter`` for code that is loaded later: nothing until ``read_from`` was called."""
+    """Reads the steps of an instrumented library; 0 until ``read_from`` has been called.
+
+    The kernel reads the meter at each interaction point.
+    """
 
     def __init__(self) -> None:
         self._counters: Counters | None = None
-        self._worth: ToSteps = lambda counters: 0
-        self._taken = 0
+        self._to_steps: ToSteps = lambda counters: 0
+        self._read = 0
 
-    def read_from(self, counters: Counters, worth: ToSteps) -> None:
-        """From now on *worth* of *counters* is what there is."""
-        self._counters, self._worth = counters, worth
-        self._taken = worth(counters)
+    def read_from(self, counters: Counters, to_steps: ToSteps) -> None:
+        """Read the steps of ``counters`` from now on."""
+        self._counters, self._to_steps = counters, to_steps
+        self._read = to_steps(counters)
 
     def __call__(self) -> int:
-        """Steps since it was last asked. It is asked at each interaction point."""
+        """Return the steps since the last reading."""
         if self._counters is None:
             return 0
-        total = self._worth(self._counters)
-        steps, self._taken = total - self._taken, total
+        total = self._to_steps(self._counters)
+        steps, self._read = total - self._read, total
         return steps

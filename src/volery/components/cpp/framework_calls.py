@@ -1,4 +1,4 @@
-"""What any C++ component may ask: time, sleep, costs, words, its parameters and its required ports."""
+"""Requests that any C++ component may make: time, sleep, charges, log, its parameters, its required ports."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.position import AMSL, Position
-from volery.base.time import Ns
 from volery.components import component_api
 from volery.components.cpp.bindings import CppOperation
 from volery.components.cpp.framework import ProcessExit
 from volery.components.virtual_stdlib import EPOCH
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
-from volery.ros.client_libraries.abi_codec import CppFlow, Reader, RequestHandler, Writer
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
 from volery.vehicles import Drone
 
 STICK_FULL_SCALE = 1000
@@ -24,7 +23,7 @@ STICK_FULL_SCALE = 1000
 
 @dataclass(frozen=True)
 class ConnectedPort:
-    """A required port's operations by name, and what it is connected to. Operations are empty for drones."""
+    """A required port: its operations by name, empty for drones, and what it is connected to."""
 
     operations: Mapping[str, CppOperation]
     targets: Sequence[Any]
@@ -33,30 +32,56 @@ class ConnectedPort:
 def request_handlers(
     kernel: Kernel, name: str, parameters: Mapping[str, Any], ports: Mapping[str, ConnectedPort]
 ) -> dict[str, RequestHandler]:
-    """What the component called *name* is answered. *ports* may be filled until it first asks."""
-    return {**_services(kernel), **_ports(name, ports), "parameter": _Parameters(name, parameters)}
+    """Return the handlers of the component ``name`` by request.
+
+    Args:
+        kernel: The run's kernel.
+        name: Name of the instance, for error messages.
+        parameters: Parameters of the instance.
+        ports: Required ports by name; entries may be added until the first request.
+    """
+    return {
+        **_service_handlers(kernel),
+        **_port_handlers(name, ports),
+        "parameter": _ParameterHandler(name, parameters),
+    }
 
 
-def _services(kernel: Kernel) -> dict[str, RequestHandler]:
-    def now(flow: CppFlow, asked: Reader) -> bytes:
+def _service_handlers(kernel: Kernel) -> dict[str, RequestHandler]:
+    def now(fiber: CppFiber, arguments: Reader) -> bytes:
         return Writer().real(component_api.now()).done()
 
-    def monotonic(flow: CppFlow, asked: Reader) -> bytes:
+    def monotonic(fiber: CppFiber, arguments: Reader) -> bytes:
         with kernel:
             return Writer().integer(kernel.now()).done()
 
-    def time_of_day(flow: CppFlow, asked: Reader) -> bytes:
+    def time_of_day(fiber: CppFiber, arguments: Reader) -> bytes:
         with kernel:
             return Writer().integer(EPOCH + kernel.now()).done()
 
-    def sleep(flow: CppFlow, asked: Reader) -> bytes:
-        component_api.sleep(asked.real())
+    def sleep(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.sleep(arguments.real())
         return b""
 
-    def sleep_ns(flow: CppFlow, asked: Reader) -> bytes:
-        duration: Ns = asked.integer()
-        waiting.sleep(kernel, duration)
+    def sleep_ns(fiber: CppFiber, arguments: Reader) -> bytes:
+        waiting.sleep(kernel, arguments.integer())
         return b""
+
+    def add_time(fiber: CppFiber, arguments: Reader) -> bytes:
+        seconds, at_mhz, joules = arguments.real(), arguments.real(), arguments.real()
+        component_api.add_time(seconds, at_mhz or None, joules)
+        return b""
+
+    def log(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.log(arguments.text(), arguments.text())
+        return b""
+
+    def note(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.note(arguments.text(), arguments.text(), arguments.text(), arguments.text())
+        return b""
+
+    def exit_process(fiber: CppFiber, arguments: Reader) -> bytes:
+        raise ProcessExit(arguments.integer())
 
     return {
         "now": now,
@@ -64,41 +89,21 @@ def _services(kernel: Kernel) -> dict[str, RequestHandler]:
         "time_of_day": time_of_day,
         "sleep": sleep,
         "sleep_ns": sleep_ns,
-        "add_time": _add_time,
-        "log": _log,
-        "note": _note,
-        "exit": _exit,
+        "add_time": add_time,
+        "log": log,
+        "note": note,
+        "exit": exit_process,
     }
 
 
-def _add_time(flow: CppFlow, asked: Reader) -> bytes:
-    seconds, at_mhz, joules = asked.real(), asked.real(), asked.real()
-    component_api.add_time(seconds, at_mhz or None, joules)
-    return b""
-
-
-def _log(flow: CppFlow, asked: Reader) -> bytes:
-    component_api.log(asked.text(), asked.text())
-    return b""
-
-
-def _note(flow: CppFlow, asked: Reader) -> bytes:
-    component_api.note(asked.text(), asked.text(), asked.text(), asked.text())
-    return b""
-
-
-def _exit(flow: CppFlow, asked: Reader) -> bytes:
-    raise ProcessExit(asked.integer())
-
-
-class _Parameters:
-    """``volery::parameter<T>(name)``."""
+class _ParameterHandler:
+    """Handler of ``volery::parameter<T>(name)``."""
 
     def __init__(self, component: str, values: Mapping[str, Any]) -> None:
         self._component, self._values = component, values
 
-    def __call__(self, flow: CppFlow, asked: Reader) -> bytes:
-        name, kind = asked.text(), asked.text()
+    def __call__(self, fiber: CppFiber, arguments: Reader) -> bytes:
+        name, kind = arguments.text(), arguments.text()
         if name not in self._values:
             hint = did_you_mean(name, self._values)
             raise UsageError(f"{self._component} has no parameter {name!r}{hint}: {choices(self._values)}")
@@ -112,28 +117,29 @@ class _Parameters:
         raise UsageError(f"{self._component}: parameter {name!r} is {value!r}, which is no {kind}")
 
 
-def _ports(name: str, ports: Mapping[str, ConnectedPort]) -> dict[str, RequestHandler]:
-    def connected(flow: CppFlow, asked: Reader) -> bytes:
-        return Writer().integer(len(ports[asked.text()].targets)).done()
+def _port_handlers(name: str, ports: Mapping[str, ConnectedPort]) -> dict[str, RequestHandler]:
+    def connected(fiber: CppFiber, arguments: Reader) -> bytes:
+        return Writer().integer(len(ports[arguments.text()].targets)).done()
 
-    def call(flow: CppFlow, asked: Reader) -> bytes:
-        port = ports[asked.text()]
-        target, operation = port.targets[asked.integer()], port.operations[asked.text()]
-        arguments = [kind.read(asked) for _, kind in operation.arguments]
-        result = getattr(target, operation.name)(*arguments)
-        written = Writer()
-        operation.returns.write(written, result)
-        return written.done()
+    def call(fiber: CppFiber, arguments: Reader) -> bytes:
+        port = ports[arguments.text()]
+        target, operation = port.targets[arguments.integer()], port.operations[arguments.text()]
+        values = [kind.read(arguments) for _, kind in operation.arguments]
+        result = getattr(target, operation.name)(*values)
+        reply = Writer()
+        operation.returns.write(reply, result)
+        return reply.done()
 
-    def drone(flow: CppFlow, asked: Reader) -> bytes:
-        found = _drone(name, ports, asked.text(), asked.integer())
-        _DRONE[asked.text()](found, Reader(asked.raw()))
+    def drone(fiber: CppFiber, arguments: Reader) -> bytes:
+        commanded = _drone(name, ports, arguments.text(), arguments.integer())
+        _DRONE_OPERATIONS[arguments.text()](commanded, Reader(arguments.raw()))
         return b""
 
     return {"connected": connected, "port": call, "drone": drone}
 
 
 def _drone(name: str, ports: Mapping[str, ConnectedPort], port: str, index: int) -> Drone:
+    """Return the drone at a port; with an empty ``port``, the only drone of the component."""
     drones = [one for one in ports.values() if not one.operations]
     if port:
         found = ports[port].targets[index]
@@ -149,22 +155,22 @@ def _drone(name: str, ports: Mapping[str, ConnectedPort], port: str, index: int)
     return found
 
 
-def _go(drone: Drone, asked: Reader) -> None:
-    latitude, longitude, altitude = asked.real(), asked.real(), asked.real()
+def _go(drone: Drone, arguments: Reader) -> None:
+    latitude, longitude, altitude = arguments.real(), arguments.real(), arguments.real()
     drone.goto(Position(latitude, longitude, AMSL(altitude)))
 
 
-def _joystick(drone: Drone, asked: Reader) -> None:
-    pitch, roll, throttle, yaw = (asked.integer() / STICK_FULL_SCALE for _ in range(4))
+def _joystick(drone: Drone, arguments: Reader) -> None:
+    pitch, roll, throttle, yaw = (arguments.integer() / STICK_FULL_SCALE for _ in range(4))
     drone.manual_control(pitch, roll, throttle, yaw)
 
 
-_DRONE: Mapping[str, Callable[[Drone, Reader], None]] = {
-    "gps_fly": lambda drone, asked: drone.takeoff(asked.real()),
+_DRONE_OPERATIONS: Mapping[str, Callable[[Drone, Reader], None]] = {
+    "gps_fly": lambda drone, arguments: drone.takeoff(arguments.real()),
     "gps_go": _go,
-    "return_ground": lambda drone, asked: drone.return_home(),
+    "return_ground": lambda drone, arguments: drone.return_home(),
     "joystick": _joystick,
-    "stabilize_fly": lambda drone, asked: drone.stabilize(),
-    "alt_hold_fly": lambda drone, asked: drone.altitude_hold(),
-    "land_ground": lambda drone, asked: drone.land(),
+    "stabilize_fly": lambda drone, arguments: drone.stabilize(),
+    "alt_hold_fly": lambda drone, arguments: drone.altitude_hold(),
+    "land_ground": lambda drone, arguments: drone.land(),
 }

@@ -81,7 +81,7 @@ class Writer:
         return bytes(self.data)
 
 
-class CppFlow(Protocol):
+class CppFiber(Protocol):
     """A flow of control of C++ code that has asked something and waits for the answer."""
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:
@@ -91,7 +91,7 @@ class CppFlow(Protocol):
         """
 
 
-RequestHandler = Callable[[CppFlow, Reader], bytes]
+RequestHandler = Callable[[CppFiber, Reader], bytes]
 """Does what is asked, as the task that asks; it may block and it may ``call`` back."""
 
 RequestHandlers = Mapping[str, RequestHandler]

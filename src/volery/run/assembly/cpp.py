@@ -107,8 +107,8 @@ class CountingCompiler:
         made = cache_folder() / f"{self._digest(plain)}.o"
         costs = made.with_suffix(".npz")
         if not (made.exists() and costs.exists()):
-            if tools.tell is not None:
-                tools.tell(f"counting {tools.component} on {self._law.name}")
+            if tools.report_progress is not None:
+                tools.report_progress(f"counting {tools.component} on {self._law.name}")
             self._make(sources, include, flags, made)
         self._price(costs)
         return [made]
@@ -151,15 +151,15 @@ class CountingCompiler:
         )
         new.replace(made)
 
-    def worth(self) -> ToSteps:
+    def to_steps(self) -> ToSteps:
         """What counts amount to in steps, once it has compiled. All numbers are whole: nothing is rounded."""
         assert self._cycles is not None
         steps = np.rint(self._cycles * STEPS_PER_CYCLE).astype(np.int64)
 
-        def worth(counters: Counters) -> int:
+        def to_steps(counters: Counters) -> int:
             return int((np.ctypeslib.as_array(counters).view(np.int64) * steps).sum())
 
-        return worth
+        return to_steps
 
 
 WINDOW, STRIDE = 1024, 4096
@@ -346,7 +346,7 @@ class CppPrograms:
         else:
             made = CppProgram(self._kernel, model.name, compiled)
         if counting is not None:
-            made.count(self.meters[model.name], counting.worth())
+            made.count(self.meters[model.name], counting.to_steps())
         if tracing is not None and self._traces is not None:
             made.when_loaded(partial(self._trace, tracing, self._traces / model.name))
         return made

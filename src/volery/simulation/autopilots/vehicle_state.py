@@ -22,7 +22,6 @@ from volery.simulation.autopilots.manual_control import NEVER, RcChannels
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
 
 if TYPE_CHECKING:
-    pass
     from volery.simulation.autopilots.firmware import Firmware
 
 

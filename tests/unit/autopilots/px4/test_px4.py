@@ -18,12 +18,11 @@ from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.px4 import FIRMWARE
-from volery.simulation.autopilots.px4.events import Checks, report
-from volery.simulation.autopilots.px4.joystick import Deflection, Joystick, deflection
+from volery.simulation.autopilots.px4.events import ArmingChecks, arming_report
+from volery.simulation.autopilots.px4.flight_modes import curve, interpolated
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
-from volery.simulation.autopilots.px4.offboard import Stream, Target, attitude_target
-from volery.simulation.autopilots.px4.piloted import curve
-from volery.simulation.autopilots.px4.ramps import interpolated
+from volery.simulation.autopilots.px4.offboard import OffboardTarget, SetpointStream, attitude_target
+from volery.simulation.autopilots.px4.pilot_input import Joystick, StickDeflection, deflection
 from volery.simulation.world.body_specs import Multirotor, Rover
 
 
@@ -35,42 +34,42 @@ def test_a_mode_is_two_numbers_in_one() -> None:
 @pytest.mark.parametrize(
     ("axes", "found"),
     [
-        ({"x": 0, "y": 0, "z": 500, "r": 0}, Deflection(0.0, 0.0, 0.0, 0.0)),
-        ({"x": 1000, "y": -500, "z": 1000, "r": 250}, Deflection(1.0, -0.5, 1.0, 0.25)),
-        ({"x": 2000, "y": 0, "z": -900, "r": 0}, Deflection(1.0, 0.0, -1.0, 0.0)),
+        ({"x": 0, "y": 0, "z": 500, "r": 0}, StickDeflection(0.0, 0.0, 0.0, 0.0)),
+        ({"x": 1000, "y": -500, "z": 1000, "r": 250}, StickDeflection(1.0, -0.5, 1.0, 0.25)),
+        ({"x": 2000, "y": 0, "z": -900, "r": 0}, StickDeflection(1.0, 0.0, -1.0, 0.0)),
         ({"x": 32767, "y": 0, "z": 500, "r": 0}, None),
     ],
 )
 def test_sticks_are_centred_at_500_and_stay_within_their_way(
-    axes: dict[str, int], found: Deflection | None
+    axes: dict[str, int], found: StickDeflection | None
 ) -> None:
     assert deflection(axes) == found
 
 
 def test_sticks_that_come_back_have_not_moved() -> None:
     sticks = Joystick()
-    assert sticks.take(Deflection(pitch=0.9), S) == 0.0
+    assert sticks.take(StickDeflection(pitch=0.9), S) == 0.0
     assert not sticks.moved(0.3)
     sticks.valid = False
-    assert sticks.take(Deflection(pitch=-0.9), 3 * S) == 2.0
+    assert sticks.take(StickDeflection(pitch=-0.9), 3 * S) == 2.0
     assert not sticks.moved(0.3)
-    sticks.take(Deflection(pitch=0.0), 3 * S + 1)
+    sticks.take(StickDeflection(pitch=0.0), 3 * S + 1)
     assert sticks.moved(0.3)
 
 
 def test_a_stream_lives_as_long_as_it_may() -> None:
-    stream = Stream()
+    stream = SetpointStream()
     assert not stream.alive(0, S)
-    stream.take(Target(position=(0.0, 0.0, -5.0)), S)
+    stream.take(OffboardTarget(position=(0.0, 0.0, -5.0)), S)
     assert stream.alive(2 * S, S)
     assert not stream.alive(2 * S + 1, S)
 
 
 def test_a_setpoint_lifts_only_if_it_is_above() -> None:
-    assert Target(position=(nan, nan, -2.0)).lifts(0.0)
-    assert not Target(position=(5.0, 5.0, 0.5)).lifts(0.0)
-    assert Target(velocity=(0.0, 0.0, -0.5)).lifts(0.0)
-    assert not Target(velocity=(1.0, 0.0, nan)).lifts(0.0)
+    assert OffboardTarget(position=(nan, nan, -2.0)).lifts(0.0)
+    assert not OffboardTarget(position=(5.0, 5.0, 0.5)).lifts(0.0)
+    assert OffboardTarget(velocity=(0.0, 0.0, -0.5)).lifts(0.0)
+    assert not OffboardTarget(velocity=(1.0, 0.0, nan)).lifts(0.0)
 
 
 def test_an_attitude_without_a_thrust_is_no_setpoint() -> None:
@@ -88,9 +87,9 @@ def test_an_integer_survives_as_bytes(number: int) -> None:
 
 
 def test_all_checks_passed_leaves_two_summaries() -> None:
-    fine = Checks(*([True] * 7))
-    assert len(report(fine)) == 2
-    assert len(report(fine._replace(position=False))) == 4
+    fine = ArmingChecks(*([True] * 7))
+    assert len(arming_report(fine)) == 2
+    assert len(arming_report(fine._replace(position=False))) == 4
 
 
 def test_curves() -> None:
@@ -157,4 +156,4 @@ def test_the_same_seed_is_the_same_flight(kind: str) -> None:
 
 
 def test_nan_is_not_asked() -> None:
-    assert all(isnan(value) for value in Target().position)
+    assert all(isnan(value) for value in OffboardTarget().position)

@@ -125,7 +125,7 @@ def test_in_a_cut_nothing_passes_and_a_request_is_given_up_without_being_obeyed(
 def test_faults_may_begin_and_end_in_use() -> None:
     pair = Pair()
     assert len(pair.say(10)) == 10
-    pair.wire.suffer(WireFaults(drop=1.0))
+    pair.wire.set_faults(WireFaults(drop=1.0))
     assert len(pair.say(10)) == 10
-    pair.wire.suffer(WireFaults())
+    pair.wire.set_faults(WireFaults())
     assert len(pair.say(10)) == 20

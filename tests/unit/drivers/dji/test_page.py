@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from volery.simulation.autopilots.dji import assumed as simulated
-from volery.simulation.autopilots.dji.parameters import HONOURED, parameters
+from volery.simulation.autopilots.dji import firmware as simulated
+from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters
 from volery.vehicles.drivers.dji import driver as driver
 
 PAGE = Path(__file__).parents[4] / "docs" / "dji.md"
@@ -34,5 +34,5 @@ def test_every_assumption_is_in_a_table(heading: str, assumed: Mapping[str, str]
 
 
 def test_every_figure_is_in_the_table() -> None:
-    expected = [f"| `{one.name}` | {one.value:g} | {HONOURED[one.name]} |" for one in parameters()]
+    expected = [f"| `{one.name}` | {one.value:g} | {SUPPORTED[one.name]} |" for one in parameters()]
     assert table("## The simulated DJI", "| parameter | value | what it is |") == expected

@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.kernel.task import ExecutionContext
 from volery.ros.client_libraries import roscpp
-from volery.ros.client_libraries.abi_codec import CppFlow, Reader, Writer
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, Writer
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.client_libraries.roscpp import node_requests
 from volery.ros.messages import new, to_cdr
@@ -75,7 +75,7 @@ class Code:
         return self.returns
 
     def ask(self, question: str, with_: Writer | None = None) -> Reader:
-        flow: CppFlow = self
+        flow: CppFiber = self
         return Reader(self.answers[f"ros.{question}"](flow, Reader((with_ or Writer()).done())))
 
 

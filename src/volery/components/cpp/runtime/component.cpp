@@ -1,11 +1,11 @@
-// The part of the border that is linked into each component's library: what the house may call there.
+// The part of the framework ABI that is linked into each component's library: its callables and requests.
 #include <cxxabi.h>
 
 #include <cstdlib>
 #include <memory>
 #include <typeinfo>
 
-#include "volery/border.h"
+#include "volery/abi.h"
 
 namespace volery {
 namespace {
@@ -15,7 +15,7 @@ struct Callables {
     std::int64_t next = FREE;
 };
 
-// Never destroyed: other static objects may still say goodbye when the program ends.
+// Never destroyed: destructors of other static objects may still unregister callables when the program ends.
 Callables& callables() {
     static auto* all = new Callables;
     return *all;
@@ -30,16 +30,16 @@ std::string type_of_current_exception() {
     return failed ? type->name() : name.get();
 }
 
-// How a callable ended, and what it has to say.
+// Run a callable; return how it ended. `result` holds what it returned, or the type and text of its exception.
 const char* run(std::int64_t number, Reader argument, Writer& result) {
     try {
         auto found = callables().by_number.find(number);
-        if (found == callables().by_number.end()) throw std::logic_error("nothing to call has this number");
-        auto const callable = found->second;  // it may forget itself while it runs
+        if (found == callables().by_number.end()) throw std::logic_error("no callable has this number");
+        auto const callable = found->second;  // it may unregister itself while it runs
         (*callable)(argument, result);
         return "returned";
-    } catch (const Ended&) {
-        return "ended";
+    } catch (const Cancelled&) {
+        return "cancelled";
     } catch (const Error& error) {
         result = Writer().put("volery::Error").put(error.what());
         return "failed";
@@ -53,46 +53,46 @@ const char* run(std::int64_t number, Reader argument, Writer& result) {
 
 }  // namespace
 
-Reader ask(const char* question, const Writer& with) {
-    static const char no[64] = {};
-    bool const unwinding = std::uncaught_exceptions() > 0;  // what is thrown now would end the program
-    auto const& bytes = with.bytes();
-    switch (volery_ask(question, bytes.data(), bytes.size(), unwinding)) {
-        case VOLERY_ANSWER: break;
-        case VOLERY_END: throw Ended{};
+Reader request(const char* name, const Writer& arguments) {
+    static const char zeros[64] = {};
+    bool const unwinding = std::uncaught_exceptions() > 0;  // another exception would terminate the program
+    auto const& bytes = arguments.bytes();
+    switch (volery_request(name, bytes.data(), bytes.size(), unwinding)) {
+        case VOLERY_REPLY: break;
+        case VOLERY_CANCEL: throw Cancelled{};
         case VOLERY_FAIL:
-            if (unwinding) return Reader(no, sizeof no);
-            throw Error(std::string(volery_here()->reply, volery_here()->reply_size));
+            if (unwinding) return Reader(zeros, sizeof zeros);
+            throw Error(std::string(volery_current_fiber()->reply, volery_current_fiber()->reply_size));
         default:
-            throw std::logic_error(std::string(question) + ": a component has one flow of control: nothing is asked "
+            throw std::logic_error(std::string(name) + ": a component has one flow of control; it makes no requests "
                                    "before main() or in a thread of its own");
     }
-    return Reader(volery_here()->reply, volery_here()->reply_size);
+    return Reader(volery_current_fiber()->reply, volery_current_fiber()->reply_size);
 }
 
-bool tell(const char* question, const Writer& with) noexcept {
-    auto const& bytes = with.bytes();
-    return volery_ask(question, bytes.data(), bytes.size(), true) == VOLERY_ANSWER;
+bool try_request(const char* name, const Writer& arguments) noexcept {
+    auto const& bytes = arguments.bytes();
+    return volery_request(name, bytes.data(), bytes.size(), true) == VOLERY_REPLY;
 }
 
-std::int64_t enlist(Callable callable) {
+std::int64_t register_callable(Callable callable) {
     auto const number = callables().next++;
-    enlist_as(number, std::move(callable));
+    register_callable_as(number, std::move(callable));
     return number;
 }
 
-void enlist_as(std::int64_t number, Callable callable) {
+void register_callable_as(std::int64_t number, Callable callable) {
     callables().by_number[number] = std::make_shared<Callable>(std::move(callable));
 }
 
-void forget(std::int64_t number) { callables().by_number.erase(number); }
+void unregister_callable(std::int64_t number) { callables().by_number.erase(number); }
 
 }  // namespace volery
 
-extern "C" void volery_component_dispatch(volery_flow* flow) {
+extern "C" void volery_component_dispatch(volery_fiber* fiber) {
     volery::Writer result;
-    // The reply is gone once the callable asks something itself: keep it.
-    std::string const argument(flow->reply, flow->reply_size);
-    const char* how = volery::run(flow->callable, {argument.data(), argument.size()}, result);
-    volery_return(flow, how, result.bytes().data(), result.bytes().size());
+    // The callable's own requests overwrite the reply, so the argument is copied.
+    std::string const argument(fiber->reply, fiber->reply_size);
+    const char* outcome = volery::run(fiber->callable, {argument.data(), argument.size()}, result);
+    volery_return(fiber, outcome, result.bytes().data(), result.bytes().size());
 }

@@ -10,7 +10,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.ros.client_libraries.abi_codec import CppFlow, Reader, Writer
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, Writer
 from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Session
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, QoS, ServiceError, Timer
 from volery.ros.messages import from_cdr, service, to_cdr
@@ -189,11 +189,11 @@ def _find_timer(session: Session, asked: Reader) -> CppTimer:
     return session.find(asked.integer(), CppTimer)
 
 
-def _spin_once(session: Session, flow: CppFlow, asked: Reader) -> None:
+def _spin_once(session: Session, flow: CppFiber, asked: Reader) -> None:
     session.spin(flow, session.node.spin_available)
 
 
-def _spin(session: Session, flow: CppFlow, asked: Reader) -> None:
+def _spin(session: Session, flow: CppFiber, asked: Reader) -> None:
     session.spin(flow, session.node.spin)
 
 
@@ -215,7 +215,7 @@ SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
     "timer_period": lambda session, asked: _find_timer(session, asked).change(asked.integer()),
 }
 
-WITH_FLOW: dict[str, Callable[[Session, CppFlow, Reader], Any]] = {
+WITH_FLOW: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
     "spin_once": _spin_once,
     "spin": _spin,
 }

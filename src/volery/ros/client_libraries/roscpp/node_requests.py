@@ -10,7 +10,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.ros.client_libraries.abi_codec import CppFlow, Reader, RequestHandler, Writer
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
 from volery.ros.client_libraries.roscpp.connection_requests import SIMPLE, WITH_FLOW
 from volery.ros.client_libraries.roscpp.session import Session
 from volery.trace.events import Text
@@ -75,14 +75,14 @@ def request_handlers(session: Session) -> dict[str, RequestHandler]:
 
 
 def _plain(session: Session, what: Simple) -> RequestHandler:
-    def answer(flow: CppFlow, asked: Reader) -> bytes:
+    def answer(flow: CppFiber, asked: Reader) -> bytes:
         return _written(what(session, asked))
 
     return answer
 
 
-def _with_flow(session: Session, what: Callable[[Session, CppFlow, Reader], Any]) -> RequestHandler:
-    def answer(flow: CppFlow, asked: Reader) -> bytes:
+def _with_flow(session: Session, what: Callable[[Session, CppFiber, Reader], Any]) -> RequestHandler:
+    def answer(flow: CppFiber, asked: Reader) -> bytes:
         return _written(what(session, flow, asked))
 
     return answer

@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.task import Task
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.abi_codec import CppFlow
+from volery.ros.client_libraries.abi_codec import CppFiber
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph, ServiceError
 
@@ -43,7 +43,7 @@ class Session:
     opened: Node | None = None
     finished: bool = False
     _things: dict[int, Any] = field(default_factory=dict)
-    _spinning: dict[Task, CppFlow] = field(default_factory=dict)
+    _spinning: dict[Task, CppFiber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.kernel = self.graph.kernel
@@ -115,7 +115,7 @@ class Session:
 
     # -- callbacks run on the stack of whoever spins
 
-    def spin(self, flow: CppFlow, spinning: Callable[[], object]) -> None:
+    def spin(self, flow: CppFiber, spinning: Callable[[], object]) -> None:
         """Run *spinning*, which runs callbacks, for the flow that asked for it."""
         task = current_task(self.kernel)
         before = self._spinning.get(task)

@@ -1,15 +1,17 @@
 """What ArduPilot 4.5.6 does by itself after it is switched on: the recorded timeline, as data.
 
 Times are seconds after boot. Parameters are announced with index 65535, with the value that they have then.
+
+What copter and rover do alike by themselves: once there is a position, and each second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from volery.base.time import S
-from volery.simulation.autopilots.ardupilot.arming import INFO
+from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
 from volery.simulation.autopilots.firmware import BootEvent, VehicleAction
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -195,3 +197,27 @@ def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
         at(42.08, partial(using_gps, units=(0, 1))),
         words(42.085, "AHRS: EKF3 active"),
     )
+
+
+STORE_COUNTERS_EVERY = 30 * S
+
+Problems = Callable[[Vehicle], list[str]]
+"""What speaks against arming, in the firmware's words."""
+
+
+def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
+    """There is a home, and nothing speaks against arming."""
+    home_set(vehicle)
+    vehicle.prearm_ok = not before_arming(vehicle)
+
+
+def each_second(vehicle: Vehicle, before_arming: Problems) -> None:
+    """Readiness, and the counters of hours."""
+    if vehicle.uptime() < vehicle.firmware.ready_after:
+        return
+    update_prearm_state(vehicle, before_arming)
+    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
+        vehicle.counted_at = vehicle.uptime()
+        if vehicle.flight_time:
+            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
+        vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)

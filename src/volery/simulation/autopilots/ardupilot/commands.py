@@ -7,8 +7,14 @@ from functools import partial
 from math import isfinite, isnan, nan, radians
 
 from volery.base.frames import wrap
-from volery.simulation.autopilots.ardupilot.arming import FORCE, SKIP_CHECKS, arm, disarm
-from volery.simulation.autopilots.ardupilot.modes import set_mode, switch
+from volery.simulation.autopilots.ardupilot.modes import (
+    FORCE,
+    SKIP_CHECKS,
+    arm,
+    change_mode,
+    disarm,
+    set_mode,
+)
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
@@ -59,7 +65,7 @@ def to_mode(number: int) -> Handler:
     """A command that is a mode."""
 
     def handle(vehicle: Vehicle, _command: Command) -> int:
-        return ACCEPTED if switch(vehicle, number) else FAILED
+        return ACCEPTED if change_mode(vehicle, number) else FAILED
 
     return handle
 
@@ -85,7 +91,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """MISSION_START: AUTO, and off the ground if it is armed."""
     auto = next(number for number, mode in vehicle.firmware.modes.items() if mode.name == "AUTO")
-    if not vehicle.armed or not switch(vehicle, auto):
+    if not vehicle.armed or not change_mode(vehicle, auto):
         return FAILED
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, FlyMission):
@@ -159,7 +165,7 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
     if vehicle.mode.number != guided:
         if not round(command.param2) & 1:
             return DENIED
-        if not switch(vehicle, guided):
+        if not change_mode(vehicle, guided):
             return FAILED
     if command.param1 > 0.0:
         vehicle.speed = command.param1
@@ -234,7 +240,7 @@ def on_get_home(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-def shared(problems: Problems, words: tuple[str, str], guided: int) -> dict[int, Handler]:
+def shared_commands(problems: Problems, words: tuple[str, str], guided: int) -> dict[int, Handler]:
     """Commands that copter and rover have alike. *words* are said on arming and on disarming."""
     return {
         ARM_DISARM: lambda vehicle, command: on_arm(vehicle, command, problems, words),
@@ -252,10 +258,12 @@ def shared(problems: Problems, words: tuple[str, str], guided: int) -> dict[int,
     }
 
 
-def copter(problems: Problems, words: tuple[str, str], modes: Mapping[str, int]) -> dict[int, Handler]:
+def copter_commands(
+    problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
+) -> dict[int, Handler]:
     """All of a copter's. *modes* gives the numbers of the modes that commands enter."""
     return {
-        **shared(problems, words, modes["GUIDED"]),
+        **shared_commands(problems, words, modes["GUIDED"]),
         TAKEOFF: on_takeoff,
         LAND: to_mode(modes["LAND"]),
         RETURN: to_mode(modes["RTL"]),
@@ -264,10 +272,12 @@ def copter(problems: Problems, words: tuple[str, str], modes: Mapping[str, int])
     }
 
 
-def rover(problems: Problems, words: tuple[str, str], modes: Mapping[str, int]) -> dict[int, Handler]:
+def rover_commands(
+    problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
+) -> dict[int, Handler]:
     """All of a rover's."""
     return {
-        **shared(problems, words, modes["GUIDED"]),
+        **shared_commands(problems, words, modes["GUIDED"]),
         RETURN: to_mode(modes["RTL"]),
         SET_YAW_SPEED: on_set_yaw_speed,
     }

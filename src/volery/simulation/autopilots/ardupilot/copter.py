@@ -5,11 +5,26 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S, from_seconds
-from volery.simulation.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
-from volery.simulation.autopilots.ardupilot.arming import (
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
+from volery.simulation.autopilots.ardupilot.firmware import (
+    MESSAGE_HANDLERS,
+    ardupilot_firmware,
+    ardupilot_mavlink,
+    builders,
+    introduce,
+    streams,
+)
+from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
+from volery.simulation.autopilots.ardupilot.modes import (
+    CUSTOM,
+    GUIDED,
     INFO,
+    MANUAL,
+    STABILIZED,
     Check,
     between,
+    change_mode,
     disarm,
     failing,
     flies_by_position,
@@ -19,10 +34,8 @@ from volery.simulation.autopilots.ardupilot.arming import (
     no_mission,
     not_armable,
 )
-from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
-from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
-from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, STABILIZED, switch
-from volery.simulation.autopilots.ardupilot.status import (
+from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
+from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     CRITICAL,
     STANDBY,
@@ -30,9 +43,6 @@ from volery.simulation.autopilots.ardupilot.status import (
     Z_CONTROL,
     Health,
 )
-from volery.simulation.autopilots.ardupilot.honoured import COPTER as HONOURED
-from volery.simulation.autopilots.ardupilot.tables import streams
-from volery.simulation.autopilots.ardupilot.targets import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Loiter, Stabilize
@@ -71,7 +81,7 @@ MODES = {
             3,
             "AUTO",
             BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, copter_leg, missions.leaves_ground),
+            lambda vehicle: FlyMission(vehicle, copter_leg, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
             armable=False,
@@ -162,7 +172,7 @@ def warm(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire, touch-down, disarming by itself."""
-    radio.on_step(vehicle)
+    pilot_input.on_step(vehicle)
     if not vehicle.armed:
         return
     if not vehicle.landed:
@@ -228,9 +238,9 @@ def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
     """A copter does not store stream rates."""
 
 
-_FAILSAFES = CopterFailsafes(switch, ARMED_WORDS[1])
+_FAILSAFES = CopterFailsafes(change_mode, ARMED_WORDS[1])
 
-_MAVLINK = mavlink(
+_MAVLINK = ardupilot_mavlink(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
     ),
@@ -238,15 +248,17 @@ _MAVLINK = mavlink(
     heartbeat_from=round(2.037 * S),
     messages={
         **builders(QUADROTOR, CAPABILITIES, HEALTH, system_status),
-        "ESC_TELEMETRY_1_TO_4": status.esc_telemetry,
-        "TERRAIN_REPORT": status.terrain_report,
-        "WIND": status.wind,
+        "ESC_TELEMETRY_1_TO_4": telemetry.esc_telemetry,
+        "TERRAIN_REPORT": telemetry.terrain_report,
+        "WIND": telemetry.wind,
     },
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
     on_stream_request=_ignored,
-    commands=commands.copter(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    commands=commands.copter_commands(
+        problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
+    ),
     handlers={
-        **HEARD,
+        **MESSAGE_HANDLERS,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,
@@ -254,7 +266,7 @@ _MAVLINK = mavlink(
     on_parameter_list=greet,
 )
 
-COPTER = ardupilot(
+COPTER = ardupilot_firmware(
     kind="multirotor",
     face=partial(MavlinkEndpoint, _MAVLINK),
     boot_mode=MODES[0],
@@ -264,11 +276,11 @@ COPTER = ardupilot(
     position_after=POSITION,
     local_position_after=POSITION,
     on_warm=warm,
-    on_warm_position=partial(routine.on_position, before_arming=before_arming),
-    each_second=partial(routine.each_second, before_arming=before_arming),
+    on_warm_position=partial(boot.on_position, before_arming=before_arming),
+    each_second=partial(boot.each_second, before_arming=before_arming),
     each_second_from=EACH_SECOND,
     modes=MODES,
-    tuning=tuning.copter,
+    tuning=copter_tuning,
     transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
     stands=True,
     motors_rest=2 * S,
@@ -278,7 +290,7 @@ COPTER = ardupilot(
     watches=_FAILSAFES.watches(),
     on_step=on_step,
     on_disarmed=on_disarmed,
-    mission_ended=missions.copter_ended,
+    mission_ended=mission.copter_ended,
     parameters=parameters,
-    supported_parameters=HONOURED,
+    supported_parameters=COPTER_SUPPORTED,
 )

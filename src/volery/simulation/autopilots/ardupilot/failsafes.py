@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from volery.base.time import S, from_seconds
-from volery.simulation.autopilots.ardupilot.arming import CRITICAL, WARNING, disarm
+from volery.simulation.autopilots.ardupilot.modes import CRITICAL, WARNING, disarm
 from volery.simulation.autopilots.firmware import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manual_control import NEVER

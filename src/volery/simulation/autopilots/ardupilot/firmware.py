@@ -1,21 +1,169 @@
-"""What a dialect of ArduPilot 4.5.6 says of every vehicle, whatever its kind."""
+"""Tables that copter and rover share: messages and their builders, streams, and the order within a burst.
+
+What a dialect of ArduPilot 4.5.6 says of every vehicle, whatever its kind.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.ardupilot import commands, missions, radio, status
-from volery.simulation.autopilots.ardupilot.arming import INFO
-from volery.simulation.autopilots.ardupilot.modes import set_mode
-from volery.simulation.autopilots.ardupilot.status import Health
-from volery.simulation.autopilots.ardupilot.tables import BUILDERS, ORDER
+from volery.simulation.autopilots.ardupilot import commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
+from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.firmware import Firmware
 from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.mavlink import message_fields
 from volery.simulation.autopilots.mavlink.command import DENIED, FAILED
 from volery.simulation.autopilots.mavlink.firmware import Builder, MavlinkFirmware
 from volery.simulation.autopilots.vehicle_state import Vehicle
+
+RAW_SENSORS, EXTENDED_STATUS, RC_CHANNELS, RAW_CONTROLLER, POSITION = 1, 2, 3, 4, 6
+EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
+"""MAV_DATA_STREAM."""
+
+
+def nothing(_vehicle: Vehicle) -> None:
+    """A message that the firmware knows and has no reason to send."""
+    return
+
+
+BUILDERS: Mapping[str, Builder] = {
+    "AHRS": telemetry.ahrs,
+    "AHRS2": telemetry.ahrs2,
+    "ATTITUDE": message_fields.attitude,
+    "ATTITUDE_QUATERNION": message_fields.attitude_quaternion,
+    "BATTERY_STATUS": telemetry.battery_status,
+    "DISTANCE_SENSOR": telemetry.distance_sensor,
+    "EKF_STATUS_REPORT": telemetry.ekf_status,
+    "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
+    "GLOBAL_POSITION_INT": telemetry.global_position,
+    "GPS_GLOBAL_ORIGIN": telemetry.origin,
+    "GPS_RAW_INT": telemetry.gps_raw,
+    "HOME_POSITION": telemetry.home_position,
+    "LOCAL_POSITION_NED": telemetry.local_position,
+    "MEMINFO": telemetry.meminfo,
+    "MISSION_CURRENT": telemetry.mission_current,
+    "NAV_CONTROLLER_OUTPUT": telemetry.nav_controller,
+    "POSITION_TARGET_GLOBAL_INT": telemetry.position_target,
+    "POSITION_TARGET_LOCAL_NED": telemetry.local_target,
+    "POWER_STATUS": telemetry.power_status,
+    "RANGEFINDER": telemetry.rangefinder,
+    "RAW_IMU": telemetry.raw_imu,
+    "RC_CHANNELS": telemetry.rc_channels,
+    "RC_CHANNELS_RAW": telemetry.rc_channels_raw,
+    "SCALED_IMU2": telemetry.scaled_imu2,
+    "SCALED_IMU3": telemetry.scaled_imu3,
+    "SCALED_PRESSURE": telemetry.pressure,
+    "SCALED_PRESSURE2": telemetry.pressure,
+    "SERVO_OUTPUT_RAW": telemetry.servo_output,
+    "SIMSTATE": telemetry.simstate,
+    "SYSTEM_TIME": telemetry.system_time,
+    "VFR_HUD": telemetry.vfr_hud,
+    "VIBRATION": telemetry.vibration,
+    **dict.fromkeys(
+        (
+            "ADSB_VEHICLE",
+            "AOA_SSA",
+            "CAMERA_FEEDBACK",
+            "EFI_STATUS",
+            "FENCE_STATUS",
+            "GENERATOR_STATUS",
+            "GIMBAL_DEVICE_ATTITUDE_STATUS",
+            "GPS2_RAW",
+            "GPS2_RTK",
+            "GPS_RTK",
+            "HIGH_LATENCY2",
+            "HYGROMETER_SENSOR",
+            "MAG_CAL_PROGRESS",
+            "MAG_CAL_REPORT",
+            "MCU_STATUS",
+            "OPTICAL_FLOW",
+            "PID_TUNING",
+            "RPM",
+            "SCALED_PRESSURE3",
+            "WINCH_STATUS",
+        ),
+        nothing,
+    ),
+}
+
+ORDER: Sequence[str] = (
+    "ATTITUDE",
+    "ATTITUDE_QUATERNION",
+    "GLOBAL_POSITION_INT",
+    "HOME_POSITION",
+    "GPS_GLOBAL_ORIGIN",
+    "SYS_STATUS",
+    "POWER_STATUS",
+    "MEMINFO",
+    "NAV_CONTROLLER_OUTPUT",
+    "MISSION_CURRENT",
+    "VFR_HUD",
+    "SERVO_OUTPUT_RAW",
+    "RC_CHANNELS",
+    "RC_CHANNELS_RAW",
+    "RAW_IMU",
+    "SCALED_IMU2",
+    "SCALED_IMU3",
+    "SCALED_PRESSURE",
+    "SCALED_PRESSURE2",
+    "GPS_RAW_INT",
+    "SYSTEM_TIME",
+    "RC_CHANNELS_SCALED",
+    "AHRS",
+    "SIMSTATE",
+    "AHRS2",
+    "WIND",
+    "RANGEFINDER",
+    "DISTANCE_SENSOR",
+    "TERRAIN_REPORT",
+    "EKF_STATUS_REPORT",
+    "LOCAL_POSITION_NED",
+    "VIBRATION",
+    "POSITION_TARGET_GLOBAL_INT",
+    "POSITION_TARGET_LOCAL_NED",
+    "BATTERY_STATUS",
+    "ESC_TELEMETRY_1_TO_4",
+    "EXTENDED_SYS_STATE",
+)
+"""Of the messages within one burst, as recorded."""
+
+
+def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[str, ...]]:
+    """MAV_DATA_STREAM to messages.
+
+    *controller* and *extra* are what one kind of vehicle adds to the common ones.
+    """
+    groups: dict[int, tuple[str, ...]] = {
+        RAW_SENSORS: ("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3", "SCALED_PRESSURE", "SCALED_PRESSURE2"),
+        EXTENDED_STATUS: (
+            "SYS_STATUS",
+            "POWER_STATUS",
+            "MEMINFO",
+            "NAV_CONTROLLER_OUTPUT",
+            "MISSION_CURRENT",
+            "GPS_RAW_INT",
+            "POSITION_TARGET_GLOBAL_INT",
+        ),
+        RC_CHANNELS: ("SERVO_OUTPUT_RAW", "RC_CHANNELS"),
+        RAW_CONTROLLER: tuple(controller),
+        POSITION: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),
+        EXTRA1: ("ATTITUDE", "SIMSTATE", "AHRS2"),
+        EXTRA2: ("VFR_HUD",),
+        EXTRA3: (
+            "SYSTEM_TIME",
+            "AHRS",
+            "RANGEFINDER",
+            "DISTANCE_SENSOR",
+            "EKF_STATUS_REPORT",
+            "VIBRATION",
+            "BATTERY_STATUS",
+            *extra,
+        ),
+    }
+    return {**groups, ALL: tuple(name for names in groups.values() for name in names)}
 
 
 def board(vehicle: Vehicle) -> str:
@@ -48,22 +196,22 @@ def builders(
     """
     return {
         **BUILDERS,
-        "AUTOPILOT_VERSION": lambda vehicle: status.autopilot_version(
+        "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
             vehicle, capabilities, board(vehicle).encode()
         ),
-        "HEARTBEAT": lambda vehicle: status.heartbeat(vehicle, kind, system_status(vehicle)),
-        "SYS_STATUS": partial(status.sys_status, health=health),
+        "HEARTBEAT": lambda vehicle: telemetry.heartbeat(vehicle, kind, system_status(vehicle)),
+        "SYS_STATUS": partial(telemetry.sys_status, health=health),
     }
 
 
-HEARD = {
-    "HEARTBEAT": radio.on_heartbeat,
-    "MANUAL_CONTROL": radio.on_manual_control,
-    "RC_CHANNELS_OVERRIDE": radio.on_override,
+MESSAGE_HANDLERS = {
+    "HEARTBEAT": pilot_input.on_heartbeat,
+    "MANUAL_CONTROL": pilot_input.on_manual_control,
+    "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
 """What every vehicle obeys of sticks and stations."""
 
-mavlink = partial(
+ardupilot_mavlink = partial(
     MavlinkFirmware,
     deaf_until=100 * MS,
     message_order=ORDER,
@@ -71,21 +219,21 @@ mavlink = partial(
     unknown_message=FAILED,
     set_mode=set_mode,
     set_mode_ack=11,
-    mission_runs=missions.runs,
-    stored_item=missions.stored_item,
-    home_item=missions.home_item,
+    mission_runs=mission.runs,
+    stored_item=mission.stored_item,
+    home_item=mission.home_item,
     go_to_item=commands.go_to_item,
-    mission_grew=missions.mission_grew,
+    mission_grew=mission.mission_grew,
     timesync_every=10 * S,
 )
 """A ``MavlinkFirmware`` but for what depends on the kind."""
 
-ardupilot = partial(
+ardupilot_firmware = partial(
     Firmware,
     name="ardupilot",
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_action=missions.act,
+    mission_item_done=mission.item_done,
+    mission_item_begins=mission.item_begins,
+    mission_action=mission.act,
     own_parameters=own_parameters,
 )
 """A ``Firmware`` but for what depends on the kind."""

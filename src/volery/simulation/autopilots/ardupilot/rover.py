@@ -5,22 +5,34 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.ardupilot import boot, commands, missions, radio, routine, status, tuning
-from volery.simulation.autopilots.ardupilot.arming import (
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
+from volery.simulation.autopilots.ardupilot.firmware import (
+    ALL,
+    MESSAGE_HANDLERS,
+    ardupilot_firmware,
+    ardupilot_mavlink,
+    builders,
+    introduce,
+    streams,
+)
+from volery.simulation.autopilots.ardupilot.guided import rover_global, rover_local
+from volery.simulation.autopilots.ardupilot.modes import (
+    CUSTOM,
+    GUIDED,
+    MANUAL,
     WARNING,
     Check,
     between,
+    change_mode,
     failing,
     lost_position,
     low_battery,
     no_mission,
     not_armable,
 )
-from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
-from volery.simulation.autopilots.ardupilot.firmware import HEARD, ardupilot, builders, introduce, mavlink
-from volery.simulation.autopilots.ardupilot.modes import CUSTOM, GUIDED, MANUAL, switch
-from volery.simulation.autopilots.ardupilot.motion import nav_controller
-from volery.simulation.autopilots.ardupilot.status import (
+from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
+from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     ATTITUDE_CONTROL,
     CALIBRATING,
@@ -30,10 +42,8 @@ from volery.simulation.autopilots.ardupilot.status import (
     XY_CONTROL,
     YAW_CONTROL,
     Health,
+    nav_controller,
 )
-from volery.simulation.autopilots.ardupilot.honoured import ROVER as HONOURED
-from volery.simulation.autopilots.ardupilot.tables import ALL, streams
-from volery.simulation.autopilots.ardupilot.targets import rover_global, rover_local
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
@@ -133,7 +143,7 @@ def warm(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire."""
-    radio.on_step(vehicle)
+    pilot_input.on_step(vehicle)
     if vehicle.armed:
         vehicle.flight_time += ROVER.tick
 
@@ -180,9 +190,9 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
 
 
-_FAILSAFES = RoverFailsafes(switch, ARMED_WORDS[1])
+_FAILSAFES = RoverFailsafes(change_mode, ARMED_WORDS[1])
 
-_MAVLINK = mavlink(
+_MAVLINK = ardupilot_mavlink(
     boot_bytes=boot.bytes_at(
         (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
     ),
@@ -192,20 +202,22 @@ _MAVLINK = mavlink(
     messages={
         **builders(GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
         "NAV_CONTROLLER_OUTPUT": navigation,
-        "RC_CHANNELS_SCALED": status.rc_channels_scaled,
+        "RC_CHANNELS_SCALED": telemetry.rc_channels_scaled,
     },
     streams=streams(("RC_CHANNELS_SCALED",), ()),
     on_stream_request=on_stream_request,
-    commands=commands.rover(problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}),
+    commands=commands.rover_commands(
+        problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
+    ),
     handlers={
-        **HEARD,
+        **MESSAGE_HANDLERS,
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
         "SET_POSITION_TARGET_LOCAL_NED": rover_local,
     },
     on_parameter_list=greet,
 )
 
-ROVER = ardupilot(
+ROVER = ardupilot_firmware(
     kind="rover",
     face=partial(MavlinkEndpoint, _MAVLINK),
     boot_mode=INITIALISING,
@@ -215,11 +227,11 @@ ROVER = ardupilot(
     position_after=POSITION,
     local_position_after=HOME,
     on_warm=warm,
-    on_warm_position=partial(routine.on_position, before_arming=before_arming),
-    each_second=partial(routine.each_second, before_arming=before_arming),
+    on_warm_position=partial(boot.on_position, before_arming=before_arming),
+    each_second=partial(boot.each_second, before_arming=before_arming),
     each_second_from=round(0.345 * S),
     modes=MODES,
-    tuning=tuning.rover,
+    tuning=rover_tuning,
     transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
     throttle_centred=True,
     stands=False,
@@ -228,7 +240,7 @@ ROVER = ardupilot(
     on_disarmed=lambda _vehicle: None,
     guided_arrived=guided_arrived,
     guided_stale=guided_stale,
-    mission_ended=missions.rover_ended,
+    mission_ended=mission.rover_ended,
     parameters=parameters,
-    supported_parameters=HONOURED,
+    supported_parameters=ROVER_SUPPORTED,
 )

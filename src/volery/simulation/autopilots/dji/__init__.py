@@ -4,7 +4,7 @@ The protocol is from public definitions; how the aircraft behaves beyond them is
 for figures, ``parameters``.
 """
 
-from volery.simulation.autopilots.dji.copter import COPTER
+from volery.simulation.autopilots.dji.firmware import COPTER
 from volery.simulation.autopilots.firmware import FirmwareFamily
 
 FIRMWARE = FirmwareFamily("dji", {"multirotor": COPTER}, codec=None)

@@ -38,7 +38,7 @@ _ASSUMED: tuple[tuple[str, int, float, str], ...] = (
     ("LAND_SPEED", REAL32, 0.7, "metres per second near the ground in a landing"),
 )
 
-HONOURED: Mapping[str, str] = {name: what for name, _, _, what in _ASSUMED}
+SUPPORTED: Mapping[str, str] = {name: what for name, _, _, what in _ASSUMED}
 """All of them."""
 
 SDK_TILT = radians(35.0)

@@ -22,7 +22,7 @@ from volery.ros.messages.dji_constants import (
     DisplayMode,
     Flag,
 )
-from volery.simulation.autopilots.dji.controller import Controller
+from volery.simulation.autopilots.dji.flight_controller import FlightController
 
 START, STOP, PAUSE, RESUME = range(4)
 """Actions on a mission."""
@@ -52,7 +52,7 @@ def _response(kind: str, result: bool) -> Any:
 class Services:
     """What one aircraft is asked. *referred* is called once there is a local reference."""
 
-    def __init__(self, controller: Controller, referred: Callable[[], None]) -> None:
+    def __init__(self, controller: FlightController, referred: Callable[[], None]) -> None:
         self._controller = controller
         self._referred = referred
         self._joystick = 0  # the flag that set_joystick_mode has stated

@@ -19,14 +19,14 @@ from volery.simulation.autopilots.paparazzi.flight_plan import (
     Go,
     Heading,
     Idle,
+    Navigation,
     Once,
     Oval,
     Stay,
     While,
 )
-from volery.simulation.autopilots.paparazzi.gps import fix_is_valid
 from volery.simulation.autopilots.paparazzi.modes import NAV, in_flight, set_motors
-from volery.simulation.autopilots.paparazzi.navigation import Navigation
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import fix_is_valid
 
 HEIGHT_M = 5.0
 """Of waypoints above the local origin."""

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from volery.base.time import from_seconds
 from volery.simulation.autopilots.firmware import Failsafe
-from volery.simulation.autopilots.paparazzi import gps
-from volery.simulation.autopilots.paparazzi.memory import of
+from volery.simulation.autopilots.paparazzi import rotorcraft_state
 from volery.simulation.autopilots.paparazzi.modes import (
     FAILSAFE,
     HOME,
@@ -20,7 +19,7 @@ from volery.simulation.autopilots.paparazzi.modes import (
     in_flight,
     set_mode,
 )
-from volery.simulation.autopilots.paparazzi.radio import REALLY_LOST
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import RADIO_REALLY_LOST, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
@@ -32,13 +31,13 @@ def too_far(vehicle: Vehicle) -> bool:
     """In NAV, further from HOME than the plan allows."""
     if not _navigates(vehicle):
         return False
-    return of(vehicle).navigation.from_home() > vehicle.parameters["MAX_DIST_FROM_HOME"]
+    return state_of(vehicle).navigation.from_home() > vehicle.parameters["MAX_DIST_FROM_HOME"]
 
 
 def too_high(vehicle: Vehicle) -> bool:
     """In NAV, above GEOFENCE_MAX_ALTITUDE, if there is one."""
     limit = vehicle.parameters["GEOFENCE_MAX_ALTITUDE"]
-    return limit > 0.0 and _navigates(vehicle) and of(vehicle).navigation.position[2] > limit
+    return limit > 0.0 and _navigates(vehicle) and state_of(vehicle).navigation.position[2] > limit
 
 
 def datalink_lost(vehicle: Vehicle) -> bool:
@@ -46,12 +45,12 @@ def datalink_lost(vehicle: Vehicle) -> bool:
     seconds = vehicle.parameters["GEOFENCE_DATALINK_LOST_TIME"]
     if seconds <= 0.0 or not _navigates(vehicle):
         return False
-    return vehicle.kernel.now() - of(vehicle).uplink_at > from_seconds(seconds)
+    return vehicle.kernel.now() - state_of(vehicle).uplink_at > from_seconds(seconds)
 
 
 def go_home(vehicle: Vehicle) -> None:
     """HOME; too far even for that, FAILSAFE."""
-    far = of(vehicle).navigation.from_home() > vehicle.parameters["FAILSAFE_MODE_DISTANCE"]
+    far = state_of(vehicle).navigation.from_home() > vehicle.parameters["FAILSAFE_MODE_DISTANCE"]
     set_mode(vehicle, FAILSAFE if far else HOME)
 
 
@@ -59,12 +58,12 @@ def radio_lost(vehicle: Vehicle) -> bool:
     """In a mode that sticks fly, no sticks any more."""
     if vehicle.mode.number in UNSUPERVISED:
         return False
-    return of(vehicle).radio.status(vehicle) == REALLY_LOST
+    return state_of(vehicle).radio.status(vehicle) == RADIO_REALLY_LOST
 
 
 def satellites_lost(vehicle: Vehicle) -> bool:
     """In NAV or HOME, motors on, no fix any more."""
-    return vehicle.armed and vehicle.mode.number in (NAV, HOME) and gps.is_lost(vehicle)
+    return vehicle.armed and vehicle.mode.number in (NAV, HOME) and rotorcraft_state.gps_lost(vehicle)
 
 
 def battery_gone(vehicle: Vehicle) -> bool:

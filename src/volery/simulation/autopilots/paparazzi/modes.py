@@ -8,8 +8,7 @@ three settings. A refusal is silence: the mode in the telemetry stays what it wa
 from __future__ import annotations
 
 from volery.base.time import Ns, S
-from volery.simulation.autopilots.paparazzi.memory import of
-from volery.simulation.autopilots.paparazzi.radio import OK
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import RADIO_OK, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 KILL, FAILSAFE, HOME = 0, 1, 2
@@ -58,7 +57,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
 
 def set_mode_by_datalink(vehicle: Vehicle, number: int) -> None:
     """The setting ``mode``."""
-    if number in ALWAYS or (number in WITHOUT_RADIO and of(vehicle).radio.status(vehicle) != OK):
+    if number in ALWAYS or (number in WITHOUT_RADIO and state_of(vehicle).radio.status(vehicle) != RADIO_OK):
         set_mode(vehicle, number)
 
 
@@ -66,7 +65,7 @@ def set_motors(vehicle: Vehicle, on: bool) -> None:
     """Motors on or off. They stay off in KILL, before the attitude is aligned, and with a critical battery
     where that is a failsafe; why is the arming status.
     """
-    kept = of(vehicle)
+    kept = state_of(vehicle)
     if not on:
         kept.refused = None
         if vehicle.armed:
@@ -93,11 +92,11 @@ def battery_critical(vehicle: Vehicle) -> bool:
 
 def arming_status(vehicle: Vehicle) -> int:
     """ROTORCRAFT_STATUS.arming_status."""
-    kept = of(vehicle)
+    kept = state_of(vehicle)
     if vehicle.armed:
         return ARMED
     if kept.refused is not None:
         return kept.refused
-    if kept.radio.status(vehicle) != OK:
+    if kept.radio.status(vehicle) != RADIO_OK:
         return NO_RC
     return UNARMED_IN_AUTO if not vehicle.mode.pilot else WAITING

@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 from volery.base.frames import Vector, enu_to_ned, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.simulation.autopilots.manual_control import NEVER
-from volery.simulation.autopilots.paparazzi import gps, modes
-from volery.simulation.autopilots.paparazzi.guided import Guided
-from volery.simulation.autopilots.paparazzi.memory import of
-from volery.simulation.autopilots.paparazzi.navigation import Vertical
-from volery.simulation.autopilots.paparazzi.radio import FULL
-from volery.simulation.autopilots.paparazzi.settings import NUMBERED, read
+from volery.simulation.autopilots.paparazzi import modes, rotorcraft_state
+from volery.simulation.autopilots.paparazzi.flight_modes import Guided
+from volery.simulation.autopilots.paparazzi.flight_plan import Vertical
+from volery.simulation.autopilots.paparazzi.parameters import NUMBERED, read_setting
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import FULL, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Fields = dict[str, Any]
@@ -76,7 +75,7 @@ def rotorcraft_fp(vehicle: Vehicle) -> Fields:
 
 def _carrot(vehicle: Vehicle) -> tuple[Vector, float]:
     """North, east, down, and the heading."""
-    manoeuvre, navigation = vehicle.manoeuvre, of(vehicle).navigation
+    manoeuvre, navigation = vehicle.manoeuvre, state_of(vehicle).navigation
     if isinstance(manoeuvre, Guided):
         return manoeuvre.carrot()
     demand = navigation.demand
@@ -99,7 +98,7 @@ def _centimetres(name: str, vector: Vector, fields: Fields) -> None:
 def gps_int(vehicle: Vehicle) -> Fields:
     """The receiver's last fix; without one what it was."""
     fix = vehicle.estimate.gps
-    kind = gps.fix_type(vehicle)
+    kind = rotorcraft_state.fix_type(vehicle)
     fields: Fields = {
         "lat": counts(fix.latitude, 1e7),
         "lon": counts(fix.longitude, 1e7),
@@ -150,9 +149,9 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
     """Mode, motors, arming."""
     plane, height = GUIDANCE[vehicle.mode.number]
     return {
-        "rc_status": of(vehicle).radio.status(vehicle),
+        "rc_status": state_of(vehicle).radio.status(vehicle),
         "frame_rate": MAIN_LOOP_HZ,
-        "gps_status": gps.fix_type(vehicle),
+        "gps_status": rotorcraft_state.fix_type(vehicle),
         "ap_mode": vehicle.mode.number,
         "ap_in_flight": int(modes.in_flight(vehicle)),
         "ap_motors_on": int(vehicle.armed),
@@ -167,7 +166,7 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
 
 def nav_status(vehicle: Vehicle) -> Fields:
     """Where it is in its flight plan."""
-    navigation = of(vehicle).navigation
+    navigation = state_of(vehicle).navigation
     return {
         "block_time": whole(navigation.block_time),
         "stage_time": whole(navigation.stage_time),
@@ -202,7 +201,7 @@ def energy(vehicle: Vehicle) -> Fields:
 
 def datalink_report(vehicle: Vehicle) -> Fields:
     """How the ground is heard."""
-    kept = of(vehicle)
+    kept = state_of(vehicle)
     heard = kept.uplink_at != NEVER
     silence = vehicle.kernel.now() - kept.uplink_at if heard else vehicle.uptime()
     return {
@@ -214,13 +213,13 @@ def datalink_report(vehicle: Vehicle) -> Fields:
 
 def radio_control(vehicle: Vehicle) -> Fields:
     """The sticks."""
-    radio = of(vehicle).radio
+    radio = state_of(vehicle).radio
     return {**radio.frame._asdict(), "kill": FULL, "status": radio.status(vehicle)}
 
 
 def waypoint(vehicle: Vehicle, number: int) -> Fields:
     """WP_MOVED_ENU of that number."""
-    east, north, up = of(vehicle).navigation.waypoints[number]
+    east, north, up = state_of(vehicle).navigation.waypoints[number]
     return {
         "wp_id": number,
         "east": counts(east, POSITION),
@@ -231,16 +230,16 @@ def waypoint(vehicle: Vehicle, number: int) -> Fields:
 
 def next_waypoint(vehicle: Vehicle) -> Fields:
     """WP_MOVED_ENU of one after the other."""
-    kept = of(vehicle)
+    kept = state_of(vehicle)
     kept.shown_waypoint = (kept.shown_waypoint + 1) % len(kept.navigation.waypoints)
     return waypoint(vehicle, kept.shown_waypoint)
 
 
 def next_setting(vehicle: Vehicle) -> Fields | None:
     """DL_VALUE of one after the other."""
-    kept = of(vehicle)
+    kept = state_of(vehicle)
     kept.shown_setting = (kept.shown_setting + 1) % len(NUMBERED)
-    value = read(vehicle, kept.shown_setting)
+    value = read_setting(vehicle, kept.shown_setting)
     return None if value is None else {"index": kept.shown_setting, "value": value}
 
 

@@ -4,8 +4,8 @@ it is.
 
 from volery.simulation.autopilots.firmware import FirmwareFamily, Station
 from volery.simulation.autopilots.px4.copter import COPTER
+from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
 from volery.simulation.autopilots.px4.rover import ROVER
-from volery.simulation.autopilots.px4.tables import ONBOARD, STATION
 
 STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
 """As the firmware's own simulator has them: for programs, and for ground stations."""

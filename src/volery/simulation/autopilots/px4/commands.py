@@ -1,11 +1,16 @@
-"""PX4's commands: what each does and with which MAV_RESULT it is acknowledged."""
+"""PX4's commands: what each does and with which MAV_RESULT it is acknowledged.
+
+Messages that PX4 takes without an answer: heartbeats, sticks, set-points.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite, isnan
+from typing import Any, Protocol, runtime_checkable
 
 from volery.base.frames import Vector
+from volery.simulation.autopilots.mavlink.channel import GROUND_STATION
 from volery.simulation.autopilots.mavlink.command import (
     ACCEPTED,
     DENIED,
@@ -16,9 +21,11 @@ from volery.simulation.autopilots.mavlink.command import (
 )
 from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
-from volery.simulation.autopilots.px4 import events, modes
-from volery.simulation.autopilots.px4.commander import CRITICAL, FORCE, INFO, of
-from volery.simulation.autopilots.px4.planned import Hold
+from volery.simulation.autopilots.px4 import events, modes, offboard
+from volery.simulation.autopilots.px4.failsafes import OFFBOARD_LOST
+from volery.simulation.autopilots.px4.flight_modes import Hold
+from volery.simulation.autopilots.px4.modes import CRITICAL, FORCE, INFO, Commander, commander_of
+from volery.simulation.autopilots.px4.pilot_input import deflection, set_rc_channels
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
@@ -55,22 +62,22 @@ def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
 
 def switch(vehicle: Vehicle, number: int) -> int:
     """To a mode, as the user's wish."""
-    return of(vehicle).wish(number)
+    return commander_of(vehicle).wish(number)
 
 
 def on_arm(vehicle: Vehicle, command: Command) -> int:
     """COMPONENT_ARM_DISARM."""
     force = whole(command.param2) == FORCE
     if command.param1 == 1.0:
-        return of(vehicle).arm(force)
+        return commander_of(vehicle).arm(force)
     if command.param1 == 0.0:
-        return of(vehicle).disarm(force)
+        return commander_of(vehicle).disarm(force)
     return UNSUPPORTED
 
 
 def on_takeoff(vehicle: Vehicle, command: Command) -> int:
     """NAV_TAKEOFF: AMSL; accepted while disarmed, too: then arming takes off."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.TAKEOFF):
         return TEMPORARILY_REJECTED
     commander.takeoff_amsl = command.z if isfinite(command.z) and command.z != 0.0 else None
@@ -80,7 +87,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 
 def on_land(vehicle: Vehicle, _command: Command) -> int:
     """NAV_LAND: here."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     if commander.wish(modes.LAND) != ACCEPTED:
         return TEMPORARILY_REJECTED
     vehicle.say(INFO, "Landing at current position\t")
@@ -90,7 +97,7 @@ def on_land(vehicle: Vehicle, _command: Command) -> int:
 
 def on_return(vehicle: Vehicle, _command: Command) -> int:
     """NAV_RETURN_TO_LAUNCH."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.RTL):
         vehicle.say(CRITICAL, "Return to launch denied\t")
         return TEMPORARILY_REJECTED
@@ -114,7 +121,7 @@ def place_of(vehicle: Vehicle, command: Command) -> Vector | None:
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
     """DO_REPOSITION: without its flag it is refused, and in AUTO.LOITER flown all the same."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     point = place_of(vehicle, command)
     if point is None or not vehicle.has_position:
         return DENIED
@@ -166,7 +173,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
 
 def on_orbit(vehicle: Vehicle, command: Command) -> int:
     """DO_ORBIT: radius, speed; about the place or here."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     centre = place_of(vehicle, command)
     if centre is None or not vehicle.has_position or not vehicle.armed:
         return TEMPORARILY_REJECTED
@@ -179,7 +186,7 @@ def on_orbit(vehicle: Vehicle, command: Command) -> int:
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """MISSION_START: the mode, and arming."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     if len(vehicle.plan) == 0 or commander.wish(modes.MISSION) != ACCEPTED:
         return DENIED
     return ACCEPTED if commander.arm(force=False) == ACCEPTED else DENIED
@@ -190,7 +197,7 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     if not isfinite(command.param1) or command.param1 <= 0.5:
         return TEMPORARILY_REJECTED
     if vehicle.armed:
-        of(vehicle).disarmed("termination", events.BY_COMMAND)
+        commander_of(vehicle).disarmed("termination", events.BY_COMMAND)
     return ACCEPTED
 
 
@@ -204,7 +211,7 @@ def accepted(_vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-SHARED: Mapping[int, Handler] = {
+SHARED_COMMANDS: Mapping[int, Handler] = {
     RETURN: on_return,
     DO_SET_MODE: on_set_mode,
     CHANGE_SPEED: on_change_speed,
@@ -217,5 +224,107 @@ SHARED: Mapping[int, Handler] = {
     REQUEST_PROTOCOL: accepted,
 }
 
-COPTER: Mapping[int, Handler] = {**SHARED, LAND: on_land, TAKEOFF: on_takeoff, ORBIT: on_orbit}
+COPTER_COMMANDS: Mapping[int, Handler] = {
+    **SHARED_COMMANDS,
+    LAND: on_land,
+    TAKEOFF: on_takeoff,
+    ORBIT: on_orbit,
+}
 """A multirotor's. All others are unsupported, among them NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
+
+
+MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
+
+FROM_JOYSTICK = (1, 2, 3)
+"""Values of COM_RC_IN_MODE with which MANUAL_CONTROL counts."""
+
+
+@runtime_checkable
+class Follower(Protocol):
+    """A manoeuvre of OFFBOARD."""
+
+    def take(self, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
+        """A set-point came."""
+
+
+OVERRIDE_AUTOMATIC, OVERRIDE_OFFBOARD = 1, 2
+"""Bits of COM_RC_OVERRIDE."""
+
+
+def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """HEARTBEAT of somebody else."""
+    if fields["type"] == GROUND_STATION:
+        commander_of(vehicle).station_seen = vehicle.kernel.now()
+
+
+def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """MANUAL_CONTROL."""
+    given = deflection(fields)
+    enabled = round(vehicle.parameters["COM_RC_IN_MODE"]) in FROM_JOYSTICK
+    if given is None or not enabled or fields["target"] not in (0, vehicle.system):
+        return
+    commander = commander_of(vehicle)
+    away = commander.joystick.take(given, vehicle.kernel.now())
+    if away:
+        commander.log.tell(events.STICKS_BACK, events.real(away))
+    set_rc_channels(vehicle, given)
+    if vehicle.armed:
+        _override(commander)
+        if vehicle.mode.pilot:
+            vehicle.act()
+
+
+def _override(commander: Commander) -> None:
+    """Moving the sticks takes an automatic mode over, in the air."""
+    vehicle = commander.vehicle
+    may = round(vehicle.parameters["COM_RC_OVERRIDE"])
+    number = vehicle.mode.number
+    by_itself = number in modes.AUTOMATIC and may & OVERRIDE_AUTOMATIC
+    by_computer = number == modes.OFFBOARD and may & OVERRIDE_OFFBOARD
+    resting = vehicle.firmware.stands and vehicle.landed
+    if resting or not (by_itself or by_computer):
+        return
+    if commander.joystick.moved(vehicle.parameters["COM_RC_STICK_OV"] / 100.0):
+        commander.pilot_takes_over()
+
+
+def _take(vehicle: Vehicle, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
+    if target is None:
+        return
+    commander = commander_of(vehicle)
+    commander.stream.take(target, vehicle.kernel.now())
+    if commander.failsafe == OFFBOARD_LOST and vehicle.armed:
+        commander.give_back()
+    if isinstance(vehicle.manoeuvre, Follower):
+        vehicle.manoeuvre.take(target)
+        if vehicle.armed and not (vehicle.firmware.stands and vehicle.landed):
+            vehicle.act()
+
+
+def on_local_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_LOCAL_NED."""
+    _take(vehicle, offboard.local_target(vehicle, fields, commander_of(vehicle).log))
+
+
+def on_global_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_POSITION_TARGET_GLOBAL_INT: counts only with a position."""
+    if vehicle.has_position:
+        _take(vehicle, offboard.global_target(vehicle, fields, commander_of(vehicle).log))
+
+
+def on_attitude_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """SET_ATTITUDE_TARGET."""
+    _take(vehicle, offboard.attitude_target(fields))
+
+
+MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
+    "HEARTBEAT": on_heartbeat,
+    "MANUAL_CONTROL": on_manual_control,
+    "SET_ATTITUDE_TARGET": on_attitude_target,
+    "SET_POSITION_TARGET_GLOBAL_INT": on_global_target,
+    "SET_POSITION_TARGET_LOCAL_NED": on_local_target,
+}
+"""What a multirotor hears."""
+
+ROVER_MESSAGE_HANDLERS: Mapping[str, MessageHandler] = MESSAGE_HANDLERS
+"""What a rover hears: it makes nothing of attitudes."""

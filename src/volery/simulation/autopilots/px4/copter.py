@@ -1,7 +1,11 @@
-"""PX4 1.14.0 on a multirotor: its modes and its habits, put together as a dialect."""
+"""PX4 1.14.0 on a multirotor: its modes and its habits, put together as a dialect.
+
+What PX4 says while it returns.
+"""
 
 from __future__ import annotations
 
+import struct
 from functools import cache, partial
 
 from volery.base.time import MS, S
@@ -9,17 +13,47 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.px4 import commands, missions, modes, radio, tuning
-from volery.simulation.autopilots.px4.commander import of
-from volery.simulation.autopilots.px4.firmware import px4
-from volery.simulation.autopilots.px4.mavlink import mavlink
-from volery.simulation.autopilots.px4.piloted import Position
-from volery.simulation.autopilots.px4.planned import Descent, Hold, Orbit, Return, TakeOff
-from volery.simulation.autopilots.px4.pursuit import Offboard
-from volery.simulation.autopilots.px4.returning import tell_stage
-from volery.simulation.autopilots.px4.honoured import COPTER as HONOURED
-from volery.simulation.autopilots.px4.watching import on_step
+from volery.simulation.autopilots.px4 import commands, events, mission, modes
+from volery.simulation.autopilots.px4.failsafes import on_step
+from volery.simulation.autopilots.px4.firmware import px4_firmware, px4_mavlink
+from volery.simulation.autopilots.px4.flight_modes import (
+    Descent,
+    Hold,
+    Orbit,
+    PositionControl,
+    Return,
+    TakeOff,
+)
+from volery.simulation.autopilots.px4.modes import INFO, commander_of
+from volery.simulation.autopilots.px4.offboard import Offboard
+from volery.simulation.autopilots.px4.parameters import COPTER_SUPPORTED, copter_tuning
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+
+
+def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
+    """The words and the event of a stage; *amsl* is its altitude, *above* that above the destination."""
+    log = commander_of(vehicle).log
+    figures = struct.pack("<iB", int(amsl), max(0, min(255, int(above))))
+    heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
+    if stage == "climb":
+        vehicle.say(INFO, "RTL HOME activated\t")
+        log.tell(events.RETURN_ACTIVATED)
+        if not vehicle.armed:
+            return
+        vehicle.say(INFO, "RTL: landing at home position.\t")
+        vehicle.say(INFO, f"RTL: climb to {heights}")
+        log.tell(events.RETURN_HOME)
+        log.tell(events.RETURN_CLIMB, figures)
+    elif stage == "return":
+        vehicle.say(INFO, f"RTL: return at {heights}")
+        log.tell(events.RETURN_FLY, figures)
+    elif stage == "descend":
+        vehicle.say(INFO, f"RTL: descend to {heights}")
+        log.tell(events.RETURN_DESCEND, figures)
+    else:
+        vehicle.say(INFO, "RTL: land at destination\t")
+        log.tell(events.RETURN_LAND)
+
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -27,7 +61,7 @@ QUADROTOR = 2
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
     """To the altitude of the command; at least MIS_TAKEOFF_ALT above where it stands."""
-    commander = of(vehicle)
+    commander = commander_of(vehicle)
     here = vehicle.estimate.geodetic[2]
     least = vehicle.parameters["MIS_TAKEOFF_ALT"]
     amsl = commander.takeoff_amsl
@@ -40,7 +74,7 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
 
 
 def _orbit(vehicle: Vehicle) -> Manoeuvre:
-    asked = of(vehicle).orbit
+    asked = commander_of(vehicle).orbit
     centre, radius, speed = asked or (vehicle.estimate.position, 5.0, 1.0)
     return Orbit(vehicle, centre, radius, speed)
 
@@ -50,7 +84,7 @@ MODES = {
     for mode in (
         Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
         Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, AltitudeHold, pilot=True),
-        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, Position, needs_position=True, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, PositionControl, needs_position=True, pilot=True),
         Mode(modes.ORBIT, "ORBIT", modes.BY_COMPUTER, _orbit, needs_position=True, armable=False),
         Mode(modes.ACRO, "ACRO", modes.BY_RATES, Stabilize, pilot=True, manual_throttle=True),
         Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, Offboard, needs_position=True),
@@ -61,14 +95,14 @@ MODES = {
             modes.MISSION,
             "AUTO.MISSION",
             modes.BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, missions.leg, lambda _vehicle: True),
+            lambda vehicle: FlyMission(vehicle, mission.leg, lambda _vehicle: True),
             needs_position=True,
         ),
         Mode(
             modes.RTL,
             "AUTO.RTL",
             modes.BY_ITSELF,
-            lambda vehicle: Return(vehicle, tell_stage),
+            lambda vehicle: Return(vehicle, report_return_stage),
             needs_position=True,
             armable=False,
         ),
@@ -88,7 +122,7 @@ def _on_step(vehicle: Vehicle) -> None:
 def _stay_here(vehicle: Vehicle) -> None:
     """The take-off has ended: it stays at the height at which that was noticed."""
     here = vehicle.estimate.position
-    of(vehicle).follow_up(modes.LOITER)
+    commander_of(vehicle).follow_up(modes.LOITER)
     if isinstance(vehicle.manoeuvre, Hold):
         vehicle.manoeuvre.point = here
 
@@ -99,17 +133,19 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.px4", "data/copter.parameters")
 
 
-COPTER = px4(
+COPTER = px4_firmware(
     kind="multirotor",
-    face=partial(MavlinkEndpoint, mavlink(QUADROTOR, commands.COPTER, radio.COPTER)),
+    face=partial(
+        MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, commands.MESSAGE_HANDLERS)
+    ),
     boot_mode=MODES[modes.LOITER],
     modes=MODES,
-    tuning=tuning.copter,
+    tuning=copter_tuning,
     stands=True,
     spool_time=1 * S,
     takeoff_slew=200 * MS,
     resigns_after=1500 * MS,
     on_step=_on_step,
     parameters=parameters,
-    supported_parameters=HONOURED,
+    supported_parameters=COPTER_SUPPORTED,
 )

@@ -67,7 +67,7 @@ FIRST_SEQUENCE = 65_526
 _EVENTS_OF_OFFBOARD, _EVENTS_OF_STICKS = 1 << 20, 1 << 7
 
 
-class Log:
+class EventLog:
     """The events of one vehicle, counted."""
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -87,7 +87,7 @@ class Log:
         self._vehicle.outlet.tell("EVENT", fields)
 
 
-class Checks(NamedTuple):
+class ArmingChecks(NamedTuple):
     """What speaks for and against arming."""
 
     started: bool
@@ -100,7 +100,7 @@ class Checks(NamedTuple):
     """Whether the wished mode is one that may be armed."""
 
 
-def _modes(checks: Checks) -> int:
+def _modes(checks: ArmingChecks) -> int:
     """A bit for each mode that could be flown now, by its navigation state."""
     missing: list[int] = []
     if not checks.position:
@@ -119,7 +119,7 @@ def _modes(checks: Checks) -> int:
     return allowed
 
 
-def report(checks: Checks) -> list[tuple[Event, bytes]]:
+def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
     """The events that tell it."""
     able = _modes(checks)
     errors = 0 if checks.offboard else _EVENTS_OF_OFFBOARD

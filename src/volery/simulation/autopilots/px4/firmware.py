@@ -1,37 +1,276 @@
-"""What a dialect of PX4 says of every vehicle, whatever its kind."""
+"""What PX4 does by itself after it is switched on, and what all kinds of vehicles have in common.
+
+Which messages PX4 sends on which link, how often, and who builds them.
+
+PX4's MAVLink, for any kind of vehicle.
+
+What a dialect of PX4 says of every vehicle, whatever its kind.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
-from volery.simulation.autopilots.firmware import Firmware
-from volery.simulation.autopilots.px4 import boot, missions
-from volery.simulation.autopilots.px4.commander import READY_AFTER
+from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.firmware import BootEvent, Firmware
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.firmware import (
+    Builder,
+    MavlinkFirmware,
+    MissionUploadPolicy,
+    ParameterPolicy,
+    StatusTextPolicy,
+)
+from volery.simulation.autopilots.px4 import commands, mission, telemetry
+from volery.simulation.autopilots.px4.modes import READY_AFTER, Commander, commander_of
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+ORIGIN: Ns = 6_200 * MS
+"""Recorded: positions from 6.4 s on."""
+
+HOME: Ns = 7_600 * MS
+"""Recorded: the first home 7.59 to 7.60 s after boot."""
+
+STREAMS: Ns = 500 * MS
+"""Recorded: streams half a second after boot, the first heartbeat later."""
+
+FIRST_HEARTBEAT: Ns = 1_252 * MS
+"""Recorded: 1.19 to 1.34 s after boot."""
+
+
+def _origin_set(vehicle: Vehicle) -> None:
+    vehicle.flight.set_origin()
+
+
+def home_set(vehicle: Vehicle) -> None:
+    """The position is good enough for a home."""
+    if vehicle.estimate.position_ok and vehicle.home is None:
+        vehicle.home_is_here()
+
+
+def stand(vehicle: Vehicle) -> None:
+    """On the ground, disarmed."""
+    vehicle.landed = True
+
+
+EVENTS = (
+    BootEvent(0, stand),
+    BootEvent(ORIGIN, _origin_set),
+    BootEvent(HOME, home_set),
+    BootEvent(READY_AFTER - 50 * MS, home_set),
+)
+
+
+def on_position(vehicle: Vehicle) -> None:
+    """A warm vehicle has found its place."""
+    home_set(vehicle)
+    commander_of(vehicle).reported = commander_of(vehicle).checks()
+
+
+def memory(vehicle: Vehicle) -> Commander:
+    """What PX4 alone keeps."""
+    return Commander(vehicle)
+
+
+def nothing(_vehicle: Vehicle) -> None:
+    """There is nothing to do then."""
+
+
+def own_parameters(system: int, _flight: Flight) -> Mapping[str, float]:
+    """What follows from the vehicle."""
+    return {"MAV_SYS_ID": system}
+
+
+def _every(rates: Mapping[float, Sequence[str]]) -> dict[str, Ns]:
+    return {name: round(S / rate) for rate, names in rates.items() for name in names}
+
+
+ONBOARD, STATION = "onboard", "station"
+
+USES: Mapping[str, Mapping[str, Ns]] = {
+    ONBOARD: _every(
+        {
+            100.0: ("ATTITUDE",),
+            50.0: ("ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "HIGHRES_IMU"),
+            30.0: ("LOCAL_POSITION_NED", "ODOMETRY"),
+            10.0: (
+                "ALTITUDE",
+                "ATTITUDE_TARGET",
+                "DISTANCE_SENSOR",
+                "MISSION_CURRENT",
+                "POSITION_TARGET_GLOBAL_INT",
+                "POSITION_TARGET_LOCAL_NED",
+                "SERVO_OUTPUT_RAW",
+                "TIMESYNC",
+                "VFR_HUD",
+            ),
+            8.0: ("GPS_RAW_INT",),
+            5.0: ("EXTENDED_SYS_STATE", "SYS_STATUS"),
+            2.0: ("ORBIT_EXECUTION_STATUS",),
+            1.0: ("ESTIMATOR_STATUS", "PING", "SCALED_PRESSURE", "SYSTEM_TIME"),
+            0.5: ("BATTERY_STATUS", "HOME_POSITION", "VIBRATION"),
+            0.333: ("CURRENT_EVENT_SEQUENCE",),
+        }
+    ),
+    STATION: _every(
+        {
+            50.0: (
+                "ATTITUDE",
+                "ATTITUDE_QUATERNION",
+                "ATTITUDE_TARGET",
+                "GLOBAL_POSITION_INT",
+                "LOCAL_POSITION_NED",
+                "POSITION_TARGET_LOCAL_NED",
+                "SERVO_OUTPUT_RAW",
+            ),
+            10.0: ("MISSION_CURRENT",),
+            4.0: ("VFR_HUD",),
+            2.0: ("ORBIT_EXECUTION_STATUS",),
+            1.0: (
+                "ALTITUDE",
+                "EXTENDED_SYS_STATE",
+                "GPS_RAW_INT",
+                "POSITION_TARGET_GLOBAL_INT",
+                "SCALED_PRESSURE",
+                "SYS_STATUS",
+            ),
+            0.5: ("BATTERY_STATUS", "DISTANCE_SENSOR", "ESTIMATOR_STATUS", "HOME_POSITION"),
+            0.333: ("CURRENT_EVENT_SEQUENCE",),
+            0.1: ("PING", "VIBRATION"),
+        }
+    ),
+}
+"""What a link is for, to the period of each message on it, as recorded."""
+
+BUILDERS: Mapping[str, Builder] = {
+    "ALTITUDE": telemetry.altitude,
+    "ATTITUDE": telemetry.attitude,
+    "ATTITUDE_QUATERNION": telemetry.attitude_quaternion,
+    "ATTITUDE_TARGET": telemetry.attitude_target,
+    "AUTOPILOT_VERSION": telemetry.autopilot_version,
+    "BATTERY_STATUS": telemetry.battery_status,
+    "CURRENT_EVENT_SEQUENCE": telemetry.event_sequence,
+    "DISTANCE_SENSOR": telemetry.distance_sensor,
+    "ESTIMATOR_STATUS": telemetry.estimator_status,
+    "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
+    "GLOBAL_POSITION_INT": telemetry.global_position,
+    "GPS_GLOBAL_ORIGIN": telemetry.origin,
+    "GPS_RAW_INT": telemetry.gps_raw,
+    "HIGHRES_IMU": telemetry.highres_imu,
+    "HOME_POSITION": telemetry.home_position,
+    "LOCAL_POSITION_NED": telemetry.local_position,
+    "MISSION_CURRENT": telemetry.mission_current,
+    "ODOMETRY": telemetry.odometry,
+    "ORBIT_EXECUTION_STATUS": telemetry.orbit_status,
+    "PING": telemetry.ping,
+    "POSITION_TARGET_GLOBAL_INT": telemetry.global_target,
+    "POSITION_TARGET_LOCAL_NED": telemetry.position_target,
+    "SCALED_PRESSURE": telemetry.pressure,
+    "SERVO_OUTPUT_RAW": telemetry.servo_output,
+    "SYSTEM_TIME": telemetry.system_time,
+    "SYS_STATUS": telemetry.sys_status,
+    "TIMESYNC": telemetry.timesync,
+    "VFR_HUD": telemetry.vfr_hud,
+    "VIBRATION": telemetry.vibration,
+}
+
+ORDER: Sequence[str] = tuple(sorted(BUILDERS))
+"""Of the messages within one burst."""
+
+
+def builders(kind: int) -> Mapping[str, Builder]:
+    """All of them; *kind* is the MAV_TYPE of the heartbeat."""
+    return {**BUILDERS, "HEARTBEAT": partial(telemetry.heartbeat, kind=kind)}
+
+
+MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
+
+TEXTS = StatusTextPolicy(numbered=True, to_stations=True, spacing=48 * MS)
+"""Recorded: at most one text each 48 to 52 ms."""
+
+PARAMETERS = ParameterPolicy(
+    burst=20,
+    period=20 * MS,
+    read_delay=2 * MS,
+    bytewise=True,
+    keeps_index=True,
+    typed=True,
+    checksum="_HASH_CHECK",
+)
+"""Recorded: 877 parameters in 0.85 s."""
+
+
+def _no_streams(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
+    """REQUEST_DATA_STREAM means nothing to PX4."""
+
+
+def _refuse_interval(_vehicle: Vehicle, _number: int) -> int:
+    return FAILED
+
+
+def px4_mavlink(
+    kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, MessageHandler]
+) -> MavlinkFirmware:
+    """*kind* is the MAV_TYPE of the heartbeat; *commanded* and *heard* are what it obeys."""
+    return MavlinkFirmware(
+        heartbeat_from=FIRST_HEARTBEAT,
+        answer_delay=6 * MS,
+        uses=USES,
+        mode_told=(),
+        home_told=("GPS_GLOBAL_ORIGIN",),
+        texts=TEXTS,
+        parameter_habits=PARAMETERS,
+        upload_habits=MissionUploadPolicy(
+            mission.asks_with, received="", turns_to_integers=True, keeps_old=True
+        ),
+        wrong_target=FAILED,
+        reads_nan=True,
+        messages=builders(kind),
+        message_order=ORDER,
+        streams={},
+        on_stream_request=_no_streams,
+        refuse_interval=_refuse_interval,
+        unknown_message=DENIED,
+        commands=commanded,
+        handlers=heard,
+        set_mode=commands.set_mode,
+        set_mode_ack=commands.DO_SET_MODE,
+        on_parameter_list=nothing,
+        mission_runs=mission.runs,
+        stored_item=mission.stored_item,
+        home_item=mission.no_home_item,
+        go_to_item=mission.goes_nowhere,
+        mission_grew=mission.grew,
+    )
+
 
 STICKS_AT_REST = (1500,) * 4 + (0,) * 12
 
-px4 = partial(
+px4_firmware = partial(
     Firmware,
     name="px4",
-    memory=boot.memory,
-    boot_events=boot.EVENTS,
-    ready_after=boot.STREAMS,
-    origin_after=boot.HOME,
+    memory=memory,
+    boot_events=EVENTS,
+    ready_after=STREAMS,
+    origin_after=HOME,
     position_after=READY_AFTER,
-    local_position_after=boot.STREAMS,
-    on_warm=boot.stand,
-    on_warm_position=boot.on_position,
+    local_position_after=STREAMS,
+    on_warm=stand,
+    on_warm_position=on_position,
     watch_every=1,
-    each_second=boot.nothing,
+    each_second=nothing,
     transmitter=STICKS_AT_REST,
-    on_disarmed=boot.nothing,
+    on_disarmed=nothing,
     throttle_centred=True,
     first_item=0,
     actions_count=True,
-    mission_item_done=missions.item_done,
-    mission_item_begins=missions.item_begins,
-    mission_ended=missions.ended,
-    mission_action=missions.act,
-    own_parameters=boot.own_parameters,
+    mission_item_done=mission.item_done,
+    mission_item_begins=mission.item_begins,
+    mission_ended=mission.ended,
+    mission_action=mission.act,
+    own_parameters=own_parameters,
 )
 """A ``Firmware`` but for what depends on the kind."""

@@ -1,8 +1,24 @@
-"""PX4's modes as the wire knows them: main mode and sub-mode in one number, bits of the heartbeat, words."""
+"""PX4's modes as the wire knows them: main mode and sub-mode in one number, bits of the heartbeat, words.
+
+PX4's commander: who decides the mode. The user's wish, and what a failsafe makes of it.
+
+A failsafe replaces the mode that is flown, not the one that was wished for: when its cause goes away, some
+give the wished mode back by themselves (the stream of OFFBOARD set-points is there again), others only when
+the user asks for a mode, moves the sticks or disarms.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+
+from volery.base.frames import Vector
+from volery.base.time import MS, Ns
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.mavlink.command import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
+from volery.simulation.autopilots.px4 import events
+from volery.simulation.autopilots.px4.offboard import SetpointStream
+from volery.simulation.autopilots.px4.pilot_input import Joystick
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
 """MAV_MODE_FLAG."""
@@ -69,3 +85,285 @@ NAVIGATION_STATE: Mapping[int, int] = {
 """Bits by which events name modes: ``nav_state`` of VehicleStatus."""
 
 DESCEND_STATE = 12
+
+
+CRITICAL, INFO = 2, 6
+"""MAV_SEVERITY."""
+
+FORCE = 21_196
+
+READY_AFTER: Ns = 8_600 * MS
+"""Recorded: armable 8.56 to 9.16 s after boot."""
+
+ATTITUDE_AFTER: Ns = 6_400 * MS
+STARTED_AFTER: Ns = 4_000 * MS
+REPORT_FROM: Ns = 2_084 * MS
+REPORT_EVERY: Ns = 2_000 * MS
+
+THROTTLE_HIGH = 0.2
+"""Of the stick's way above its centre, in modes that hold the climb rate; in the others above its low end."""
+
+
+class Commander:
+    """``Vehicle.memory`` of a PX4."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.reset()
+
+    def reset(self) -> None:
+        """As after a boot."""
+        self.joystick = Joystick()
+        self.stream = SetpointStream()
+        self.log = events.EventLog(self.vehicle)
+        self.wished = LOITER
+        """The mode that the user wants."""
+        self.after_disarming = LOITER
+        self.failsafe = ""
+        """What replaces the wished mode now: its name, or nothing."""
+        self.acting: int | None = None
+        """The mode that the failsafe flies; ``None``: the wished one."""
+        self.descending = False
+        """Whether AUTO.LAND stands for the blind descent without a position."""
+        self.takeoff_amsl: float | None = None
+        """Altitude of the next take-off, where one was commanded."""
+        self.least_height = 0.0
+        """Of the next take-off, where that was raised to the least one; 0: it was not."""
+        self.orbit: tuple[Vector, float, float] | None = None
+        """Centre, radius, speed of a circle."""
+        self.delay_left = -1.0
+        """Seconds of Hold that a failsafe may still take; below 0: all of COM_FAIL_ACT_T."""
+        self.hold_until: Ns = NEVER
+        self.after_hold = 0
+        self.station_seen: Ns = NEVER
+        self.ground = 0.0
+        """Down about the estimator's origin of the ground where it was armed."""
+        self.lifted_at: Ns = NEVER
+        """When it left the ground."""
+        self.flying = False
+        self.took_off = False
+        self.landed_at: Ns = NEVER
+        self.reported: events.ArmingChecks | None = None
+        self.reported_at: Ns = NEVER
+        self.last_step: Ns = NEVER
+
+    # -- what there is
+
+    @property
+    def above_ground(self) -> float:
+        """Metres above where it was armed: the ground is flat."""
+        return self.ground - self.vehicle.estimate.position[2]
+
+    @property
+    def ready(self) -> bool:
+        """Sensors and estimator would let it arm."""
+        vehicle = self.vehicle
+        return vehicle.home is not None and vehicle.has_position
+
+    def stream_alive(self) -> bool:
+        """Whether OFFBOARD may be flown."""
+        vehicle = self.vehicle
+        return self.stream.alive(vehicle.kernel.now(), vehicle.seconds_parameter("COM_OF_LOSS_T"))
+
+    def checks(self) -> events.ArmingChecks:
+        """What the report of the arming checks says."""
+        vehicle = self.vehicle
+        age = vehicle.uptime()
+        return events.ArmingChecks(
+            started=age >= STARTED_AFTER,
+            attitude=age >= ATTITUDE_AFTER,
+            position=self.ready,
+            sticks=self.joystick.valid,
+            mission=len(vehicle.plan) > 0,
+            offboard=self.stream_alive(),
+            mode=vehicle.armed or vehicle.firmware.modes[self.wished].armable,
+        )
+
+    def can_fly(self, number: int) -> bool:
+        """Whether that mode has what it needs."""
+        vehicle = self.vehicle
+        mode = vehicle.firmware.modes[number]
+        if mode.needs_position and not vehicle.has_position:
+            return False
+        if number in NEEDS_STICKS and not self.joystick.valid:
+            return False
+        if number == OFFBOARD and not self.stream_alive():
+            return False
+        return number != MISSION or len(vehicle.plan) > 0
+
+    # -- modes
+
+    def wish(self, number: int) -> int:
+        """The user asks for a mode; returns a MAV_RESULT. Disarmed every mode is accepted."""
+        vehicle = self.vehicle
+        if number not in vehicle.firmware.modes:
+            return ACCEPTED if not vehicle.armed else UNSUPPORTED
+        if vehicle.armed and not self.can_fly(number):
+            vehicle.say(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
+            group = OFFBOARD_IN_EVENTS if number == OFFBOARD else POSITION_IN_EVENTS
+            self.log.tell(events.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
+            return TEMPORARILY_REJECTED
+        self._take_wish(number)
+        return ACCEPTED
+
+    def _take_wish(self, number: int) -> None:
+        vehicle = self.vehicle
+        self.wished = number
+        if vehicle.firmware.modes[number].armable:
+            self.after_disarming = number
+        self.end_failsafe()
+        self.joystick.rest()
+        self._fly(number)
+
+    def _fly(self, number: int, anew: bool = False) -> None:
+        mode = self.vehicle.firmware.modes[number]
+        if mode is not self.vehicle.mode or anew:
+            self.vehicle.enter(mode)
+
+    def wish_anew(self, number: int) -> None:
+        """Fly that mode from its start, although it may be flown already: its aim has changed."""
+        again = self.vehicle.mode.number == number and self.acting is None
+        self._take_wish(number)
+        if again:
+            self._fly(number, anew=True)
+
+    def follow_up(self, number: int) -> None:
+        """A mode has ended; another one follows by itself."""
+        self.wished = number
+        if self.vehicle.firmware.modes[number].armable:
+            self.after_disarming = number
+        self.joystick.rest()
+        self._fly(number)
+
+    # -- failsafes
+
+    def begin_failsafe(self, name: str, number: int) -> None:
+        """Fly that mode instead of the wished one."""
+        self.failsafe, self.acting = name, number
+        self.joystick.rest()
+        self._fly(number)
+
+    def end_failsafe(self) -> None:
+        """Its cause is gone, or somebody took over."""
+        self.failsafe, self.acting, self.hold_until = "", None, NEVER
+        self.descending = False
+
+    def give_back(self) -> None:
+        """Fly the wished mode again."""
+        self.end_failsafe()
+        self.joystick.rest()
+        self._fly(self.wished)
+
+    def pilot_takes_over(self) -> None:
+        """The sticks moved in a mode that flies by itself."""
+        if self.failsafe:
+            self.log.tell(events.PILOT_TOOK_OVER)
+        else:
+            self.vehicle.say(INFO, "Pilot took over using sticks\t")
+        self._take_wish(POSCTL)
+
+    # -- arming
+
+    def arm(self, force: bool) -> int:
+        """By command; returns a MAV_RESULT. Why it is refused, only events say, but for the throttle."""
+        vehicle = self.vehicle
+        if vehicle.armed:
+            return ACCEPTED
+        if not force:
+            if self._throttle_is_high():
+                vehicle.say(CRITICAL, "Arming denied: throttle above center\t")
+                self.log.tell(events.THROTTLE_HIGH)
+                return TEMPORARILY_REJECTED
+            if not self.armable:
+                vehicle.refused_at = vehicle.kernel.now()
+                return TEMPORARILY_REJECTED
+        if vehicle.has_position and not vehicle.home_by_user:
+            vehicle.home_is_here()
+        self.joystick.lost_when_armed = not self.joystick.valid
+        self.joystick.rest()
+        self.took_off = False
+        self.lifted_at = NEVER
+        self.ground = vehicle.estimate.position[2]
+        vehicle.arm()
+        vehicle.say(INFO, "Armed by external command\t")
+        self.log.tell(events.ARMED, events.BY_COMMAND)
+        self.tell_least_height()
+        return ACCEPTED
+
+    def tell_least_height(self) -> None:
+        """Once, if the take-off that begins was raised to the least height."""
+        if self.least_height and self.wished == TAKEOFF:
+            self.vehicle.say(INFO, f"Using minimum takeoff altitude: {self.least_height:.2f} m\t")
+            self.log.tell(events.LEAST_TAKEOFF, events.real(self.least_height))
+        self.least_height = 0.0
+
+    @property
+    def armable(self) -> bool:
+        """Whether the checks let it arm in the wished mode."""
+        mode = self.vehicle.firmware.modes[self.wished]
+        return self._fit(mode.needs_position) and mode.armable and self.can_fly(self.wished)
+
+    def _fit(self, to_go_by_position: bool) -> bool:
+        """COM_ARM_WO_GPS: by sticks it also arms without a position."""
+        if self.ready:
+            return True
+        allowed = self.vehicle.parameters["COM_ARM_WO_GPS"] != 0.0
+        return not to_go_by_position and allowed and self.checks().attitude
+
+    def _throttle_is_high(self) -> bool:
+        if not self.joystick.valid or self.wished not in NEEDS_STICKS:
+            return False
+        by_thrust = self.vehicle.firmware.stands and self.wished in (
+            MANUAL,
+            STABILIZE,
+            ACRO,
+        )
+        return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
+
+    def disarm(self, force: bool) -> int:
+        """By command; returns a MAV_RESULT."""
+        vehicle = self.vehicle
+        if not vehicle.armed:
+            return ACCEPTED
+        if vehicle.firmware.stands and not vehicle.landed and not force:
+            vehicle.say(CRITICAL, "Disarming denied! Not landed\t")
+            self.log.tell(events.DISARM_REFUSED)
+            return TEMPORARILY_REJECTED
+        self.disarmed("external command", events.BY_COMMAND)
+        return ACCEPTED
+
+    def disarmed(self, words: str, reason: bytes) -> None:
+        """Disarm, say by what, and go back to a mode that may be armed."""
+        vehicle = self.vehicle
+        vehicle.disarm()
+        vehicle.say(INFO, f"Disarmed by {words}\t")
+        self.log.tell(events.DISARMED, reason)
+        vehicle.firmware.on_disarmed(vehicle)
+        self.end_failsafe()
+        self.takeoff_amsl = None
+        self.wished = self.after_disarming
+        self._fly(self.wished)
+
+    # -- reports
+
+    def report(self) -> None:
+        """The arming checks, when they changed."""
+        vehicle = self.vehicle
+        now = vehicle.kernel.now()
+        if vehicle.uptime() < REPORT_FROM or now - self.reported_at < REPORT_EVERY:
+            return
+        found = self.checks()
+        if found != self.reported:
+            self.reported, self.reported_at = found, now
+            for event, arguments in events.arming_report(found):
+                self.log.tell(event, arguments)
+
+
+OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3
+"""How an event names the wished mode, as far as recorded."""
+
+
+def commander_of(vehicle: Vehicle) -> Commander:
+    """The commander of a vehicle."""
+    commander: Commander = vehicle.memory
+    return commander

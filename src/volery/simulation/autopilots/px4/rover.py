@@ -22,13 +22,12 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 )
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, UNSUPPORTED, Command, Handler
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.px4 import commands, copter, modes, radio, tuning
-from volery.simulation.autopilots.px4.commander import of
-from volery.simulation.autopilots.px4.firmware import px4
-from volery.simulation.autopilots.px4.mavlink import mavlink
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Target
-from volery.simulation.autopilots.px4.honoured import ROVER as HONOURED
-from volery.simulation.autopilots.px4.watching import on_step
+from volery.simulation.autopilots.px4 import commands, copter, modes
+from volery.simulation.autopilots.px4.failsafes import on_step
+from volery.simulation.autopilots.px4.firmware import px4_firmware, px4_mavlink
+from volery.simulation.autopilots.px4.modes import commander_of
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget, OffboardTarget
+from volery.simulation.autopilots.px4.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 GROUND_ROVER = 10
@@ -66,11 +65,11 @@ class OffboardRover(Manoeuvre):
 
     def enter(self) -> None:
         """Stand until told."""
-        self.take(of(self.vehicle).stream.target)
+        self.take(commander_of(self.vehicle).stream.target)
 
-    def take(self, target: Target | AttitudeTarget | None) -> None:
+    def take(self, target: OffboardTarget | AttitudeTarget | None) -> None:
         """A set-point came; attitudes mean nothing to wheels."""
-        if not isinstance(target, Target):
+        if not isinstance(target, OffboardTarget):
             return
         north, east, _ = target.position
         if isfinite(north) and isfinite(east):
@@ -110,7 +109,7 @@ class StickDrive(Manual):
 
     def step(self) -> None:
         """Pass the sticks on."""
-        if of(self.vehicle).joystick.valid:
+        if commander_of(self.vehicle).joystick.valid:
             super().step()
         else:
             accel = self.vehicle.tuning.accel
@@ -124,13 +123,13 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
         return DENIED
     if commands.whole(command.param2) != commands.CHANGE_MODE:
         return UNSUPPORTED
-    of(vehicle).wish_anew(modes.LOITER)
+    commander_of(vehicle).wish_anew(modes.LOITER)
     if isinstance(vehicle.manoeuvre, HoldRover):
         vehicle.manoeuvre.send_to(point)
     return ACCEPTED
 
 
-COMMANDS: dict[int, Handler] = {**commands.SHARED, commands.REPOSITION: on_reposition}
+COMMANDS: dict[int, Handler] = {**commands.SHARED_COMMANDS, commands.REPOSITION: on_reposition}
 
 MODES = {
     mode.number: mode
@@ -166,14 +165,14 @@ def parameters() -> tuple[Parameter, ...]:
     return (*shared, *ASSUMED)
 
 
-ROVER = px4(
+ROVER = px4_firmware(
     kind="rover",
-    face=partial(MavlinkEndpoint, mavlink(GROUND_ROVER, COMMANDS, radio.ROVER)),
+    face=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, COMMANDS, commands.MESSAGE_HANDLERS)),
     boot_mode=MODES[modes.LOITER],
     modes=MODES,
-    tuning=tuning.rover,
+    tuning=rover_tuning,
     stands=False,
     on_step=on_step,
     parameters=parameters,
-    supported_parameters=HONOURED,
+    supported_parameters=ROVER_SUPPORTED,
 )

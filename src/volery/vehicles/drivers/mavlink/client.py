@@ -376,7 +376,7 @@ class MavlinkClient:
         """Nothing while it is heard; else what is there instead."""
         wrong = self._link.problem()
         if wrong:
-            heard = getattr(self._link, "heard", None)
+            heard = getattr(self._link, "statistics", None)
             garbled = isinstance(heard, ReceiveStatistics) and heard.octets > 0 and not heard.frames
             return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
         if self._unfit:

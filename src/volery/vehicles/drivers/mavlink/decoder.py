@@ -79,7 +79,7 @@ class TelemetryDecoder(ABC):
             "POSITION_TARGET_GLOBAL_INT": self._target,
             "GPS_RAW_INT": self._gps,
             "ATTITUDE": self._attitude,
-            "STATUSTEXT": self._texts.hear,
+            "STATUSTEXT": self._texts.add,
             "MISSION_ITEM_REACHED": self._reached,
             "MISSION_CURRENT": self._mission_current,
         }

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import LinkError, LinkSilent
 from volery.base.frames import enu_to_ned, ned_to_enu
-from volery.base.geoid import BY_NAME, EGM96, Geoid, geoid_of
+from volery.base.geoid import EGM96, EGM96_NAME, Geoid, parse_geoid
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
@@ -354,4 +354,4 @@ def namespace_and_geoid(driver: str, name: str, options: Mapping[str, str]) -> t
     ``geoid``: MAVROS counts altitudes from the ellipsoid, by EGM96; else metres.
     """
     check_options(driver, options, *MAVROS_OPTIONS)
-    return options.get("namespace", f"/{name}"), geoid_of(options.get("geoid", BY_NAME))
+    return options.get("namespace", f"/{name}"), parse_geoid(options.get("geoid", EGM96_NAME))

@@ -210,7 +210,7 @@ class PaparazziBackend:
             return CapabilityError(self._mistaken)
         wrong = self._link.problem()
         if wrong:
-            heard = getattr(self._link, "heard", None)
+            heard = getattr(self._link, "statistics", None)
             garbled = isinstance(heard, ReceiveStatistics) and heard.octets > 0 and not heard.frames
             return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
         if self.telemetry.heard >= 0:

@@ -1,7 +1,7 @@
-// The interface of a drone to controllers in C++: the same seven calls for every autopilot.
+// The interface of a drone for controllers in C++: the same seven calls for every autopilot.
 //
-// Each call blocks until it is done: until the height is reached, the place, the ground. It throws
-// volery::Error with the autopilot's words if that fails.
+// Each call blocks until the height, the position or the ground is reached. It throws volery::Error with the
+// autopilot's message if that fails.
 #pragma once
 #include <cstddef>
 
@@ -12,40 +12,40 @@ class I_RosDron {
 public:
     explicit I_RosDron(const char* port = "", std::size_t index = 0) : port_(port), index_(index) {}
 
-    // -- with a position. gps_fly comes before gps_go.
+    // -- modes that need a position estimate. Call gps_fly before gps_go.
 
-    // Arm, and climb to so many metres above home.
+    // Arm and climb to a height in metres above home.
     void gps_fly(double height) { call("gps_fly", volery::Writer().put(height)); }
-    // Go to a place: degrees north, degrees east, metres above mean sea level.
+    // Fly to a position: degrees north, degrees east, metres above mean sea level.
     void gps_go(double latitude, double longitude, double altitude) {
         call("gps_go", volery::Writer().put(latitude).put(longitude).put(altitude));
     }
-    // Return to home and land there.
+    // Return to the home position and land there.
     void return_ground() { call("return_ground"); }
 
-    // -- without one
+    // -- manual modes
 
-    // Hold the sticks like this until the next call: pitch, roll and yaw -1000..1000 (forward, right and clockwise
-    // are positive), throttle 0..1000 (500 keeps the altitude in alt_hold_fly). It comes before the two that follow.
+    // Hold these stick positions until the next call: pitch, roll and yaw -1000..1000 (forward, right and clockwise
+    // are positive), throttle 0..1000 (500 keeps the altitude in alt_hold_fly). Call it before the two that follow.
     void joystick(int pitch, int roll, int throttle, int yaw) {
         call("joystick", volery::Writer().put(pitch).put(roll).put(throttle).put(yaw));
     }
-    // Fly by sticks: they command attitude and throttle.
+    // Manual control of attitude and throttle.
     void stabilize_fly() { call("stabilize_fly"); }
-    // Fly by sticks: they command attitude and climb rate.
+    // Manual control of attitude and climb rate.
     void alt_hold_fly() { call("alt_hold_fly"); }
-    // Descend here, until it is on the ground.
+    // Descend at the current position until the drone is on the ground.
     void land_ground() { call("land_ground"); }
 
 private:
     void call(const char* operation, const volery::Writer& with = {}) {
-        volery::ask("drone", volery::Writer().put(port_).put(index_).put(operation).put(with.bytes()));
+        volery::request("drone", volery::Writer().put(port_).put(index_).put(operation).put(with.bytes()));
     }
     const char* port_;
     std::size_t index_;
 };
 
-// The same for a component that commands one drone only.
+// The same calls for a component that commands one drone only.
 inline void uc_drone_gps_fly(double height) { I_RosDron().gps_fly(height); }
 inline void uc_drone_gps_go(double latitude, double longitude, double altitude) {
     I_RosDron().gps_go(latitude, longitude, altitude);

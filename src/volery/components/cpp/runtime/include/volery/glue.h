@@ -1,4 +1,4 @@
-// What the generated glue of a component is made of.
+// Templates that the generated glue of a component uses.
 #pragma once
 #include <memory>
 #include <type_traits>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "I_RosDron.h"
-#include "volery/border.h"
+#include "volery/abi.h"
 #include "volery/types.h"
 
 namespace volery {
@@ -53,7 +53,7 @@ Value get(Reader& in) {
     return value;
 }
 
-// A required port: where it leads is the house's to know.
+// A required port. The framework knows the component at its other end.
 class Port {
 public:
     Port(const char* port, std::size_t index) : port_(port), index_(index) {}
@@ -61,11 +61,11 @@ public:
 protected:
     template <class Result, class... Arguments>
     Result call(const char* operation, const Arguments&... arguments) const {
-        Writer with;
-        with.put(port_).put(index_).put(operation);
-        (put(with, arguments), ...);
-        auto answer = ask("port", with);
-        if constexpr (!std::is_void_v<Result>) return get<Result>(answer);
+        Writer encoded;
+        encoded.put(port_).put(index_).put(operation);
+        (put(encoded, arguments), ...);
+        auto reply = request("port", encoded);
+        if constexpr (!std::is_void_v<Result>) return get<Result>(reply);
     }
 
 private:
@@ -73,7 +73,8 @@ private:
     std::size_t index_;
 };
 
-// What a required port is connected to. They live as long as the component, which is as long as the program.
+// The components that a required port is connected to. The objects live as long as the component, that is, as
+// long as the program.
 template <class Interface, class Implementation>
 Interface& one(const char* port) {
     return *new Implementation(port, 0);
@@ -82,7 +83,7 @@ Interface& one(const char* port) {
 template <class Interface, class Implementation>
 const std::vector<Interface*>& many(const char* port) {
     auto* all = new std::vector<Interface*>;
-    auto const count = ask("connected", Writer().put(port)).integer();
+    auto const count = request("connected", Writer().put(port)).integer();
     for (std::int64_t index = 0; index < count; ++index)
         all->push_back(new Implementation(port, static_cast<std::size_t>(index)));
     return *all;
@@ -100,7 +101,7 @@ struct has_run : std::false_type {};
 template <class Class>
 struct has_run<Class, std::void_t<decltype(std::declval<Class&>().run())>> : std::true_type {};
 
-// The one object of a component.
+// The only object of a component.
 template <class Class>
 class Component {
 public:

@@ -1,39 +1,39 @@
-// What any C++ component may ask of the run it is part of.
+// Calls of any C++ component to the run that it is part of.
 #pragma once
 #include <string>
 
-#include "volery/border.h"
+#include "volery/abi.h"
 
 namespace volery {
 
-// Seconds since the start of the run.
-inline double now() { return ask("now").real(); }
+// Return the seconds since the start of the run.
+inline double now() { return request("now").real(); }
 
-// Do nothing for so long.
-inline void sleep(double seconds) { ask("sleep", Writer().put(seconds)); }
+// Block for some seconds of the run.
+inline void sleep(double seconds) { request("sleep", Writer().put(seconds)); }
 
-// Charge the component with computing that nothing else counts: seconds of execution time on its processor, at
-// the frequency at_mhz if that is above 0, and joules where they are known.
+// Charge the component for computing that is neither stated nor counted: seconds of execution time on its
+// processor, stated at the frequency at_mhz if that is above 0, and joules where they are known.
 inline void add_time(double seconds, double at_mhz = 0.0, double joules = 0.0) {
-    ask("add_time", Writer().put(seconds).put(at_mhz).put(joules));
+    request("add_time", Writer().put(seconds).put(at_mhz).put(joules));
 }
 
-// Record a line of text; severity is "error", "warning", "info" or "debug".
+// Record a line of text. The severity is "error", "warning", "info" or "debug".
 inline void log(const std::string& text, const std::string& severity = "info") {
-    ask("log", Writer().put(text).put(severity));
+    request("log", Writer().put(text).put(severity));
 }
 
-// Record that something the application follows entered a state: note("parcel", "p-1", "ordered").
+// Record that something which the application follows has entered a state: note("parcel", "p-1", "ordered").
 inline void note(const std::string& kind, const std::string& subject, const std::string& state,
                  const std::string& detail = "") {
-    ask("note", Writer().put(kind).put(subject).put(state).put(detail));
+    request("note", Writer().put(kind).put(subject).put(state).put(detail));
 }
 
 inline Reader parameter_(const std::string& name, const char* kind) {
-    return ask("parameter", Writer().put(name).put(kind));
+    return request("parameter", Writer().put(name).put(kind));
 }
 
-// A parameter of the model.
+// Return a parameter of the model.
 template <class Value>
 Value parameter(const std::string& name);
 template <>
@@ -55,5 +55,5 @@ inline std::string parameter<std::string>(const std::string& name) {
 
 }  // namespace volery
 
-// The same under the name that figures of early design are stated with: seconds, and joules.
+// add_time under its name in early-design models.
 inline void uc_add_times(double seconds, double joules = 0.0) { volery::add_time(seconds, 0.0, joules); }

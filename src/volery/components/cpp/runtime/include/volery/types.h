@@ -6,10 +6,10 @@
 
 namespace volery {
 
-// What an altitude is measured above.
+// The surface that an altitude is measured from.
 enum class Reference { amsl, ellipsoid, home, ground };
 
-// A point: WGS-84 degrees, north and east positive, and metres above the reference.
+// A point: WGS-84 degrees, north and east positive, and metres above the reference surface.
 struct Position {
     double latitude = 0.0;
     double longitude = 0.0;

@@ -26,7 +26,7 @@ inline void notifyLoggerLevelsChanged() {}
 namespace detail {
 
 inline void say(console::Level level, const std::string& text) {
-    volery::ask("ros.log", volery::Writer().put(static_cast<int>(level)).put(text));
+    volery::request("ros.log", volery::Writer().put(static_cast<int>(level)).put(text));
 }
 
 __attribute__((format(printf, 1, 2))) inline std::string formatted(const char* format, ...) {

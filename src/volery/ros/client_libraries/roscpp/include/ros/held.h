@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "volery/border.h"
+#include "volery/abi.h"
 
 namespace ros {
 namespace detail {
@@ -24,8 +24,8 @@ public:
     void close() noexcept {
         if (!open_) return;
         open_ = false;
-        volery::tell("ros.close", volery::Writer().put(handle_));
-        if (callable_ != NO_CALLABLE) volery::forget(callable_);
+        volery::try_request("ros.close", volery::Writer().put(handle_));
+        if (callable_ != NO_CALLABLE) volery::unregister_callable(callable_);
     }
     bool open() const { return open_; }
     std::int64_t handle() const { return handle_; }
@@ -54,12 +54,12 @@ public:
 protected:
     // Have something done with it; nothing if it is none.
     void order(const char* question) const {
-        if (held_) volery::ask(question, volery::Writer().put(held_->handle()));
+        if (held_) volery::request(question, volery::Writer().put(held_->handle()));
     }
     std::string name() const { return held_ ? held_->name() : ""; }
     // A question about it; 0 if it is none.
     std::int64_t count(const char* question) const {
-        return held_ ? volery::ask(question, volery::Writer().put(held_->handle())).integer() : 0;
+        return held_ ? volery::request(question, volery::Writer().put(held_->handle())).integer() : 0;
     }
     std::shared_ptr<Held> held_;
 };

@@ -16,25 +16,25 @@ using InitOption = init_options::InitOption;
 // As in a launch file, the component's name names the node, whatever is said here.
 inline void init(const M_string&, const std::string& name, std::uint32_t options = 0) {
     bool const anonymous = (options & init_options::AnonymousName) != 0;
-    volery::ask("ros.init", volery::Writer().put(name).put(anonymous));
+    volery::request("ros.init", volery::Writer().put(name).put(anonymous));
 }
 inline void init(int&, char**, const std::string& name, std::uint32_t options = 0) {
     init(M_string(), name, options);
 }
 
-inline bool isInitialized() { return volery::ask("ros.initialized").flag(); }
+inline bool isInitialized() { return volery::request("ros.initialized").flag(); }
 inline bool isStarted() { return isInitialized(); }
-inline void start() { volery::ask("ros.ok"); }
-inline bool ok() { return volery::ask("ros.ok").flag(); }
+inline void start() { volery::request("ros.ok"); }
+inline bool ok() { return volery::request("ros.ok").flag(); }
 inline bool isShuttingDown() { return !ok(); }
-inline void shutdown() { volery::ask("ros.shutdown"); }
+inline void shutdown() { volery::request("ros.shutdown"); }
 inline void requestShutdown() { shutdown(); }
-inline void waitForShutdown() { volery::ask("ros.wait_for_shutdown"); }
+inline void waitForShutdown() { volery::request("ros.wait_for_shutdown"); }
 
 // Run the callbacks that are ready.
-inline void spinOnce() { volery::ask("ros.spin_once"); }
+inline void spinOnce() { volery::request("ros.spin_once"); }
 // Run callbacks as they come, until the node shuts down.
-inline void spin() { volery::ask("ros.spin"); }
+inline void spin() { volery::request("ros.spin"); }
 
 class SingleThreadedSpinner {
 public:

@@ -19,7 +19,7 @@ public:
 namespace names {
 
 inline std::string resolve(const std::string& ns, const std::string& name, bool = true) {
-    return volery::ask("ros.resolve", volery::Writer().put(ns).put(name)).text();
+    return volery::request("ros.resolve", volery::Writer().put(ns).put(name)).text();
 }
 inline std::string resolve(const std::string& name, bool remap = true) { return resolve("", name, remap); }
 inline std::string clean(const std::string& name) {
@@ -35,8 +35,8 @@ inline std::string append(const std::string& left, const std::string& right) { r
 
 namespace this_node {
 
-inline std::string getName() { return volery::ask("ros.name").text(); }
-inline std::string getNamespace() { return volery::ask("ros.namespace").text(); }
+inline std::string getName() { return volery::request("ros.name").text(); }
+inline std::string getNamespace() { return volery::request("ros.namespace").text(); }
 
 }  // namespace this_node
 }  // namespace ros

@@ -106,7 +106,7 @@ public:
     template <class Service>
     ServiceClient serviceClient(const std::string& service, bool = false, const M_string& = {}) {
         auto const name = resolveName(service);
-        return {volery::ask("ros.client", volery::Writer().put(name).put(Service::name_())).integer(), name};
+        return {volery::request("ros.client", volery::Writer().put(name).put(Service::name_())).integer(), name};
     }
 
     // -- timers
@@ -166,19 +166,19 @@ public:
 
 private:
     void enter(const std::string& parent, const std::string& ns) {
-        namespace_ = volery::ask("ros.node_handle", volery::Writer().put(parent).put(ns)).text();
+        namespace_ = volery::request("ros.node_handle", volery::Writer().put(parent).put(ns)).text();
     }
     static std::shared_ptr<detail::Held> held(const char* question, const volery::Writer& with,
                                               const std::string& name,
                                               std::int64_t callable = detail::NO_CALLABLE) {
-        return std::make_shared<detail::Held>(volery::ask(question, with).integer(), name, callable);
+        return std::make_shared<detail::Held>(volery::request(question, with).integer(), name, callable);
     }
 
     template <class Parameter, class Callback>
     Subscriber hear(const std::string& topic, std::uint32_t queue_size, Callback callback) {
         using Adapter = detail::Adapted<Parameter>;
         using Message = typename Adapter::Message;
-        auto const callable = volery::enlist([callback](volery::Reader in, volery::Writer&) {
+        auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
             auto const message = detail::received<Message>(in);
             callback(Adapter::from(message));
         });
@@ -190,7 +190,7 @@ private:
 
     template <class Request, class Response, class Handler>
     ServiceServer serve(const std::string& service, Handler handler) {
-        auto const callable = volery::enlist([handler](volery::Reader in, volery::Writer& out) {
+        auto const callable = volery::register_callable([handler](volery::Reader in, volery::Writer& out) {
             Request request;
             Response response;
             detail::from_bytes(in, request);
@@ -211,7 +211,7 @@ namespace topic {
 template <class Message>
 boost::shared_ptr<Message const> waitForMessage(const std::string& topic, Duration timeout = Duration(-1.0)) {
     auto const with = volery::Writer().put(topic).put(Message::name_()).put(timeout.toNSec());
-    auto answer = volery::ask("ros.wait_for_message", with);
+    auto answer = volery::request("ros.wait_for_message", with);
     if (!answer.flag()) return {};
     return detail::received<Message>(answer);
 }

@@ -94,7 +94,7 @@ namespace param {
 // Whether there is such a parameter of such a kind; *value* is left alone otherwise.
 template <class Value>
 bool get(const std::string& name, Value& value) {
-    auto answer = volery::ask("ros.param_get", volery::Writer().put(name));
+    auto answer = volery::request("ros.param_get", volery::Writer().put(name));
     return answer.flag() && detail::get_value(answer, value);
 }
 template <class Value>
@@ -106,11 +106,11 @@ void set(const std::string& name, const Value& value) {
     volery::Writer with;
     with.put(name);
     detail::put_value(with, value);
-    volery::ask("ros.param_set", with);
+    volery::request("ros.param_set", with);
 }
 inline void set(const std::string& name, const char* value) { set(name, std::string(value)); }
-inline bool has(const std::string& name) { return volery::ask("ros.param_has", volery::Writer().put(name)).flag(); }
-inline bool del(const std::string& name) { return volery::ask("ros.param_delete", volery::Writer().put(name)).flag(); }
+inline bool has(const std::string& name) { return volery::request("ros.param_has", volery::Writer().put(name)).flag(); }
+inline bool del(const std::string& name) { return volery::request("ros.param_delete", volery::Writer().put(name)).flag(); }
 template <class Value>
 bool param(const std::string& name, Value& value, const Value& otherwise) {
     if (get(name, value)) return true;
@@ -124,7 +124,7 @@ Value param(const std::string& name, const Value& otherwise) {
     return value;
 }
 inline bool getParamNames(std::vector<std::string>& names) {
-    auto answer = volery::ask("ros.param_names");
+    auto answer = volery::request("ros.param_names");
     names.resize(static_cast<std::size_t>(answer.integer()));
     for (auto& name : names) name = answer.text();
     return true;

@@ -16,7 +16,7 @@ public:
     template <class Message>
     void publish(const Message& message) const {
         if (!held_) throw Exception("publish() on an invalid ros::Publisher");
-        volery::ask("ros.publish", volery::Writer().put(held_->handle()).put(detail::to_bytes(message)));
+        volery::request("ros.publish", volery::Writer().put(held_->handle()).put(detail::to_bytes(message)));
     }
     template <class Message>
     void publish(const boost::shared_ptr<Message>& message) const {

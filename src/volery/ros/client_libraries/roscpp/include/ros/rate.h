@@ -11,12 +11,12 @@ public:
 
     // Until the next release. A loop that is late goes on at once.
     bool sleep() {
-        auto answer = volery::ask("ros.rate_sleep", volery::Writer().put(handle_));
+        auto answer = volery::request("ros.rate_sleep", volery::Writer().put(handle_));
         cycle_.fromNSec(answer.integer());
         return cycle_ <= period_;
     }
     // Count anew from now.
-    void reset() { handle_ = volery::ask("ros.rate", volery::Writer().put(period_.toNSec())).integer(); }
+    void reset() { handle_ = volery::request("ros.rate", volery::Writer().put(period_.toNSec())).integer(); }
     // How long the last cycle computed, and how long it may be.
     Duration cycleTime() const { return cycle_; }
     Duration expectedCycleTime() const { return period_; }

@@ -19,7 +19,7 @@ namespace detail {
 
 template <class Request, class Response>
 bool call(std::int64_t client, const Request& request, Response& response) {
-    auto answer = volery::ask("ros.call", volery::Writer().put(client).put(to_bytes(request)));
+    auto answer = volery::request("ros.call", volery::Writer().put(client).put(to_bytes(request)));
     if (!answer.flag()) return false;
     from_bytes(answer, response);
     return true;
@@ -49,7 +49,7 @@ public:
     // A negative time-out: for ever.
     bool waitForExistence(Duration timeout = Duration(-1.0)) {
         auto const with = volery::Writer().put(name_).put(timeout.toNSec());
-        return isValid() && volery::ask("ros.wait_for_service", with).flag();
+        return isValid() && volery::request("ros.wait_for_service", with).flag();
     }
     bool isPersistent() const { return false; }
     bool isValid() const { return handle_ >= 0; }
@@ -65,7 +65,7 @@ private:
 namespace service {
 
 inline bool waitForService(const std::string& name, Duration timeout = Duration(-1.0)) {
-    return volery::ask("ros.wait_for_service", volery::Writer().put(name).put(timeout.toNSec())).flag();
+    return volery::request("ros.wait_for_service", volery::Writer().put(name).put(timeout.toNSec())).flag();
 }
 inline bool waitForService(const std::string& name, std::int32_t milliseconds) {
     return waitForService(name, Duration(milliseconds / 1000.0));
@@ -74,7 +74,7 @@ inline bool exists(const std::string& name, bool) { return waitForService(name, 
 
 template <class Service>
 bool call(const std::string& name, Service& service) {
-    auto const client = volery::ask("ros.client", volery::Writer().put(name).put(Service::name_())).integer();
+    auto const client = volery::request("ros.client", volery::Writer().put(name).put(Service::name_())).integer();
     return detail::call(client, service.request, service.response);
 }
 

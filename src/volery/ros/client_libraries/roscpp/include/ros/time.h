@@ -7,7 +7,7 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "volery/border.h"
+#include "volery/abi.h"
 
 namespace ros {
 
@@ -50,7 +50,7 @@ public:
     }
     bool isZero() const { return sec == 0 && nsec == 0; }
     bool sleep() const {
-        volery::ask("ros.sleep", volery::Writer().put(toNSec()));
+        volery::request("ros.sleep", volery::Writer().put(toNSec()));
         return true;
     }
 
@@ -96,7 +96,7 @@ public:
         : sec(seconds + nanoseconds / detail::SECOND), nsec(nanoseconds % detail::SECOND) {}
     explicit TimeBase(double seconds) { fromSec(seconds); }
 
-    static Self now() { return Self().fromNSec(static_cast<std::uint64_t>(volery::ask("ros.now").integer())); }
+    static Self now() { return Self().fromNSec(static_cast<std::uint64_t>(volery::request("ros.now").integer())); }
     static bool sleepUntil(const Self& end) {
         Span const left = end - now();
         return left > Span() ? left.sleep() : true;

@@ -33,14 +33,14 @@ public:
     void start() { order("ros.timer_start"); }
     void stop() { order("ros.timer_stop"); }
     void setPeriod(const Span& period, bool = true) {
-        if (held_) volery::ask("ros.timer_period", volery::Writer().put(held_->handle()).put(period.toNSec()));
+        if (held_) volery::request("ros.timer_period", volery::Writer().put(held_->handle()).put(period.toNSec()));
     }
     bool hasStarted() const { return count("ros.timer_started") != 0; }
     bool hasPending() const { return hasStarted(); }
     bool isValid() const { return held_ != nullptr; }
 
     static TimerOf make(Span period, boost::function<void(const Event&)> callback, bool oneshot, bool autostart) {
-        auto const callable = volery::enlist([callback](volery::Reader in, volery::Writer&) {
+        auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
             Event event;
             event.last_expected = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
             event.last_real = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
@@ -50,7 +50,7 @@ public:
             callback(event);
         });
         auto const with = volery::Writer().put(period.toNSec()).put(oneshot).put(autostart).put(callable);
-        return TimerOf(std::make_shared<Held>(volery::ask("ros.timer", with).integer(), "", callable));
+        return TimerOf(std::make_shared<Held>(volery::request("ros.timer", with).integer(), "", callable));
     }
 };
 

@@ -1,0 +1,391 @@
+"""The library of a model: interfaces, and kinds of components with their ports and what they take.
+
+Frozen data. Every class declares how it is written in a model; what follows from other parts of the model
+(the processor that times are stated for, interfaces) is resolved while it is read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated
+
+from volery.base.errors import Location
+from volery.base.time import Ns
+from volery.model.fields import (
+    ANYTHING,
+    ENERGY,
+    FREQUENCY,
+    PERIOD,
+    PROCESSOR_KIND,
+    TEXT,
+    TIME,
+    Key,
+    ListOf,
+    MapOf,
+    OneOf,
+    Record,
+    Schema,
+    Shorter,
+    Syntax,
+    Whole,
+    WrongValueError,
+    expected,
+)
+from volery.model.reading import Reading
+from volery.model.text import Node, Path
+
+Value = bool | int | float | str | None | Sequence["Value"] | Mapping[str, "Value"]
+"""A parameter: what YAML can state. A number with a unit (``6 / h``) arrives as an SI number."""
+
+VEHICLE_INTERFACES: Mapping[str, str] = {"Drone": "multirotor", "Rover": "rover"}
+"""Interfaces that vehicles provide, and the kind of vehicle that does. Commands go over the ROS graph."""
+
+ENVIRONMENT_INTERFACE = "Environment"
+"""The interface whose port gives a component the ``Environment``: places, roads, zones, workload."""
+
+SPECIAL_INTERFACES = (*VEHICLE_INTERFACES, ENVIRONMENT_INTERFACE)
+"""Interfaces that exist in every model."""
+
+LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp", "rclcpp")
+"""Languages that a model may name. The ``Vocabulary`` states which of them run."""
+
+CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
+"""Languages that are compiled."""
+
+ROS_LANGUAGES = ("rospy", "rclpy", "roscpp", "rclcpp")
+"""Languages whose components are ROS nodes."""
+
+PROVENANCES = ("estimated", "measured", "calculated", "required")
+"""Where a figure comes from (MARTE's NFP source)."""
+
+LIBRARY: Path = ("components",)
+_MANY = "[]"
+
+
+# -- interfaces
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument of an operation. ``type`` is text for people and generators: ``str``, ``Position[]``."""
+
+    name: str
+    type: str
+
+
+class _Arguments(Syntax):
+    """Names of arguments with their types."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> tuple[Argument, ...]:
+        """See ``Syntax``."""
+        types = MapOf(TEXT).read(node, path, reading)
+        assert isinstance(types, dict)
+        return tuple(Argument(name, type_) for name, type_ in types.items())
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return MapOf(TEXT).schema(definitions)
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """An operation of an interface. ``returns`` is empty where it returns nothing."""
+
+    name: str
+    arguments: Annotated[
+        tuple[Argument, ...], Key("args"), _Arguments(), "Arguments by name, and their types."
+    ] = ()
+    returns: Annotated[str, TEXT, "Type of the result; nothing is returned if it is not given."] = ""
+
+
+OPERATIONS = Shorter(MapOf(Shorter(Record(Signature), empty=True)), empty=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A named set of operations. Without operations it stands for publish and subscribe, which needs ROS."""
+
+    name: str
+    operations: Mapping[str, Signature] = field(default_factory=dict)
+    where: Location | None = field(default=None, compare=False)
+
+    @property
+    def is_publish_subscribe(self) -> bool:
+        """True if ports of it are not connected: their component publishes and subscribes to topics."""
+        return not self.operations
+
+
+class _Interface(Syntax):
+    """An interface: its operations by name."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Interface:
+        """See ``Syntax``."""
+        name = str(path[-1])
+        if name in SPECIAL_INTERFACES:
+            reading.problems.add(path, f"{name} is there in every model; choose another name")
+        return Interface(name, OPERATIONS.read(node, path, reading), node.where)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return OPERATIONS.schema(definitions)
+
+
+INTERFACES = MapOf(_Interface())
+
+
+def _operations_of(interface: str, reading: Reading) -> list[str]:
+    return reading.names(("interfaces", interface))
+
+
+# -- what computing takes
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The processor of the catalogue and the frequency that a figure was stated at."""
+
+    processor: Annotated[str, PROCESSOR_KIND, "Kind of processor."]
+    frequency_hz: Annotated[float, FREQUENCY, "Frequency of the processor."]
+
+
+class _Reference(Record):
+    """A reference whose frequency is within the catalogue's range."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Reference:
+        """See ``Syntax``."""
+        made: Reference = super().read(node, path, reading)
+        check_frequency(reading, path, made.processor, made.frequency_hz)
+        return made
+
+
+REFERENCE = _Reference(Reference)
+
+
+def check_frequency(reading: Reading, path: Path, kind: str, frequency_hz: float) -> None:
+    """Report it if *frequency_hz*, stated in the mapping at *path*, is outside the range of the processor."""
+    known = reading.vocabulary.processors.get(kind)
+    if known is not None and not known.least_hz <= frequency_hz <= known.greatest_hz:
+        reading.problems.add(
+            (*path, "frequency"),
+            f"{frequency_hz / 1e6:g} MHz is outside what is known of {kind}: "
+            f"{known.least_hz / 1e6:g} to {known.greatest_hz / 1e6:g} MHz",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """What an operation or an activation takes, stated at a processor of the catalogue and a frequency.
+
+    ``energy_j`` is None where the model states none. A law scales it to other frequencies of the processor.
+    """
+
+    time_ns: Annotated[Ns, TIME, "Execution time."]
+    at: Annotated[Reference, REFERENCE, "Where it was taken; that of the component if it is not given."]
+    energy_j: Annotated[float | None, ENERGY, "Energy; by the processor's law if it is not given."] = None
+    provenance: Annotated[str, OneOf(PROVENANCES), "Where the figure comes from."] = "estimated"
+    where: Location | None = field(default=None, compare=False)
+
+
+def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
+    """Add the component's reference to a figure without one of its own."""
+    if "at" in node.items:
+        return node
+    default = reading.root.at((*path[:2], "at"))
+    if default is None:
+        what = "a time means nothing without where it was taken: add `at: {processor: ..., frequency: ...}`"
+        reading.problems.add(path, what)
+        raise WrongValueError("")
+    return replace(node, value={**node.items, "at": default})
+
+
+FIGURES = ListOf(Record(Figure, prepare=_with_reference), bare=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """An active component's flow of control. Releases are checked against its period.
+
+    ``deadline_ns`` counts from each release; ``start_ns`` delays the first one.
+    """
+
+    period_ns: Annotated[Ns | None, PERIOD, "Time between releases."] = None
+    deadline_ns: Annotated[Ns | None, PERIOD, "Time from a release to its end; by default, the period."] = (
+        None
+    )
+    priority: Annotated[int, Whole(), "Priority; a greater number is more urgent."] = 0
+    start_ns: Annotated[Ns, TIME, "Delay of the first release."] = 0
+
+
+def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
+    """Make the period the deadline where none is stated."""
+    if "period" in node.items and "deadline" not in node.items:
+        return replace(node, value={**node.items, "deadline": node.items["period"]})
+    return node
+
+
+ACTIVITY = Shorter(Record(Activity, prepare=_with_deadline), switch=True)
+
+
+# -- components
+
+
+@dataclass(frozen=True, slots=True)
+class RequiredPort:
+    """What a component needs: one provider of an interface, or any number (``many``: a list is injected)."""
+
+    name: str
+    interface: str
+    many: bool = False
+
+
+class _RequiredPort(Syntax):
+    """The name of an interface; ``Name[]`` for any number of providers."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> RequiredPort:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        interface, port = node.value.removesuffix(_MANY).strip(), str(path[-1])
+        reading.known(path, interface, "interface", [*reading.names(("interfaces",)), *SPECIAL_INTERFACES])
+        if port in INSTANCE_KEYS:
+            what = f"a required port cannot be called {port!r}: instances have a key of that name"
+            reading.problems.add(path, what)
+        return RequiredPort(port, interface, node.value.endswith(_MANY))
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
+
+
+INSTANCE_KEYS = ("is", "component", "parameters", "active", "namespace", "remap")
+"""Keys of an instance. Every other key of an instance is a required port."""
+
+
+class _ProvidedPort(Syntax):
+    """The name of an interface of the model."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        interface = node.value
+        if interface in SPECIAL_INTERFACES:
+            provider = "the environment" if interface == ENVIRONMENT_INTERFACE else "a vehicle"
+            reading.problems.add(path, f"{interface} is provided by {provider}, not by a component")
+        else:
+            reading.known(path, interface, "interface", reading.names(("interfaces",)))
+        return interface
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
+
+
+class _File(Syntax):
+    """A file beside the model; a folder, too, for C++."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        file = reading.folder / node.value
+        language = reading.root.at((*path[:-1], "language"))
+        folder = language is not None and language.value in CPP_LANGUAGES and file.is_dir()
+        if node.value and not file.is_file() and not folder:
+            there = sorted(found.name for found in file.parent.glob("*") if found.is_file())
+            beside = f"; in that folder there is {', '.join(there[:8])}" if there else ""
+            reading.problems.add(path, f"there is no file {node.value!r} beside the model{beside}")
+        return node.value
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """How C++ is compiled."""
+
+    flags: Annotated[tuple[str, ...], ListOf(TEXT, bare=True), "Options for the compiler."] = ()
+    libraries: Annotated[
+        tuple[str, ...], ListOf(TEXT, bare=True), "Libraries, by the names that follow `-l`."
+    ] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A kind of component: its language and file, its ports, and what it takes in fidelity `times`.
+
+    ``path`` is relative to the model's folder (``System.file_of`` resolves it) and empty where there is no
+    code yet. ``activity`` is None for a passive component. ``operations`` and ``activation`` hold the figures
+    of fidelity ``times``, one per processor kind.
+    """
+
+    name: str
+    language: Annotated[str, OneOf(LANGUAGES), "Language, with its ROS client library."]
+    path: Annotated[str, _File(), "File with its code, relative to the model; of C++, maybe a folder."] = ""
+    stated_class: Annotated[
+        str, Key("class"), TEXT, "Class in the file; by default, the name of the component in camel case."
+    ] = ""
+    build: Annotated[Build, Record(Build), "How C++ is compiled."] = Build()
+    provides: Annotated[
+        Mapping[str, str], MapOf(_ProvidedPort()), "Provided ports, and the interface of each."
+    ] = field(default_factory=dict)
+    requires: Annotated[
+        Mapping[str, RequiredPort],
+        MapOf(_RequiredPort()),
+        "Required ports, and the interface of each; `Name[]` for any number of providers.",
+    ] = field(default_factory=dict)
+    parameters: Annotated[
+        Mapping[str, Value], MapOf(ANYTHING, free=True), "Parameters, and their defaults."
+    ] = field(default_factory=dict)
+    activity: Annotated[
+        Activity | None,
+        Key("active"),
+        ACTIVITY,
+        "Its own flow of control; `true` for one without a period. Passive if it is not given.",
+    ] = None
+    at: Annotated[Reference | None, REFERENCE, "Where its figures were taken that do not state it."] = None
+    operations: Annotated[
+        Mapping[str, tuple[Figure, ...]],
+        MapOf(FIGURES),
+        "What each operation of its provided ports takes, one figure for each kind of processor.",
+    ] = field(default_factory=dict)
+    activation: Annotated[
+        tuple[Figure, ...], FIGURES, "What an activation takes, one figure for each kind of processor."
+    ] = ()
+    where: Location | None = field(default=None, compare=False)
+
+    @property
+    def class_name(self) -> str:
+        """The class that its file is expected to define: ``drone_control`` gives ``DroneControl``."""
+        parts = re.split(r"[_-]+", self.name)
+        return self.stated_class or "".join(part[:1].upper() + part[1:] for part in parts)
+
+
+class _Component(Record):
+    """A component whose figures are of operations that it provides."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Component:
+        """See ``Syntax``."""
+        made: Component = super().read(node, path, reading)
+        offered = [name for one in made.provides.values() for name in _operations_of(one, reading)]
+        for operation in made.operations:
+            at = (*path, "operations", operation)
+            reading.known(at, operation, "operation of its provided ports", offered)
+        return made
+
+
+COMPONENTS = MapOf(_Component(Component))
+
+
+def library(reading: Reading) -> dict[str, Component]:
+    """Return the components of the model. Use with ``Reading.once``."""
+    node = reading.root.at(LIBRARY)
+    if node is None or not isinstance(node.value, dict):
+        return {}
+    made = COMPONENTS.read(node, LIBRARY, reading)
+    assert isinstance(made, dict)
+    return made

@@ -1,0 +1,290 @@
+"""The catalogue of faults: which there are, what they do to what, and with which arguments. Data only.
+
+One class per kind declares its arguments with their units, ranges, defaults and descriptions. From it follow
+the model's parser, its JSON Schema and the generated page of faults. The effect of each kind on a simulated
+run is in ``volery.run.assembly.faults``; fault trials (``volery.testing.faults``) use the same classes.
+
+A new kind of fault: a class here with ``@fault``, its effect there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated, Any, TypeVar
+
+from volery.base.errors import Location
+from volery.base.time import Ns
+from volery.model.fields import (
+    HEADING,
+    NETWORK,
+    PROCESSOR,
+    SHARE,
+    SPEED,
+    TIME,
+    VEHICLE,
+    Record,
+    Schema,
+    Syntax,
+    Whole,
+    WrongValueError,
+    expected,
+)
+from volery.model.reading import Reading
+from volery.model.text import Node, Path, no_such
+
+ONLY_TRIALS = "Only in fault trials: a model cannot state it."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Something that breaks at a stated time, for good or for a while.
+
+    ``kind`` is the name of the kind. ``subject`` is the name of the thing that breaks.
+    """
+
+    kind = ""
+
+    name: str = ""
+    at_ns: Annotated[Ns, TIME, "When it happens, from the start of the run."]
+    duration_ns: Annotated[Ns | None, TIME, "How long it lasts; for good if it is not given."] = None
+    where: Location | None = field(default=None, compare=False)
+
+    @property
+    def subject(self) -> str:
+        """The name of the vehicle, processor or network that breaks."""
+        return ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleFault(Fault):
+    """A fault of one vehicle."""
+
+    vehicle: Annotated[str, VEHICLE, "The vehicle that it happens to."]
+
+    @property
+    def subject(self) -> str:
+        """The name of the vehicle."""
+        return self.vehicle
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessorFault(Fault):
+    """A fault of one computer."""
+
+    processor: Annotated[str, PROCESSOR, "The computer that it happens to."]
+
+    @property
+    def subject(self) -> str:
+        """The name of the processor."""
+        return self.processor
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkFault(Fault):
+    """A fault of one network."""
+
+    network: Annotated[str, NETWORK, "The network that it happens to."]
+
+    @property
+    def subject(self) -> str:
+        """The name of the network."""
+        return self.network
+
+
+FAULTS: dict[str, type[Fault]] = {}
+"""The kinds that a model can state, by name."""
+
+TRIAL_FAULTS: dict[str, type[Fault]] = {}
+"""The kinds that only fault trials know, by name."""
+
+C = TypeVar("C", bound=type[Fault])
+
+
+def fault(kind: str, *, trials_only: bool = False) -> Callable[[C], C]:
+    """Register a class of the catalogue under the name of its *kind*."""
+
+    def register(cls: C) -> C:
+        cls.kind = kind
+        (TRIAL_FAULTS if trials_only else FAULTS)[kind] = cls
+        return cls
+
+    return register
+
+
+# -- the airframe
+
+
+@fault("motor-dead")
+@dataclass(frozen=True, kw_only=True)
+class MotorDead(VehicleFault):
+    """A motor of a multirotor gives no thrust, or only a share of it."""
+
+    motor: Annotated[int, Whole(least=1, most=4), "Number of the motor, in the autopilot's order."] = 1
+    thrust: Annotated[float, SHARE, "Share of its thrust that is left."] = 0.0
+
+
+@fault("battery-low")
+@dataclass(frozen=True, kw_only=True)
+class BatteryLow(VehicleFault):
+    """The battery is drained to a share of its capacity at once. What was drained does not come back."""
+
+    charge: Annotated[float, SHARE, "Share of the capacity that is left."] = 0.08
+
+
+@fault("battery-cell-dead")
+@dataclass(frozen=True, kw_only=True)
+class BatteryCellDead(VehicleFault):
+    """Cells of the battery are short-circuited: its voltage drops by theirs."""
+
+    cells: Annotated[int, Whole(least=1, most=12), "Number of dead cells; at least one cell stays alive."] = 1
+
+
+# -- sensors
+
+
+@fault("gps-lost")
+@dataclass(frozen=True, kw_only=True)
+class GpsLost(VehicleFault):
+    """The satellite receiver sees no satellites."""
+
+
+@fault("gps-drift")
+@dataclass(frozen=True, kw_only=True)
+class GpsDrift(VehicleFault):
+    """The position that the satellite receiver reports drifts away from the true one.
+
+    The reported velocity contains the drift. When the fault is over, the report jumps back to the truth.
+    """
+
+    speed_m_s: Annotated[float, SPEED, "Speed of the drift."] = 1.0
+    direction_deg: Annotated[float, HEADING, "Where it drifts to, clockwise from north."] = 0.0
+
+
+@fault("barometer-stuck")
+@dataclass(frozen=True, kw_only=True)
+class BarometerStuck(VehicleFault):
+    """The barometer repeats its last value."""
+
+
+@fault("compass-stuck")
+@dataclass(frozen=True, kw_only=True)
+class CompassStuck(VehicleFault):
+    """The compass repeats its last value."""
+
+
+# -- the link between an autopilot and what commands it
+
+
+@fault("link-cut")
+@dataclass(frozen=True, kw_only=True)
+class LinkCut(VehicleFault):
+    """Nothing passes on the link to the autopilot, in either direction."""
+
+
+@fault("link-degraded")
+@dataclass(frozen=True, kw_only=True)
+class LinkDegraded(VehicleFault):
+    """The link to the autopilot loses, delays, doubles or damages what it carries, in both directions."""
+
+    loss: Annotated[float, SHARE, "Share of the frames that are lost."] = 0.0
+    delay_ns: Annotated[Ns, TIME, "Delay of frames: evenly drawn between nothing and this time."] = 0
+    duplicate: Annotated[float, SHARE, "Share of the frames that arrive twice."] = 0.0
+    reorder: Annotated[float, SHARE, "Share of the frames that are overtaken by those of the next 60 ms."] = (
+        0.0
+    )
+    corrupt: Annotated[float, SHARE, "Share of the bytes that have one bit flipped."] = 0.0
+    truncate: Annotated[float, SHARE, "Share of the frames that end too early."] = 0.0
+
+
+# -- computers and what joins them
+
+
+@fault("network-cut")
+@dataclass(frozen=True, kw_only=True)
+class NetworkCut(NetworkFault):
+    """The network loses whatever is sent over it."""
+
+
+@fault("network-degraded")
+@dataclass(frozen=True, kw_only=True)
+class NetworkDegraded(NetworkFault):
+    """The network loses more than usual, or delays what it carries."""
+
+    loss: Annotated[float, SHARE, "Share of the transmissions that are lost, if it is more than usual."] = 0.0
+    delay_ns: Annotated[Ns, TIME, "Delay that is added to the usual latency."] = 0
+
+
+@fault("computer-stopped")
+@dataclass(frozen=True, kw_only=True)
+class ComputerStopped(ProcessorFault):
+    """The computer executes nothing. Afterwards it goes on where it stopped."""
+
+
+@fault("computer-slowed")
+@dataclass(frozen=True, kw_only=True)
+class ComputerSlowed(ProcessorFault):
+    """Something else takes a share of each core of the computer before all components."""
+
+    load: Annotated[float, SHARE, "Share of each core that is taken."] = 0.5
+
+
+# -- the air
+
+
+@fault("wind")
+@dataclass(frozen=True, kw_only=True)
+class WindChange(Fault):
+    """The wind changes over all of the world."""
+
+    speed_m_s: Annotated[float, SPEED, "Mean speed."] = 12.0
+    direction_deg: Annotated[float, HEADING, "Where it blows from, clockwise from north."] = 270.0
+    gusts_m_s: Annotated[float, SPEED, "Standard deviation of the gusts."] = 1.5
+
+    @property
+    def subject(self) -> str:
+        """The air has no name of its own."""
+        return "wind"
+
+
+# -- only in trials
+
+
+@fault("other-station", trials_only=True)
+@dataclass(frozen=True, kw_only=True)
+class OtherStation(VehicleFault):
+    """Another station lands the vehicle; on the ground it disarms it.
+
+    Where all programs share one node, the pilot does so by remote control.
+    """
+
+
+@fault("program-killed", trials_only=True)
+@dataclass(frozen=True, kw_only=True)
+class ProgramKilled(VehicleFault):
+    """The program that commands the vehicle is killed: it stops without a farewell."""
+
+
+class _AnyFault(Syntax):
+    """One of the kinds of faults that a model can state."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        if not isinstance(node.value, dict):
+            raise expected("a mapping of keys", node)
+        kind = node.items.get("kind")
+        if kind is None or not isinstance(kind.value, str):
+            what = "this key is missing" if kind is None else str(expected("text", kind))
+            reading.problems.add((*path, "kind"), what, (kind or node).where)
+            raise WrongValueError("")
+        if kind.value not in FAULTS:
+            reading.problems.add((*path, "kind"), no_such(kind.value, "kind of fault", FAULTS), kind.where)
+            raise WrongValueError("")
+        return Record(FAULTS[kind.value], kind=kind.value).read(node, path, reading)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"anyOf": [Record(cls, kind=kind).schema(definitions) for kind, cls in FAULTS.items()]}
+
+
+FAULT = _AnyFault()

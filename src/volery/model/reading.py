@@ -1,0 +1,100 @@
+"""One pass over a model's tree: where names are looked up and problems are collected.
+
+The names of vehicles, processors, components and so on are taken from the tree, not from what was read before.
+So references are checked where they stand, in any order of sections, and all problems are reported at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any, TypeVar
+
+from volery.base.errors import Location
+from volery.model.text import Node, Path, Problems
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Observable:
+    """A quantity that requirements may bound: ``<subject>.<quantity>``.
+
+    ``subject`` is the kind of the observed thing: ``component``, ``processor``, ``vehicle``, ``chain`` or
+    ``application``. An empty ``unit`` stands for a count or a share.
+    """
+
+    subject: str
+    quantity: str
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessorKind:
+    """What the catalogue states of a processor: its cores and the range in which its laws are valid.
+
+    ``settings_hz`` are the frequencies within the range that can be set, ascending; empty if unknown.
+    """
+
+    cores: int
+    least_hz: float
+    greatest_hz: float
+    settings_hz: tuple[float, ...] = ()
+
+
+Kinds = Mapping[str, ProcessorKind]
+
+
+def _no_catalogue(file: FilePath) -> Kinds:
+    return {}
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Names that are defined outside the model. The caller supplies them; the model only checks against them.
+
+    ``languages`` are those that run today; a model may name others of ``LANGUAGES``. ``read_catalogue``
+    returns the processors of a catalogue file that the model refers to, or raises ``ModelError``.
+    """
+
+    processors: Kinds
+    languages: frozenset[str]
+    autopilots: frozenset[str]
+    observables: tuple[Observable, ...] = ()
+    read_catalogue: Callable[[FilePath], Kinds] = _no_catalogue
+
+
+@dataclass
+class Reading:
+    """The tree that is read, what it is checked against, and the problems found so far."""
+
+    root: Node
+    problems: Problems
+    vocabulary: Vocabulary
+    folder: FilePath
+    _results: dict[Callable[[Any], Any], Any] = field(default_factory=dict)
+
+    def names(self, *sections: Path) -> list[str]:
+        """Return the keys of the mappings at *sections*, in order."""
+        found = (self.root.at(section) for section in sections)
+        return [name for node in found if node is not None for name in node.items]
+
+    def once(self, make: Callable[[Reading], T]) -> T:
+        """Return what *make* computes from this reading. It is called only the first time."""
+        if make not in self._results:
+            self._results[make] = make(self)
+        result: T = self._results[make]
+        return result
+
+    def where(self, path: Path) -> Location | None:
+        """Return the file and line of *path*."""
+        return self.problems.where(path)
+
+    def known(self, path: Path, name: str, noun: str, valid: Iterable[str]) -> bool:
+        """Return whether *name* is one of the *valid* names; report a problem at *path* if it is not."""
+        names = list(valid)
+        if name not in names:
+            self.problems.unknown(path, name, noun, names)
+        return name in names

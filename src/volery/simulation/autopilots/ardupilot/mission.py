@@ -1,0 +1,197 @@
+"""ArduPilot's missions: what is accepted, what is read back, and what is said on the way."""
+
+from __future__ import annotations
+
+from math import isinf, isnan
+
+from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
+from volery.simulation.autopilots.ardupilot.modes import INFO, disarm
+from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
+from volery.simulation.autopilots.mavlink.message_fields import finite
+from volery.simulation.autopilots.onboard_mission import (
+    CHANGE_SPEED,
+    CONDITION_DELAY,
+    CONDITION_DISTANCE,
+    CONDITION_YAW,
+    DELAY,
+    GLOBAL,
+    GLOBAL_INT,
+    GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT,
+    GLOBAL_TERRAIN,
+    GLOBAL_TERRAIN_INT,
+    JUMP,
+    LAND,
+    LOITER_TIME,
+    LOITER_TO_ALTITUDE,
+    LOITER_TURNS,
+    LOITER_UNLIMITED,
+    RETURN,
+    SET_HOME,
+    SET_YAW_SPEED,
+    SPLINE_WAYPOINT,
+    TAKEOFF,
+    WAYPOINT,
+    MissionItem,
+)
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
+"""MAV_MISSION_RESULT."""
+
+NAMES = {
+    WAYPOINT: "WP",
+    SPLINE_WAYPOINT: "SplineWP",
+    LOITER_UNLIMITED: "LoitUnlim",
+    LOITER_TURNS: "LoitTurns",
+    LOITER_TIME: "LoitTime",
+    LOITER_TO_ALTITUDE: "LoitAltitude",
+    RETURN: "RTL",
+    LAND: "Land",
+    TAKEOFF: "Takeoff",
+    DELAY: "Delay",
+    SET_YAW_SPEED: "SetYawSpd",
+    CONDITION_DELAY: "CondDelay",
+    CONDITION_DISTANCE: "CondDist",
+    CONDITION_YAW: "CondYaw",
+    CHANGE_SPEED: "ChangeSpeed",
+    SET_HOME: "SetHome",
+    JUMP: "Jump",
+}
+"""How the firmware calls items in its texts."""
+
+KEPT_ONLY = frozenset({189, 195, 197, 201, 203, 205, 206, 211, 181, 182, 183, 184, 207, 208, 212})
+"""Items that are stored and read back but do nothing here: cameras, servos, relays, grippers, fences,
+regions.
+"""
+
+PLACED = frozenset(
+    {
+        WAYPOINT,
+        SPLINE_WAYPOINT,
+        LOITER_UNLIMITED,
+        LOITER_TURNS,
+        LOITER_TIME,
+        LOITER_TO_ALTITUDE,
+        LAND,
+        TAKEOFF,
+        SET_HOME,
+    }
+)
+"""Items whose frame is kept; the others read back frame 0."""
+
+STORED_FRAMES = {
+    GLOBAL: GLOBAL,
+    GLOBAL_INT: GLOBAL,
+    GLOBAL_RELATIVE: GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT: GLOBAL_RELATIVE,
+    GLOBAL_TERRAIN: GLOBAL_TERRAIN,
+    GLOBAL_TERRAIN_INT: GLOBAL_TERRAIN,
+}
+"""The frame that is read back for the one that was sent."""
+
+MISSION_FRAME = 2
+
+
+def stored_item(item: MissionItem) -> MissionItem | int:
+    """As it is kept: frames without their integer twins, numbers that are none as zero."""
+    if item.command not in NAMES and item.command not in KEPT_ONLY:
+        return UNSUPPORTED
+    if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
+        return UNSUPPORTED_FRAME
+    wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
+    if wrong:
+        return wrong
+    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in PLACED else GLOBAL
+    return item._replace(
+        frame=frame,
+        param1=finite(item.param1),
+        param2=finite(item.param2),
+        param3=finite(item.param3),
+        param4=finite(item.param4),
+        z=finite(item.z),
+    )
+
+
+def _wrong_parameter(item: MissionItem) -> int:
+    """The result that names the parameter that is no number; a heading of three commands need not be one."""
+    for place, value in enumerate((item.param1, item.param2, item.param3, item.param4)):
+        may_be_none = place == 3 and item.command in (WAYPOINT, LAND, TAKEOFF)
+        if isinf(value) or (isnan(value) and not may_be_none):
+            return INVALID_PARAM1 + place
+    return 0
+
+
+def _wrong_place(item: MissionItem) -> int:
+    if abs(item.x) > 900_000_000:
+        return INVALID_X
+    if abs(item.y) > 1_800_000_000:
+        return INVALID_Y
+    return 0 if abs(item.z) < HIGHEST else INVALID_Z  # a NaN is not less
+
+
+def home_item(vehicle: Vehicle) -> MissionItem | None:
+    """Item 0 is home."""
+    home = vehicle.home
+    if home is None:
+        return None
+    return MissionItem(
+        WAYPOINT, GLOBAL, x=round(home.latitude * 1e7), y=round(home.longitude * 1e7), z=home.amsl
+    )
+
+
+def mission_grew(vehicle: Vehicle, count: int) -> None:
+    """MIS_TOTAL counts along."""
+    vehicle.set_parameter("MIS_TOTAL", count)
+
+
+def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+    """Another item is flown."""
+    vehicle.say(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
+
+
+def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+    """MISSION_ITEM_REACHED, and words for what is not a take-off or the end."""
+    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": index})
+    if item.command in (WAYPOINT, SPLINE_WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_TO_ALTITUDE, DELAY):
+        vehicle.say(INFO, f"Reached command #{index}")
+
+
+def act(vehicle: Vehicle, item: MissionItem) -> None:
+    """Items that are done at once."""
+    if item.command == CHANGE_SPEED:
+        change_speed(vehicle, round(item.param1), item.param2)
+    elif item.command == CONDITION_YAW:
+        turn_to(vehicle, item.param1, item.param3, relative=item.param4 == 1.0)
+    elif item.command == SET_HOME:
+        if item.param1 == 1.0 or not item.has_place:
+            vehicle.home_is_here()
+        else:
+            vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
+
+
+def leaves_ground(vehicle: Vehicle) -> bool:
+    """Whether AUTO takes off without a MISSION_START: the throttle is raised, or AUTO_OPTIONS allows it."""
+    raised = vehicle.tuning.sticks.read(vehicle.sticks).throttle > 0.0
+    return raised or bool(round(vehicle.parameters["AUTO_OPTIONS"]) & 2)
+
+
+def runs(vehicle: Vehicle) -> bool:
+    """Whether the mission is being flown."""
+    plan = vehicle.plan
+    return vehicle.armed and vehicle.mode.name == "AUTO" and plan.current > 0 and not plan.complete
+
+
+def copter_ended(vehicle: Vehicle) -> None:
+    """On the ground it disarms; in the air it stays where it is."""
+    if vehicle.landed and vehicle.armed:
+        disarm(vehicle, "Disarming motors", force=True)
+    elif vehicle.armed:
+        stay = ToPoint(vehicle)
+        stay.enter()
+        stay.step()
+
+
+def rover_ended(vehicle: Vehicle) -> None:
+    """It holds."""
+    vehicle.say(INFO, "Mission Complete")

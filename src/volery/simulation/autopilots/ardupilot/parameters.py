@@ -1,0 +1,219 @@
+"""The parameters that change what a simulated ArduPilot does. All others are kept, listed and read back.
+
+From ArduPilot's parameters to the figures that manoeuvres fly by.
+
+Every parameter read here is honoured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import radians
+from types import MappingProxyType
+
+from volery.base.time import MS, from_seconds
+from volery.simulation.autopilots.autopilot_parameters import Parameters, Tuning
+from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
+
+_STICKS = {
+    **{
+        f"RCMAP_{stick}": f"channel of the {stick.lower()} stick"
+        for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")
+    },
+    **{
+        f"RC{channel}_{part}": f"{words} of channel {channel}"
+        for channel in range(1, 17)
+        for part, words in (
+            ("MIN", "lower end"),
+            ("TRIM", "middle"),
+            ("MAX", "upper end"),
+            ("DZ", "dead zone"),
+            ("REVERSED", "direction"),
+        )
+    },
+}
+
+_SHARED = {
+    **_STICKS,
+    "ARMING_CHECK": "0 skips all checks, anything else makes all of them",
+    "BATT_ARM_MAH": "charge that arming asks for",
+    "BATT_ARM_VOLT": "voltage that arming asks for",
+    "BATT_CAPACITY": "charge of the full battery; set from the vehicle's own unless given",
+    "BATT_CRT_MAH": "critical level by charge",
+    "BATT_CRT_VOLT": "critical level by voltage",
+    "BATT_FS_CRT_ACT": "what happens at the critical level",
+    "BATT_FS_LOW_ACT": "what happens at the low level",
+    "BATT_LOW_MAH": "low level by charge",
+    "BATT_LOW_TIMER": "how long the voltage must stay below a level",
+    "BATT_LOW_VOLT": "low level by voltage",
+    "FS_GCS_ENABLE": "what happens when the ground station falls silent",
+    "FS_GCS_TIMEOUT": "after which time that is",
+    "FS_THR_ENABLE": "what happens when the throttle channel falls below FS_THR_VALUE",
+    "FS_THR_VALUE": "pulse width of a lost transmitter",
+    "INITIAL_MODE": "mode after boot",
+    "RC_OVERRIDE_TIME": "overrides end after that; 0 refuses them, less lets them stay",
+    "RNGFND1_TYPE": "any type but 0 sends RANGEFINDER and DISTANCE_SENSOR",
+    "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
+    "SYSID_MYGCS": "the system id whose heartbeats and sticks count",
+}
+
+COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
+    {
+        **_SHARED,
+        "ANGLE_MAX": "largest lean",
+        "AUTO_OPTIONS": "bit 0 allows arming in AUTO, bit 1 its take-off without a raised throttle",
+        "CIRCLE_RADIUS": "circle of LOITER_TURNS",
+        "CIRCLE_RATE": "turn rate on it",
+        "DISARM_DELAY": "idle on the ground it disarms after that",
+        "FRAME_TYPE": "the shape that is named when parameters are listed; it flies as built",
+        "FS_EKF_ACTION": "what happens when the position is lost in flight",
+        "FS_EKF_THRESH": "0 switches that off",
+        "FS_OPTIONS": "bits 0, 1, 2, 3, 4: when a failsafe changes nothing",
+        "GUID_TIMEOUT": "after which velocities and attitudes without news end",
+        "LAND_ALT_LOW": "below that it lands slowly",
+        "LAND_SPEED": "slow landing speed",
+        "LAND_SPEED_HIGH": "landing speed above; 0: WPNAV_SPEED_DN",
+        "LOIT_ACC_MAX": "LOITER's largest acceleration",
+        "LOIT_ANG_MAX": "LOITER's largest lean; 0: two thirds of ANGLE_MAX",
+        "LOIT_BRK_ACCEL": "LOITER's braking",
+        "LOIT_BRK_DELAY": "how long it glides before",
+        "LOIT_SPEED": "LOITER's largest speed",
+        "MOT_THST_HOVER": "hover thrust; learnt in flight and stored on disarming",
+        "PILOT_ACCEL_Z": "the pilot's vertical acceleration",
+        "PILOT_SPEED_DN": "the pilot's largest descent; 0: PILOT_SPEED_UP",
+        "PILOT_SPEED_UP": "the pilot's largest climb",
+        "PILOT_Y_RATE": "the pilot's turn rate",
+        "RTL_ALT": "height of the return",
+        "RTL_ALT_FINAL": "height to stay at over home; 0 lands",
+        "RTL_CLIMB_MIN": "least climb of the return",
+        "RTL_CONE_SLOPE": "lower return close to home",
+        "RTL_LOIT_TIME": "wait over home",
+        "RTL_SPEED": "speed of the return; 0: WPNAV_SPEED",
+        "THR_DZ": "dead zone about the middle of the throttle",
+        "WPNAV_ACCEL": "acceleration in the plane",
+        "WPNAV_ACCEL_Z": "vertical acceleration",
+        "WPNAV_RADIUS": "radius within which a waypoint is reached",
+        "WPNAV_SPEED": "speed in the plane",
+        "WPNAV_SPEED_DN": "descent",
+        "WPNAV_SPEED_UP": "climb",
+        "WP_YAW_BEHAVIOR": "1 and 2 turn the nose along a mission's path",
+    }
+)
+"""A copter's, and what each changes."""
+
+ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
+    {
+        **_SHARED,
+        "ATC_ACCEL_MAX": "acceleration; 0: 1 m/s^2",
+        "CRUISE_SPEED": "speed where WP_SPEED is 0",
+        "FS_ACTION": "what station and radio failsafes do",
+        "RTL_SPEED": "speed of the return; 0: WP_SPEED",
+        "WP_RADIUS": "radius within which a waypoint is reached",
+        "WP_SPEED": "speed",
+    }
+)
+"""A rover's, and what each changes."""
+
+
+CHANNELS = 16
+FASTEST = 1000.0
+SLOWEST = 0.1
+"""Speed [m/s] where a parameter asks for less than none; the firmware's own least values are of that size."""
+
+
+def channel_range(parameters: Parameters, channel: int) -> ChannelRange:
+    """How channel *channel* moves."""
+    return ChannelRange(
+        parameters[f"RC{channel}_MIN"],
+        parameters[f"RC{channel}_TRIM"],
+        parameters[f"RC{channel}_MAX"],
+        parameters[f"RC{channel}_DZ"],
+        parameters[f"RC{channel}_REVERSED"] > 0.0,
+    )
+
+
+def _channel(parameters: Parameters, stick: str, usual: int) -> int:
+    """The channel of a stick; the usual one where RCMAP names none that exists."""
+    channel = round(parameters[f"RCMAP_{stick}"])
+    return channel if 1 <= channel <= CHANNELS else usual
+
+
+def stick_map(parameters: Parameters) -> StickMap:
+    """Which channel is which stick."""
+    roll, pitch, throttle, yaw = (
+        _channel(parameters, name, usual)
+        for usual, name in enumerate(("ROLL", "PITCH", "THROTTLE", "YAW"), start=1)
+    )
+    return StickMap(
+        roll,
+        pitch,
+        throttle,
+        yaw,
+        (
+            channel_range(parameters, roll),
+            channel_range(parameters, pitch),
+            channel_range(parameters, throttle),
+            channel_range(parameters, yaw),
+        ),
+    )
+
+
+def _moving(value: float, instead: float = SLOWEST) -> float:
+    """A speed or an acceleration that moves; *instead* where it is none."""
+    return min(value, FASTEST) if value > 0.0 else instead
+
+
+def copter_tuning(parameters: Parameters) -> Tuning:
+    """A copter's. Its parameters are centimetres and hundredths of a degree."""
+    p = parameters
+    speed_down = _moving(p["WPNAV_SPEED_DN"] / 100.0)
+    pilot_up = _moving(p["PILOT_SPEED_UP"] / 100.0)
+    speed = _moving(p["WPNAV_SPEED"] / 100.0)
+    angle = radians(min(80.0, max(10.0, p["ANGLE_MAX"] / 100.0)))
+    return Tuning(
+        sticks=stick_map(p),
+        speed=speed,
+        speed_up=_moving(p["WPNAV_SPEED_UP"] / 100.0),
+        speed_down=speed_down,
+        accel=_moving(p["WPNAV_ACCEL"] / 100.0, 1.0),
+        accel_z=_moving(p["WPNAV_ACCEL_Z"] / 100.0, 1.0),
+        tilt=angle,
+        waypoint_radius=_moving(p["WPNAV_RADIUS"] / 100.0),
+        face_path=p["WP_YAW_BEHAVIOR"] in (1.0, 2.0),
+        land_speed=_moving(p["LAND_SPEED"] / 100.0),
+        land_speed_high=_moving(p["LAND_SPEED_HIGH"] / 100.0, speed_down),
+        land_slow_below=p["LAND_ALT_LOW"] / 100.0,
+        return_height=p["RTL_ALT"] / 100.0,
+        return_climb_min=p["RTL_CLIMB_MIN"] / 100.0,
+        return_cone=p["RTL_CONE_SLOPE"],
+        return_speed=_moving(p["RTL_SPEED"] / 100.0, speed),
+        return_wait=round(p["RTL_LOIT_TIME"]) * MS,
+        return_final=p["RTL_ALT_FINAL"] / 100.0,
+        pilot_up=pilot_up,
+        pilot_down=_moving(p["PILOT_SPEED_DN"] / 100.0, pilot_up),
+        pilot_accel_z=_moving(p["PILOT_ACCEL_Z"] / 100.0, 1.0),
+        pilot_yaw_rate=radians(p["PILOT_Y_RATE"]),
+        throttle_dead=p["THR_DZ"] / 1000.0,
+        hover_throttle=p["MOT_THST_HOVER"],
+        loiter_speed=_moving(p["LOIT_SPEED"] / 100.0),
+        loiter_accel=_moving(p["LOIT_ACC_MAX"] / 100.0, 1.0),
+        loiter_tilt=min(angle, _moving(radians(p["LOIT_ANG_MAX"]), angle * 2.0 / 3.0)),
+        loiter_brake=_moving(p["LOIT_BRK_ACCEL"] / 100.0, 1.0),
+        loiter_brake_delay=from_seconds(p["LOIT_BRK_DELAY"]),
+        circle_radius=p["CIRCLE_RADIUS"] / 100.0,
+        circle_rate=radians(p["CIRCLE_RATE"]),
+        target_timeout=from_seconds(p["GUID_TIMEOUT"]),
+    )
+
+
+def rover_tuning(parameters: Parameters) -> Tuning:
+    """A rover's. Its parameters are metres and degrees."""
+    p = parameters
+    speed = _moving(p["WP_SPEED"], _moving(p["CRUISE_SPEED"]))
+    return Tuning(
+        sticks=stick_map(p),
+        speed=speed,
+        accel=_moving(p["ATC_ACCEL_MAX"], 1.0),
+        waypoint_radius=_moving(p["WP_RADIUS"]),
+        return_speed=_moving(p["RTL_SPEED"], speed),
+    )

@@ -1,0 +1,588 @@
+"""Telemetry of ArduPilot about where the vehicle is and how it moves.
+
+Units and signs are the messages' own.
+
+Telemetry of ArduPilot about itself: heartbeat, health, battery, channels, mission, estimator, version.
+"""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot, nan, pi
+from typing import NamedTuple
+
+from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
+from volery.base.time import US, S
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
+from volery.simulation.autopilots.mavlink.message_fields import (
+    EPOCH_US,
+    Fields,
+    boot_ms,
+    boot_us,
+    heading_cdeg,
+    to_int16,
+    to_uint16,
+)
+from volery.simulation.autopilots.onboard_mission import OnboardMission
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+NO_FIX_AFTER = int(9.64 * S)
+"""From this uptime on the receiver is known."""
+FIX_AFTER = int(9.85 * S)
+"""From this uptime on it has a fix."""
+GRAVITY_MILLI = 1000.0 / 9.80665
+ZERO_CELSIUS_RISE = 2850
+"""What the recorded boards' thermometers show in flight [cdegC]."""
+
+
+def _has_fix(vehicle: Vehicle) -> bool:
+    return vehicle.uptime() >= FIX_AFTER
+
+
+def _cm(metres: float) -> int:
+    """Millimetres, as a firmware that reckons in centimetres gives them."""
+    return round(metres * 100.0) * 10
+
+
+def global_position(vehicle: Vehicle) -> Fields:
+    """GLOBAL_POSITION_INT: sent with zeros while there is no fix."""
+    estimate = vehicle.estimate
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle), "hdg": heading_cdeg(estimate.attitude[2])}
+    if not _has_fix(vehicle):
+        return fields
+    latitude, longitude, amsl = estimate.geodetic
+    north, east, down = estimate.velocity
+    fields["lat"], fields["lon"] = round(latitude * 1e7), round(longitude * 1e7)
+    fields["alt"], fields["relative_alt"] = _cm(amsl), round(vehicle.height * 1000.0)
+    fields["vx"], fields["vy"], fields["vz"] = (to_int16(speed * 100.0) for speed in (north, east, down))
+    return fields
+
+
+def local_position(vehicle: Vehicle) -> Fields | None:
+    """LOCAL_POSITION_NED: only with a position."""
+    if vehicle.uptime() < vehicle.firmware.local_position_after:
+        return None
+    estimate = vehicle.estimate
+    if not estimate.position_ok:
+        return None
+    x, y, z = estimate.position
+    vx, vy, vz = estimate.velocity
+    return {"time_boot_ms": boot_ms(vehicle), "x": x, "y": y, "z": z, "vx": vx, "vy": vy, "vz": vz}
+
+
+def vfr_hud(vehicle: Vehicle) -> Fields:
+    """VFR_HUD."""
+    estimate = vehicle.estimate
+    north, east, down = estimate.velocity
+    ground = hypot(north, east)
+    return {
+        "airspeed": hypot(ground, down),
+        "groundspeed": ground,
+        "heading": int(degrees(estimate.attitude[2])) % 360,
+        "throttle": round(abs(estimate.throttle) * 100.0) if vehicle.armed else 0,
+        "alt": estimate.geodetic[2] if _has_fix(vehicle) else 0.0,
+        "climb": -down,
+    }
+
+
+def _imu(vehicle: Vehicle) -> Fields:
+    estimate = vehicle.estimate
+    return {
+        "xacc": to_int16(estimate.accel[0] * GRAVITY_MILLI),
+        "yacc": to_int16(estimate.accel[1] * GRAVITY_MILLI),
+        "zacc": to_int16(estimate.accel[2] * GRAVITY_MILLI),
+        "xgyro": to_int16(estimate.gyro[0] * 1000.0),
+        "ygyro": to_int16(estimate.gyro[1] * 1000.0),
+        "zgyro": to_int16(estimate.gyro[2] * 1000.0),
+        **_compass(vehicle),
+        "temperature": ZERO_CELSIUS_RISE,
+    }
+
+
+def _compass(vehicle: Vehicle) -> Fields:
+    if vehicle.uptime() < vehicle.firmware.ready_after:
+        return {}
+    x, y, z = vehicle.estimate.mag
+    return {"xmag": to_int16(x * 1000.0), "ymag": to_int16(y * 1000.0), "zmag": to_int16(z * 1000.0)}
+
+
+def raw_imu(vehicle: Vehicle) -> Fields:
+    """RAW_IMU: milli-g, mrad/s, milligauss."""
+    return {"time_usec": boot_us(vehicle), "id": 0, **_imu(vehicle)}
+
+
+def scaled_imu2(vehicle: Vehicle) -> Fields:
+    """SCALED_IMU2: the second unit reads as the first."""
+    return {"time_boot_ms": boot_ms(vehicle), **_imu(vehicle)}
+
+
+def scaled_imu3(vehicle: Vehicle) -> Fields:
+    """SCALED_IMU3: there is no third unit but a third compass."""
+    return {"time_boot_ms": boot_ms(vehicle), **_compass(vehicle)}
+
+
+def pressure(vehicle: Vehicle) -> Fields:
+    """SCALED_PRESSURE and SCALED_PRESSURE2."""
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "press_abs": vehicle.estimate.pressure,
+        "press_diff": 0.0,
+        "temperature": ZERO_CELSIUS_RISE,
+    }
+
+
+def gps_raw(vehicle: Vehicle) -> Fields:
+    """GPS_RAW_INT."""
+    if vehicle.uptime() < NO_FIX_AFTER:
+        return {"eph": 65_535, "epv": 65_535}
+    fix = vehicle.estimate.gps
+    if fix.fix_type == 0 or not _has_fix(vehicle):
+        return {
+            "time_usec": boot_us(vehicle),
+            "fix_type": 1,
+            "eph": 9999,
+            "epv": 9999,
+            "satellites_visible": 3,
+        }
+    north, east, _ = fix.velocity
+    speed = hypot(north, east)
+    return {
+        "time_usec": boot_us(vehicle),
+        "fix_type": fix.fix_type,
+        "lat": round(fix.latitude * 1e7),
+        "lon": round(fix.longitude * 1e7),
+        "alt": _cm(fix.amsl),
+        "eph": to_uint16(fix.eph * 100.0),
+        "epv": to_uint16(fix.epv * 100.0),
+        "vel": to_uint16(speed * 100.0),
+        "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
+        "satellites_visible": fix.satellites,
+        "alt_ellipsoid": _cm(fix.amsl),
+        "h_acc": round(fix.h_acc * 1000.0),
+        "v_acc": round(fix.v_acc * 1000.0),
+        "vel_acc": round(fix.speed_acc * 1000.0),
+    }
+
+
+def system_time(vehicle: Vehicle) -> Fields:
+    """SYSTEM_TIME: satellite time once there is a fix."""
+    now = EPOCH_US + vehicle.kernel.now() // US
+    return {"time_unix_usec": now if _has_fix(vehicle) else 0, "time_boot_ms": boot_ms(vehicle)}
+
+
+def simstate(vehicle: Vehicle) -> Fields:
+    """SIMSTATE: the truth, as ArduPilot's own simulator tells it."""
+    truth = vehicle.flight.truth()
+    roll, pitch, yaw = quaternion_to_euler(attitude_enu_to_ned(truth.attitude))
+    latitude, longitude, _ = vehicle.flight.frame.from_enu(truth.position)
+    p, q, r = truth.rates
+    x, y, z = vehicle.estimate.accel
+    return {
+        "roll": roll,
+        "pitch": pitch,
+        "yaw": yaw,
+        "xacc": x,
+        "yacc": y,
+        "zacc": z,
+        "xgyro": p,
+        "ygyro": -q,
+        "zgyro": -r,
+        "lat": round(latitude * 1e7),
+        "lng": round(longitude * 1e7),
+    }
+
+
+def ahrs(vehicle: Vehicle) -> Fields:
+    """AHRS: the backup estimator's errors."""
+    return {"error_rp": 0.0025, "error_yaw": abs(vehicle.estimate.heading_error)}
+
+
+def ahrs2(vehicle: Vehicle) -> Fields | None:
+    """AHRS2: the backup estimator, which here believes what the first one does."""
+    if vehicle.uptime() < 4 * S:
+        return None
+    estimate = vehicle.estimate
+    roll, pitch, yaw = estimate.attitude
+    fields: Fields = {"roll": roll, "pitch": pitch, "yaw": yaw}
+    if _has_fix(vehicle):
+        latitude, longitude, amsl = estimate.geodetic
+        fields |= {"altitude": amsl, "lat": round(latitude * 1e7), "lng": round(longitude * 1e7)}
+    return fields
+
+
+def nav_controller(vehicle: Vehicle) -> Fields:
+    """NAV_CONTROLLER_OUTPUT."""
+    estimate, target = vehicle.estimate, vehicle.manoeuvre.target
+    roll, pitch, yaw = estimate.target_attitude
+    fields: Fields = {
+        "nav_roll": degrees(roll),
+        "nav_pitch": degrees(pitch),
+        "nav_bearing": round(degrees(yaw)),
+    }
+    if target is not None:
+        away = bearing(estimate.position, target) % (2.0 * pi)
+        fields["target_bearing"] = int(degrees(away))
+        fields["wp_dist"] = min(65_535, int(vehicle.manoeuvre.distance()))
+        fields["alt_error"] = estimate.position[2] - target[2]
+    return fields
+
+
+def position_target(vehicle: Vehicle) -> Fields | None:
+    """POSITION_TARGET_GLOBAL_INT: only while there is a point to go to."""
+    target = vehicle.manoeuvre.target
+    if target is None or not vehicle.armed:
+        return None
+    latitude, longitude, amsl = vehicle.flight.from_ned(target)
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "coordinate_frame": 0,
+        "type_mask": 65_016,
+        "lat_int": round(latitude * 1e7),
+        "lon_int": round(longitude * 1e7),
+        "alt": amsl,
+    }
+
+
+def local_target(vehicle: Vehicle) -> Fields | None:
+    """POSITION_TARGET_LOCAL_NED: the same point about the estimator's origin."""
+    target = vehicle.manoeuvre.target
+    if target is None or not vehicle.armed:
+        return None
+    x, y, z = target
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "coordinate_frame": 1,
+        "type_mask": 65_016,
+        "x": x,
+        "y": y,
+        "z": z,
+    }
+
+
+def home_position(vehicle: Vehicle) -> Fields | None:
+    """HOME_POSITION: once there is a home."""
+    home = vehicle.home
+    if home is None:
+        return None
+    x, y, z = home.ned
+    return {
+        "latitude": round(home.latitude * 1e7),
+        "longitude": round(home.longitude * 1e7),
+        "altitude": _cm(home.amsl),
+        "x": x,
+        "y": y,
+        "z": z,
+        "q": (nan, nan, nan, nan),
+        "time_usec": boot_us(vehicle),
+    }
+
+
+def origin(vehicle: Vehicle) -> Fields | None:
+    """GPS_GLOBAL_ORIGIN: once the estimator has one."""
+    if vehicle.home is None or not vehicle.estimate.position_ok:
+        return None
+    latitude, longitude, amsl = vehicle.estimate.origin
+    return {
+        "latitude": round(latitude * 1e7),
+        "longitude": round(longitude * 1e7),
+        "altitude": _cm(amsl),
+        "time_usec": boot_us(vehicle),
+    }
+
+
+def rangefinder(vehicle: Vehicle) -> Fields | None:
+    """RANGEFINDER: where one is set up and sees the ground."""
+    distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
+    return None if distance is None else {"distance": distance, "voltage": 0.0}
+
+
+def distance_sensor(vehicle: Vehicle) -> Fields | None:
+    """DISTANCE_SENSOR: the same, looking down."""
+    distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
+    if distance is None:
+        return None
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "min_distance": 20,
+        "max_distance": 3000,
+        "current_distance": to_uint16(distance * 100.0),
+        "orientation": 25,
+    }
+
+
+ARMED = 128
+"""MAV_MODE_FLAG_SAFETY_ARMED."""
+
+CALIBRATING, STANDBY, ACTIVE, CRITICAL = 2, 3, 4, 5
+"""MAV_STATE."""
+
+MEASURED_AFTER = int(2.4 * S)
+"""From this uptime on battery and compass have been read, and the copter's terrain follower runs."""
+
+ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
+"""MAV_LANDED_STATE."""
+
+NOT_THERE = 65_535
+
+# MAV_SYS_STATUS_SENSOR
+MAG, GPS = 1 << 2, 1 << 5
+RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
+    1 << 10,
+    1 << 11,
+    1 << 12,
+    1 << 13,
+    1 << 14,
+)
+AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 << 28
+
+
+class Health(NamedTuple):
+    """The three words of SYS_STATUS when all is well, disarmed, in a mode without controls of its own."""
+
+    present: int
+    enabled: int
+    healthy: int
+    estimator_enabled_after: int
+    """Uptime from which the attitude estimator counts as enabled [ns], and as healthy."""
+    estimator_healthy_after: int
+
+
+def logs(vehicle: Vehicle) -> bool:
+    """Whether the log is written: armed, and 15 s after that and after a refusal."""
+    now = vehicle.kernel.now()
+    return vehicle.armed or now - vehicle.refused_at < 15 * S or now - vehicle.disarmed_at < 15 * S
+
+
+def sys_status(vehicle: Vehicle, health: Health) -> Fields:
+    """SYS_STATUS."""
+    age, controls = vehicle.uptime(), vehicle.mode.controls
+    present, enabled, healthy = health.present, health.enabled | controls, health.healthy | controls
+    missing = 0
+    if age < NO_FIX_AFTER:
+        missing |= GPS
+    if age < MEASURED_AFTER:
+        missing |= TERRAIN
+        healthy &= ~(MAG | BATTERY)
+    if age < health.estimator_enabled_after:
+        enabled &= ~AHRS
+    if age < health.estimator_healthy_after or not vehicle.estimate.attitude_ok:
+        healthy &= ~AHRS
+    if not logs(vehicle):
+        enabled &= ~LOGGING
+    if not vehicle.prearm_ok:
+        healthy &= ~PREARM
+    if age > FIX_AFTER and vehicle.estimate.gps.fix_type == 0:
+        healthy &= ~GPS
+    volts, amps, left = _battery(vehicle)
+    return {
+        "onboard_control_sensors_present": present & ~missing,
+        "onboard_control_sensors_enabled": enabled & ~missing,
+        "onboard_control_sensors_health": healthy & ~missing,
+        "load": 0,
+        "voltage_battery": volts,
+        "current_battery": amps,
+        "battery_remaining": left,
+    }
+
+
+def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
+    """Millivolts, hundredths of an ampere, percent."""
+    if vehicle.uptime() < MEASURED_AFTER:
+        return 0, -1, -1
+    estimate = vehicle.estimate
+    capacity = vehicle.parameters["BATT_CAPACITY"]
+    left = 1.0 - estimate.battery_used_mah / capacity if capacity > 0.0 else 0.0
+    return (
+        to_uint16(estimate.battery_volts * 1000.0),
+        to_int16(estimate.battery_amps * 100.0),
+        int(max(0.0, left) * 100.0),
+    )
+
+
+def battery_status(vehicle: Vehicle) -> Fields:
+    """BATTERY_STATUS."""
+    volts, amps, left = _battery(vehicle)
+    estimate = vehicle.estimate
+    return {
+        "id": 0,
+        "temperature": 32_767,
+        "voltages": (volts or NOT_THERE, *([NOT_THERE] * 9)),
+        "current_battery": max(0, amps),
+        "current_consumed": int(estimate.battery_used_mah),
+        "energy_consumed": int(estimate.battery_energy_j / 100.0),
+        "battery_remaining": left,
+        "charge_state": 1,
+    }
+
+
+def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
+    """HEARTBEAT of a vehicle of MAV_TYPE *kind*."""
+    return {
+        "type": kind,
+        "autopilot": 3,
+        "base_mode": vehicle.mode.base_mode | (ARMED if vehicle.armed else 0),
+        "custom_mode": vehicle.mode.number,
+        "system_status": system_status,
+        "mavlink_version": 3,
+    }
+
+
+def extended_sys_state(vehicle: Vehicle) -> Fields:
+    """EXTENDED_SYS_STATE."""
+    if vehicle.landed:
+        landed = ON_GROUND
+    elif vehicle.manoeuvre.taking_off:
+        landed = TAKING_OFF
+    else:
+        landed = LANDING if vehicle.manoeuvre.landing else IN_AIR
+    return {"vtol_state": 3, "landed_state": landed}
+
+
+def rc_channels(vehicle: Vehicle) -> Fields:
+    """RC_CHANNELS: what the autopilot hears, overrides included."""
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle), "chancount": 16, "rssi": 255}
+    for number, pulse in enumerate(vehicle.sticks.pulses(), start=1):
+        fields[f"chan{number}_raw"] = pulse
+    return fields
+
+
+def rc_channels_raw(vehicle: Vehicle) -> Fields:
+    """RC_CHANNELS_RAW: the first eight."""
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle), "port": 0, "rssi": 255}
+    for number, pulse in enumerate(vehicle.sticks.pulses()[:8], start=1):
+        fields[f"chan{number}_raw"] = pulse
+    return fields
+
+
+def rc_channels_scaled(vehicle: Vehicle) -> Fields:
+    """RC_CHANNELS_SCALED: steering and throttle outputs in 1/10000."""
+    steering, throttle, _, _ = vehicle.estimate.motors
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "chan1_scaled": round(steering * 10_000.0),
+        "chan3_scaled": round(throttle * 10_000.0),
+        "rssi": 255,
+    }
+
+
+def servo_output(vehicle: Vehicle) -> Fields:
+    """SERVO_OUTPUT_RAW."""
+    first, second, third, fourth = vehicle.estimate.motor_pwm
+    return {
+        "time_usec": boot_us(vehicle),
+        "port": 0,
+        "servo1_raw": first,
+        "servo2_raw": second,
+        "servo3_raw": third,
+        "servo4_raw": fourth,
+    }
+
+
+NO_MISSION, NOT_STARTED, IN_PROGRESS, COMPLETE = 1, 2, 3, 5
+"""MISSION_STATE."""
+
+
+def _mission_state(plan: OnboardMission) -> int:
+    if len(plan) <= 1:
+        return NO_MISSION
+    if plan.complete:
+        return COMPLETE
+    return IN_PROGRESS if plan.current else NOT_STARTED
+
+
+def mission_current(vehicle: Vehicle) -> Fields:
+    """MISSION_CURRENT: home is not counted among the items."""
+    plan = vehicle.plan
+    return {
+        "seq": plan.current,
+        "total": max(0, len(plan) - 1),
+        "mission_state": _mission_state(plan),
+        "mission_mode": int(vehicle.mode.name == "AUTO"),
+    }
+
+
+WITHOUT_POSITION, WITH_POSITION, STARTING = 167, 831, 1024
+"""EKF_STATUS_FLAGS as recorded: attitude and height only; with positions; not initialised."""
+
+EKF_REPORTS_AFTER, EKF_STARTS_AFTER, EKF_ALIGNED_AFTER = int(3.3 * S), int(5.3 * S), int(5.75 * S)
+
+
+def ekf_status(vehicle: Vehicle) -> Fields | None:
+    """EKF_STATUS_REPORT."""
+    age = vehicle.uptime()
+    if age < EKF_REPORTS_AFTER:
+        return None
+    if age < EKF_ALIGNED_AFTER:
+        return {"flags": STARTING if age < EKF_STARTS_AFTER else 0}
+    estimate = vehicle.estimate
+    return {
+        "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
+        "velocity_variance": 0.007,
+        "pos_horiz_variance": min(1.0, abs(estimate.gps_innovation) / 5.0) ** 2,
+        "pos_vert_variance": 0.002,
+        "compass_variance": min(1.0, abs(estimate.heading_error)),
+    }
+
+
+def vibration(vehicle: Vehicle) -> Fields:
+    """VIBRATION: the law of the body has none."""
+    return {"time_usec": boot_us(vehicle), "vibration_x": 0.003, "vibration_y": 0.003, "vibration_z": 0.003}
+
+
+def wind(vehicle: Vehicle) -> Fields | None:
+    """WIND: without an airspeed sensor the firmware estimates none."""
+    return {"direction": -180.0, "speed": 0.0, "speed_z": 0.0} if vehicle.has_position else None
+
+
+def terrain_report(vehicle: Vehicle) -> Fields:
+    """TERRAIN_REPORT: no data on board."""
+    if vehicle.uptime() < FIX_AFTER:
+        return {"spacing": 100, "pending": 56}
+    latitude, longitude, amsl = vehicle.estimate.geodetic
+    return {
+        "lat": round(latitude * 1e7),
+        "lon": round(longitude * 1e7),
+        "current_height": amsl,
+        "pending": 504,
+    }
+
+
+def esc_telemetry(vehicle: Vehicle) -> Fields | None:
+    """ESC_TELEMETRY_1_TO_4: as the firmware's simulator makes it up."""
+    age = vehicle.uptime()
+    if age < 6 * S:
+        return None
+    count = age // (S // 10) % 65_536
+    return {
+        "temperature": (32,) * 4,
+        "voltage": (1679,) * 4,
+        "current": (80,) * 4,
+        "totalcurrent": (1,) * 4,
+        "rpm": (0,) * 4,
+        "count": (count,) * 4,
+    }
+
+
+def power_status(_vehicle: Vehicle) -> Fields:
+    """POWER_STATUS."""
+    return {"Vcc": 5000}
+
+
+def meminfo(_vehicle: Vehicle) -> Fields:
+    """MEMINFO."""
+    return {"brkval": 0, "freemem": 65_535, "freemem32": 131_072}
+
+
+FLIGHT_SW_VERSION = 67_438_335
+"""4.5.6, an official release, as recorded."""
+
+GIT_HASH = tuple(b"7ce11b41")
+
+
+def autopilot_version(_vehicle: Vehicle, capabilities: int, board: bytes) -> Fields:
+    """AUTOPILOT_VERSION; *board* is the board's own number, as text."""
+    return {
+        "capabilities": capabilities,
+        "flight_sw_version": FLIGHT_SW_VERSION,
+        "flight_custom_version": GIT_HASH,
+        "uid2": tuple(board.ljust(18, b"\0")[:18]),
+    }

@@ -1,0 +1,360 @@
+"""What the node publishes: topics, types, rates, and how a message is made of what the aircraft knows.
+
+The node through which a DJI aircraft is reached: ``dji_sdk`` 3.8, or the vehicle node of ``dji_osdk_ros``.
+
+It publishes only what somebody has subscribed to: who does not listen cannot tell, and a simulation is spared
+hundreds of messages a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import cos, radians
+from typing import Any, NamedTuple
+
+from volery.base.errors import UsageError
+from volery.base.frames import attitude_ned_to_enu, frd_to_flu, ned_to_enu
+from volery.base.time import MS, Ns, S
+from volery.kernel.api import Action, Handle
+from volery.kernel.task import ExecutionContext
+from volery.ros.graph import DEFAULT, LATCHED, Node, Publisher, QoS, RosGraph, Work
+from volery.ros.messages import message_class
+from volery.ros.messages.dji_constants import M100, NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
+from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
+from volery.simulation.autopilots.dji.services import Services
+from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import Text
+
+FAST, USUAL, SLOW = 10 * MS, 20 * MS, 200 * MS
+"""Periods of the node's three packages of data: 100, 50 and 5 Hz."""
+
+EARTH_M = 6_378_137.0
+"""Radius of the flat-earth conversion of the local position."""
+
+FIX, NO_FIX, GPS = 0, -1, 1
+SWITCH_SCALE = 8000.0 / 500.0
+"""From pulse widths to the numbers that the mode switch shows as: -8000 P, 0 A, 8000 F. Assumed."""
+
+Builder = Callable[[FlightController, Ns], Any]
+"""The message now, stamped with a ROS time; ``None`` while there is none."""
+
+
+class Topic(NamedTuple):
+    """One topic."""
+
+    name: str
+    type: str
+    period: Ns
+    build: Builder
+    qos: QoS = DEFAULT
+
+
+def _header(stamp: Ns, frame: str) -> Any:
+    time = message_class("builtin_interfaces/msg/Time")(stamp // S, stamp % S)
+    return message_class("std_msgs/msg/Header")(time, frame)
+
+
+def _vector(values: tuple[float, float, float]) -> Any:
+    return message_class("geometry_msgs/msg/Vector3")(*values)
+
+
+def _quaternion(controller: FlightController) -> Any:
+    w, x, y, z = attitude_ned_to_enu(controller.vehicle.estimate.quaternion)
+    return message_class("geometry_msgs/msg/Quaternion")(x, y, z, w)
+
+
+def _attitude(controller: FlightController, stamp: Ns) -> Any:
+    kind = message_class("geometry_msgs/msg/QuaternionStamped")
+    return kind(_header(stamp, "body_FLU"), _quaternion(controller))
+
+
+def _imu(controller: FlightController, stamp: Ns) -> Any:
+    estimate = controller.vehicle.estimate
+    made: Any = message_class("sensor_msgs/msg/Imu")(_header(stamp, "body_FLU"))
+    made.orientation = _quaternion(controller)
+    made.angular_velocity = _vector(frd_to_flu(estimate.rates))
+    made.linear_acceleration = _vector(frd_to_flu(estimate.accel))
+    return made
+
+
+def _rates(controller: FlightController, stamp: Ns) -> Any:
+    rates = frd_to_flu(controller.vehicle.estimate.rates)
+    return message_class("geometry_msgs/msg/Vector3Stamped")(_header(stamp, "body_FLU"), _vector(rates))
+
+
+def _acceleration(controller: FlightController, stamp: Ns) -> Any:
+    acceleration = ned_to_enu(controller.vehicle.estimate.acceleration)
+    kind = message_class("geometry_msgs/msg/Vector3Stamped")
+    return kind(_header(stamp, "ground_ENU"), _vector(acceleration))
+
+
+def _velocity(controller: FlightController, stamp: Ns) -> Any:
+    velocity = ned_to_enu(controller.vehicle.estimate.velocity)
+    kind = message_class("geometry_msgs/msg/Vector3Stamped")
+    return kind(_header(stamp, "ground_ENU"), _vector(velocity))
+
+
+def _byte(value: int) -> Any:
+    return message_class("std_msgs/msg/UInt8")(value)
+
+
+def _display_mode(controller: FlightController, _stamp: Ns) -> Any:
+    """An M100 has none."""
+    return None if controller.aircraft == M100 else _byte(controller.mode)
+
+
+def _fix(stamp: Ns, place: tuple[float, float, float], good: bool) -> Any:
+    made: Any = message_class("sensor_msgs/msg/NavSatFix")(_header(stamp, "/gps"))
+    made.status.status, made.status.service = (FIX if good else NO_FIX), GPS
+    made.latitude, made.longitude, made.altitude = place
+    return made
+
+
+def _gps_position(controller: FlightController, stamp: Ns) -> Any:
+    """Altitude above the sea."""
+    vehicle = controller.vehicle
+    if not vehicle.estimate.position_ok:
+        return _fix(stamp, (0.0, 0.0, 0.0), good=False)
+    return _fix(stamp, vehicle.estimate.geodetic, good=True)
+
+
+def _local_position(controller: FlightController, stamp: Ns) -> Any:
+    """East, north, up of the reference."""
+    reference = controller.reference
+    if reference is None:
+        return None
+    latitude, longitude, amsl = controller.vehicle.estimate.geodetic
+    made: Any = message_class("geometry_msgs/msg/PointStamped")(_header(stamp, "/local"))
+    made.point.x = radians(longitude - reference[1]) * EARTH_M * cos(radians(reference[0]))
+    made.point.y = radians(latitude - reference[0]) * EARTH_M
+    made.point.z = amsl - reference[2]
+    return made
+
+
+def _local_frame_ref(controller: FlightController, stamp: Ns) -> Any:
+    reference = controller.reference
+    return None if reference is None else _fix(stamp, reference, good=True)
+
+
+def _height(controller: FlightController, _stamp: Ns) -> Any:
+    return message_class("std_msgs/msg/Float32")(controller.vehicle.height)
+
+
+def _rc(controller: FlightController, stamp: Ns) -> Any:
+    """Roll, pitch, yaw, throttle in -1..1, mode switch, gear."""
+    pulses = controller.vehicle.sticks.pulses()
+    roll, pitch, throttle, yaw, switch = ((pulse - 1500) / 500.0 for pulse in pulses[:5])
+    axes = [roll, pitch, yaw, throttle, switch * 500.0 * SWITCH_SCALE, 0.0]
+    return message_class("sensor_msgs/msg/Joy")(_header(stamp, ""), axes, [])
+
+
+def _battery(controller: FlightController, stamp: Ns) -> Any:
+    """Millivolts, milliamperes and percent, as the flight controller gives them."""
+    estimate = controller.vehicle.estimate
+    made: Any = message_class("sensor_msgs/msg/BatteryState")(_header(stamp, ""))
+    made.voltage = estimate.battery_volts * 1000.0
+    made.current = -estimate.battery_amps * 1000.0
+    made.capacity = controller.vehicle.flight.capacity_as / 3.6
+    made.percentage = float(round(estimate.battery_left * 100.0))
+    made.present = True
+    return made
+
+
+def _anomaly(controller: FlightController, package: str) -> Any:
+    return message_class(f"{package}/msg/FlightAnomaly")(controller.anomalies)
+
+
+TOPICS: tuple[Topic, ...] = (
+    Topic("attitude", "geometry_msgs/msg/QuaternionStamped", FAST, _attitude),
+    Topic("imu", "sensor_msgs/msg/Imu", FAST, _imu),
+    Topic("angular_velocity_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _rates),
+    Topic("acceleration_ground_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _acceleration),
+    Topic("flight_status", "std_msgs/msg/UInt8", USUAL, lambda one, _: _byte(one.status)),
+    Topic("display_mode", "std_msgs/msg/UInt8", USUAL, _display_mode),
+    Topic("gps_health", "std_msgs/msg/UInt8", USUAL, lambda one, _: _byte(one.gps_health)),
+    Topic("gps_position", "sensor_msgs/msg/NavSatFix", USUAL, _gps_position),
+    Topic("local_position", "geometry_msgs/msg/PointStamped", USUAL, _local_position),
+    Topic("height_above_takeoff", "std_msgs/msg/Float32", USUAL, _height),
+    Topic("velocity", "geometry_msgs/msg/Vector3Stamped", USUAL, _velocity),
+    Topic("rc", "sensor_msgs/msg/Joy", USUAL, _rc),
+    Topic("rc_connection_status", "std_msgs/msg/UInt8", USUAL, lambda _one, _stamp: _byte(1)),
+    Topic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
+)
+"""All that is repeated, but for ``flight_anomaly``, whose type depends on the names."""
+
+REFERENCE = Topic("local_frame_ref", "sensor_msgs/msg/NavSatFix", 0, _local_frame_ref, LATCHED)
+
+
+def topics(package: str) -> tuple[Topic, ...]:
+    """All that is repeated, with the types of *package*."""
+    kind = f"{package}/msg/FlightAnomaly"
+    return (*TOPICS, Topic("flight_anomaly", kind, USUAL, lambda one, _: _anomaly(one, package)))
+
+
+LOOK_EVERY: Ns = 200 * MS
+"""How often it is looked who listens."""
+
+JOY = "sensor_msgs/msg/Joy"
+
+
+class _Package:
+    """Topics of one period."""
+
+    def __init__(self, face: DjiEndpoint, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
+        self._face = face
+        self._looks_every = max(1, LOOK_EVERY // period)
+        self._listed = listed
+        self._wanted: list[tuple[Topic, Publisher]] = []
+        self._round = 0
+
+    def publish(self) -> None:
+        """What is wanted, once. House code."""
+        if self._round % self._looks_every == 0:
+            self._wanted = [one for one in self._listed if one[1].subscribers()]
+        self._round += 1
+        if not self._wanted or not self._face.speaks:
+            return
+        stamp = self._face.stamp()
+        for topic, publisher in self._wanted:
+            message = topic.build(self._face.controller, stamp)
+            if message is not None:
+                publisher.publish(message)
+
+
+class DjiEndpoint:
+    """See ``Face`` and ``GraphFace``."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._kernel = vehicle.kernel
+        self._on = False
+        self._clocks: list[Handle] = []
+        self._packages: dict[Ns, _Package] = {}
+        self._graph: RosGraph | None = None
+        self._node: Node | None = None
+        self._reference: Publisher | None = None
+        self._place = ExecutionContext(vehicle.name)
+
+    @property
+    def controller(self) -> FlightController:
+        """What it speaks for."""
+        return controller_of(self._vehicle)
+
+    @property
+    def speaks(self) -> bool:
+        """It is switched on and has booted."""
+        return self._on and self._vehicle.uptime() >= self._vehicle.firmware.ready_after
+
+    def stamp(self) -> Ns:
+        """ROS time."""
+        return (self._graph.epoch if self._graph else 0) + self._kernel.now()
+
+    # -- the graph
+
+    def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
+        """Serve under *namespace*: ``/dji_sdk``, ``/drone_1/dji_sdk``, or one that ends in ``dji_osdk_ros``
+        for the names of 4.1. The node's computing is spent at *place*.
+        """
+        above, _, package = namespace.rstrip("/").rpartition("/")
+        if package not in (OLD_NAMES, NEW_NAMES):
+            raise UsageError(
+                f"{self._vehicle.name}: a DJI node is reached under {OLD_NAMES} or {NEW_NAMES}, as in "
+                f"/{self._vehicle.name}/{OLD_NAMES}; not under {namespace!r}"
+            )
+        if self._node is not None:
+            raise UsageError(f"{self._vehicle.name} is on a graph already, as {self._node.name}")
+        self._graph, self._place = graph, place
+        node = self._node = graph.node(package, above or "/", place=place)
+        self._advertise(node, package)
+        self._listen(node, package)
+        services = Services(self.controller, self._publish_reference)
+        group = node.group(self._start)
+        for served in services.table(package):
+            node.serve(served.name, served.type, partial(self._answer, served.answer), group)
+        if self._on:
+            self.start()
+
+    def _advertise(self, node: Node, package: str) -> None:
+        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {FAST: [], USUAL: [], SLOW: []}
+        for topic in topics(package):
+            publisher = node.advertise(f"{package}/{topic.name}", topic.type, topic.qos)
+            listed[topic.period].append((topic, publisher))
+        self._packages = {period: _Package(self, period, some) for period, some in listed.items()}
+        self._reference = node.advertise(f"{package}/{REFERENCE.name}", REFERENCE.type, REFERENCE.qos)
+
+    def _publish_reference(self) -> None:
+        message = REFERENCE.build(self.controller, self.stamp())
+        if self._reference is not None and message is not None:
+            self._reference.publish(message)
+
+    def _listen(self, node: Node, package: str) -> None:
+        """Set-points are taken as they come. The vehicle node of 4.1 takes them by a service."""
+        if package == NEW_NAMES:
+            return
+        group = node.group(lambda work: work.run())
+        for name, flag in SETPOINT_TOPICS.items():
+            node.subscribe(f"{package}/{name}", JOY, partial(self._setpoint, flag), group=group)
+        node.subscribe(f"{package}/{SETPOINT}generic", JOY, self._generic, group=group)
+
+    def _setpoint(self, flag: int, message: Any) -> None:
+        with self._kernel.guard:
+            if self.speaks:
+                self.controller.obey(tuple(float(axis) for axis in message.axes[:4]), flag)
+
+    def _generic(self, message: Any) -> None:
+        if len(message.axes) >= 5 and 0.0 <= message.axes[4] < 256.0:
+            self._setpoint(int(message.axes[4]), message)
+
+    def _start(self, work: Work) -> None:
+        """Each request has a task of its own."""
+        self._kernel.spawn(work.run, f"{self._vehicle.name} (service)", self._place, self._kernel.root)
+
+    def _answer(self, answer: Any, request: Any) -> Any:
+        with self._kernel.guard:
+            return answer(request)
+
+    # -- the aircraft
+
+    def start(self) -> None:
+        """It was switched on."""
+        self.stop()
+        self._on = True
+        every = self._kernel.every
+        self._clocks = [every(period, package.publish) for period, package in self._packages.items()]
+
+    def stop(self) -> None:
+        """Fall silent."""
+        self._on = False
+        for clock in self._clocks:
+            clock.cancel()
+        self._clocks.clear()
+
+    def hang_up(self) -> None:
+        """Leave the graph."""
+        if self._node is not None:
+            self._node.close()
+            self._node = None
+
+    def say(self, severity: int, text: str) -> None:
+        """There is no topic for words: they go to the trace."""
+        self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
+
+    def parameter(self, name: str) -> None:
+        """Nobody is told."""
+
+    def mode_changed(self) -> None:
+        """It shows at the next round."""
+
+    def home_changed(self) -> None:
+        """Nobody is told."""
+
+    def announce(self, message: str) -> None:
+        """There is nothing to announce."""
+
+    def tell(self, message: str, fields: dict[str, Any]) -> None:
+        """There are no such events."""
+
+    def after_answer(self, action: Action) -> None:
+        """At once."""
+        action()

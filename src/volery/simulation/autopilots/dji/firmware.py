@@ -1,0 +1,162 @@
+"""A DJI multirotor: its modes and its habits, put together as a dialect.
+
+What the simulated DJI aircraft does where the public definitions are silent: one table.
+
+Figures that somebody may want to try others of are parameters instead: see ``parameters``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from volery.base.time import MS, S, to_seconds
+from volery.ros.messages.dji_constants import GO_HOME_ALTITUDES, DisplayMode
+from volery.simulation.autopilots.dji.endpoint import SWITCH_SCALE, DjiEndpoint
+from volery.simulation.autopilots.dji.flight_controller import (
+    F_ABOVE,
+    FEWEST,
+    FINISHED,
+    MOST,
+    P_BELOW,
+    STARTING,
+    STAY,
+    SWITCH,
+    FlightController,
+    controller_of,
+)
+from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters, tuning
+from volery.simulation.autopilots.dji.sdk_setpoints import (
+    LIFTS_ABOVE_M,
+    LIFTS_ABOVE_M_S,
+    LIFTS_ABOVE_PERCENT,
+    SdkControl,
+)
+from volery.simulation.autopilots.dji.services import ACCEPTED, REFUSED
+from volery.simulation.autopilots.firmware import BootEvent, Failsafe, Firmware
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+
+READY, ORIGIN, POSITION = 3 * S, 15 * S, 25 * S
+"""After it was switched on: when it speaks, when it knows where it is, when that may be trusted. Assumed."""
+
+NO_BITS = 0
+"""There is no heartbeat whose bits a mode could set."""
+
+
+def _take_off(vehicle: Vehicle) -> Manoeuvre:
+    return TakeOff(vehicle, vehicle.parameters["TAKEOFF_HEIGHT"])
+
+
+def _mission(vehicle: Vehicle) -> Manoeuvre:
+    return FlyMission(vehicle, copter_leg)
+
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(DisplayMode.ATTITUDE, "ATTITUDE", NO_BITS, AltitudeHold, pilot=True),
+        Mode(DisplayMode.P_GPS, "P_GPS", NO_BITS, Loiter, pilot=True),
+        Mode(DisplayMode.AUTO_TAKEOFF, "AUTO_TAKEOFF", NO_BITS, _take_off),
+        Mode(DisplayMode.AUTO_LANDING, "AUTO_LANDING", NO_BITS, Land),
+        Mode(DisplayMode.NAVI_MISSION, "NAVI_MISSION", NO_BITS, _mission, needs_position=True),
+        Mode(DisplayMode.NAVI_GO_HOME, "NAVI_GO_HOME", NO_BITS, Return, needs_position=True),
+        Mode(DisplayMode.NAVI_SDK_CTRL, "NAVI_SDK_CTRL", NO_BITS, SdkControl),
+        Mode(DisplayMode.FORCE_AUTO_LANDING, "FORCE_AUTO_LANDING", NO_BITS, Land),
+    )
+}
+
+
+def ready(vehicle: Vehicle) -> None:
+    """It stands, and speaks from now on."""
+    vehicle.landed = True
+    controller_of(vehicle).reset()
+    vehicle.enter(MODES[DisplayMode.P_GPS])
+
+
+def _nothing(_vehicle: Vehicle) -> None:
+    """Nothing is done then."""
+
+
+def _below(percent: str) -> Failsafe:
+    begins = {
+        "LOW_BATTERY": FlightController.low_battery,
+        "CRITICAL_BATTERY": FlightController.critical_battery,
+    }[percent]
+    return Failsafe(
+        percent.lower().replace("_", " "),
+        lambda vehicle: vehicle.estimate.battery_left * 100.0 < vehicle.parameters[percent],
+        lambda vehicle: begins(controller_of(vehicle)),
+        _nothing,
+    )
+
+
+def own_parameters(_system: int, _flight: Flight) -> dict[str, float]:
+    """None follow from the vehicle."""
+    return {}
+
+
+COPTER = Firmware(
+    name="dji",
+    kind="multirotor",
+    face=DjiEndpoint,
+    memory=FlightController,
+    boot_mode=MODES[DisplayMode.P_GPS],
+    boot_events=(BootEvent(READY, ready), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())),
+    ready_after=READY,
+    origin_after=ORIGIN,
+    position_after=POSITION,
+    local_position_after=POSITION,
+    on_warm=ready,
+    on_warm_position=_nothing,
+    each_second=_nothing,
+    modes=MODES,
+    tuning=tuning,
+    transmitter=(1500, 1500, 1500, 1500, 2000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0, 0, 0),
+    stands=True,
+    motors_rest=S,
+    spool_time=S,
+    takeoff_slew=100 * MS,
+    resigns_after=1500 * MS,
+    watches=(_below("LOW_BATTERY"), _below("CRITICAL_BATTERY")),
+    on_step=lambda vehicle: controller_of(vehicle).step(),
+    on_disarmed=_nothing,
+    throttle_centred=True,
+    first_item=0,
+    mission_item_begins=lambda vehicle, number, item: controller_of(vehicle).item_begins(number, item),
+    mission_ended=lambda vehicle: controller_of(vehicle).mission_ended(),
+    parameters=parameters,
+    own_parameters=own_parameters,
+    supported_parameters=SUPPORTED,
+)
+
+
+ASSUMED: Mapping[str, str] = {
+    "switching on": f"it speaks after {to_seconds(READY):g} s, knows where it is after "
+    f"{to_seconds(ORIGIN):g} s, and may be trusted after {to_seconds(POSITION):g} s",
+    "activation": "succeeds with any key; the node of 4.1 activates by itself",
+    "authority": "is given while the mode switch is at F and it is activated, to any number of programs at "
+    "once",
+    "mode switch": f"channel {SWITCH} of the transmitter: F above {F_ABOVE}, P below {P_BELOW}, A between; "
+    f"`rc` shows {-500 * SWITCH_SCALE:g} at P, 0 at A, {500 * SWITCH_SCALE:g} at F; any move of "
+    "it takes the authority, and in the air it hovers",
+    "start of the motors": f"shows ENGINE_START for {to_seconds(STARTING):g} s; home is there",
+    "an M100": f"has no `display_mode`, and shows FINISHED_LANDING for {to_seconds(FINISHED):g} s",
+    "`gps_health`": "is 5 once the position may be trusted, 3 with a fix before that, else 0",
+    "set-points": "have no effect during a take-off, and while it goes home or lands by its own decision; "
+    "they end what a program has asked for",
+    "set-points on the ground": f"lift it off above {LIFTS_ABOVE_M:g} m, {LIFTS_ABOVE_M_S:g} m/s or "
+    f"{LIFTS_ABOVE_PERCENT:g} % of thrust",
+    "set-points not flown": "angular rates, and thrust with anything but angles",
+    "without a position": "set-points about the ground are hovering level; P_GPS becomes ATTITUDE",
+    "missions": f"have {FEWEST} to {MOST} waypoints; action {STAY} is staying for so many milliseconds; they "
+    "start in the air only",
+    "`ack_data`": f"is {ACCEPTED} where it is accepted, {REFUSED} where it is refused",
+    "altitude for going home": f"is taken from {GO_HOME_ALTITUDES.lowest:g} to "
+    f"{GO_HOME_ALTITUDES.highest:g} m",
+    "battery": "is measured without error; once low it goes home, once critical it lands, and "
+    "set-points do not end that",
+}
+"""What, and what is taken for true."""

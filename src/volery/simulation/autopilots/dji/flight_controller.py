@@ -1,0 +1,428 @@
+"""What a DJI flight controller allows and does: authority, motors, tasks, set-points, missions, batteries.
+
+It says yes or no; it knows neither topics nor services.
+
+Waypoint missions: what is taken, and how it lies on board as items of the flight stack.
+"""
+
+from __future__ import annotations
+
+from math import hypot, isfinite, radians
+from typing import Any
+
+from volery.base.time import Ns, S, from_seconds
+from volery.ros.messages.dji_constants import M100, MISSION_SPEEDS, DisplayMode, FlightStatus, M100Status
+from volery.simulation.autopilots.dji.parameters import AIRCRAFT
+from volery.simulation.autopilots.dji.sdk_setpoints import SdkControl, sdk_command
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+FEWEST, MOST = 2, 99
+"""Waypoints of a mission: assumed."""
+STAY = 0
+"""A waypoint's action: stay for so many milliseconds. The number is assumed."""
+NO_ACTION, GO_HOME_AT_END, LAND_AT_END, TO_FIRST, NO_EXIT = range(5)
+"""What is done at the end of a mission."""
+YAW_LOCKED, YAW_BY_WAYPOINT = 1, 3
+STOPS_S = 0.1
+"""Flown from point to point it stands at each of them; coordinated it does not."""
+
+
+def mission_refusal(task: Any) -> str:
+    """Why a mission is not taken; empty if it is."""
+    points = task.mission_waypoint
+    low, high = MISSION_SPEEDS
+    if not FEWEST <= len(points) <= MOST:
+        return f"{len(points)} waypoints; {FEWEST} to {MOST}"
+    if not (low <= task.velocity_range <= high and low <= task.idle_velocity <= task.velocity_range):
+        return f"speeds {task.idle_velocity:g} and {task.velocity_range:g} m/s; {low:g} to {high:g}"
+    for number, point in enumerate(points, start=1):
+        place = (point.latitude, point.longitude, point.altitude)
+        if not all(isfinite(value) for value in place) or abs(place[0]) > 90.0 or abs(place[1]) > 180.0:
+            return f"waypoint {number} is nowhere"
+    return ""
+
+
+def mission_items(task: Any) -> list[MissionItem]:
+    """The items of a mission that is taken."""
+    once = [_item(point, coordinated=task.trace_mode == 1) for point in task.mission_waypoint]
+    items = once * max(1, min(2, task.mission_exec_times))
+    return [*items, items[0]] if task.action_on_finish == TO_FIRST else items
+
+
+def _item(point: Any, coordinated: bool) -> MissionItem:
+    stay = _stay(point)
+    return MissionItem(
+        WAYPOINT,
+        GLOBAL_RELATIVE,
+        param1=stay or (0.0 if coordinated else STOPS_S),
+        x=round(point.latitude * 1e7),
+        y=round(point.longitude * 1e7),
+        z=point.altitude,
+    )
+
+
+def _stay(point: Any) -> float:
+    """Seconds that its actions have it stay."""
+    action = point.waypoint_action
+    count = action.action_repeat & 0x0F if point.has_action else 0
+    listed = zip(action.command_list[:count], action.command_parameter[:count], strict=True)
+    return sum(int(milliseconds) for command, milliseconds in listed if command == STAY) / 1000.0
+
+
+INFO, WARNING = 6, 4
+"""Severities as in syslog."""
+
+SWITCH, F_ABOVE, P_BELOW = 5, 1700, 1300
+"""The channel of the transmitter's mode switch, and its pulse widths for F and P; A is between them."""
+
+STARTING: Ns = 2 * S
+"""So long after the start of the motors it shows ENGINE_START: assumed."""
+FINISHED: Ns = 3 * S
+"""So long after a landing an M100 shows FINISHED_LANDING: assumed."""
+
+BY_ITSELF = frozenset(
+    {
+        DisplayMode.AUTO_TAKEOFF,
+        DisplayMode.AUTO_LANDING,
+        DisplayMode.NAVI_GO_HOME,
+        DisplayMode.FORCE_AUTO_LANDING,
+    }
+)
+"""Modes that set-points do not end while the aircraft itself has chosen them."""
+COMING_DOWN = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
+
+
+class FlightController:
+    """One aircraft's. ``sdk`` says that a program on board has the authority."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self._activates_itself = False
+        self.reset()
+
+    def reset(self) -> None:
+        """As it is switched on."""
+        self.activated = self._activates_itself
+        self.sdk = False
+        self.reference: tuple[float, float, float] | None = None
+        """Degrees and metres AMSL about which the local position counts."""
+        self.task: Any = None
+        """The waypoint mission on board, as it was uploaded."""
+        self.anomalies = 0
+        self._switch = "F"
+        self._set_at: Ns = NEVER
+        self._asked_by_sdk = False
+
+    # -- what it shows
+
+    @property
+    def aircraft(self) -> str:
+        """A3, M100 and so on."""
+        return AIRCRAFT[min(len(AIRCRAFT) - 1, max(0, round(self.vehicle.parameters["AIRCRAFT"])))]
+
+    @property
+    def mode(self) -> int:
+        """The display mode."""
+        vehicle = self.vehicle
+        starting = vehicle.armed and vehicle.landed and vehicle.kernel.now() - vehicle.armed_at < STARTING
+        return DisplayMode.ENGINE_START if starting else vehicle.mode.number
+
+    @property
+    def status(self) -> int:
+        """The flight status, in the numbers of this aircraft."""
+        vehicle = self.vehicle
+        if self.aircraft == M100:
+            return self._m100_status()
+        if not vehicle.armed:
+            return FlightStatus.STOPPED
+        return FlightStatus.ON_GROUND if vehicle.landed else FlightStatus.IN_AIR
+
+    def _m100_status(self) -> int:
+        vehicle = self.vehicle
+        if not vehicle.armed or vehicle.landed:
+            if vehicle.armed and self._is(DisplayMode.AUTO_TAKEOFF):
+                return M100Status.TAKING_OFF
+            landed = vehicle.landed_at != NEVER and vehicle.kernel.now() - vehicle.landed_at < FINISHED
+            return M100Status.FINISHED_LANDING if landed else M100Status.ON_GROUND
+        if self._is(DisplayMode.AUTO_TAKEOFF):
+            return M100Status.TAKING_OFF
+        return M100Status.LANDING if vehicle.mode.number in COMING_DOWN else M100Status.IN_AIR
+
+    @property
+    def gps_health(self) -> int:
+        """0 to 5."""
+        vehicle = self.vehicle
+        if vehicle.has_position:
+            return 5
+        return 3 if vehicle.estimate.gps.fix_type >= 3 and vehicle.estimate.position_ok else 0
+
+    def _is(self, mode: DisplayMode) -> bool:
+        return self.vehicle.mode.number == mode
+
+    # -- what a program may ask
+
+    def activate(self) -> bool:
+        """Any key will do."""
+        self.activated = True
+        return True
+
+    def activate_by_itself(self) -> None:
+        """Its node activates whenever it is switched on."""
+        self._activates_itself = self.activated = True
+
+    def obtain(self, wanted: bool) -> bool:
+        """Give a program the authority, or take it back. The pilot's switch decides."""
+        if wanted and (self._switch != "F" or not self.activated):
+            return False
+        self.sdk = wanted
+        if not wanted and self._is(DisplayMode.NAVI_SDK_CTRL):
+            self.hover()
+        return True
+
+    def motors(self, on: bool) -> bool:
+        """Start or stop them, in the air as well."""
+        if not self.sdk:
+            return False
+        if on:
+            return self.vehicle.armed or self._start_motors()
+        self.kill()
+        return True
+
+    def kill(self) -> bool:
+        """Stop the motors wherever it is."""
+        if self.vehicle.armed:
+            self.vehicle.disarm()
+            self._rest()
+        return True
+
+    def _start_motors(self) -> bool:
+        vehicle = self.vehicle
+        if not vehicle.landed or not self.activated:
+            return False
+        if vehicle.has_position:
+            vehicle.home_is_here()
+        vehicle.arm()
+        vehicle.say(INFO, "motors started")
+        return True
+
+    def take_off(self) -> bool:
+        """Start the motors and climb to the fixed height."""
+        vehicle = self.vehicle
+        if not vehicle.landed or not vehicle.has_position:
+            return False
+        if not vehicle.armed and not self._start_motors():
+            return False
+        self._enter(DisplayMode.AUTO_TAKEOFF, by_sdk=True)
+        return True
+
+    def go_home(self, by_sdk: bool = True) -> bool:
+        """Climb, go home, land. Near home it lands at once."""
+        vehicle = self.vehicle
+        home = vehicle.home
+        if vehicle.landed or home is None or not vehicle.has_position:
+            return False
+        north, east, _ = vehicle.estimate.position
+        near = hypot(home.ned[0] - north, home.ned[1] - east) < vehicle.parameters["GO_HOME_NEAR"]
+        self._enter(DisplayMode.AUTO_LANDING if near else DisplayMode.NAVI_GO_HOME, by_sdk=by_sdk)
+        return True
+
+    def land(self, by_sdk: bool = True) -> bool:
+        """Straight down."""
+        if self.vehicle.landed:
+            return False
+        self._enter(DisplayMode.AUTO_LANDING, by_sdk=by_sdk)
+        return True
+
+    def interrupt(self, *modes: DisplayMode) -> bool:
+        """Hover instead of these modes, if a program has asked for them."""
+        if self.vehicle.mode.number not in modes or not self._asked_by_sdk:
+            return False
+        self.hover()
+        return True
+
+    def brake(self) -> bool:
+        """Stop and hover."""
+        if self.vehicle.landed:
+            return False
+        self.hover()
+        return True
+
+    def hover(self) -> None:
+        """As the pilot's switch says, sticks in the middle."""
+        by_position = self._switch != "A" and self.vehicle.has_position
+        self._enter(DisplayMode.P_GPS if by_position else DisplayMode.ATTITUDE)
+
+    def refer(self) -> bool:
+        """From now on the local position counts from here."""
+        if not self.vehicle.has_position:
+            return False
+        self.reference = self.vehicle.estimate.geodetic
+        return True
+
+    def obey(self, numbers: tuple[float, ...], flag: int) -> None:
+        """A set-point. Without the authority, or with motors that stand, it has no effect."""
+        vehicle = self.vehicle
+        if not self.sdk or not vehicle.armed:
+            return
+        if vehicle.mode.number in BY_ITSELF and not (self._asked_by_sdk and not vehicle.landed):
+            return
+        if self._is(DisplayMode.AUTO_TAKEOFF):
+            return
+        command = sdk_command(numbers, flag, vehicle.estimate.position)
+        if command is None:
+            self._once(f"set-points with flag 0x{flag:02X} are not flown here, or its numbers are none")
+            return
+        self._set_at = vehicle.kernel.now()
+        if not self._is(DisplayMode.NAVI_SDK_CTRL):
+            self._enter(DisplayMode.NAVI_SDK_CTRL, by_sdk=True)
+        if isinstance(vehicle.manoeuvre, SdkControl):
+            vehicle.manoeuvre.command = command
+            vehicle.act()
+
+    def _once(self, text: str) -> None:
+        if text not in self.vehicle.said:
+            self.vehicle.said.add(text)
+            self.vehicle.say(WARNING, text)
+
+    # -- missions
+
+    def upload(self, task: Any) -> bool:
+        """Replace the mission on board, if it makes sense."""
+        found = mission_refusal(task)
+        if found:
+            self.vehicle.say(WARNING, f"mission refused: {found}")
+            return False
+        self.task = task
+        self.vehicle.plan.replace(mission_items(task))
+        return True
+
+    def start_mission(self, *, anew: bool) -> bool:
+        """From its first point, or from where it was left; in the air only."""
+        vehicle = self.vehicle
+        if self.task is None or vehicle.landed or not vehicle.has_position:
+            return False
+        if anew:
+            vehicle.plan.restart()
+        elif vehicle.plan.complete:
+            return False
+        self._enter(DisplayMode.NAVI_MISSION, by_sdk=True)
+        vehicle.speed = self.task.idle_velocity
+        if self.task.yaw_mode == YAW_LOCKED:
+            vehicle.yaw_target = vehicle.estimate.attitude[2]
+        return True
+
+    def leave_mission(self) -> bool:
+        """Hover where it is."""
+        if not self._is(DisplayMode.NAVI_MISSION):
+            return False
+        self.hover()
+        return True
+
+    def mission_speed(self, metres_per_second: float) -> bool:
+        """From now on."""
+        if self.task is None:
+            return False
+        self.task.idle_velocity = metres_per_second
+        if self._is(DisplayMode.NAVI_MISSION):
+            self.vehicle.speed = metres_per_second
+        return True
+
+    def item_begins(self, number: int, _item: MissionItem) -> None:
+        """Turn to the waypoint's heading, where the mission says so."""
+        if self.task is not None and self.task.yaw_mode == YAW_BY_WAYPOINT:
+            point = self.task.mission_waypoint[number % len(self.task.mission_waypoint)]
+            self.vehicle.yaw_target = radians(point.target_yaw)
+
+    def mission_ended(self) -> None:
+        """What the mission says is to follow."""
+        finish = self.task.action_on_finish if self.task is not None else NO_ACTION
+        if finish == GO_HOME_AT_END:
+            self.go_home()
+        elif finish == LAND_AT_END:
+            self.land()
+        elif finish != NO_EXIT:
+            self.hover()
+
+    # -- what it does by itself
+
+    def step(self) -> None:
+        """Ten times a second."""
+        self._look_at_switch()
+        if not self.vehicle.armed:
+            return
+        if self.vehicle.landed:
+            self._stop_motors_by_itself()
+        else:
+            self._go_on()
+
+    def _look_at_switch(self) -> None:
+        """The pilot always wins: with the switch out of F the program has lost."""
+        pulse = self.vehicle.sticks[SWITCH]
+        now = "F" if pulse > F_ABOVE else "P" if pulse < P_BELOW else "A"
+        if now == self._switch:
+            return
+        self._switch = now
+        self.sdk = False
+        self.vehicle.say(INFO, f"the mode switch is at {now}")
+        if self.vehicle.armed and not self.vehicle.landed:
+            self.hover()
+
+    def _go_on(self) -> None:
+        vehicle = self.vehicle
+        number, manoeuvre = vehicle.mode.number, vehicle.manoeuvre
+        timeout = from_seconds(vehicle.parameters["SETPOINT_TIMEOUT"])
+        if number == DisplayMode.NAVI_SDK_CTRL:
+            if vehicle.kernel.now() - self._set_at > timeout:
+                self.hover()
+        elif number == DisplayMode.AUTO_TAKEOFF:
+            if vehicle.height > vehicle.parameters["TAKEOFF_HEIGHT"] - 0.1:
+                self.hover()
+        elif number == DisplayMode.NAVI_GO_HOME:
+            if manoeuvre.landing:
+                self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._asked_by_sdk)
+        elif number == DisplayMode.P_GPS and not vehicle.has_position:
+            vehicle.say(WARNING, "position lost")
+            self.hover()
+        elif number == DisplayMode.ATTITUDE and vehicle.has_position and self._switch != "A":
+            self.hover()
+
+    def _stop_motors_by_itself(self) -> None:
+        vehicle = self.vehicle
+        now, parameters = vehicle.kernel.now(), vehicle.parameters
+        number = vehicle.mode.number
+        if number in COMING_DOWN and now - vehicle.landed_at >= from_seconds(parameters["LANDED_STOP"]):
+            self.kill()
+            return
+        if vehicle.manoeuvre.wants_to_fly():
+            vehicle.idle_since = now
+        elif now - vehicle.idle_since >= from_seconds(parameters["IDLE_STOP"]):
+            self.kill()
+
+    def low_battery(self) -> None:
+        """Go home."""
+        self.vehicle.say(WARNING, "battery low")
+        if self.vehicle.armed and self.vehicle.mode.number not in COMING_DOWN:
+            self.go_home(by_sdk=False)
+
+    def critical_battery(self) -> None:
+        """Land where it is."""
+        self.vehicle.say(WARNING, "battery critical")
+        if self.vehicle.armed and not self.vehicle.landed:
+            self._enter(DisplayMode.FORCE_AUTO_LANDING)
+
+    def _rest(self) -> None:
+        """The motors stand."""
+        self.vehicle.say(INFO, "motors stopped")
+        self.hover()
+
+    def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
+        self._asked_by_sdk = by_sdk
+        self.vehicle.enter(self.vehicle.firmware.modes[mode])
+
+
+def controller_of(vehicle: Vehicle) -> FlightController:
+    """The flight controller of a vehicle of this dialect."""
+    controller: FlightController = vehicle.memory
+    return controller

@@ -1,0 +1,179 @@
+"""Set-points of a program on board: four numbers and a byte that says how they are meant.
+
+All is in the conventions of the ROS node: east, north, up, or forward, left, up; anticlockwise; radians. The
+height is above the point of take-off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, isfinite, pi, sin
+from typing import TYPE_CHECKING
+
+from volery.base.frames import Vector
+from volery.ros.messages.dji_constants import HORIZONTAL, SETPOINT_HEIGHTS, VERTICAL, Flag
+from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
+from volery.simulation.autopilots.vehicle_state import Manoeuvre
+
+if TYPE_CHECKING:
+    from volery.simulation.autopilots.vehicle_state import Vehicle
+
+LIFTS_ABOVE_M, LIFTS_ABOVE_M_S, LIFTS_ABOVE_PERCENT = 0.5, 0.1, 20.0
+"""A set-point of more than that takes an aircraft that stands with turning motors off the ground: assumed."""
+
+
+@dataclass(frozen=True)
+class SdkCommand:
+    """A set-point that makes sense. *anchor* is where the aircraft was when it came: offsets count from there
+    [north, east, down m].
+    """
+
+    flag: int
+    x: float
+    y: float
+    z: float
+    yaw: float
+    anchor: Vector
+
+    @property
+    def horizontal(self) -> int:
+        """What ``x`` and ``y`` are."""
+        return self.flag & HORIZONTAL
+
+    @property
+    def vertical(self) -> int:
+        """What ``z`` is."""
+        return self.flag & VERTICAL
+
+    @property
+    def needs_position(self) -> bool:
+        """It is about the ground."""
+        return self.horizontal in (Flag.HORIZONTAL_VELOCITY, Flag.HORIZONTAL_POSITION)
+
+    @property
+    def lifts(self) -> bool:
+        """It takes the aircraft off the ground."""
+        if self.vertical == Flag.VERTICAL_POSITION:
+            return self.z > LIFTS_ABOVE_M
+        return self.z > (LIFTS_ABOVE_PERCENT if self.vertical == Flag.VERTICAL_THRUST else LIFTS_ABOVE_M_S)
+
+
+def sdk_command(numbers: tuple[float, ...], flag: int, anchor: Vector) -> SdkCommand | None:
+    """The command that four numbers and a flag are; ``None`` for what is not flown here: angular rates,
+    thrust with anything but angles, numbers that are none.
+    """
+    if len(numbers) < 4 or not all(isfinite(number) for number in numbers[:4]):
+        return None
+    x, y, z, yaw = numbers[:4]
+    made = SdkCommand(flag, x, y, z, yaw, anchor)
+    angles = made.horizontal == 0
+    if made.horizontal == Flag.HORIZONTAL_RATE or made.vertical == VERTICAL:
+        return None
+    if made.vertical == Flag.VERTICAL_THRUST and not angles:
+        return None
+    return made
+
+
+class SdkControl(Manoeuvre):
+    """Fly the command that came last. Without a position, what is about the ground is hovering level."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self.command: SdkCommand | None = None
+
+    def wants_to_fly(self) -> bool:
+        """If the command lifts it."""
+        return self.command is not None and self.command.lifts
+
+    def step(self) -> None:
+        """Hand it to the inner loops."""
+        command, vehicle = self.command, self.vehicle
+        if command is None or (command.needs_position and not vehicle.has_position):
+            vehicle.drive(Setpoint(Control.CLIMB, accel_z=vehicle.tuning.accel_z))
+        elif command.horizontal == Flag.HORIZONTAL_POSITION:
+            vehicle.drive(self._to_point(command))
+        elif command.horizontal == Flag.HORIZONTAL_VELOCITY:
+            vehicle.drive(self._along(command))
+        else:
+            vehicle.drive(self._leaning(command))
+
+    def _plane(self, command: SdkCommand) -> tuple[float, float]:
+        """``x`` and ``y`` as north and east."""
+        if not command.flag & Flag.BODY:
+            return command.y, command.x
+        heading = self.vehicle.estimate.attitude[2]
+        c, s = cos(heading), sin(heading)
+        return command.x * c + command.y * s, command.x * s - command.y * c
+
+    def _down(self, command: SdkCommand) -> float:
+        home = self.vehicle.home
+        low, high = SETPOINT_HEIGHTS
+        return (home.ned[2] if home else 0.0) - min(high, max(low, command.z))
+
+    def _climb(self, command: SdkCommand) -> float:
+        tuning = self.vehicle.tuning
+        if command.vertical == Flag.VERTICAL_POSITION:
+            wanted = command.z - self.vehicle.height
+            return min(tuning.speed_up, max(-tuning.speed_down, wanted))
+        return min(SDK_CLIMB, max(-SDK_CLIMB, command.z))
+
+    def _turn(self, command: SdkCommand) -> tuple[float | None, float | None]:
+        """Where the nose is to point and how fast to turn, clockwise; one of them is ``None``."""
+        if command.flag & Flag.YAW_RATE:
+            return None, -command.yaw
+        return pi / 2.0 - command.yaw, None
+
+    def _to_point(self, command: SdkCommand) -> Setpoint:
+        north, east = self._plane(command)
+        tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
+        by_height = command.vertical == Flag.VERTICAL_POSITION
+        return Setpoint(
+            Control.POSITION if by_height else Control.POSITION_CLIMB,
+            position=(command.anchor[0] + north, command.anchor[1] + east, self._down(command)),
+            climb=0.0 if by_height else self._climb(command),
+            yaw=yaw,
+            yaw_rate=rate,
+            speed=tuning.speed,
+            speed_up=tuning.speed_up if by_height else SDK_CLIMB,
+            speed_down=tuning.speed_down if by_height else SDK_CLIMB,
+            accel=tuning.accel,
+            accel_z=tuning.accel_z,
+            tilt=tuning.tilt,
+        )
+
+    def _along(self, command: SdkCommand) -> Setpoint:
+        north, east = self._plane(command)
+        tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
+        by_height = command.vertical == Flag.VERTICAL_POSITION
+        return Setpoint(
+            Control.VELOCITY_HEIGHT if by_height else Control.VELOCITY,
+            position=(0.0, 0.0, self._down(command)),
+            velocity=(north, east, 0.0 if by_height else -self._climb(command)),
+            yaw=yaw,
+            yaw_rate=rate,
+            speed=SDK_SPEED,
+            speed_up=SDK_CLIMB,
+            speed_down=SDK_CLIMB,
+            accel=tuning.accel,
+            accel_z=tuning.accel_z,
+            tilt=tuning.tilt,
+        )
+
+    def _leaning(self, command: SdkCommand) -> Setpoint:
+        tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
+        by_thrust = command.vertical == Flag.VERTICAL_THRUST
+        share = min(1.0, max(0.0, command.z / 100.0))
+        return Setpoint(
+            Control.ATTITUDE if by_thrust else Control.CLIMB,
+            roll=min(SDK_TILT, max(-SDK_TILT, command.x)),
+            pitch=min(SDK_TILT, max(-SDK_TILT, -command.y)),
+            yaw=yaw,
+            yaw_rate=rate,
+            throttle=Stabilize(self.vehicle).thrust(share) if by_thrust else 0.0,
+            climb=0.0 if by_thrust else self._climb(command),
+            speed_up=SDK_CLIMB,
+            speed_down=SDK_CLIMB,
+            accel_z=tuning.accel_z,
+        )

@@ -1,0 +1,151 @@
+"""What a rotorcraft does with the messages that the ground sends it.
+
+A message for another aircraft is not looked at. Nothing is acknowledged: a setting answers with its value,
+a moved waypoint with its place, everything else is seen on the telemetry or not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import Any
+
+from volery.base.frames import ned_to_enu
+from volery.simulation.autopilots.paparazzi import modes, parameters, rotorcraft_state
+from volery.simulation.autopilots.paparazzi.flight_modes import Guided
+from volery.simulation.autopilots.paparazzi.parameters import AUTO1_SWITCH, AUTO2_SWITCH, MANUAL_SWITCH
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import (
+    FULL,
+    PER_COUNT,
+    StickFrame,
+    bounded,
+    state_of,
+)
+from volery.simulation.autopilots.paparazzi.telemetry import waypoint
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+Fields = dict[str, Any]
+
+KILL_ALL, STANDBY, LAND = range(3)
+"""EMERGENCY_CMD.cmd."""
+MANUAL_BELOW, AUTO2_ABOVE = -FULL // 2, FULL // 2
+"""Of the mode switch."""
+
+
+def on_ping(vehicle: Vehicle, _fields: Fields) -> None:
+    """PING."""
+    vehicle.outlet.tell("PONG", {})
+
+
+def on_setting(vehicle: Vehicle, fields: Fields) -> None:
+    """SETTING: write, and say what it is now."""
+    value = parameters.write_setting(vehicle, fields["index"], fields["value"])
+    if value is not None:
+        vehicle.outlet.tell("DL_VALUE", {"index": fields["index"], "value": value})
+
+
+def on_get_setting(vehicle: Vehicle, fields: Fields) -> None:
+    """GET_SETTING."""
+    value = parameters.read_setting(vehicle, fields["index"])
+    if value is not None:
+        vehicle.outlet.tell("DL_VALUE", {"index": fields["index"], "value": value})
+
+
+def on_block(vehicle: Vehicle, fields: Fields) -> None:
+    """BLOCK: in any mode; it is flown in NAV."""
+    state_of(vehicle).navigation.jump(fields["block_id"])
+
+
+def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
+    """MOVE_WP: degrees 1e-7, millimetres above mean sea level. Ignored while there is no local frame."""
+    if not vehicle.estimate.position_ok:
+        return
+    place = vehicle.flight.to_ned(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
+    if state_of(vehicle).navigation.move(fields["wp_id"], ned_to_enu(place)):
+        vehicle.outlet.tell("WP_MOVED_ENU", waypoint(vehicle, fields["wp_id"]))
+
+
+def on_guided(vehicle: Vehicle, fields: Fields) -> None:
+    """GUIDED_SETPOINT_NED: silently ignored in every mode but GUIDED."""
+    manoeuvre = vehicle.manoeuvre
+    values = fields["x"], fields["y"], fields["z"]
+    if isinstance(manoeuvre, Guided) and all(map(isfinite, (*values, fields["yaw"]))):
+        manoeuvre.follow(fields["flags"], values, fields["yaw"])
+
+
+def on_emergency(vehicle: Vehicle, fields: Fields) -> None:
+    """EMERGENCY_CMD: motors off, block Standby, or down where it is."""
+    command = fields["cmd"]
+    if command == KILL_ALL:
+        modes.set_mode(vehicle, modes.KILL)
+    elif command == STANDBY:
+        state_of(vehicle).navigation.go_to_block("Standby")
+        modes.set_mode(vehicle, modes.NAV)
+    elif command == LAND:
+        modes.set_mode(vehicle, modes.FAILSAFE)
+
+
+# -- sticks
+
+
+def on_sticks(vehicle: Vehicle, fields: Fields) -> None:
+    """RC_4CH: counts of 1/128; the switch is 0, 1 or 2."""
+    _hear(
+        vehicle,
+        StickFrame(
+            bounded(PER_COUNT * fields["roll"]),
+            bounded(PER_COUNT * fields["pitch"]),
+            bounded(PER_COUNT * fields["yaw"]),
+            bounded(PER_COUNT * min(127, fields["throttle"]), 0),
+            bounded(FULL * (fields["mode"] - 1)),
+        ),
+    )
+
+
+def on_channels(vehicle: Vehicle, fields: Fields) -> None:
+    """RC_UP: the same as channels roll, pitch, yaw, throttle, mode; fewer are no frame."""
+    channels = fields["channels"]
+    if len(channels) >= len(StickFrame._fields):
+        roll, pitch, yaw, throttle, mode = (PER_COUNT * channel for channel in channels[:5])
+        frame = StickFrame(bounded(roll), bounded(pitch), bounded(yaw), bounded(throttle, 0), bounded(mode))
+        _hear(vehicle, frame)
+
+
+def on_joystick(vehicle: Vehicle, fields: Fields) -> None:
+    """JOYSTICK_RAW: the sticks themselves, the switch at AUTO2."""
+    roll, pitch, yaw = (bounded(fields[name]) for name in ("roll", "pitch", "yaw"))
+    _hear(vehicle, StickFrame(roll, pitch, yaw, bounded(fields["throttle"], 0), FULL))
+
+
+def _hear(vehicle: Vehicle, frame: StickFrame) -> None:
+    """A frame of radio control: the switch first, then the sticks."""
+    state_of(vehicle).radio.hear(vehicle, frame)
+    _switch(vehicle, frame.mode)
+    if vehicle.armed and vehicle.mode.pilot:
+        vehicle.act()
+
+
+def _switch(vehicle: Vehicle, position: int) -> None:
+    """MANUAL always; the other positions not out of HOME or FAILSAFE; NAV not without a fix."""
+    manual = position < MANUAL_BELOW
+    name = MANUAL_SWITCH if manual else AUTO2_SWITCH if position > AUTO2_ABOVE else AUTO1_SWITCH
+    wanted = round(vehicle.parameters[name])
+    if wanted == modes.NAV and rotorcraft_state.gps_lost(vehicle):
+        return
+    if manual or vehicle.mode.number not in (modes.HOME, modes.FAILSAFE):
+        modes.set_mode(vehicle, wanted)
+
+
+HANDLERS: Mapping[str, Callable[[Vehicle, Fields], None]] = {
+    "BLOCK": on_block,
+    "EMERGENCY_CMD": on_emergency,
+    "GET_SETTING": on_get_setting,
+    "GUIDED_SETPOINT_NED": on_guided,
+    "JOYSTICK_RAW": on_joystick,
+    "MOVE_WP": on_move_waypoint,
+    "PING": on_ping,
+    "RC_4CH": on_sticks,
+    "RC_UP": on_channels,
+    "SETTING": on_setting,
+}
+"""By name of the message."""

@@ -1,0 +1,172 @@
+"""Paparazzi's rotorcraft firmware: its modes and habits, put together as a dialect.
+
+From public definitions of the protocol and the static autopilot; not compared with a flight. What had to be
+assumed stands in docs/paparazzi.md.
+
+What had to be assumed of Paparazzi's rotorcraft firmware: one table.
+
+Protocol and rules are from public definitions and sources. No recording of a flight exists to compare with.
+Figures that an airframe file would define stand in ``airframe.FIGURES``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.firmware import BootEvent, Firmware
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
+from volery.simulation.autopilots.paparazzi import parameters
+from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
+from volery.simulation.autopilots.paparazzi.endpoint import PaparazziEndpoint
+from volery.simulation.autopilots.paparazzi.failsafes import WATCHES
+from volery.simulation.autopilots.paparazzi.flight_modes import (
+    Direct,
+    FlyHome,
+    FlyPlan,
+    Guided,
+    HoldHeight,
+    HoldPlace,
+    Killed,
+    Sink,
+)
+from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
+from volery.simulation.autopilots.paparazzi.modes import HOME, in_flight, set_mode
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import (
+    ACQUIRED_AFTER,
+    RotorcraftState,
+    state_of,
+    update_fix,
+)
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+
+TICK: Ns = S // 16
+"""Navigation runs sixteen times a second; so does everything else here."""
+
+READY: Ns = 2 * S
+HOLDING_POINT = PLAN.block_number("Holding point")
+
+MODES = {
+    mode.number: mode
+    for mode in (
+        Mode(0, "KILL", 0, Killed),
+        Mode(1, "FAILSAFE", 0, Sink),
+        Mode(2, "HOME", 0, FlyHome, needs_position=True),
+        Mode(4, "ATTITUDE_DIRECT", 0, Direct, pilot=True, manual_throttle=True),
+        Mode(6, "ATTITUDE_RC_CLIMB", 0, AltitudeHold, pilot=True),
+        Mode(9, "ATTITUDE_Z_HOLD", 0, HoldHeight, pilot=True),
+        Mode(12, "HOVER_Z_HOLD", 0, HoldPlace, pilot=True, needs_position=True),
+        Mode(13, "NAV", 0, FlyPlan, needs_position=True),
+        Mode(19, "GUIDED", 0, Guided, needs_position=True),
+    )
+}
+"""Those that this firmware was built with. Bits of heartbeats are MAVLink's: none here."""
+
+
+def rotorcraft_state(vehicle: Vehicle) -> RotorcraftState:
+    """A flight plan at its beginning, no sticks."""
+    return RotorcraftState(Navigation(vehicle, PLAN))
+
+
+def ready(vehicle: Vehicle) -> None:
+    """The firmware is up, on the ground, in its start-up mode."""
+    vehicle.landed = True
+    set_mode(vehicle, round(vehicle.parameters["MODE_STARTUP"]))
+
+
+def warm(vehicle: Vehicle) -> None:
+    """Its flight plan has come to the holding point."""
+    ready(vehicle)
+    state_of(vehicle).navigation.jump(HOLDING_POINT)
+
+
+def on_step(vehicle: Vehicle) -> None:
+    """Satellites, flight plan, flight time; without motors on the ground it stands."""
+    update_fix(vehicle)
+    navigation = state_of(vehicle).navigation
+    if vehicle.mode.number == HOME:
+        navigation.fly_home()
+    elif vehicle.uptime() >= READY:
+        navigation.step()
+    if in_flight(vehicle):
+        vehicle.flight_time += TICK
+    elif not vehicle.armed and vehicle.estimate.landed:
+        vehicle.landed = True
+
+
+def _nothing(_vehicle: Vehicle) -> None:
+    """Nothing is done then."""
+
+
+ROTORCRAFT = Firmware(
+    name="paparazzi",
+    kind="multirotor",
+    face=PaparazziEndpoint,
+    memory=rotorcraft_state,
+    boot_mode=MODES[0],
+    boot_events=(BootEvent(READY, ready),),
+    ready_after=READY,
+    origin_after=ACQUIRED_AFTER,
+    position_after=0,
+    local_position_after=0,
+    on_warm=warm,
+    on_warm_position=Vehicle.home_is_here,
+    tick=TICK,
+    watch_every=1,
+    each_second=_nothing,
+    modes=MODES,
+    tuning=parameters.tuning,
+    transmitter=(1500, 1500, 1000, 1500),
+    stands=True,
+    spool_time=500 * MS,
+    resigns_after=1500 * MS,
+    watches=WATCHES,
+    on_step=on_step,
+    on_disarmed=_nothing,
+    parameters=parameters.default_parameters,
+    own_parameters=parameters.own_parameters,
+    supported_parameters={name: figure.what for name, figure in parameters.FIGURES.items()},
+)
+
+
+ASSUMED: Mapping[str, str] = {
+    "aircraft": "the stock rotorcraft: settings, blocks and waypoints of the files in "
+    "`links/stock_rotorcraft`",
+    "switching on": "telemetry after 2 s, attitude aligned after 4 s, first fix after 12 s; it starts in NAV",
+    "Geo init": "lasts 10 s, then origin and home are where it stands; in the air it changes nothing",
+    "transmitter": "there is none; sticks by RC_4CH, RC_UP (roll, pitch, yaw, throttle, mode) or "
+    "JOYSTICK_RAW (switch at AUTO2) are one",
+    "sticks": "right, nose up and clockwise are positive; a frame is obeyed at once, the last one holds "
+    "while the radio is LOST",
+    "modes": "KILL, FAILSAFE, HOME, ATTITUDE_DIRECT, ATTITUDE_RC_CLIMB, ATTITUDE_Z_HOLD, HOVER_Z_HOLD, "
+    "NAV and GUIDED are built in; others are refused in silence",
+    "HOME": "flies straight to the waypoint HOME at that waypoint's height, and stays there: it does not "
+    "land",
+    "FAILSAFE": "sinks level and drifts with the wind; out of it lead `mode`, and a transmitter in MANUAL",
+    "KILL": "stops the motors anywhere; only another mode and then `kill_throttle` 0 starts them again",
+    "kill_throttle": "starts motors in every mode but KILL, on the ground and in the air",
+    "arming_status": "ARMED; else why motors were last refused (KILLED, AHRS_NOT_ALLIGNED, LOW_BATTERY); "
+    "else NO_RC, WAITING or UNARMED_IN_AUTO",
+    "in flight": "motors on and the landed detector of the simulated flight stack not sure of the ground",
+    "NAV": "flies at the airframe's speeds, heading as it was when NAV began; on lines and circles it "
+    "follows a point 12 m ahead",
+    "block Takeoff": "climbs over the spot at NAV_CLIMB_VSPEED until 2 m, then goes on in Standby",
+    "block land here": "moves TD below it, sinks to TD's height, then at NAV_DESCEND_VSPEED to the "
+    "ground; there Holding point stops the motors",
+    "blocks in other modes": "run, but for starting and stopping motors; NAV flies where they have come to",
+    "GUIDED": "begins by holding place, height and heading; a set-point 0.3 m above, or a climb above 0.1 "
+    "m/s, lifts it off; on the ground it idles and keeps its motors on",
+    "GUIDED_SETPOINT_NED": "offsets count from the estimate when it arrives; body velocities are turned "
+    "once; numbers that are not finite are ignored",
+    "GUIDED_FULL_NED, REMOTE_GPS_LOCAL": "are not understood",
+    "MISSION_...": "are not understood: the stock plan flies no uploaded mission",
+    "guided in NAV": "does not occur: the stock plan has no guided instruction",
+    "EMERGENCY_CMD": "KILL: mode KILL; STANDBY: mode NAV in block Standby; LAND: mode FAILSAFE",
+    "MOVE_WP": "takes effect at once and is answered with WP_MOVED_ENU; nothing before there is an origin",
+    "telemetry": "ATTITUDE and ROTORCRAFT_RADIO_CONTROL each 0.5 s, DL_VALUE 1.1 s and WP_MOVED_ENU 1.3 s "
+    "in turn; ROTORCRAFT_STATUS also when the mode changes",
+    "satellites lost in GUIDED": "changes nothing: it flies on by what the estimator believes",
+    "sea level": "and ellipsoid are one surface",
+    "battery": "is measured without error; only FAILSAFE_ON_BAT_CRITICAL makes it count",
+}
+"""What, and what is taken for true."""

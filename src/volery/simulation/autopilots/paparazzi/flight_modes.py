@@ -1,0 +1,269 @@
+"""What the modes of the rotorcraft fly, but for GUIDED.
+
+GUIDED: set-points of another computer, each axis a position or a velocity. None ever expires.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, sin
+
+from volery.base.frames import Vector, enu_to_ned, wrap
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Stabilize
+from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
+from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+
+LIFT_OFF_M = 0.3
+"""Standing on the ground it lifts off for a height that far above."""
+
+
+class Killed(Manoeuvre):
+    """Motors off: nothing to fly."""
+
+    def step(self) -> None:
+        """Motors cannot be on in this mode."""
+        self.idle()
+
+
+class Sink(Manoeuvre):
+    """FAILSAFE: level, down at FAILSAFE_DESCENT_SPEED, wherever the wind carries it."""
+
+    landing = True
+
+    def step(self) -> None:
+        """Sink."""
+        speed = self.vehicle.parameters["FAILSAFE_DESCENT_SPEED"]
+        tuning = self.vehicle.tuning
+        self.drive(Setpoint(Control.CLIMB, climb=-speed, speed_down=max(0.1, speed), accel_z=tuning.accel_z))
+
+
+class FlyPlan(Manoeuvre):
+    """NAV: whatever the flight plan demands."""
+
+    def enter(self) -> None:
+        """Keep the heading that it has."""
+        state_of(self.vehicle).navigation.heading = self.vehicle.estimate.attitude[2]
+
+    @property
+    def demand(self) -> Demand:
+        """What is to be flown now."""
+        return state_of(self.vehicle).navigation.demand
+
+    def wants_to_fly(self) -> bool:
+        """When it is to climb, or to be above where it stands."""
+        demand = self.demand
+        if demand.vertical is Vertical.CLIMB:
+            return demand.climb > 0.0
+        here = state_of(self.vehicle).navigation.position
+        return demand.vertical is Vertical.ALTITUDE and demand.target[2] > here[2] + LIFT_OFF_M
+
+    def step(self) -> None:
+        """Drive there."""
+        demand, tuning = self.demand, self.vehicle.tuning
+        self.landing = demand.vertical is Vertical.CLIMB and demand.climb < 0.0
+        self.target = None if demand.vertical is Vertical.THROTTLE else enu_to_ned(demand.goal)
+        if demand.vertical is Vertical.THROTTLE:
+            self.idle()
+            return
+        climbs = demand.vertical is Vertical.CLIMB
+        self.drive(
+            Setpoint(
+                Control.POSITION_CLIMB if climbs else Control.POSITION,
+                position=enu_to_ned(demand.target),
+                climb=demand.climb,
+                yaw=state_of(self.vehicle).navigation.heading,
+                speed=tuning.speed,
+                speed_up=tuning.speed_up,
+                speed_down=tuning.speed_down,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+class FlyHome(FlyPlan):
+    """HOME: to the waypoint HOME at its height, and stay there."""
+
+    def enter(self) -> None:
+        """Straight there."""
+        super().enter()
+        state_of(self.vehicle).navigation.fly_home()
+
+
+class Direct(Stabilize):
+    """ATTITUDE_DIRECT: sticks are lean angles, turn rate and thrust, in proportion."""
+
+    def thrust(self, throttle: float) -> float:
+        """As the stick says."""
+        return throttle
+
+
+class HoldHeight(AltitudeHold):
+    """ATTITUDE_Z_HOLD: sticks are lean angles and turn rate; the height at which it began is held."""
+
+    def climb(self, throttle: float) -> float:
+        """The throttle stick commands no climb."""
+        return 0.0
+
+
+class HoldPlace(ByPilot):
+    """HOVER_Z_HOLD: it stays where it began; the sticks turn it only."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._place: Vector = (0.0, 0.0, 0.0)
+
+    def enter(self) -> None:
+        """Stay here."""
+        self._place = self.vehicle.estimate.position
+
+    def step(self) -> None:
+        """Stay."""
+        tuning = self.vehicle.tuning
+        self.drive(
+            Setpoint(
+                Control.POSITION,
+                position=self._place,
+                yaw_rate=self.pilot.yaw * tuning.pilot_yaw_rate,
+                speed=tuning.speed,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+OFFSET_PLANE, BODY, OFFSET_HEIGHT, OFFSET_YAW = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+VELOCITY_PLANE, VELOCITY_HEIGHT, YAW_RATE = 1 << 5, 1 << 6, 1 << 7
+"""Flags of GUIDED_SETPOINT_NED."""
+
+LIFTS_M, LIFTS_M_S = 0.3, 0.1
+"""Standing on the ground it lifts off for a height that far above, or a climb that fast."""
+
+
+@dataclass(frozen=True)
+class GuidedSetpoint:
+    """North, east: metres about the local origin, or m/s; likewise down; radians clockwise, or rad/s."""
+
+    north: float
+    east: float
+    down: float
+    yaw: float
+    plane_is_velocity: bool = False
+    height_is_velocity: bool = False
+    yaw_is_rate: bool = False
+
+
+class Guided(Manoeuvre):
+    """Hold what was asked for last; at first the place where it began."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._setpoint = self._here()
+
+    def _here(self) -> GuidedSetpoint:
+        estimate = self.vehicle.estimate
+        return GuidedSetpoint(*estimate.position, estimate.attitude[2])
+
+    def enter(self) -> None:
+        """Hold this place and heading."""
+        self._hold(self._here())
+
+    def _hold(self, setpoint: GuidedSetpoint) -> None:
+        self._setpoint = setpoint
+        plane = setpoint.plane_is_velocity
+        self.target = None if plane else (setpoint.north, setpoint.east, self._target_down())
+
+    def _target_down(self) -> float:
+        return self._position[2] if self._setpoint.height_is_velocity else self._setpoint.down
+
+    @property
+    def _position(self) -> Vector:
+        return self.vehicle.estimate.position
+
+    def wants_to_fly(self) -> bool:
+        """When it is asked to be above where it stands, or to climb."""
+        setpoint = self._setpoint
+        if setpoint.height_is_velocity:
+            return setpoint.down < -LIFTS_M_S
+        return setpoint.down < self._position[2] - LIFTS_M
+
+    def follow(self, flags: int, values: Vector, yaw: float) -> None:
+        """GUIDED_SETPOINT_NED: *values* north, east, down as the flags mean them.
+
+        Offsets count from where the vehicle is now, in its body's axes where flagged, and are ignored, axis
+        by axis, while there is no local frame.
+        """
+        setpoint = self._plane(flags, values[0], values[1])
+        setpoint = self._height(setpoint, flags, values[2])
+        self._hold(self._turned(setpoint, flags, yaw))
+        if self.vehicle.armed:
+            self.vehicle.act()
+
+    def _plane(self, flags: int, x: float, y: float) -> GuidedSetpoint:
+        now = self._setpoint
+        if flags & BODY:
+            heading = self.vehicle.estimate.attitude[2]
+            x, y = x * cos(heading) - y * sin(heading), x * sin(heading) + y * cos(heading)
+        if flags & VELOCITY_PLANE:
+            return replace(now, north=x, east=y, plane_is_velocity=True)
+        if flags & (OFFSET_PLANE | BODY):
+            if not self.vehicle.estimate.position_ok:
+                return now
+            here = self._position
+            x, y = here[0] + x, here[1] + y
+        return replace(now, north=x, east=y, plane_is_velocity=False)
+
+    def _height(self, now: GuidedSetpoint, flags: int, z: float) -> GuidedSetpoint:
+        if flags & VELOCITY_HEIGHT:
+            return replace(now, down=z, height_is_velocity=True)
+        if flags & OFFSET_HEIGHT:
+            if not self.vehicle.estimate.position_ok:
+                return now
+            z += self._position[2]
+        return replace(now, down=z, height_is_velocity=False)
+
+    def _turned(self, now: GuidedSetpoint, flags: int, yaw: float) -> GuidedSetpoint:
+        if flags & YAW_RATE:
+            return replace(now, yaw=yaw, yaw_is_rate=True)
+        if flags & OFFSET_YAW:
+            yaw += self.vehicle.estimate.attitude[2]
+        return replace(now, yaw=wrap(yaw), yaw_is_rate=False)
+
+    def step(self) -> None:
+        """Drive there."""
+        wanted, tuning = self._setpoint, self.vehicle.tuning
+        self.drive(
+            Setpoint(
+                _CONTROLS[wanted.plane_is_velocity, wanted.height_is_velocity],
+                position=(wanted.north, wanted.east, wanted.down),
+                velocity=(wanted.north, wanted.east, wanted.down),
+                climb=-wanted.down,
+                yaw=None if wanted.yaw_is_rate else wanted.yaw,
+                yaw_rate=wanted.yaw if wanted.yaw_is_rate else None,
+                speed=tuning.speed,
+                speed_up=tuning.speed_up,
+                speed_down=tuning.speed_down,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+    def carrot(self) -> tuple[Vector, float]:
+        """Where it is led: north, east, down [m], and the heading [rad]."""
+        wanted, here = self._setpoint, self.vehicle.estimate
+        plane = here.position[:2] if wanted.plane_is_velocity else (wanted.north, wanted.east)
+        return (*plane, self._target_down()), here.attitude[2] if wanted.yaw_is_rate else wanted.yaw
+
+
+_CONTROLS = {
+    (False, False): Control.POSITION,
+    (False, True): Control.POSITION_CLIMB,
+    (True, False): Control.VELOCITY_HEIGHT,
+    (True, True): Control.VELOCITY,
+}
+"""By whether the plane, and the height, is a velocity."""

@@ -1,0 +1,158 @@
+"""The figures of the airframe: what an airframe file defines for the rotorcraft firmware, as parameters.
+
+Names are the firmware's own where it has one. None is recorded: the values are the firmware's documented
+defaults where those make sense for the simulated body, and assumptions else (docs/paparazzi.md).
+
+Settings: variables of the firmware that a ground station reads and writes by number.
+
+The numbers are those of the stock rotorcraft (``links.pprz_aircraft``). A value outside a setting's bounds
+is taken as it comes, as in the firmware: the bounds are the ground station's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import isfinite, radians
+from typing import NamedTuple
+
+from volery.links.paparazzi_aircraft import stock_aircraft
+from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
+from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
+from volery.simulation.autopilots.paparazzi.modes import set_mode_by_datalink, set_motors
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+MANUAL_SWITCH, AUTO1_SWITCH, AUTO2_SWITCH = "MODE_MANUAL", "MODE_AUTO1", "MODE_AUTO2"
+"""What the three positions of a transmitter's mode switch mean."""
+
+CRITICAL_CELL_VOLTS = 3.1
+FARTHEST_M = stock_aircraft().farthest or 150.0
+"""From HOME in NAV, by the flight plan."""
+SLOWEST = 0.1
+
+
+class Figure(NamedTuple):
+    """A figure of the airframe, and what it is."""
+
+    value: float
+    what: str
+
+
+FIGURES: Mapping[str, Figure] = {
+    "MODE_STARTUP": Figure(13.0, "mode after switching on: NAV"),
+    MANUAL_SWITCH: Figure(4.0, "mode at the transmitter's MANUAL: ATTITUDE_DIRECT"),
+    AUTO1_SWITCH: Figure(12.0, "mode at AUTO1: HOVER_Z_HOLD"),
+    AUTO2_SWITCH: Figure(13.0, "mode at AUTO2, the setting `auto2`: NAV"),
+    "MAX_DIST_FROM_HOME": Figure(FARTHEST_M, "m from HOME at which NAV becomes HOME"),
+    "FAILSAFE_MODE_DISTANCE": Figure(
+        1.5 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
+    ),
+    "FAILSAFE_DESCENT_SPEED": Figure(1.5, "m/s in FAILSAFE"),
+    "FAILSAFE_ON_BAT_CRITICAL": Figure(0.0, "1: a critical battery is FAILSAFE, and keeps motors off"),
+    "CRITIC_BAT_LEVEL": Figure(0.0, "V that are critical; 3.1 V a cell of its battery"),
+    "GEOFENCE_DATALINK_LOST_TIME": Figure(0.0, "s of silence after which NAV becomes HOME; 0: never"),
+    "GEOFENCE_MAX_ALTITUDE": Figure(0.0, "m above the origin at which NAV becomes HOME; 0: none"),
+    "GPS_TIMEOUT": Figure(2.0, "s without a fix after which satellites are lost"),
+    "RC_LOST_TIME": Figure(0.5, "s without sticks: LOST"),
+    "RC_REALLY_LOST_TIME": Figure(1.0, "s without sticks: REALLY_LOST, in modes of sticks FAILSAFE"),
+    "GUIDANCE_H_REF_MAX_SPEED": Figure(5.0, "m/s in the plane"),
+    "GUIDANCE_H_REF_MAX_ACCEL": Figure(2.5, "m/s^2 in the plane"),
+    "GUIDANCE_V_REF_MAX_CLIMB": Figure(2.5, "m/s up"),
+    "GUIDANCE_V_REF_MAX_DESCENT": Figure(1.5, "m/s down"),
+    "GUIDANCE_V_REF_MAX_ACCEL": Figure(1.0, "m/s^2 up and down"),
+    "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(30.0, "degrees of lean"),
+    "STABILIZATION_ATTITUDE_SP_MAX_R": Figure(90.0, "degrees/s of turn by stick"),
+    "ARRIVED_AT_WAYPOINT": Figure(3.0, "m from a waypoint at which the plan goes on"),
+    "NAV_CLIMB_VSPEED": Figure(0.5, "m/s up in block Takeoff"),
+    "NAV_DESCEND_VSPEED": Figure(-0.8, "m/s up in block flare"),
+    "DEFAULT_CIRCLE_RADIUS": Figure(5.0, "m; clockwise if positive"),
+}
+"""By name. The model's ``default_parameters`` of a vehicle replace them."""
+
+_FULL = ChannelRange(1000.0, 1500.0, 2000.0, 0.0)
+
+
+def default_parameters() -> tuple[Parameter, ...]:
+    """All of them."""
+    return tuple(Parameter(name, REAL32, figure.value) for name, figure in FIGURES.items())
+
+
+def own_parameters(_system: int, flight: Flight) -> dict[str, float]:
+    """What follows from the battery."""
+    return {"CRITIC_BAT_LEVEL": CRITICAL_CELL_VOLTS * flight.spec.battery.cells}
+
+
+def tuning(parameters: Parameters) -> Tuning:
+    """What manoeuvres fly by."""
+    p = parameters
+    up, down = _moving(p["GUIDANCE_V_REF_MAX_CLIMB"]), _moving(p["GUIDANCE_V_REF_MAX_DESCENT"])
+    accel_z = _moving(p["GUIDANCE_V_REF_MAX_ACCEL"])
+    return Tuning(
+        sticks=StickMap(travels=(_FULL, _FULL, _FULL, _FULL)),
+        speed=_moving(p["GUIDANCE_H_REF_MAX_SPEED"]),
+        speed_up=up,
+        speed_down=down,
+        accel=_moving(p["GUIDANCE_H_REF_MAX_ACCEL"]),
+        accel_z=accel_z,
+        tilt=radians(min(80.0, max(5.0, p["STABILIZATION_ATTITUDE_SP_MAX_PHI"]))),
+        waypoint_radius=_moving(p["ARRIVED_AT_WAYPOINT"]),
+        pilot_up=up,
+        pilot_down=down,
+        pilot_accel_z=accel_z,
+        pilot_yaw_rate=radians(p["STABILIZATION_ATTITUDE_SP_MAX_R"]),
+    )
+
+
+def _moving(value: float) -> float:
+    """A speed, an acceleration or a distance that is not none."""
+    return max(SLOWEST, value)
+
+
+class Variable(NamedTuple):
+    """How one is read and written."""
+
+    read: Callable[[Vehicle], float]
+    write: Callable[[Vehicle, float], None]
+
+
+def _parameter(name: str) -> Variable:
+    def write(vehicle: Vehicle, value: float) -> None:
+        vehicle.set_parameter(name, value)
+
+    return Variable(lambda vehicle: vehicle.parameters[name], write)
+
+
+def _nothing(_vehicle: Vehicle, _value: float) -> None:
+    """There is no such hardware."""
+
+
+VARIABLES = {
+    "auto2": _parameter(AUTO2_SWITCH),
+    "kill_throttle": Variable(
+        lambda vehicle: float(not vehicle.armed), lambda vehicle, value: set_motors(vehicle, value == 0.0)
+    ),
+    "autopilot_power_switch": Variable(lambda _vehicle: 1.0, _nothing),
+    "mode": Variable(
+        lambda vehicle: float(vehicle.mode.number),
+        lambda vehicle, value: set_mode_by_datalink(vehicle, int(value)),
+    ),
+}
+"""By the name that the stock rotorcraft gives them."""
+
+NUMBERED = {one.number: VARIABLES[one.name] for one in stock_aircraft().settings}
+
+
+def read_setting(vehicle: Vehicle, number: int) -> float | None:
+    """Its value; ``None`` if there is none of that number."""
+    variable = NUMBERED.get(number)
+    return None if variable is None else variable.read(vehicle)
+
+
+def write_setting(vehicle: Vehicle, number: int, value: float) -> float | None:
+    """Set it, and return what it is then; ``None`` if there is none of that number."""
+    variable = NUMBERED.get(number)
+    if variable is None:
+        return None
+    if isfinite(value):
+        variable.write(vehicle, value)
+    return variable.read(vehicle)

@@ -1,0 +1,369 @@
+"""Speeds that depend on something by straight lines between points.
+
+The automatic modes of PX4's multirotor, which plan their path: hold, take-off, landing, return, circle.
+
+POSCTL: PX4's multirotor flown by sticks, or by nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from math import atan2, cos, dist, hypot, pi, sin
+
+from volery.base.frames import Vector, wrap
+from volery.base.time import Ns, to_seconds
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.manual_flight import ByPilot
+from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
+from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+
+CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
+"""Share of a climb rate over the time since it left the ground, in MPC_TKO_RAMP_T: as recorded."""
+
+
+def interpolated(value: float, low: tuple[float, float], high: tuple[float, float]) -> float:
+    """Between two points (value, result), and their results beyond them."""
+    if high[0] <= low[0]:
+        return high[1] if value > low[0] else low[1]
+    share = min(1.0, max(0.0, (value - low[0]) / (high[0] - low[0])))
+    return low[1] + share * (high[1] - low[1])
+
+
+def climb_share(vehicle: Vehicle) -> float:
+    """How much of its climb rate it may use: little just after it has left the ground."""
+    lifted = vehicle.memory.lifted_at
+    if lifted == NEVER:
+        return CLIMB_RAMP[0][1]
+    along = to_seconds(vehicle.kernel.now() - lifted) / max(0.1, vehicle.parameters["MPC_TKO_RAMP_T"])
+    for low, high in pairwise(CLIMB_RAMP):
+        if along <= high[0]:
+            return interpolated(along, low, high)
+    return 1.0
+
+
+JERK_AUTO = 4.0
+"""MPC_JERK_AUTO [m/s^3]."""
+
+CRUISE_SHARE = 0.84
+"""Of MPC_XY_CRUISE: legs asked for at 5 m/s were flown at 4.0 to 4.2."""
+
+ACCEL_SHARE = 0.67
+"""Of MPC_ACC_HOR: how a leg begins and ends in the recordings."""
+
+ALIGNED, SPEED_ASIDE = 0.35, 0.5
+"""A leg is flown in earnest once the nose is that close to its direction [rad]; before, that fast [m/s]."""
+
+
+class Hold(ToPoint):
+    """AUTO.LOITER: stop and stay; a reposition moves the point."""
+
+    def towards(self, point: Vector) -> Setpoint:
+        """As planned by the firmware: gently."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        return Setpoint(
+            Control.POSITION,
+            position=point,
+            yaw=self.yaw if vehicle.yaw_target is None else vehicle.yaw_target,
+            speed=self._cruise(),
+            speed_up=tuning.speed_up,
+            speed_down=tuning.speed_down,
+            accel=ACCEL_SHARE * tuning.accel,
+            accel_z=tuning.accel_z,
+            tilt=tuning.tilt,
+            jerk=JERK_AUTO,
+        )
+
+    def _cruise(self) -> float:
+        """Speed in the plane; slow until the nose points along the leg."""
+        vehicle = self.vehicle
+        speed = CRUISE_SHARE * (self.speed or vehicle.speed or vehicle.parameters["MPC_XY_CRUISE"])
+        if self.yaw is None or abs(wrap(self.yaw - vehicle.estimate.attitude[2])) < ALIGNED:
+            return speed
+        return min(speed, SPEED_ASIDE)
+
+    def near(self, sideways: float, height: float) -> bool:
+        """Whether it is that close to the point."""
+        if self.point is None:
+            return True
+        here = self.vehicle.estimate.position
+        return dist(here[:2], self.point[:2]) < sideways and abs(here[2] - self.point[2]) < height
+
+
+class TakeOff(Hold):
+    """Straight up to an altitude, as MPC_TKO_SPEED and its ramp allow. It counts as there 0.8 m below."""
+
+    taking_off = True
+    slow_start = True
+
+    def __init__(self, vehicle: Vehicle, down: float) -> None:
+        super().__init__(vehicle)
+        self.down = down
+
+    def enter(self) -> None:
+        """From where it stands."""
+        north, east, _ = self.vehicle.estimate.position
+        self.point = self.target = (north, east, self.down)
+
+    def wants_to_fly(self) -> bool:
+        """That is what it is for."""
+        return True
+
+    def towards(self, point: Vector) -> Setpoint:
+        """Slowly at first."""
+        share = climb_share(self.vehicle)
+        return replace(super().towards(point), speed_up=share * self.vehicle.parameters["MPC_TKO_SPEED"])
+
+    def arrived(self, passing: bool = False) -> bool:
+        """Within NAV_MC_ALT_RAD, or above."""
+        reach = self.vehicle.parameters["NAV_MC_ALT_RAD"]
+        return self.vehicle.estimate.position[2] - self.down < reach
+
+
+class Descent(Land):
+    """AUTO.LAND: slower and slower below MPC_LAND_ALT1, ALT2 and ALT3."""
+
+    def sink(self) -> float:
+        """Metres per second down at the present height."""
+        p, height = self.vehicle.parameters, self.vehicle.memory.above_ground
+        middle = p["MPC_LAND_SPEED"]
+        if height > p["MPC_LAND_ALT2"]:
+            return interpolated(
+                height, (p["MPC_LAND_ALT2"], middle), (p["MPC_LAND_ALT1"], p["MPC_Z_V_AUTO_DN"])
+            )
+        return interpolated(height, (p["MPC_LAND_ALT3"], p["MPC_LAND_CRWL"]), (p["MPC_LAND_ALT2"], middle))
+
+
+class Return(Manoeuvre):
+    """AUTO.RTL: climb, fly home, sink to RTL_DESCEND_ALT, land. *stage* is told the name of each stage, its
+    altitude AMSL and its height above the destination.
+    """
+
+    def __init__(self, vehicle: Vehicle, told: Callable[[Vehicle, str, float, float], None]) -> None:
+        super().__init__(vehicle)
+        self._told = told
+        self._stage = ""
+        self._doing: Manoeuvre = Hold(vehicle)
+
+    def enter(self) -> None:
+        """Straight up first."""
+        here, home = self.vehicle.estimate.position, self._home
+        away = hypot(home[0] - here[0], home[1] - here[1])
+        self._height = max(self._least_height(away), home[2] - here[2])
+        self._next("climb", (here[0], here[1], home[2] - self._height))
+
+    @property
+    def _home(self) -> Vector:
+        return self.vehicle.home.ned if self.vehicle.home else (0.0, 0.0, 0.0)
+
+    def _least_height(self, away: float) -> float:
+        """Above home: RTL_RETURN_ALT, less within a cone of RTL_CONE_ANG about home."""
+        p = self.vehicle.parameters
+        full, reach, angle = p["RTL_RETURN_ALT"], p["NAV_ACC_RAD"], p["RTL_CONE_ANG"]
+        if angle <= 0.0:
+            return full
+        if away <= reach:
+            return 2.0 * away
+        if away <= p["RTL_MIN_DIST"]:
+            half = min(89.0, max(1.0, angle)) * pi / 180.0
+            full = min(full, away * cos(half) / sin(half))
+        return max(full, 2.0 * reach)
+
+    def _next(self, stage: str, point: Vector) -> None:
+        self._stage = stage
+        self._doing = Descent(self.vehicle, point) if stage == "land" else Hold(self.vehicle, point)
+        self._doing.enter()
+        self.target, self.landing = self._doing.target, self._doing.landing
+        above = self._home[2] - point[2]
+        amsl = (self.vehicle.home.amsl if self.vehicle.home else 0.0) + above
+        self._told(self.vehicle, stage, amsl, above)
+
+    def step(self) -> None:
+        """On to the next stage when one is done."""
+        doing, home = self._doing, self._home
+        p = self.vehicle.parameters
+        if isinstance(doing, Hold):
+            if self._stage == "climb" and doing.near(1e9, p["NAV_MC_ALT_RAD"]):
+                self._next("return", (home[0], home[1], home[2] - self._height))
+            elif self._stage == "return" and doing.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
+                self._next("descend", (home[0], home[1], home[2] - min(self._height, p["RTL_DESCEND_ALT"])))
+            elif self._stage == "descend" and doing.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
+                self._next("land", home)
+        self._doing.step()
+
+
+class Orbit(Manoeuvre):
+    """Circles about a centre, nose to it."""
+
+    def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, speed: float) -> None:
+        super().__init__(vehicle)
+        self.centre, self.radius, self.speed = centre, radius, speed
+        self.target = centre
+
+    def step(self) -> None:
+        """Along the tangent, with a pull to the circle; positive radius: clockwise."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        north, east, _ = vehicle.estimate.position
+        angle = atan2(east - self.centre[1], north - self.centre[0])
+        size = abs(self.radius)
+        pull = size - hypot(north - self.centre[0], east - self.centre[1])
+        along = self.speed * (1.0 if self.radius > 0.0 else -1.0) * max(0.0, 1.0 - abs(pull) / size)
+        inward = min(2.5, max(-2.5, pull))
+        velocity = (
+            inward * cos(angle) - along * sin(angle),
+            inward * sin(angle) + along * cos(angle),
+            0.0,
+        )
+        vehicle.drive(
+            Setpoint(
+                Control.VELOCITY_HEIGHT,
+                position=self.centre,
+                velocity=velocity,
+                yaw=angle + pi,
+                speed=tuning.speed,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+SINK_BLIND = 0.7
+"""MPC_LAND_SPEED: how it sinks in POSCTL without sticks [m/s]."""
+
+EXPO = 0.6
+"""MPC_XY_MAN_EXPO, MPC_Z_MAN_EXPO."""
+
+STICK_SPEED_SHARE = 0.78
+"""Of MPC_VEL_MANUAL: what a stick held for long came to in the recordings."""
+
+
+def curve(stick: float, dead: float) -> float:
+    """-1..1: nothing within the dead zone, gently beyond."""
+    size = abs(stick)
+    if size <= dead:
+        return 0.0
+    along = (size - dead) / (1.0 - dead)
+    shaped = EXPO * along**3 + (1.0 - EXPO) * along
+    return shaped if stick > 0.0 else -shaped
+
+
+class BlindDescent(Manoeuvre):
+    """POSCTL with nobody at the sticks: it keeps its place and sinks."""
+
+    landing = False
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._held: Vector = (0.0, 0.0, 0.0)
+
+    def enter(self) -> None:
+        """Where it is."""
+        self._held = self.vehicle.estimate.position
+
+    def step(self) -> None:
+        """Sink."""
+        tuning = self.vehicle.tuning
+        self.vehicle.drive(
+            Setpoint(
+                Control.POSITION_CLIMB,
+                position=self._held,
+                climb=-SINK_BLIND,
+                speed=tuning.speed,
+                speed_down=tuning.speed_down,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+
+class PositionControl(ByPilot):
+    """POSCTL: sticks are accelerations against a drag; let go, it brakes and stays."""
+
+    slow_start = True
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._velocity = (0.0, 0.0)
+        self._last: Ns = 0
+        self._held: Vector | None = None
+        self._blind: BlindDescent | None = None
+
+    def enter(self) -> None:
+        """With the speed that it has."""
+        north, east, _ = self.vehicle.estimate.velocity
+        self._velocity, self._held, self._blind = (north, east), None, None
+        self._last = self.vehicle.kernel.now()
+
+    def wants_to_fly(self) -> bool:
+        """When the pilot asks to climb."""
+        return self._sticks and self._climb() > 0.0
+
+    @property
+    def _sticks(self) -> bool:
+        valid: bool = self.vehicle.memory.joystick.valid
+        return valid
+
+    def _climb(self) -> float:
+        p = self.vehicle.parameters
+        asked = curve(self.vehicle.memory.joystick.now.throttle, p["MPC_HOLD_DZ"])
+        return asked * (p["MPC_Z_VEL_MAX_UP"] if asked > 0.0 else p["MPC_Z_VEL_MAX_DN"])
+
+    def step(self) -> None:
+        """Sticks to speed; without sticks it sinks."""
+        if not self._sticks:
+            if self._blind is None:
+                self._blind = BlindDescent(self.vehicle)
+                self._blind.enter()
+            self._blind.step()
+            return
+        if self._blind is not None:
+            self.enter()
+        self._fly()
+
+    def _fly(self) -> None:
+        vehicle, tuning, p = self.vehicle, self.vehicle.tuning, self.vehicle.parameters
+        now = vehicle.kernel.now()
+        passed, self._last = to_seconds(now - self._last), now
+        sticks, dead = vehicle.memory.joystick.now, p["MPC_HOLD_DZ"]
+        forward, right = curve(sticks.pitch, dead), curve(sticks.roll, dead)
+        self._move(forward, right, passed)
+        climb = self._climb()
+        north, east = self._velocity
+        self.drive(
+            Setpoint(
+                Control.VELOCITY if self._held is None else Control.POSITION_CLIMB,
+                position=self._held or (0.0, 0.0, 0.0),
+                velocity=(north, east, -climb),
+                climb=min(climb, climb_share(vehicle) * tuning.speed_up),
+                yaw_rate=curve(sticks.yaw, dead) * tuning.pilot_yaw_rate,
+                speed=tuning.speed,
+                speed_up=climb_share(vehicle) * tuning.speed_up,
+                speed_down=tuning.speed_down,
+                accel=tuning.accel,
+                accel_z=tuning.accel_z,
+                tilt=tuning.tilt,
+            )
+        )
+
+    def _move(self, forward: float, right: float, passed: float) -> None:
+        p = self.vehicle.parameters
+        heading = self.vehicle.estimate.attitude[2]
+        c, s = cos(heading), sin(heading)
+        north, east = self._velocity
+        push, top = p["MPC_ACC_HOR"], STICK_SPEED_SHARE * p["MPC_VEL_MANUAL"]
+        if forward or right:
+            self._held = None
+            kept = 1.0 / (1.0 + push / top * passed)
+            north = (north + push * (forward * c - right * s) * passed) * kept
+            east = (east + push * (forward * s + right * c) * passed) * kept
+            self._velocity = (north, east)
+            return
+        speed = hypot(north, east)
+        left = max(0.0, speed - max(0.3, min(push, 1.2 * speed)) * passed)
+        self._velocity = (north * left / speed, east * left / speed) if speed > 0.0 else (0.0, 0.0)
+        if left == 0.0 and self._held is None:
+            self._held = self.vehicle.estimate.target

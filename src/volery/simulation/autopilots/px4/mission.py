@@ -1,0 +1,214 @@
+"""PX4's missions: what is accepted, how items are flown, what is said on the way."""
+
+from __future__ import annotations
+
+from volery.base.frames import Vector
+from volery.base.time import MS, Ns, from_seconds
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
+    FOREVER,
+    Leg,
+    item_point,
+    point_height,
+)
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
+from volery.simulation.autopilots.mavlink.command import Command
+from volery.simulation.autopilots.onboard_mission import (
+    CHANGE_SPEED,
+    DELAY,
+    GLOBAL,
+    GLOBAL_INT,
+    GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT,
+    JUMP,
+    LAND,
+    LOITER_TIME,
+    LOITER_UNLIMITED,
+    RETURN,
+    SET_HOME,
+    TAKEOFF,
+    WAYPOINT,
+    MissionItem,
+)
+from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4.commands import on_return
+from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
+from volery.simulation.autopilots.px4.modes import INFO, commander_of
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+
+UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
+"""MAV_MISSION_RESULT."""
+
+MISSION_FRAME = 2
+
+FLOWN = frozenset({WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, CHANGE_SPEED})
+KEPT = frozenset({SET_HOME, 115, 195, 197, 201, 203, 205, 206, 211, 214, 530, 1000, 2000, 2001, 2500, 2501})
+"""Items that are stored and read back but do nothing here: cameras, mounts, regions of interest, grippers,
+headings.
+"""
+
+FRAMES = (GLOBAL, GLOBAL_INT, GLOBAL_RELATIVE, GLOBAL_RELATIVE_INT, MISSION_FRAME)
+
+REACHED_AGAIN = 10
+"""MISSION_ITEM_REACHED comes that often again,"""
+REACHED_EVERY: Ns = 100 * MS
+"""and so far apart."""
+
+
+def asks_with(number: int) -> str:
+    """The first item is asked for by the old message, the rest by the new one."""
+    return "MISSION_REQUEST" if number == 0 else "MISSION_REQUEST_INT"
+
+
+def stored_item(item: MissionItem) -> MissionItem | int:
+    """As it was sent."""
+    if item.command not in FLOWN | KEPT:
+        return UNSUPPORTED
+    return item if item.frame in FRAMES else UNSUPPORTED_FRAME
+
+
+def no_home_item(_vehicle: Vehicle) -> MissionItem | None:
+    """Item 0 is the first of the mission."""
+    return None
+
+
+def runs(_vehicle: Vehicle) -> bool:
+    """It may be cleared at any time."""
+    return False
+
+
+def goes_nowhere(_vehicle: Vehicle, _item: MissionItem) -> bool:
+    """An item that is no part of a mission is refused."""
+    return False
+
+
+def grew(_vehicle: Vehicle, _count: int) -> None:
+    """Nothing counts along."""
+
+
+def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
+    """MISSION_ITEM_REACHED, again and again."""
+
+    def tell() -> None:
+        vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": index})
+
+    tell()
+    for again in range(1, REACHED_AGAIN + 1):
+        vehicle.kernel.call_at(vehicle.kernel.now() + again * REACHED_EVERY, tell)
+
+
+def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
+    """A take-off says how high; a return is the mode of that name."""
+    if item.command == TAKEOFF and vehicle.home is not None:
+        above = vehicle.home.ned[2] - point_height(vehicle, item)
+        vehicle.say(INFO, f"Takeoff to {above:.1f} meters above home\t")
+        commander_of(vehicle).log.tell(events.MISSION_TAKEOFF, events.real(above))
+
+
+def ended(vehicle: Vehicle) -> None:
+    """It stays where it is, in AUTO.LOITER."""
+    vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _loiter(vehicle))
+
+
+def _loiter(vehicle: Vehicle) -> None:
+    if vehicle.armed and not vehicle.landed and vehicle.mode.number == modes.MISSION:
+        commander_of(vehicle).follow_up(modes.LOITER)
+
+
+def act(vehicle: Vehicle, item: MissionItem) -> None:
+    """Items that are done at once."""
+    if item.command == CHANGE_SPEED and item.param2 > 0.0:
+        vehicle.speed = item.param2
+
+
+class ReturnFromMission(Manoeuvre):
+    """An item that says: return. The mode changes."""
+
+    def step(self) -> None:
+        """Once."""
+        vehicle = self.vehicle
+        vehicle.kernel.call_at(vehicle.kernel.now(), self._change)
+
+    def _change(self) -> None:
+        if self.vehicle.armed and self.vehicle.mode.number == modes.MISSION:
+            on_return(self.vehicle, _NO_COMMAND)
+
+
+_NO_COMMAND = Command(RETURN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GLOBAL_RELATIVE, is_int=False)
+
+
+class LandAt(Manoeuvre):
+    """Fly level to a place, then land there; without a place, here."""
+
+    def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
+        super().__init__(vehicle)
+        self._landing = Descent(vehicle, point)
+        down = vehicle.estimate.position[2]
+        self._going = None if point is None else Hold(vehicle, (point[0], point[1], down))
+
+    def enter(self) -> None:
+        """Begin with whichever comes first."""
+        (self._going or self._landing).enter()
+        self.landing = self._going is None
+
+    def step(self) -> None:
+        """Go, then sink."""
+        if self._going is not None and self._going.near(1.0, 2.0):
+            self._going = None
+            self._landing.enter()
+            self.landing = True
+        (self._going or self._landing).step()
+
+
+class Going(Hold):
+    """To an item's place; from the ground straight up to its height first."""
+
+    slow_start = True
+
+    def __init__(self, vehicle: Vehicle, point: Vector, yaw: float | None) -> None:
+        super().__init__(vehicle, point, yaw)
+        self._climbing: TakeOff | None = TakeOff(vehicle, point[2]) if vehicle.landed else None
+
+    def enter(self) -> None:
+        """Whichever comes first."""
+        super().enter()
+        if self._climbing is not None:
+            self._climbing.enter()
+
+    def wants_to_fly(self) -> bool:
+        """A mission does."""
+        return True
+
+    def step(self) -> None:
+        """Climb, then go."""
+        if self._climbing is not None and self._climbing.arrived():
+            self._climbing = None
+        self.taking_off = self._climbing is not None
+        if self._climbing is not None:
+            self._climbing.step()
+        else:
+            super().step()
+
+
+def leg(vehicle: Vehicle, item: MissionItem, _goes_on: bool) -> Leg:
+    """The leg of a multirotor for an item that navigates."""
+    if item.command == TAKEOFF:
+        climbing = TakeOff(vehicle, point_height(vehicle, item))
+        return Leg(climbing, climbing.arrived)
+    if item.command == LAND:
+        place = item_point(vehicle, item) if item.has_place else None
+        return Leg(LandAt(vehicle, place), lambda: vehicle.landed)
+    if item.command == RETURN:
+        return Leg(ReturnFromMission(vehicle), lambda: False)
+    return _go(vehicle, item)
+
+
+def _go(vehicle: Vehicle, item: MissionItem) -> Leg:
+    p = vehicle.parameters
+    point = vehicle.estimate.position if item.command == DELAY else item_point(vehicle, item)
+    far = not Hold(vehicle, point).near(p["NAV_ACC_RAD"], 1e9)
+    going = Going(vehicle, point, bearing(vehicle.estimate.position, point) if far else None)
+    reach = item.param2 if item.command == WAYPOINT and item.param2 > 0.0 else p["NAV_ACC_RAD"]
+    stay = from_seconds(max(0.0, item.param1)) if item.command in (WAYPOINT, LOITER_TIME, DELAY) else 0
+    if item.command == LOITER_UNLIMITED:
+        stay = FOREVER
+    return Leg(going, lambda: going.near(reach, p["NAV_MC_ALT_RAD"]), stay)

@@ -1,0 +1,476 @@
+"""Telemetry of PX4 about where the vehicle is and how it moves. Units and signs are the messages' own.
+
+Telemetry of PX4 about itself: heartbeat, health, battery, motors, mission, estimator, version, events.
+"""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot, nan
+
+from volery.base.frames import euler_to_quaternion, quaternion_to_euler
+from volery.base.time import MS, US, Ns, S
+from volery.simulation.autopilots.mavlink import message_fields
+from volery.simulation.autopilots.mavlink.message_fields import (
+    EPOCH_US,
+    Fields,
+    boot_ms,
+    boot_us,
+    heading_cdeg,
+    to_int16,
+    to_uint16,
+)
+from volery.simulation.autopilots.px4 import modes
+from volery.simulation.autopilots.px4.flight_modes import Orbit
+from volery.simulation.autopilots.px4.modes import ATTITUDE_AFTER, commander_of
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+GLOBAL_AFTER: Ns = 6_500 * MS
+"""Recorded: the first GLOBAL_POSITION_INT a tenth of a second after the first ATTITUDE."""
+
+HOME_FROM: Ns = 2_200 * MS
+"""Before there is a home, the receiver's own place is sent as one."""
+
+NOT_KNOWN = 65_535
+
+
+def _aligned(vehicle: Vehicle) -> bool:
+    return vehicle.uptime() >= ATTITUDE_AFTER
+
+
+def attitude(vehicle: Vehicle) -> Fields | None:
+    """ATTITUDE: once the estimator is aligned."""
+    return message_fields.attitude(vehicle) if _aligned(vehicle) else None
+
+
+def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
+    """ATTITUDE_QUATERNION: likewise."""
+    return message_fields.attitude_quaternion(vehicle) if _aligned(vehicle) else None
+
+
+def global_position(vehicle: Vehicle) -> Fields | None:
+    """GLOBAL_POSITION_INT: once there is a position."""
+    estimate = vehicle.estimate
+    if vehicle.uptime() < GLOBAL_AFTER or not estimate.position_ok:
+        return None
+    latitude, longitude, amsl = estimate.geodetic
+    north, east, down = estimate.velocity
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "lat": round(latitude * 1e7),
+        "lon": round(longitude * 1e7),
+        "alt": round(amsl * 1000.0),
+        "relative_alt": round(vehicle.height * 1000.0),
+        "vx": to_int16(north * 100.0),
+        "vy": to_int16(east * 100.0),
+        "vz": to_int16(down * 100.0),
+        "hdg": heading_cdeg(estimate.attitude[2]),
+    }
+
+
+def local_position(vehicle: Vehicle) -> Fields:
+    """LOCAL_POSITION_NED: from the start."""
+    estimate = vehicle.estimate
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle)}
+    if estimate.position_ok:
+        fields["x"], fields["y"], fields["z"] = estimate.position
+        fields["vx"], fields["vy"], fields["vz"] = estimate.velocity
+    return fields
+
+
+def odometry(vehicle: Vehicle) -> Fields:
+    """ODOMETRY."""
+    estimate = vehicle.estimate
+    p, q, r = estimate.rates
+    x, y, z = estimate.position
+    vx, vy, vz = estimate.velocity
+    plane, height, speed, climb = (spread**2 for spread in estimate.spread)
+    return {
+        "time_usec": boot_us(vehicle),
+        "frame_id": 1,
+        "child_frame_id": 1,
+        "x": x,
+        "y": y,
+        "z": z,
+        "q": estimate.quaternion,
+        "vx": vx,
+        "vy": vy,
+        "vz": vz,
+        "rollspeed": p,
+        "pitchspeed": q,
+        "yawspeed": r,
+        "pose_covariance": _diagonal(plane, plane, height, 4.5e-4, 4.5e-4, 1.2e-3),
+        "velocity_covariance": _diagonal(speed, speed, climb, nan, nan, nan),
+        "estimator_type": 8,
+    }
+
+
+def _diagonal(*variances: float) -> tuple[float, ...]:
+    """The upper triangle of a 6 by 6 matrix, row by row."""
+    values: list[float] = []
+    for row, variance in enumerate(variances):
+        values += [variance, *([nan] * (5 - row))]
+    return tuple(values)
+
+
+def altitude(vehicle: Vehicle) -> Fields:
+    """ALTITUDE."""
+    estimate = vehicle.estimate
+    return {
+        "time_usec": boot_us(vehicle),
+        "altitude_monotonic": estimate.baro_altitude,
+        "altitude_amsl": estimate.geodetic[2],
+        "altitude_local": -estimate.position[2],
+        "altitude_relative": vehicle.height,
+        "altitude_terrain": nan,
+        "bottom_clearance": nan,
+    }
+
+
+def vfr_hud(vehicle: Vehicle) -> Fields:
+    """VFR_HUD: no airspeed sensor."""
+    estimate = vehicle.estimate
+    north, east, down = estimate.velocity
+    return {
+        "airspeed": 0.0,
+        "groundspeed": hypot(north, east),
+        "heading": int(degrees(estimate.attitude[2])) % 360,
+        "throttle": round(abs(estimate.throttle) * 100.0) if vehicle.armed else 0,
+        "alt": estimate.geodetic[2],
+        "climb": -down,
+    }
+
+
+def highres_imu(vehicle: Vehicle) -> Fields:
+    """HIGHRES_IMU: m/s^2, rad/s, gauss, hectopascals as PX4 1.14 fills them."""
+    estimate = vehicle.estimate
+    xacc, yacc, zacc = estimate.accel
+    xgyro, ygyro, zgyro = estimate.gyro
+    xmag, ymag, zmag = estimate.mag
+    return {
+        "time_usec": boot_us(vehicle),
+        "xacc": xacc,
+        "yacc": yacc,
+        "zacc": zacc,
+        "xgyro": xgyro,
+        "ygyro": ygyro,
+        "zgyro": zgyro,
+        "xmag": xmag,
+        "ymag": ymag,
+        "zmag": zmag,
+        "abs_pressure": estimate.pressure * 100.0,
+        "pressure_alt": estimate.baro_altitude,
+        "temperature": 15.0,
+        "fields_updated": 63,
+    }
+
+
+def pressure(vehicle: Vehicle) -> Fields:
+    """SCALED_PRESSURE."""
+    return {"time_boot_ms": boot_ms(vehicle), "press_abs": vehicle.estimate.pressure, "temperature": 1479}
+
+
+def gps_raw(vehicle: Vehicle) -> Fields:
+    """GPS_RAW_INT."""
+    fix = vehicle.estimate.gps
+    if fix.fix_type == 0:
+        return {"time_usec": boot_us(vehicle), "eph": NOT_KNOWN, "epv": NOT_KNOWN, "cog": NOT_KNOWN}
+    north, east, _ = fix.velocity
+    speed = hypot(north, east)
+    return {
+        "time_usec": boot_us(vehicle),
+        "fix_type": fix.fix_type,
+        "lat": round(fix.latitude * 1e7),
+        "lon": round(fix.longitude * 1e7),
+        "alt": round(fix.amsl * 1000.0),
+        "eph": to_uint16(fix.eph * 100.0),
+        "epv": to_uint16(fix.epv * 100.0),
+        "vel": to_uint16(speed * 100.0),
+        "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
+        "satellites_visible": fix.satellites,
+        "alt_ellipsoid": round(fix.amsl * 1000.0),
+        "h_acc": round(fix.h_acc * 1000.0),
+        "v_acc": round(fix.v_acc * 1000.0),
+        "vel_acc": round(fix.speed_acc * 1000.0),
+    }
+
+
+def system_time(vehicle: Vehicle) -> Fields:
+    """SYSTEM_TIME."""
+    now = EPOCH_US + vehicle.kernel.now() // US
+    return {"time_unix_usec": now, "time_boot_ms": boot_ms(vehicle)}
+
+
+def position_target(vehicle: Vehicle) -> Fields:
+    """POSITION_TARGET_LOCAL_NED: not-a-number where nothing is held."""
+    estimate = vehicle.estimate
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle), "coordinate_frame": 1}
+    if not vehicle.armed or vehicle.landed:
+        blank = dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), nan)
+        return {**fields, **blank, "afz": 100.0, "yaw": estimate.attitude[2], "type_mask": 63}
+    target = vehicle.manoeuvre.target or estimate.target
+    fields["x"], fields["y"], fields["z"] = target
+    fields["vx"], fields["vy"], fields["vz"] = estimate.target_velocity
+    fields["yaw"] = estimate.target_attitude[2]
+    return fields
+
+
+def global_target(vehicle: Vehicle) -> Fields | None:
+    """POSITION_TARGET_GLOBAL_INT: once it flies to a point."""
+    target = vehicle.manoeuvre.target
+    if target is None or not vehicle.armed:
+        return None
+    latitude, longitude, amsl = vehicle.flight.from_ned(target)
+    vx, vy, vz = vehicle.estimate.target_velocity
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "coordinate_frame": 5,
+        "lat_int": round(latitude * 1e7),
+        "lon_int": round(longitude * 1e7),
+        "alt": amsl,
+        "vx": vx,
+        "vy": vy,
+        "vz": vz,
+        "yaw": vehicle.estimate.target_attitude[2],
+    }
+
+
+def attitude_target(vehicle: Vehicle) -> Fields:
+    """ATTITUDE_TARGET."""
+    estimate = vehicle.estimate
+    wanted = commander_of(vehicle).stream.target
+    thrust = estimate.throttle
+    angles = estimate.target_attitude
+    if vehicle.mode.number == modes.OFFBOARD and isinstance(wanted, AttitudeTarget):
+        angles, thrust = quaternion_to_euler(wanted.attitude), wanted.thrust
+    return {"time_boot_ms": boot_ms(vehicle), "q": euler_to_quaternion(*angles), "thrust": thrust}
+
+
+def home_position(vehicle: Vehicle) -> Fields | None:
+    """HOME_POSITION: until there is a home, where the receiver says the vehicle is."""
+    home = vehicle.home
+    fields: Fields = {"q": (1.0, 0.0, 0.0, 0.0), "time_usec": boot_us(vehicle)}
+    if home is not None:
+        x, y, z = home.ned
+        place = home.latitude, home.longitude, home.amsl
+        fields |= {"x": x, "y": y, "z": z}
+    else:
+        fix = vehicle.estimate.gps
+        if vehicle.uptime() < HOME_FROM or fix.fix_type == 0:
+            return None
+        place = fix.latitude, fix.longitude, fix.amsl
+    latitude, longitude, amsl = place
+    fields["latitude"], fields["longitude"] = round(latitude * 1e7), round(longitude * 1e7)
+    fields["altitude"] = round(amsl * 1000.0)
+    return fields
+
+
+def origin(vehicle: Vehicle) -> Fields | None:
+    """GPS_GLOBAL_ORIGIN: once the estimator has one."""
+    if not vehicle.estimate.position_ok:
+        return None
+    latitude, longitude, amsl = vehicle.estimate.origin
+    return {
+        "latitude": round(latitude * 1e7),
+        "longitude": round(longitude * 1e7),
+        "altitude": round(amsl * 1000.0),
+        "time_usec": boot_us(vehicle),
+    }
+
+
+def distance_sensor(vehicle: Vehicle) -> Fields:
+    """DISTANCE_SENSOR, looking down: the recorded airframe has one that reaches 100 m."""
+    height = max(0.0, commander_of(vehicle).above_ground)
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "max_distance": 10_000,
+        "current_distance": to_uint16(height * 100.0),
+        "orientation": 25,
+    }
+
+
+def orbit_status(vehicle: Vehicle) -> Fields | None:
+    """ORBIT_EXECUTION_STATUS: while it circles."""
+    circling = vehicle.manoeuvre
+    if not isinstance(circling, Orbit):
+        return None
+    latitude, longitude, amsl = vehicle.flight.from_ned(circling.centre)
+    return {
+        "time_usec": boot_us(vehicle),
+        "radius": circling.radius,
+        "x": round(latitude * 1e7),
+        "y": round(longitude * 1e7),
+        "z": amsl,
+    }
+
+
+ARMED = 128
+"""MAV_MODE_FLAG_SAFETY_ARMED."""
+
+STANDBY, ACTIVE, CRITICAL = 3, 4, 5
+"""MAV_STATE."""
+
+ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
+"""MAV_LANDED_STATE."""
+
+NOT_THERE = 65_535
+
+PRESENT, ENABLED, HEALTHY, PREARM, GPS = 35_651_629, 35_717_165, 572_555_327, 1 << 28, 1 << 5
+"""Words of SYS_STATUS as recorded; the check before arming is a bit of its own."""
+
+CAPABILITIES = 60_671
+"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+
+VERSION, OS_VERSION = 17_694_975, 101_854_463
+"""1.14.0, an official release, as recorded, and the recorded machine's kernel."""
+
+GIT_HASH = (0, 0, 0, 114, 221, 65, 197, 184)
+UID = 5_283_920_058_631_409_231
+
+WITH_POSITION, WITHOUT_POSITION = 831, 1
+"""ESTIMATOR_STATUS_FLAGS as recorded with a position; without one only the attitude counts."""
+
+
+def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
+    """HEARTBEAT; *kind* is a MAV_TYPE."""
+    commander, mode = commander_of(vehicle), vehicle.mode
+    base = mode.base_mode
+    if mode.number == modes.OFFBOARD and commander.stream.target is None:
+        base = modes.CUSTOM
+    state = ACTIVE if vehicle.armed else STANDBY
+    if vehicle.armed and commander.failsafe:
+        state = CRITICAL
+    return {
+        "type": kind,
+        "autopilot": 12,
+        "base_mode": base | (ARMED if vehicle.armed else 0),
+        "custom_mode": mode.number,
+        "system_status": state,
+        "mavlink_version": 3,
+    }
+
+
+def sys_status(vehicle: Vehicle) -> Fields:
+    """SYS_STATUS."""
+    estimate = vehicle.estimate
+    healthy = HEALTHY
+    if commander_of(vehicle).armable or vehicle.armed:
+        healthy |= PREARM
+    if estimate.gps.fix_type == 0:
+        healthy &= ~GPS
+    return {
+        "onboard_control_sensors_present": PRESENT,
+        "onboard_control_sensors_enabled": ENABLED,
+        "onboard_control_sensors_health": healthy,
+        "load": 100,
+        "voltage_battery": to_uint16(estimate.battery_volts * 1000.0),
+        "current_battery": to_int16(estimate.battery_amps * 100.0),
+        "battery_remaining": _percent(vehicle),
+        "onboard_control_sensors_health_extended": 1,
+    }
+
+
+def _percent(vehicle: Vehicle) -> int:
+    return min(100, max(0, int(vehicle.estimate.battery_left * 100.0)))
+
+
+def battery_status(vehicle: Vehicle) -> Fields:
+    """BATTERY_STATUS."""
+    estimate = vehicle.estimate
+    return {
+        "id": 0,
+        "battery_function": 1,
+        "type": 1,
+        "temperature": 32_767,
+        "voltages": (to_uint16(estimate.battery_volts * 1000.0), *([NOT_THERE] * 9)),
+        "current_battery": to_int16(estimate.battery_amps * 100.0),
+        "current_consumed": int(estimate.battery_used_mah),
+        "energy_consumed": -1,
+        "battery_remaining": _percent(vehicle),
+        "charge_state": _charge_state(vehicle),
+    }
+
+
+def _charge_state(vehicle: Vehicle) -> int:
+    """MAV_BATTERY_CHARGE_STATE."""
+    left, p = vehicle.estimate.battery_left, vehicle.parameters
+    levels = (p["BAT_LOW_THR"], p["BAT_CRIT_THR"], p["BAT_EMERGEN_THR"])
+    return 1 + sum(left < level for level in levels)
+
+
+def extended_sys_state(vehicle: Vehicle) -> Fields:
+    """EXTENDED_SYS_STATE."""
+    manoeuvre = vehicle.manoeuvre
+    state = IN_AIR
+    if not vehicle.firmware.stands or not commander_of(vehicle).flying:
+        state = ON_GROUND
+    elif manoeuvre.taking_off:
+        state = TAKING_OFF
+    elif manoeuvre.landing:
+        state = LANDING
+    return {"vtol_state": 0, "landed_state": state}
+
+
+def estimator_status(vehicle: Vehicle) -> Fields:
+    """ESTIMATOR_STATUS."""
+    estimate = vehicle.estimate
+    plane, height, _, _ = estimate.spread
+    return {
+        "time_usec": boot_us(vehicle),
+        "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
+        "vel_ratio": 0.06,
+        "pos_horiz_ratio": min(1.0, abs(estimate.gps_innovation) / 5.0) ** 2,
+        "pos_vert_ratio": 0.035,
+        "mag_ratio": min(1.0, abs(estimate.heading_error)),
+        "pos_horiz_accuracy": plane,
+        "pos_vert_accuracy": height,
+    }
+
+
+def servo_output(vehicle: Vehicle) -> Fields:
+    """SERVO_OUTPUT_RAW: 900 is off."""
+    pulses = vehicle.estimate.motor_pwm if vehicle.armed else (900,) * 4
+    fields: Fields = {"time_usec": boot_us(vehicle), "port": 0}
+    for place, pulse in enumerate((*pulses, *([900] * 12)), start=1):
+        fields[f"servo{place}_raw"] = pulse
+    return fields
+
+
+def vibration(vehicle: Vehicle) -> Fields:
+    """VIBRATION: the law of the body has none."""
+    return {"time_usec": boot_us(vehicle), "vibration_x": 0.0, "vibration_y": 0.1, "vibration_z": 1.3}
+
+
+def mission_current(vehicle: Vehicle) -> Fields | None:
+    """MISSION_CURRENT: only while there is a mission."""
+    plan = vehicle.plan
+    return {"seq": plan.current} if len(plan) else None
+
+
+def ping(vehicle: Vehicle) -> Fields:
+    """PING, to anyone."""
+    return {"time_usec": boot_us(vehicle), "seq": vehicle.uptime() // S}
+
+
+def timesync(vehicle: Vehicle) -> Fields:
+    """TIMESYNC, as a question."""
+    return {"tc1": 0, "ts1": vehicle.uptime()}
+
+
+def event_sequence(vehicle: Vehicle) -> Fields:
+    """CURRENT_EVENT_SEQUENCE: by it a listener notices that it missed events."""
+    return {"sequence": commander_of(vehicle).log.latest}
+
+
+def autopilot_version(vehicle: Vehicle) -> Fields:
+    """AUTOPILOT_VERSION."""
+    return {
+        "capabilities": CAPABILITIES,
+        "flight_sw_version": VERSION,
+        "middleware_sw_version": VERSION,
+        "os_sw_version": OS_VERSION,
+        "board_version": 1,
+        "flight_custom_version": GIT_HASH,
+        "middleware_custom_version": GIT_HASH,
+        "uid": UID + vehicle.system - 1,
+    }
