@@ -102,10 +102,10 @@ def test_a_folder_without_sources(tmp_path):
 
 def test_a_class_that_is_nowhere(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "a.cpp").write_text("struct Somebody {};")
+    (tmp_path / "a.cpp").write_text("struct Other {};")
     component = build.CppComponent("Thing", tmp_path / "a.cpp", "Thing")
     with pytest.raises(ModelError, match=r"Thing: no class 'Thing' in a\.cpp"):
-        build._units(component, find_sources(component.path))
+        build._translation_units(component, find_sources(component.path))
 
 
 def _report(line: str) -> Crash | None:

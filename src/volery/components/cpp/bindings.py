@@ -200,7 +200,8 @@ def _construction(class_name: str, requires: Sequence[RequiredPort]) -> list[str
         f"    volery::check_constructor<{class_name}{parameters}>();",
         f"    component.make({', '.join(ports)});",
         "});",
-        "volery::register_callable_as(volery::RUN, [](volery::Reader, volery::Writer&) { component.run(); });",
+        "volery::register_callable_as(volery::RUN, "
+        "[](volery::Reader, volery::Writer&) { component.run(); });",
     ]
 
 

@@ -11,7 +11,7 @@ from volery.base.errors import ComponentError, ModelError
 from volery.components.cpp.bindings import CppOperation, operations
 from volery.components.cpp.build import CompiledComponent
 from volery.components.cpp.framework import (
-    CppException,
+    CppError,
     FiberPool,
     LoadedLibrary,
     ProcessExit,
@@ -139,7 +139,7 @@ class CppProgram:
             status = Reader(returned).integer() if returned else 0  # run() of a class returns nothing
         except ProcessExit as exited:
             status = exited.status
-        except CppException as error:
+        except CppError as error:
             if self._compiled.component.class_name:
                 raise
             raise ComponentError(self._name, f"main() raised {error}") from error

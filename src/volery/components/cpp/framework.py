@@ -46,7 +46,7 @@ class ProcessExit(BaseException):
         super().__init__(f"exit({status})")
 
 
-class CppException(ForeignError):
+class CppError(ForeignError):
     """A C++ exception that the code did not catch."""
 
     def __init__(self, kind: str, what: str) -> None:
@@ -195,12 +195,12 @@ class Fiber:
     def _exception(self, outcome: bytes, data: bytes) -> BaseException:
         """Return the exception that a callable ended with, the original one where it came from Python."""
         if outcome == _CANCELLED:
-            return self._cancellation or CppException("volery::Cancelled", "")
+            return self._cancellation or CppError("volery::Cancelled", "")
         reader = Reader(data)
         kind, what = reader.text(), reader.text()
         if outcome == _FAILED and self._error is not None and str(self._error) == what:
             return self._error
-        return CppException(kind, what)
+        return CppError(kind, what)
 
 
 class FiberPool:

@@ -342,7 +342,7 @@ class CppPrograms:
         if model.component.language == "roscpp":
             launch = self._launches.get(model.name, Launch())
             session = roscpp.Session(self._graph, model.name, launch, self._nodes)
-            made = CppProgram(self._kernel, model.name, compiled, roscpp.answers(session), session.end)
+            made = CppProgram(self._kernel, model.name, compiled, roscpp.request_handlers(session), session.end)
         else:
             made = CppProgram(self._kernel, model.name, compiled)
         if counting is not None:

@@ -66,7 +66,7 @@ class Code:
 
     def __init__(self, stage: Any, name: str, launch: Launch | None = None) -> None:
         self.session = roscpp.Session(stage.graph, name, launch or Launch())
-        self.answers = roscpp.answers(self.session)
+        self.answers = roscpp.request_handlers(self.session)
         self.called: list[tuple[int, bytes]] = []
         self.returns = b""
 
