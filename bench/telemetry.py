@@ -121,7 +121,7 @@ def ours(chunks: Chunks) -> Callable[[], int]:
         kernel.call_at(0, partial(arrive, b""))
         kernel.run(chunks[-1][0] + MS)
         assert woken[0] > 100
-        return link.heard.frames
+        return link.statistics.frames
 
     return run
 
@@ -179,11 +179,11 @@ def many(chunks: Chunks, seconds: float) -> None:
         child = subprocess.Popen([sys.executable, __file__, "--replay", str(file), "--ports", ports])
         while not all(drone.telemetry.heard >= 0 for drone in drones):
             sleep(0.1)
-        heard = sum(link.heard.frames for link in links)
+        heard = sum(link.statistics.frames for link in links)
         start, began = process_time(), perf_counter()
         sleep(seconds)
         share = (process_time() - start) / (perf_counter() - began)
-        heard = sum(link.heard.frames for link in links) - heard
+        heard = sum(link.statistics.frames for link in links) - heard
         child.terminate()
         child.wait()
     for drone in drones:

@@ -10,7 +10,7 @@ import sys
 import time
 
 from volery.links.link import Frame
-from volery.links.mavlink_messages import encode
+from volery.links.mavlink_codec import encode
 
 PUBLISHED = ("ATTITUDE", "GPS_RAW_INT", "RC_CHANNELS", "VFR_HUD", "RAW_IMU")
 OTHERS = (
