@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.link import Frame
-from volery.links.mavlink_codec import MavlinkParser
-from volery.links.mavlink_messages import encode, quantised
+from volery.links.mavlink_codec import MavlinkParser, encode, quantised
 
 RANGES = {
     "int8_t": (-(2**7), 2**7 - 1),

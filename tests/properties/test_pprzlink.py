@@ -59,7 +59,7 @@ def test_noise_never_raises_and_every_byte_is_accounted_for(parts: list[bytes]) 
     for frame in parser.feed(data):
         message_type(frame.name).pack(frame.fields)
     assert isinstance(parser.problem(), str)
-    assert parser.heard.octets == len(data)
+    assert parser.statistics.octets == len(data)
 
 
 @settings(max_examples=100, deadline=None)
@@ -68,5 +68,5 @@ def test_a_frame_after_noise_is_found_by_the_time_that_others_follow(noise: byte
     """Noise can look like the head of a long frame; what follows shows that it was none."""
     parser = PprzlinkParser()
     heard = parser.feed(noise + encode(frame) + bytes(300))
-    if not parser.heard.unknown and not parser.heard.frames_v1:
+    if not parser.statistics.unknown and not parser.statistics.frames_v1:
         assert frame in heard

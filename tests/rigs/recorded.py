@@ -15,7 +15,7 @@ from typing import Any
 from volery.base.time import MS
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame
-from volery.links.mavlink_messages import quantised
+from volery.links.mavlink_codec import quantised
 from volery.vehicles.telemetry import Telemetry
 
 GOLDEN = Path(__file__).parents[1] / "golden"

@@ -1,7 +1,7 @@
-"""A stream of bytes taken apart into frames. Tolerant: real links carry boot texts, noise, other protocols.
+"""MAVLink as bytes: frames encoded as MAVLink 2, and a tolerant parser for MAVLink 1 and 2.
 
-What is not MAVLink 2 is skipped, counted and kept as evidence, so that ``problem`` can say in words what does
-arrive.
+Real links carry boot texts, noise and other protocols. The parser skips and counts everything that is no frame,
+so that ``problem`` can describe what arrives instead. Signatures are neither written nor checked.
 """
 
 from __future__ import annotations
@@ -9,40 +9,60 @@ from __future__ import annotations
 import struct
 
 from volery.links.link import Codec, Frame, NonFrameBytes, ReceiveStatistics
-from volery.links.mavlink_messages import (
-    CHECKSUM,
-    HEADER,
-    HEADER_V1,
-    SIGNATURE_LENGTH,
-    SIGNED,
-    STX,
-    STX_V1,
-    MessageType,
-    encode,
-    message_type_of,
-    quantised,
-)
+from volery.links.mavlink_messages import MessageType, message_type, message_type_of
+
+STX = 0xFD
+STX_V1 = 0xFE
+HEADER = struct.Struct("<BBBBBBBHB")  # STX, length, two flags, sequence, system, component, id low, high
+HEADER_V1 = struct.Struct("<BBBBBB")  # STX, length, sequence, system, component, id
+CHECKSUM = struct.Struct("<H")
+SIGNED = 0x01
+SIGNATURE_LENGTH = 13
 
 _STARTS = frozenset((STX, STX_V1))
 _BEFORE, _AFTER = HEADER.size, CHECKSUM.size
 _AROUND = _BEFORE + _AFTER
-_WHAT_COUNTS = struct.Struct("<xBBxxBBHB")
-"""Of ``HEADER``: length, what one must understand, system, component, id low, high."""
+_RELEVANT_HEADER = struct.Struct("<xBBxxBBHB")
+"""Of ``HEADER``: length, incompatibility flags, system, component, id low, id high."""
 
 Octets = bytes | bytearray
 
 
-class _Head:
-    """What seems to be the header of a frame at *start*. ``length`` is that of the whole; 0: it is none."""
+def encode(frame: Frame, sequence: int) -> bytes:
+    """Return *frame* in MAVLink 2 wire format.
 
-    __slots__ = ("component", "kind", "length", "old", "payload", "start", "system", "trailer")
+    Args:
+        frame: The message to encode.
+        sequence: Number of frames that this sender has sent before; taken modulo 256.
+    """
+    kind = message_type(frame.name)
+    payload = kind.pack(frame.fields).rstrip(b"\0") or b"\0"
+    low, high = kind.id & 0xFFFF, kind.id >> 16
+    sender = frame.system, frame.component
+    header = HEADER.pack(STX, len(payload), 0, 0, sequence % 256, *sender, low, high)
+    return header + payload + CHECKSUM.pack(kind.checksum(header[1:] + payload))
+
+
+def quantised(frame: Frame) -> Frame:
+    """Return *frame* as it arrives after encoding and decoding.
+
+    Floats have 32 bits, strings are cut to their field, and all fields are present.
+    """
+    kind = message_type(frame.name)
+    return Frame(frame.name, kind.unpack(kind.pack(frame.fields)), frame.system, frame.component)
+
+
+class _Header:
+    """A possible frame header at *start*. ``length`` is that of the whole frame, or 0 if this is no header."""
+
+    __slots__ = ("component", "kind", "length", "payload", "start", "system", "trailer", "version_1")
 
     def __init__(self, buffer: Octets, start: int) -> None:
         self.start = start
-        self.old = buffer[start] == STX_V1
+        self.version_1 = buffer[start] == STX_V1
         self.trailer = CHECKSUM.size
         incompatible = 0
-        if self.old:
+        if self.version_1:
             _, size, _, self.system, self.component, number = HEADER_V1.unpack_from(buffer, start)
             self.payload = start + HEADER_V1.size
         else:
@@ -56,11 +76,14 @@ class _Head:
         self.length: int = self.payload - start + size + self.trailer
         if incompatible & ~SIGNED or (self.kind is not None and size > self.kind.size):
             self.length = 0
-        elif self.old and self.kind is None:
-            self.length = 0  # of the old protocol only known messages count: noise looks like the others
+        elif self.version_1 and self.kind is None:
+            self.length = 0  # noise often looks like MAVLink 1, so only known messages are accepted
 
-    def whole(self, buffer: Octets) -> bool:
-        """The checksum is right. An unknown message's cannot be told: believe it if a frame follows."""
+    def valid(self, buffer: Octets) -> bool:
+        """Return whether the checksum is right.
+
+        The checksum of an unknown message cannot be computed. Such a frame is accepted if another frame follows.
+        """
         end = self.start + self.length
         if self.kind is None:
             return len(buffer) <= end or buffer[end] in _STARTS
@@ -69,50 +92,53 @@ class _Head:
         return self.kind.checksum(bytes(buffer[self.start + 1 : body])) == checksum
 
 
-def _head(buffer: Octets, start: int) -> _Head | None:
-    """``None`` while the header is not complete."""
+def _header_at(buffer: Octets, start: int) -> _Header | None:
+    """Return the header at *start*, or None while it is incomplete."""
     size = HEADER_V1.size if buffer[start] == STX_V1 else HEADER.size
-    return _Head(buffer, start) if len(buffer) - start >= size else None
+    return _Header(buffer, start) if len(buffer) - start >= size else None
 
 
-def whole_frame(data: Octets, start: int) -> int:
-    """The length of the whole frame that lies at *start*; 0 if none does."""
+def frame_length(data: Octets, start: int) -> int:
+    """Return the length in bytes of the complete, valid frame at *start*, or 0 if there is none."""
     if start >= len(data) or data[start] not in _STARTS:
         return 0
-    head = _head(data, start)
-    if head is None or not head.length or start + head.length > len(data):
+    header = _header_at(data, start)
+    if header is None or not header.length or start + header.length > len(data):
         return 0
-    return head.length if head.whole(data) else 0
+    return header.length if header.valid(data) else 0
 
 
 class MavlinkParser:
-    """Feed it bytes in any portions; it returns the frames that they complete."""
+    """Splits a stream of bytes, fed in any portions, into MAVLink frames."""
 
     def __init__(self) -> None:
-        self.heard = ReceiveStatistics()
-        self._rest = b""  # what may become a frame
-        self._evidence = NonFrameBytes(self.heard)
+        self.statistics = ReceiveStatistics()
+        self._rest = b""  # may become a frame
+        self._other = NonFrameBytes(self.statistics)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames completed by *data*, in order, MAVLink 1 frames among them. Never raises."""
-        self.heard.octets += len(data)
+        """Return the frames completed by *data*, in order, including MAVLink 1 frames. Never raises."""
+        self.statistics.octets += len(data)
         octets = self._rest + data if self._rest else data
         frames: list[Frame] = []
-        place, size = 0, len(octets)
-        while place < size:
-            taken = self._usual(octets, place, frames) or self._unusual(octets, place, frames)
+        at, size = 0, len(octets)
+        while at < size:
+            taken = self._parse_usual(octets, at, frames) or self._parse_other(octets, at, frames)
             if not taken:
                 break
-            place += taken
-        self._rest = octets[place:]
+            at += taken
+        self._rest = octets[at:]
         return frames
 
-    def _usual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
-        """A whole unsigned MAVLink 2 frame of a known kind, as nearly all are: its length; 0 if none is."""
+    def _parse_usual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
+        """Parse a whole unsigned MAVLink 2 frame of a known message, as nearly all are.
+
+        Returns the length of the frame, or 0 if there is no such frame at *start*.
+        """
         if octets[start] != STX or len(octets) - start < _AROUND:
             return 0
         size: int
-        size, incompatible, system, component, low, high = _WHAT_COUNTS.unpack_from(octets, start)
+        size, incompatible, system, component, low, high = _RELEVANT_HEADER.unpack_from(octets, start)
         kind = message_type_of(low | high << 16)
         end = start + _BEFORE + size
         if incompatible or kind is None or size > kind.size or end + _AFTER > len(octets):
@@ -120,76 +146,64 @@ class MavlinkParser:
         body = octets[start + 1 : end]
         if kind.checksum(body) != octets[end] | octets[end + 1] << 8:
             return 0
-        self.heard.frames += 1
+        self.statistics.frames += 1
         frames.append(Frame(kind.name, kind.unpack(body[_BEFORE - 1 :]), system, component))
         return size + _AROUND
 
-    def _unusual(self, octets: bytes, start: int, frames: list[Frame]) -> int:
-        """Anything else: how many bytes of it are dealt with; 0 while it may become a frame."""
+    def _parse_other(self, octets: bytes, start: int, frames: list[Frame]) -> int:
+        """Parse anything else. Returns the bytes consumed, or 0 while they may still become a frame."""
+        statistics = self.statistics
         if octets[start] not in _STARTS:
-            self._evidence.note(octets[start])
+            self._other.add(octets[start])
             return 1
-        head = _head(octets, start)
-        if head is None or start + head.length > len(octets):
+        header = _header_at(octets, start)
+        if header is None or start + header.length > len(octets):
             return 0
-        return self._take(octets, head, frames)
+        if not header.length or not header.valid(octets):
+            if header.length and header.kind is not None:
+                statistics.corrupt += 1
+            self._other.add(octets[start])
+            return 1
+        if header.kind is None:
+            statistics.unknown += 1
+            return header.length
+        if header.version_1:
+            statistics.frames_v1 += 1
+        else:
+            statistics.frames += 1
+        payload = octets[header.payload : start + header.length - header.trailer]
+        frames.append(Frame(header.kind.name, header.kind.unpack(payload), header.system, header.component))
+        return header.length
 
     def reset(self) -> None:
-        """Forget a half-received frame: the connection behind it is gone."""
+        """Drop a half-received frame, because the connection has broken."""
         self._rest = b""
 
     def problem(self) -> str:
-        """What is wrong with what arrives, in words; empty if MAVLink 2 does, or nothing at all."""
-        heard = self.heard
-        if heard.frames or not heard.octets:
+        """Return what is wrong with the received bytes; ``""`` if MAVLink 2 or nothing was received."""
+        received = self.statistics
+        if received.frames or not received.octets:
             return ""
-        if heard.frames_v1:
+        if received.frames_v1:
             return "MAVLink 1 only: set SERIALx_PROTOCOL=2 (ArduPilot) or MAV_PROTO_VER=2 (PX4) for this port"
-        text = self._evidence.only_text()
+        text = self._other.only_text()
         if text:
             return text
-        if heard.corrupt > 2 or heard.unknown > 2:
+        if received.corrupt > 2 or received.unknown > 2:
             return (
-                f"{heard.octets} bytes arrive but no whole MAVLink frame ({heard.corrupt} corrupt, "
-                f"{heard.unknown} of unknown kind): noise, or another dialect"
+                f"{received.octets} bytes arrive but no whole MAVLink frame ({received.corrupt} corrupt, "
+                f"{received.unknown} of unknown kind): noise, or another dialect"
             )
-        return f"{heard.octets} bytes arrive but no MAVLink: another protocol, or the wrong baud rate"
-
-    def _take(self, octets: bytes, head: _Head, frames: list[Frame]) -> int:
-        """How many bytes are dealt with."""
-        if not head.length or not head.whole(octets):
-            if head.length and head.kind is not None:
-                self.heard.corrupt += 1
-            self._evidence.note(octets[head.start])
-            return 1
-        if head.kind is None:
-            self.heard.unknown += 1
-            return head.length
-        if head.old:
-            self.heard.frames_v1 += 1
-        else:
-            self.heard.frames += 1
-        payload = octets[head.payload : head.start + head.length - head.trailer]
-        frames.append(Frame(head.kind.name, head.kind.unpack(payload), head.system, head.component))
-        return head.length
+        return f"{received.octets} bytes arrive but no MAVLink: another protocol, or the wrong baud rate"
 
 
-class _Mavlink:
-    """MAVLink 2 out, 1 and 2 in."""
+class _MavlinkCodec:
+    """Encodes MAVLink 2; decodes MAVLink 1 and 2."""
 
     name = "MAVLink"
-
-    def encode(self, frame: Frame, sequence: int) -> bytes:
-        """See ``mavlink.encode``."""
-        return encode(frame, sequence)
-
-    def parser(self) -> MavlinkParser:
-        """See ``MavlinkParser``."""
-        return MavlinkParser()
-
-    def quantised(self, frame: Frame) -> Frame:
-        """See ``mavlink.quantised``."""
-        return quantised(frame)
+    encode = staticmethod(encode)
+    parser = MavlinkParser
+    quantised = staticmethod(quantised)
 
 
-MAVLINK: Codec = _Mavlink()
+MAVLINK: Codec = _MavlinkCodec()

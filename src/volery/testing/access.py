@@ -75,9 +75,9 @@ class ControlledLink:
         return self._link.problem()
 
     @property
-    def heard(self) -> object:
-        """What the link below has heard, if it counts that."""
-        return getattr(self._link, "heard", None)
+    def statistics(self) -> object:
+        """Receive statistics of the link below, or None if it keeps none."""
+        return getattr(self._link, "statistics", None)
 
     def close(self) -> None:
         """Close all links."""

@@ -19,7 +19,8 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.coded_link import CodedLink
-from volery.links.mavlink_messages import CHECKSUM, HEADER, message_type_of
+from volery.links.mavlink_codec import CHECKSUM, HEADER
+from volery.links.mavlink_messages import message_type_of
 from volery.links.pprzlink_codec import checksum as pprz_checksum
 from volery.vehicles import Drone
 from volery.vehicles.driver import drivers
@@ -217,7 +218,7 @@ def fuzz(
         after(result.fed)
         if result.fed >= count:
             break
-    result.heard = link.heard.frames
+    result.heard = link.statistics.frames
     drone.close()
     kernel.close()
     return result

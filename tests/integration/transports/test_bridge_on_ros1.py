@@ -22,8 +22,7 @@ import pytest
 
 import volery
 from volery.links.link import Frame
-from volery.links.mavlink_codec import MAVLINK
-from volery.links.mavlink_messages import encode
+from volery.links.mavlink_codec import MAVLINK, encode
 from volery.ros.transports.ros1 import Roscore
 from volery.ros.transports.ros1.package_export import write_package
 

@@ -5,8 +5,7 @@ from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.link import Frame
-from volery.links.mavlink_codec import MavlinkParser
-from volery.links.mavlink_messages import CHECKSUM, HEADER, encode
+from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
 BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
@@ -20,7 +19,7 @@ def old_beat() -> bytes:
 def test_the_text_of_a_booting_autopilot_is_skipped_and_kept() -> None:
     parser = MavlinkParser()
     assert [frame.name for frame in parser.feed(BOOT + BEAT + b"Init Gyro" + BEAT)] == ["HEARTBEAT"] * 2
-    assert "Init ArduCopter V4.5.6 (7ce11b41)" in parser.heard.lines
+    assert "Init ArduCopter V4.5.6 (7ce11b41)" in parser.statistics.lines
     assert parser.problem() == ""
 
 
@@ -35,7 +34,7 @@ def test_a_turned_bit_costs_one_frame() -> None:
     broken[12] ^= 4
     parser = MavlinkParser()
     assert len(parser.feed(bytes(broken) + BEAT)) == 1
-    assert parser.heard.corrupt == 1
+    assert parser.statistics.corrupt == 1
 
 
 def test_a_signature_is_passed_over() -> None:
@@ -52,7 +51,7 @@ def test_a_message_that_the_dialect_lacks_is_counted() -> None:
     header = HEADER.pack(0xFD, 3, 0, 0, 0, 1, 1, 0xFFF0, 0)
     parser = MavlinkParser()
     assert [frame.name for frame in parser.feed(header + b"abc" + CHECKSUM.pack(7) + BEAT)] == ["HEARTBEAT"]
-    assert parser.heard.unknown == 1
+    assert parser.statistics.unknown == 1
 
 
 def test_mavlink_1_is_read_and_named_as_the_problem_until_mavlink_2_comes() -> None:

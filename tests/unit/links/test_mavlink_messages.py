@@ -5,7 +5,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
 from volery.links.link import Frame
-from volery.links.mavlink_messages import constant, encode, entry_name, message_type, quantised
+from volery.links.mavlink_codec import encode, quantised
+from volery.links.mavlink_messages import constant, entry_name, message_type
 
 
 def test_what_we_write_is_what_pymavlink_reads() -> None:

@@ -6,8 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
 from volery.links.link import Frame
-from volery.links.mavlink_codec import MavlinkParser
-from volery.links.mavlink_messages import NEWER, Definition, NewerField, encode, message_type
+from volery.links.mavlink_codec import MavlinkParser, encode
+from volery.links.mavlink_messages import NEWER_MESSAGES, FieldDefinition, MessageDefinition, message_type
 
 RECORDED = (
     ("EVENT", "fd1e00007903019a0100e093a80120080000f7ff000088000000100080000000c02b81ffc02b81ffc610"),
@@ -22,45 +22,45 @@ def test_recorded_bytes_are_read_and_written_again(name: str, recorded: str) -> 
     raw = bytes.fromhex(recorded)
     parser = MavlinkParser()
     (frame,) = parser.feed(raw)
-    assert (frame.name, parser.heard.corrupt) == (name, 0)
+    assert (frame.name, parser.statistics.corrupt) == (name, 0)
     assert encode(frame, raw[4]) == raw
 
 
 @pytest.mark.parametrize(
     "definition",
     [
-        Definition(
+        MessageDefinition(
             30,
             "ATTITUDE",
-            NewerField("uint32_t", "time_boot_ms"),
+            FieldDefinition("uint32_t", "time_boot_ms"),
             *(
-                NewerField("float", name)
+                FieldDefinition("float", name)
                 for name in ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
             ),
         ),
-        Definition(
+        MessageDefinition(
             33,
             "GLOBAL_POSITION_INT",
-            NewerField("uint32_t", "time_boot_ms"),
-            *(NewerField("int32_t", name) for name in ("lat", "lon", "alt", "relative_alt")),
-            *(NewerField("int16_t", name) for name in ("vx", "vy", "vz")),
-            NewerField("uint16_t", "hdg"),
+            FieldDefinition("uint32_t", "time_boot_ms"),
+            *(FieldDefinition("int32_t", name) for name in ("lat", "lon", "alt", "relative_alt")),
+            *(FieldDefinition("int16_t", name) for name in ("vx", "vy", "vz")),
+            FieldDefinition("uint16_t", "hdg"),
         ),
-        Definition(
+        MessageDefinition(
             83,
             "ATTITUDE_TARGET",
-            NewerField("uint32_t", "time_boot_ms"),
-            NewerField("uint8_t", "type_mask"),
-            NewerField("float", "q", 4),
+            FieldDefinition("uint32_t", "time_boot_ms"),
+            FieldDefinition("uint8_t", "type_mask"),
+            FieldDefinition("float", "q", 4),
             *(
-                NewerField("float", name)
+                FieldDefinition("float", name)
                 for name in ("body_roll_rate", "body_pitch_rate", "body_yaw_rate", "thrust")
             ),
         ),
     ],
     ids=lambda definition: definition.msgname,
 )
-def test_the_rules_are_those_of_pymavlink(definition: Definition) -> None:
+def test_the_rules_are_those_of_pymavlink(definition: MessageDefinition) -> None:
     theirs = ardupilotmega.mavlink_map[definition.id]
     assert definition.crc_extra == theirs.crc_extra
     assert definition.ordered_fieldnames == theirs.ordered_fieldnames
@@ -69,7 +69,7 @@ def test_the_rules_are_those_of_pymavlink(definition: Definition) -> None:
 
 def test_none_of_them_has_come_to_pymavlink() -> None:
     """Once it has, ours can go."""
-    assert not [one.msgname for one in NEWER if one.id in ardupilotmega.mavlink_map]
+    assert not [one.msgname for one in NEWER_MESSAGES if one.id in ardupilotmega.mavlink_map]
 
 
 def test_they_are_messages_like_others() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.links.link import Frame
-from volery.links.mavlink_messages import encode as mavlink
+from volery.links.mavlink_codec import encode as mavlink
 from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser, checksum, encode, quantised
 from volery.links.pprzlink_messages import entry_name, entry_value, message_type, parse_definitions
 
@@ -57,7 +57,7 @@ def test_frames_come_whole_however_the_bytes_are_cut() -> None:
     frames = [frame for octet in noise + ALIVE + encode(SETPOINT) for frame in parser.feed(bytes([octet]))]
     assert [frame.name for frame in frames] == ["ALIVE", "GUIDED_SETPOINT_NED"]
     assert parser.problem() == ""
-    assert "boot" in parser.heard.lines
+    assert "boot" in parser.statistics.lines
 
 
 def test_a_turned_bit_costs_one_frame() -> None:
@@ -65,7 +65,7 @@ def test_a_turned_bit_costs_one_frame() -> None:
     broken[9] ^= 4
     parser = PprzlinkParser()
     assert [frame.name for frame in parser.feed(bytes(broken) + ALIVE + ALIVE)] == ["ALIVE", "ALIVE"]
-    assert parser.heard.corrupt == 1
+    assert parser.statistics.corrupt == 1
 
 
 def test_texts_and_arrays_arrive_as_they_were() -> None:

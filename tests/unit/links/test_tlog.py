@@ -9,7 +9,7 @@ from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.mavlink_messages import encode
+from volery.links.mavlink_codec import encode
 from volery.links.tlog import TlogTap, read_tlog
 
 BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)

@@ -24,7 +24,7 @@ def arrivals(faults: WireFaults, seed: int = 1) -> tuple[list[tuple[int, int]], 
         frame = Frame("MISSION_CURRENT", {"seq": number}, 1, 1)
         kernel.call_at(number * 10 * MS, lambda frame=frame: theirs.send(frame))
     kernel.run(10 * S)
-    return seen, ours.heard
+    return seen, ours.statistics
 
 
 def test_without_faults_all_arrive_after_the_delay() -> None:

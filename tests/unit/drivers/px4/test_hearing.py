@@ -6,8 +6,7 @@ import pytest
 
 from rigs.recorded import Recorded, extract
 from volery.links.link import Frame
-from volery.links.mavlink_codec import MavlinkParser
-from volery.links.mavlink_messages import encode
+from volery.links.mavlink_codec import MavlinkParser, encode
 from volery.vehicles.drivers.px4.decoder import KNOWN_EVENTS, PX4Decoder, event_id, event_text
 
 ARM, REJECTED = 400, 1
