@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from volery.base.time import Ns, S
-from volery.bridge.flight_modes import PX4_ID, AutopilotType
+from volery.bridge.mode_names import PX4_ID, AutopilotType
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 from volery.links.link import Frame, Link

@@ -12,7 +12,7 @@ from typing import Any
 from volery.base.errors import choices, did_you_mean
 from volery.base.time import Ns, S
 from volery.bridge.autopilot_link import request_stream
-from volery.bridge.flight_modes import mode_names, mode_number
+from volery.bridge.mode_names import mode_names, mode_number
 from volery.bridge.node_interface import InterfaceContext, Service
 from volery.kernel.waiting import Lock
 from volery.ros.messages import service

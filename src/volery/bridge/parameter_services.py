@@ -13,7 +13,7 @@ from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.base.time import MS, Ns
-from volery.bridge.flight_modes import PX4_ID
+from volery.bridge.mode_names import PX4_ID
 from volery.bridge.node_interface import Fields, InterfaceContext, Service, Topic, Translator, stamped
 from volery.links.link import Frame
 from volery.links.mavlink_conventions import from_bytewise, to_bytewise

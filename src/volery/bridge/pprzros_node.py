@@ -23,7 +23,7 @@ from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
 
 PERIOD: Ns = 100 * MS
-MOST_WAITING = 200
+MAX_WAITING = 200
 """Frames that wait for the loop; pprzros's queues are shorter."""
 
 
@@ -56,7 +56,7 @@ class PprzrosNode:
     def _heard(self, frame: Frame) -> None:
         """House code."""
         self._heard_of.add(frame.system)
-        if len(self._fresh) < MOST_WAITING:
+        if len(self._fresh) < MAX_WAITING:
             self._fresh.append((frame, self._kernel.now()))
 
     def _run(self, place: ExecutionContext, scope: Scope) -> None:

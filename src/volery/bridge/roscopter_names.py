@@ -15,7 +15,7 @@ from typing import Any
 from volery.base.time import Ns
 from volery.bridge.autopilot_link import ALL
 from volery.bridge.command_services import ARM_DISARM, CommandServices
-from volery.bridge.flight_modes import AutopilotType, mode_name
+from volery.bridge.mode_names import AutopilotType, mode_name
 from volery.bridge.motion_publishers import IMU_SOURCES, imu_source
 from volery.bridge.node_interface import (
     Fields,

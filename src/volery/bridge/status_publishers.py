@@ -16,7 +16,7 @@ from math import nan
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns
-from volery.bridge.flight_modes import AutopilotType, mode_name
+from volery.bridge.mode_names import AutopilotType, mode_name
 from volery.bridge.node_interface import (
     BODY,
     LATCHED_STATE,

@@ -22,8 +22,8 @@ from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
 from volery.bridge.autopilot_link import AutopilotLink, ReceivedFrame, StreamRequests
-from volery.bridge.flight_modes import AUTOPILOTS, mode_name
 from volery.bridge.mavros_names import MAVROS
+from volery.bridge.mode_names import AUTOPILOT_NAMES, mode_name
 from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Service, Subscription
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.link import Link
@@ -35,7 +35,7 @@ ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
 SAFETY_ARMED = 128
 """MAV_MODE_FLAG."""
 WARNING = 4
-NONSENSE = (ValueError, OverflowError, UsageError)
+INVALID_VALUES = (ValueError, OverflowError, UsageError)
 """What comes of numbers that make no sense, in a message or in a frame."""
 
 
@@ -95,7 +95,7 @@ class VehicleNode:
         if beat is None or not self.connected:
             return ""
         number = beat["autopilot"]
-        who = AUTOPILOTS.get(number, f"autopilot {number}")
+        who = AUTOPILOT_NAMES.get(number, f"autopilot {number}")
         mode = mode_name(self.wire.firmware, beat["custom_mode"])
         armed = "armed" if beat["base_mode"] & SAFETY_ARMED else "disarmed"
         return f"{who} (system {self.wire.target[0]}): {mode}, {armed}"
@@ -184,14 +184,14 @@ class VehicleNode:
             name, fields = subscription.translate(message, self._kernel.now())
             with self._kernel:
                 self.wire.send_to(name, fields)
-        except NONSENSE as error:
+        except INVALID_VALUES as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
 
     def _serve(self, node: Node, offering: NodeInterface, aside: ExecutionContext, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
                 work.run()
-            except NONSENSE as error:
+            except INVALID_VALUES as error:
                 self._warn(f"service request refused: {error}")
 
         def start(work: Work) -> None:
@@ -226,7 +226,7 @@ class VehicleNode:
         for translate in offering.translators.get(frame.name, ()):
             try:
                 translate(frame.fields, self._graph.epoch + at)
-            except NONSENSE as error:
+            except INVALID_VALUES as error:
                 if frame.name not in self._warned:
                     self._warned.add(frame.name)
                     self._warn(f"{frame.name}: not published: {error}")

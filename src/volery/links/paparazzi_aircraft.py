@@ -19,7 +19,7 @@ from lxml import etree
 
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
 
-LARGEST = 8_000_000
+MAX_FILE_SIZE = 8_000_000
 """Bytes of a file; a settings file of a large aircraft has some 100 kB."""
 
 FIRST_WAYPOINT = 1
@@ -57,7 +57,7 @@ class Waypoint:
 
 
 @dataclass(frozen=True)
-class Aircraft:
+class PaparazziAircraft:
     """What is known of one. ``system`` is its id, ``farthest`` the metres from home at which it turns back
     by itself; ``None`` where the files do not say. ``source`` says where it was read, for messages.
     """
@@ -97,9 +97,9 @@ class Aircraft:
 
 
 @cache
-def stock_aircraft() -> Aircraft:
+def stock_aircraft() -> PaparazziAircraft:
     """The stock rotorcraft: what an aircraft is taken for whose own files are not given."""
-    aircraft = Aircraft("the stock rotorcraft")
+    aircraft = PaparazziAircraft("the stock rotorcraft")
     folder = files("volery.links").joinpath("stock_rotorcraft")
     for name in ("settings.xml", "flight_plan.xml"):
         document = folder.joinpath(name).read_bytes()
@@ -107,7 +107,7 @@ def stock_aircraft() -> Aircraft:
     return aircraft
 
 
-def read_aircraft(path: Path) -> Aircraft:
+def read_aircraft(path: Path) -> PaparazziAircraft:
     """The aircraft whose XML is *path*: its folder, or one file of it.
 
     Of a folder, every ``.xml`` file is looked at, in the order of names, and told by its root element. What
@@ -115,10 +115,10 @@ def read_aircraft(path: Path) -> Aircraft:
 
     Raises ``UsageError`` if there is nothing to read, ``ModelError`` naming file and line of what is wrong.
     """
-    aircraft = Aircraft(str(path))
+    aircraft = PaparazziAircraft(str(path))
     for file in _documents(path):
-        if file.stat().st_size > LARGEST:
-            raise UsageError(f"{file}: larger than {LARGEST} bytes: not a file of an aircraft")
+        if file.stat().st_size > MAX_FILE_SIZE:
+            raise UsageError(f"{file}: larger than {MAX_FILE_SIZE} bytes: not a file of an aircraft")
         aircraft = _with(aircraft, _root(file.read_bytes(), str(file)), str(file))
     if not (aircraft.settings or aircraft.blocks):
         raise UsageError(f"{path}: neither settings nor a flight plan; give a folder var/aircrafts/NAME")
@@ -155,7 +155,7 @@ def _root(document: bytes, name: str) -> Any:
     return root
 
 
-def _with(aircraft: Aircraft, root: Any, file: str) -> Aircraft:
+def _with(aircraft: PaparazziAircraft, root: Any, file: str) -> PaparazziAircraft:
     """*aircraft* and what this document says of it; others say nothing."""
     if root.tag == "settings":
         return replace(aircraft, settings=_unique(_settings(root, file), file))

@@ -18,7 +18,7 @@ from volery.base.errors import UsageError, choices, did_you_mean
 TELEMETRY, DATALINK, GROUND, ALERT, INTERMCU = 1, 2, 3, 4, 5
 """Classes: aircraft to ground, ground to aircraft, among ground programs, their alarms, on board."""
 
-MOST_PAYLOAD = 247
+MAX_PAYLOAD = 247
 """Bytes; the length of a whole frame is one byte and counts eight around the payload."""
 
 _CODES = {
@@ -72,8 +72,8 @@ class MessageType:
             payload = b"".join(_packed(field, fields.get(field.name)) for field in self.fields)
         except (struct.error, OverflowError, TypeError, ValueError) as error:
             raise UsageError(f"{self.name}: a field does not fit ({error}): {dict(fields)}") from None
-        if len(payload) > MOST_PAYLOAD:
-            room = f"{len(payload)} bytes, a frame has room for {MOST_PAYLOAD}"
+        if len(payload) > MAX_PAYLOAD:
+            room = f"{len(payload)} bytes, a frame has room for {MAX_PAYLOAD}"
             raise UsageError(f"{self.name}: too long: {room}")
         return payload
 

@@ -137,7 +137,9 @@ def test_every_message_fits_its_definition_and_carries_its_number(make: Make) ->
     craft.run(10.0)
     assert {frame.system for frame in craft.heard} == {7}
     assert set(PERIODS) <= {frame.name for frame in craft.heard}
-    assert craft.link.statistics.corrupt == craft.link.statistics.unknown == craft.link.statistics.garbage == 0
+    assert (
+        craft.link.statistics.corrupt == craft.link.statistics.unknown == craft.link.statistics.garbage == 0
+    )
     assert craft.link.problem() == ""
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from volery.kernel.api import Kernel
 from volery.links.link import Link
-from volery.links.paparazzi_aircraft import Aircraft, read_aircraft, stock_aircraft
+from volery.links.paparazzi_aircraft import PaparazziAircraft, read_aircraft, stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.ros.graph import Node
 from volery.vehicles.address import check_options
@@ -52,7 +52,7 @@ def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, st
     return Paparazzi(kernel, PaparazziBackend(kernel, link, name, aircraft, options), blocks)
 
 
-def _aircraft(options: Mapping[str, str]) -> Aircraft:
+def _aircraft(options: Mapping[str, str]) -> PaparazziAircraft:
     given = options.get("aircraft")
     return read_aircraft(Path(given)) if given else stock_aircraft()
 

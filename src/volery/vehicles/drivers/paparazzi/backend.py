@@ -17,7 +17,7 @@ from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSile
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.link import Frame, Link, ReceiveStatistics
-from volery.links.paparazzi_aircraft import Aircraft, Setting
+from volery.links.paparazzi_aircraft import PaparazziAircraft, Setting
 from volery.links.pprzlink_codec import TO_GROUND
 from volery.links.pprzlink_messages import TELEMETRY, entry_value, message_type
 from volery.trace.events import LinkState
@@ -61,7 +61,7 @@ class PaparazziBackend:
     """Talks to one rotorcraft: the first that speaks, or the one that option ``system_option`` or its XML names."""
 
     def __init__(
-        self, kernel: Kernel, link: Link, name: str, aircraft: Aircraft, options: Mapping[str, str]
+        self, kernel: Kernel, link: Link, name: str, aircraft: PaparazziAircraft, options: Mapping[str, str]
     ) -> None:
         self.telemetry = Telemetry(kernel, name)
         self.hearing = PaparazziDecoder(kernel, self.telemetry, aircraft, record=records_texts(options))

@@ -10,7 +10,7 @@ from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.links.paparazzi_aircraft import Aircraft
+from volery.links.paparazzi_aircraft import PaparazziAircraft
 from volery.links.pprzlink_messages import entry_name
 from volery.trace.events import Text
 from volery.vehicles.drivers.paparazzi.modes import (
@@ -69,7 +69,9 @@ class PaparazziDecoder:
     and, until it is seen, the one before. HOME and FAILSAFE are failsafes only where nobody asked for them.
     """
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, aircraft: Aircraft, *, record: bool) -> None:
+    def __init__(
+        self, kernel: Kernel, telemetry: Telemetry, aircraft: PaparazziAircraft, *, record: bool
+    ) -> None:
         self.origin: Origin | None = None
         self.ours: frozenset[str] = frozenset()
         self._asked_mode = ""
@@ -221,7 +223,7 @@ def _enu(fields: Fields, prefix: str) -> Vector:
     return east, north, up
 
 
-def _home_of(aircraft: Aircraft) -> tuple[int, tuple[float, float]]:
+def _home_of(aircraft: PaparazziAircraft) -> tuple[int, tuple[float, float]]:
     """Number of the waypoint HOME, and where it is: east, north; at the origin if the plan says nothing."""
     for waypoint in aircraft.waypoints:
         if waypoint.name == HOME_WAYPOINT:

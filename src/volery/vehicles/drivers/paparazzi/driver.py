@@ -21,7 +21,7 @@ from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.links.paparazzi_aircraft import Aircraft
+from volery.links.paparazzi_aircraft import PaparazziAircraft
 from volery.vehicles.driver import Capability, ManualControl, Step
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.modes import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
@@ -40,7 +40,7 @@ from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
 
-def on_link_loss(aircraft: Aircraft) -> str:
+def on_link_loss(aircraft: PaparazziAircraft) -> str:
     """One line."""
     far = f", further than {aircraft.farthest:g} m from home it turns back" if aircraft.farthest else ""
     return (

@@ -39,7 +39,7 @@ GENERIC_ID, ARDUPILOT_ID, PAPARAZZI_ID, PX4_ID = 0, 3, 9, 12
 """MAV_AUTOPILOT."""
 DJI_ID = 255
 """MAVLink has no number for it, and does not use this one. It is said inside this process only."""
-AUTOPILOTS = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", DJI_ID: "DJI"}
+AUTOPILOT_NAMES = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", DJI_ID: "DJI"}
 
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""
