@@ -1,7 +1,7 @@
 """Base classes of links over bytes: a codec on top of a connection, and streams that reconnect.
 
-A connection waits for bytes in a thread of its own (``ReaderThread``), which posts them to the kernel. All other
-code of these classes runs as framework callbacks and needs no locks.
+A connection waits for bytes in a thread of its own (``ReaderThread``), which posts them to the kernel. All
+other code of these classes runs as framework callbacks and needs no locks.
 """
 
 from __future__ import annotations
@@ -91,7 +91,8 @@ class CodedLink(ABC):
 class ReaderThread:
     """A thread that runs *body* from ``start`` to ``stop``. *body* may block only in ``readable``.
 
-    *body* may post to the kernel before ``start`` has returned, so start the thread when its owner is complete.
+    *body* may post to the kernel before ``start`` has returned, so start the thread when its owner is
+    complete.
     """
 
     def __init__(self, name: str, body: Callable[[ReaderThread], None]) -> None:
@@ -139,8 +140,8 @@ class ByteStream(Protocol):
 class StreamLink(CodedLink):
     """A link over a stream that may break and return: a TCP connection or a serial line.
 
-    The stream is opened in the reader thread. After a break it is opened again, first after ``FIRST_RETRY`` and
-    then at intervals that double up to ``LONGEST_RETRY``.
+    The stream is opened in the reader thread. After a break it is opened again, first after ``FIRST_RETRY``
+    and then at intervals that double up to ``LONGEST_RETRY``.
     """
 
     def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:

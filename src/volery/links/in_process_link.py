@@ -1,8 +1,8 @@
 """A link within one process: frames travel as values, not as bytes, and arrive after a delay.
 
 The values are quantised as on a wire (``Codec.quantised``): 32-bit floats, strings cut to length, all fields
-present, and a field that does not fit is refused. This costs a few microseconds per frame and keeps a simulation
-from depending on digits that no radio carries.
+present, and a field that does not fit is refused. This costs a few microseconds per frame and keeps a
+simulation from depending on digits that no radio carries.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """MAVLink as bytes: frames encoded as MAVLink 2, and a tolerant parser for MAVLink 1 and 2.
 
-Real links carry boot texts, noise and other protocols. The parser skips and counts everything that is no frame,
-so that ``problem`` can describe what arrives instead. Signatures are neither written nor checked.
+Real links carry boot texts, noise and other protocols. The parser skips and counts everything that is no
+frame, so that ``problem`` can describe what arrives instead. Signatures are neither written nor checked.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def quantised(frame: Frame) -> Frame:
 
 
 class _Header:
-    """A possible frame header at *start*. ``length`` is that of the whole frame, or 0 if this is no header."""
+    """A possible frame header at *start*. ``length`` is that of the whole frame; 0 if there is no header."""
 
     __slots__ = ("component", "kind", "length", "payload", "start", "system", "trailer", "version_1")
 
@@ -82,7 +82,8 @@ class _Header:
     def valid(self, buffer: Octets) -> bool:
         """Return whether the checksum is right.
 
-        The checksum of an unknown message cannot be computed. Such a frame is accepted if another frame follows.
+        The checksum of an unknown message cannot be computed. Such a frame is accepted if another frame
+        follows.
         """
         end = self.start + self.length
         if self.kind is None:

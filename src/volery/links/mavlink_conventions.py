@@ -1,7 +1,7 @@
 """MAVLink conventions above single messages, which both ends of a link implement.
 
-Status texts longer than 50 characters are sent in chunks; some firmwares send integer parameters as the bytes of
-a float; telemetry streams have a period per message.
+Status texts longer than 50 characters are sent in chunks; some firmwares send integer parameters as the bytes
+of a float; telemetry streams have a period per message.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """MAVLink message definitions: ids, payload layouts and enumerations of the dialect ``ardupilotmega``.
 
-The dialect includes ``common``. Definitions are pymavlink's, plus the few messages that pymavlink does not have
-yet. Payloads are packed from the definitions directly, because pymavlink's message objects cost three times as
-much. Arrays are tuples of numbers; ``char[]`` fields are ``str``. A field that is not given is zero or empty, as
-the protocol prescribes for fields that an older sender does not know.
+The dialect includes ``common``. Definitions are pymavlink's, plus the few messages that pymavlink does not
+have yet. Payloads are packed from the definitions directly, because pymavlink's message objects cost three
+times as much. Arrays are tuples of numbers; ``char[]`` fields are ``str``. A field that is not given is zero
+or empty, as the protocol prescribes for fields that an older sender does not know.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class MessageDefinition:
     """A message definition with the attributes of pymavlink's that ``MessageType`` reads.
 
     Field order on the wire and the extra byte of the checksum follow from names and types by MAVLink's rules
-    (https://mavlink.io/en/guide/serialization.html): larger types first, otherwise in the order given; the extra
-    byte is the folded checksum over names and types. Extension fields are not supported.
+    (https://mavlink.io/en/guide/serialization.html): larger types first, otherwise in the order given; the
+    extra byte is the folded checksum over names and types. Extension fields are not supported.
     """
 
     def __init__(self, number: int, name: str, *fields: FieldDefinition) -> None:
@@ -125,8 +125,8 @@ class _Field(NamedTuple):
 def _dict_maker(names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
     """Return a function that makes a dictionary of its arguments, with *names* as keys.
 
-    The generated code is twice as fast as ``zip``. Arguments are numbered because a field name may be a Python
-    keyword.
+    The generated code is twice as fast as ``zip``. Arguments are numbered because a field name may be a
+    Python keyword.
     """
     arguments = [f"value_{number}" for number in range(len(names))]
     items = ", ".join(f"{name!r}: {value}" for name, value in zip(names, arguments, strict=True))

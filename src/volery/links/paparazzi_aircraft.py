@@ -1,9 +1,9 @@
-"""A Paparazzi aircraft's own XML: which number its settings, blocks and waypoints have.
+"""The XML files of a Paparazzi aircraft: numbers of its settings, flight-plan blocks and waypoints.
 
-Messages carry numbers that differ from aircraft to aircraft. What they mean stands in the files that are left
-in ``var/aircrafts/NAME`` when it is built: ``settings.xml``, ``flight_plan.xml``, ``conf_aircraft.xml``. They
-are read here, hardened: no entities, no network, no document type definitions. ``stock_aircraft`` is what is
-assumed of an aircraft whose files are not given.
+Messages carry numbers that differ from aircraft to aircraft. Their meaning is in the files that the build of
+an aircraft leaves in ``var/aircrafts/NAME``: ``settings.xml``, ``flight_plan.xml``, ``conf_aircraft.xml``.
+The reader is hardened: no entities, no network, no document type definitions. ``stock_aircraft`` describes an
+aircraft whose files are not given.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from lxml import etree
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
 
 MAX_FILE_SIZE = 8_000_000
-"""Bytes of a file; a settings file of a large aircraft has some 100 kB."""
+"""Bytes of a file; the settings file of a large aircraft has about 100 kB."""
 
 FIRST_WAYPOINT = 1
-"""In the aircraft a nameless one stands before those of the plan."""
+"""Number of the first waypoint of a plan; in the aircraft an unnamed waypoint precedes it."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A variable that can be set in flight, under the name that a ground station shows: ``shortname``."""
+    """A variable that can be set in flight. ``name`` is the ``shortname`` that a ground station shows."""
 
     number: int
     name: str
@@ -40,7 +40,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Block:
-    """A part of the flight plan that one can order the aircraft to."""
+    """A block of the flight plan, to which the aircraft can be commanded."""
 
     number: int
     name: str
@@ -48,7 +48,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Waypoint:
-    """Where it is: metres east and north of the plan's origin, or NaN where the plan gives degrees."""
+    """A waypoint, in metres east and north of the plan's origin; NaN where the plan gives degrees."""
 
     number: int
     name: str
@@ -58,8 +58,16 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class PaparazziAircraft:
-    """What is known of one. ``system`` is its id, ``farthest`` the metres from home at which it turns back
-    by itself; ``None`` where the files do not say. ``source`` says where it was read, for messages.
+    """Settings, blocks and waypoints of one aircraft.
+
+    Args:
+        source: Where the description was read, for messages.
+        name: Name of the aircraft.
+        system: Id of the aircraft; None if the files do not contain it.
+        settings: Settings by number.
+        blocks: Flight-plan blocks by number.
+        waypoints: Waypoints by number.
+        farthest: Distance from home in metres at which the aircraft turns back; None if not given.
     """
 
     source: str
@@ -71,21 +79,21 @@ class PaparazziAircraft:
     farthest: float | None = None
 
     def setting(self, name: str) -> Setting:
-        """The setting called so, by name or variable. Raises ``UsageError`` naming those that are alike."""
+        """Return the setting with this name or variable; raise ``UsageError`` listing similar ones otherwise."""
         for one in self.settings:
             if name in (one.name, one.variable):
                 return one
         raise self._lacks("setting", name, [one.name for one in self.settings])
 
     def block(self, name: str) -> Block:
-        """The block called so; raises ``UsageError`` naming those that there are."""
+        """Return the block called *name*; raise ``UsageError`` listing the blocks otherwise."""
         for one in self.blocks:
             if one.name == name:
                 return one
         raise self._lacks("block", name, [one.name for one in self.blocks])
 
     def waypoint(self, name: str) -> Waypoint:
-        """The waypoint called so; raises ``UsageError`` naming those that there are."""
+        """Return the waypoint called *name*; raise ``UsageError`` listing the waypoints otherwise."""
         for one in self.waypoints:
             if one.name == name:
                 return one
@@ -98,7 +106,7 @@ class PaparazziAircraft:
 
 @cache
 def stock_aircraft() -> PaparazziAircraft:
-    """The stock rotorcraft: what an aircraft is taken for whose own files are not given."""
+    """Return the stock rotorcraft, which is assumed of an aircraft whose files are not given."""
     aircraft = PaparazziAircraft("the stock rotorcraft")
     folder = files("volery.links").joinpath("stock_rotorcraft")
     for name in ("settings.xml", "flight_plan.xml"):
@@ -108,12 +116,17 @@ def stock_aircraft() -> PaparazziAircraft:
 
 
 def read_aircraft(path: Path) -> PaparazziAircraft:
-    """The aircraft whose XML is *path*: its folder, or one file of it.
+    """Return the aircraft described by the XML at *path*.
 
-    Of a folder, every ``.xml`` file is looked at, in the order of names, and told by its root element. What
-    no file says is as in the stock rotorcraft, by whole lists.
+    Lists that no file contains (settings, blocks, waypoints) are taken from the stock rotorcraft.
 
-    Raises ``UsageError`` if there is nothing to read, ``ModelError`` naming file and line of what is wrong.
+    Args:
+        path: The folder of the aircraft, or one file of it. In a folder every ``.xml`` file is read in the
+            order of names; its root element determines its kind.
+
+    Raises:
+        UsageError: There is nothing to read.
+        ModelError: A file is wrong; the error names file and line.
     """
     aircraft = PaparazziAircraft(str(path))
     for file in _documents(path):
@@ -156,7 +169,7 @@ def _root(document: bytes, name: str) -> Any:
 
 
 def _with(aircraft: PaparazziAircraft, root: Any, file: str) -> PaparazziAircraft:
-    """*aircraft* and what this document says of it; others say nothing."""
+    """Return *aircraft* with the content of one document; documents of other kinds change nothing."""
     if root.tag == "settings":
         return replace(aircraft, settings=_unique(_settings(root, file), file))
     plan = root if root.tag == "flight_plan" else root.find("flight_plan")
@@ -203,7 +216,7 @@ Named = TypeVar("Named", Setting, Block, Waypoint)
 
 
 def _unique(found: Iterable[Named], file: str) -> tuple[Named, ...]:
-    """All of them; two with one number could not both be meant."""
+    """Return *found* as a tuple; raise ``ModelError`` if a number is out of range or used twice."""
     listed = tuple(found)
     numbers: dict[int, str] = {}
     for one in listed:

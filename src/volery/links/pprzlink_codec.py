@@ -7,10 +7,10 @@ Format of a frame on the wire::
 ``length`` counts the whole frame; check-A is the sum of all bytes from ``length`` to the end of the payload,
 check-B the sum of the intermediate values of check-A, both modulo 256.
 
-The ``system`` of a ``Frame`` is the source (the id of an aircraft, or 0 for the ground) and its ``component`` the
-sender's component, 0..15. The class follows from the name of the message, and so does the destination: telemetry
-is sent to the ground; a datalink message is sent to the aircraft that its field ``ac_id`` names, or to all
-aircraft if it has no such field. A receiver checks ``ac_id``, as the firmware does.
+The ``system`` of a ``Frame`` is the source (the id of an aircraft, or 0 for the ground) and its ``component``
+the sender's component, 0..15. The class follows from the name of the message, and so does the destination:
+telemetry is sent to the ground; a datalink message is sent to the aircraft that its field ``ac_id`` names, or
+to all aircraft if it has no such field. A receiver checks ``ac_id``, as the firmware does.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def checksum(covered: Octets) -> bytes:
 
 
 def encode(frame: Frame, sequence: int = 0) -> bytes:
-    """Return *frame* in pprzlink 2.0 wire format. The protocol does not number frames: *sequence* is unused."""
+    """Return *frame* in pprzlink 2.0 wire format. *sequence* is unused: the protocol numbers no frames."""
     del sequence
     kind = message_type(frame.name)
     payload = kind.pack(frame.fields)
@@ -69,7 +69,8 @@ class PprzlinkParser:
     """Splits a stream of bytes, fed in any portions, into pprzlink 2.0 frames.
 
     Frames of version 1.0 are counted, not returned, because an aircraft that sends version 1.0 cannot decode
-    version 2.0. Until the first frame, received bytes are also parsed as MAVLink, so that ``problem`` can name it.
+    version 2.0. Until the first frame, received bytes are also parsed as MAVLink, so that ``problem`` can
+    name it.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,8 @@
-"""pprzlink's messages: what there is, and how the fields of one lie in a payload.
+"""pprzlink message definitions: ids, payload layouts and enumerations.
 
-The definitions stand in ``pprzlink_messages.txt``. Numbers are little-endian and follow one another in the
-order of the definition, without gaps. Arrays are tuples, ``char[]`` and ``string`` fields are ``str``. What
-is not given is zero or empty.
+The definitions are read from ``pprzlink_messages.txt``. Numbers are little-endian and follow one another in
+the order of the definition, without gaps. Arrays are tuples; ``char[]`` and ``string`` fields are ``str``. A
+field that is not given is zero or empty.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 from volery.base.errors import UsageError, choices, did_you_mean
 
 TELEMETRY, DATALINK, GROUND, ALERT, INTERMCU = 1, 2, 3, 4, 5
-"""Classes: aircraft to ground, ground to aircraft, among ground programs, their alarms, on board."""
+"""Message classes: aircraft to ground, ground to aircraft, between ground programs, alerts, on board."""
 
 MAX_PAYLOAD = 247
-"""Bytes; the length of a whole frame is one byte and counts eight around the payload."""
+"""Bytes. The length of a frame is sent as one byte and includes eight bytes around the payload."""
 
 _CODES = {
     "char": "s",
@@ -36,7 +36,7 @@ _ANY = -1
 
 
 class Field(NamedTuple):
-    """``length`` is 0 for a single value, how many an array has, or -1 where its count goes first."""
+    """One field. ``length`` is 0 for a single value, the array length, or -1 if a count comes first."""
 
     name: str
     code: str
@@ -45,7 +45,7 @@ class Field(NamedTuple):
 
     @property
     def text(self) -> bool:
-        """Characters, given and taken as one ``str``."""
+        """Whether the field holds characters, which are represented as one ``str``."""
         return self.code == "s"
 
 
@@ -61,7 +61,7 @@ class MessageType:
         self._struct = struct.Struct("<" + "".join(field.code for field in fields)) if plain else None
 
     def pack(self, fields: Mapping[str, Any]) -> bytes:
-        """The payload. Raises ``UsageError`` naming a field that does not exist or does not fit."""
+        """Return the payload; raise ``UsageError`` naming a field that does not exist or does not fit."""
         if not self._known.issuperset(fields):
             wrong = next(name for name in fields if name not in self._known)
             hint = did_you_mean(wrong, self.field_names)
@@ -78,22 +78,26 @@ class MessageType:
         return payload
 
     def unpack(self, payload: bytes) -> dict[str, Any] | None:
-        """The fields; ``None`` if *payload* has not the length of this message."""
+        """Return the fields, or None if *payload* does not have the length of this message."""
         if self._struct is not None:
             if len(payload) != self._struct.size:
                 return None
             return dict(zip(self.field_names, self._struct.unpack(payload), strict=True))
         fields: dict[str, Any] = {}
-        place = 0
+        at = 0
         for field in self.fields:
-            taken = _unpacked(field, payload, place)
+            taken = _unpacked(field, payload, at)
             if taken is None:
                 return None
-            fields[field.name], place = taken
-        return fields if place == len(payload) else None
+            fields[field.name], at = taken
+        return fields if at == len(payload) else None
 
     def words(self, field: str) -> tuple[str, ...]:
-        """The enumeration of *field*, by value; empty if it is none. ``UsageError`` for an unknown field."""
+        """Return the names of the values of *field*; empty if the field is no enumeration.
+
+        Raises:
+            UsageError: The message has no such field.
+        """
         for one in self.fields:
             if one.name == field:
                 return one.words
@@ -103,7 +107,7 @@ class MessageType:
 
 def _packed(field: Field, given: Any) -> bytes:
     if field.text:
-        octets = str(given or "").encode(errors="replace")
+        octets = str(given or "").encode(errors="reat")
         if field.length == _ANY:
             return bytes([len(octets)]) + octets
         return octets[: field.length].ljust(field.length, b"\0")
@@ -118,20 +122,20 @@ def _packed(field: Field, given: Any) -> bytes:
     return struct.pack(f"<{field.length}{field.code}", *values)
 
 
-def _unpacked(field: Field, payload: bytes, place: int) -> tuple[Any, int] | None:
-    """The value, and where the next one begins; ``None`` if the payload ends before."""
+def _unpacked(field: Field, payload: bytes, at: int) -> tuple[Any, int] | None:
+    """Return the value and the start of the next field, or None if the payload ends before."""
     count = field.length
     if count == _ANY:
-        if place >= len(payload):
+        if at >= len(payload):
             return None
-        count, place = payload[place], place + 1
+        count, at = payload[at], at + 1
     form = f"<{count}{field.code}" if count or field.length == _ANY else f"<{field.code}"
-    end = place + struct.calcsize(form)
+    end = at + struct.calcsize(form)
     if end > len(payload):
         return None
-    values = struct.unpack_from(form, payload, place)
+    values = struct.unpack_from(form, payload, at)
     if field.text:
-        return values[0].split(b"\0", 1)[0].decode(errors="replace"), end
+        return values[0].split(b"\0", 1)[0].decode(errors="reat"), end
     return (values[0] if field.length == 0 else values), end
 
 
@@ -151,7 +155,7 @@ def _field(text: str) -> Field:
 
 
 def parse_definitions(text: str) -> list[MessageType]:
-    """The messages of a text in the form that ``pprzlink_messages.txt`` describes."""
+    """Return the messages defined by *text* in the format that ``pprzlink_messages.txt`` describes."""
     found: list[MessageType] = []
     kind = 0
     for line in text.splitlines():
@@ -172,7 +176,7 @@ assert len(_BY_NUMBER) == len(_BY_NAME) == len(_ALL), "a message is defined twic
 
 
 def message_type(name: str) -> MessageType:
-    """The definition of the message called *name*; ``UsageError`` if there is none."""
+    """Return the message type called *name*; raise ``UsageError`` if there is none."""
     found = _BY_NAME.get(name)
     if found is None:
         raise UsageError(f"pprzlink has no message {name!r} here{did_you_mean(name, _BY_NAME)}")
@@ -180,25 +184,32 @@ def message_type(name: str) -> MessageType:
 
 
 def message_type_of(kind: int, number: int) -> MessageType | None:
-    """The definition of message *number* of a class; ``None`` if there is none."""
+    """Return the message type *number* of class *kind*, or None if there is none."""
     return _BY_NUMBER.get((kind, number))
 
 
 def message_names() -> list[str]:
-    """All messages that are known here, sorted."""
+    """Return the names of all defined messages, sorted."""
     return sorted(_BY_NAME)
 
 
 @cache
 def entry_name(message: str, field: str, value: int) -> str:
-    """The word for *value*, else the number: ``("ROTORCRAFT_STATUS", "ap_mode", 19)`` is ``GUIDED``."""
+    """Return the name of *value*, or its digits if it has none.
+
+    ``entry_name("ROTORCRAFT_STATUS", "ap_mode", 19)`` is ``GUIDED``.
+    """
     words = message_type(message).words(field)
     return words[value] if 0 <= value < len(words) else str(value)
 
 
 @cache
 def entry_value(message: str, field: str, word: str) -> int:
-    """The value of *word* in the enumeration of a field. Raises ``UsageError`` naming the valid ones."""
+    """Return the value of *word* in the enumeration of a field.
+
+    Raises:
+        UsageError: There is no such word; the error lists the valid ones.
+    """
     words = message_type(message).words(field)
     if word not in words:
         hint = did_you_mean(word, words)

@@ -1,7 +1,8 @@
-"""pprzlink's frames as the messages of pprzros, ``pprzros_msgs/PprzrosMsg``, both ways.
+"""Conversion between pprzlink frames and the ROS messages of pprzros, ``pprzros_msgs/PprzrosMsg``.
 
-``data`` is the payload as on the wire and ``len`` its length. What pprzros itself leaves at 0 (``comp_id``,
-``receiver_id``, ``checksum``) is filled in here; when one arrives, only names, sender and data are looked at.
+``data`` is the payload as on the wire and ``len`` its length. Fields that pprzros itself leaves at 0
+(``comp_id``, ``receiver_id``, ``checksum``) are filled in. Of a received message only name, sender and data
+are used.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from volery.ros.messages import message_class, new
 
 TYPE = "pprzros_msgs/msg/PprzrosMsg"
 TO_ROS, FROM_ROS = "pprzros/to_ros", "pprzros/from_ros"
-"""Topics: what the aircraft says, and what is said to it."""
+"""Topics of messages from the aircraft and to the aircraft."""
 
 VERSION = 2
-"""Of the protocol: 2.0."""
+"""Protocol version 2.0."""
 
 _CLASSES = {TELEMETRY: "telemetry", DATALINK: "datalink"}
 _header = message_class("std_msgs/msg/Header")
@@ -28,7 +29,15 @@ _time = message_class("builtin_interfaces/msg/Time")
 
 
 def to_message(frame: Frame, stamp: Ns) -> Any:
-    """The message that says what *frame* says; *stamp* is ROS time. Raises ``UsageError`` as a codec does."""
+    """Return *frame* as a ROS message.
+
+    Args:
+        frame: The frame to convert.
+        stamp: ROS time of the header in ns.
+
+    Raises:
+        UsageError: A field does not exist or does not fit.
+    """
     octets = encode(frame)
     kind = message_type(frame.name)
     return new(
@@ -47,8 +56,10 @@ def to_message(frame: Frame, stamp: Ns) -> Any:
 
 
 def to_frame(message: Any) -> Frame:
-    """The frame that *message* stands for. Raises ``UsageError`` if there is no such message, or it has
-    another length.
+    """Return the frame in a ROS message.
+
+    Raises:
+        UsageError: The message name is unknown, or the payload has another length.
     """
     kind = message_type(str(message.msg_name))
     payload = bytes(message.data)

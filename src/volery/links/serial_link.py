@@ -32,7 +32,7 @@ class _SerialStream:
 
 
 class SerialLink(StreamLink):
-    """Opens *device* at *baud*, and again whenever the device returns (an unplugged and replugged adapter)."""
+    """Opens *device* at *baud*, and again whenever the device returns (a replugged adapter)."""
 
     def __init__(
         self, kernel: Kernel, device: str, baud: int, name: str = "", codec: Codec = MAVLINK

@@ -1,8 +1,8 @@
 """Telemetry logs as ground stations write them: records of a time stamp and a raw MAVLink frame.
 
 The stamp is a big-endian number of 8 bytes in microseconds. QGroundControl, MAVExplorer and ``mavlogdump.py``
-read such files. The stamp is Unix time where the clock is real; in virtual time it counts from the start of the
-run.
+read such files. The stamp is Unix time where the clock is real; in virtual time it counts from the start of
+the run.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ BURST_LENGTH = 40
 """Bytes that a burst of noise overwrites."""
 
 REORDER_DELAY: Ns = 60 * MS
-"""Delay of a reordered frame: longer than the period of a fast telemetry stream, so that others overtake it."""
+"""Delay of a reordered frame: longer than the period of a fast stream, so that later frames overtake it."""
 
 PROBABILITIES = ("burst", "drop", "duplicate", "flip", "reorder", "truncate")
 
