@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 from volery.base.errors import Location, ModelError, UsageError
-from volery.model.document import WorldForm, keys_at, names_are_free, short_key
+from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
 from volery.model.system import Source
 from volery.model.text import Node, Path, Problems, no_such, parse, parse_value, written
 
@@ -282,7 +282,7 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
     environment = made.root.at(("environment",))
     if environment is None or not isinstance(environment.value, dict):
         return
-    known = list(WorldForm.model_fields)
+    known = list(GEOGRAPHY)
     for key, node in world.items.items():
         if key == "volery":
             continue

@@ -27,6 +27,7 @@ from volery.model.fields import (
     OneOf,
     Record,
     Schema,
+    Shared,
     Shorter,
     Syntax,
     Whole,
@@ -186,6 +187,16 @@ class Figure:
     energy_j: Annotated[float | None, ENERGY, "Energy; by the processor's law if it is not given."] = None
     provenance: Annotated[str, OneOf(PROVENANCES), "Where the figure comes from."] = "estimated"
     where: Location | None = field(default=None, compare=False)
+
+    @property
+    def processor(self) -> str:
+        """The kind of processor that it was stated for."""
+        return self.at.processor
+
+    @property
+    def frequency_hz(self) -> float:
+        """The frequency that it was stated at."""
+        return self.at.frequency_hz
 
 
 def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
@@ -378,14 +389,15 @@ class _Component(Record):
         return made
 
 
-COMPONENTS = MapOf(_Component(Component))
-
-
 def library(reading: Reading) -> dict[str, Component]:
     """Return the components of the model. Use with ``Reading.once``."""
     node = reading.root.at(LIBRARY)
     if node is None or not isinstance(node.value, dict):
         return {}
-    made = COMPONENTS.read(node, LIBRARY, reading)
+    made = _ALL.read(node, LIBRARY, reading)
     assert isinstance(made, dict)
     return made
+
+
+_ALL = MapOf(_Component(Component))
+COMPONENTS = Shared(_ALL, library)

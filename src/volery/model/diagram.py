@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from volery.base.time import Ns, to_seconds
+from volery.model.components import Activity
 from volery.model.environment import Vehicle
-from volery.model.system import Activity, Instance, Network, Processor, System
+from volery.model.instances import Instance
+from volery.model.system import Network, Processor, System
 
 
 def diagram(system: System) -> str:

@@ -1,8 +1,8 @@
-"""The surroundings of the system in one run: places, ways, zones, air, vehicles, workload, faults. Frozen data.
+"""The surroundings of the system in one run: places, ways, zones, air, vehicles, workload, faults.
 
-Every point is given twice, as WGS-84 degrees with metres AMSL and as metres east and north of the origin, so
-that no other package converts frames. Most classes declare how they are written in a model; points, ways and
-prisms are written differently from what they become, so each of them has a text form beside it.
+Frozen data. Every point is given twice, as WGS-84 degrees with metres AMSL and as metres east and north of the
+origin, so that no other package converts frames. Most classes declare how they are written in a model;
+points, ways and prisms are written differently from what they become, so each has a text form beside it.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from volery.model.fields import (
     OneOf,
     Record,
     Schema,
+    Shared,
     Shorter,
     Syntax,
     Whole,
@@ -193,28 +194,12 @@ PLACE = _Resolved(Shorter(Record(Point), key="place"), _place)
 """A point that belongs to something, and is named after it."""
 
 
-class _AllPlaces(Syntax):
-    """All named places of the model, which are read only once."""
-
-    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Place]:
-        """See ``Syntax``."""
-        return reading.once(Geography).places
-
-    def schema(self, definitions: Schema) -> Schema:
-        """See ``Syntax``."""
-        return MapOf(Record(NamedPoint)).schema(definitions)
+def _frame(reading: Reading) -> LocalFrame:
+    return reading.once(Geography).frame
 
 
-class _Frame(Syntax):
-    """The local frame of the model, which is read only once."""
-
-    def read(self, node: Node, path: Path, reading: Reading) -> LocalFrame:
-        """See ``Syntax``."""
-        return reading.once(Geography).frame
-
-    def schema(self, definitions: Schema) -> Schema:
-        """See ``Syntax``."""
-        return Record(Origin).schema(definitions)
+def _places(reading: Reading) -> dict[str, Place]:
+    return reading.once(Geography).places
 
 
 # -- ways and volumes
@@ -409,12 +394,12 @@ def _workload(text: WorkloadText, path: Path, reading: Reading) -> Workload:
 class Environment:
     """The surroundings of the system. The terrain is flat at the origin's altitude."""
 
-    origin: Annotated[LocalFrame, _Frame(), "Origin of the local frame."] = field(
+    origin: Annotated[LocalFrame, Shared(Record(Origin), _frame), "Origin of the local frame."] = field(
         default_factory=lambda: LocalFrame(0.0, 0.0, 0.0)
     )
-    places: Annotated[Mapping[str, Place], _AllPlaces(), "Named points on the ground."] = field(
-        default_factory=dict
-    )
+    places: Annotated[
+        Mapping[str, Place], Shared(MapOf(Record(NamedPoint)), _places), "Named points on the ground."
+    ] = field(default_factory=dict)
     roads: Annotated[Ways, WAYS, "Roads, for rovers."] = Ways()
     corridors: Annotated[Ways, WAYS, "Air corridors, for drones."] = Ways()
     no_fly_zones: Annotated[tuple[Prism, ...], PRISMS, "Volumes that drones must not enter."] = ()

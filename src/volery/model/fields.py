@@ -1,12 +1,12 @@
-"""How a field of the model's classes is written: the one declaration behind parser, JSON Schema and reference.
+"""How the fields of the model's classes are written: one declaration for parser, JSON Schema and reference.
 
-A frozen dataclass declares each field that a model file may state as ``Annotated[type, syntax, description]``.
-The syntax parses what is written and describes itself in the JSON Schema; the default of the field is its
+A frozen dataclass declares each field that a model may state as ``Annotated[type, syntax, description]``. The
+syntax parses what is written and describes itself in the JSON Schema; the default of the field is its
 default in the file. The key in the file is the name of the field without its unit (``latency_ns`` is written
 ``latency``), or a ``Key``. Fields without a syntax (``name``, ``where``) are filled in by the reader.
 
-Why not pydantic: it would need a second class per entity for the units, the source lines and the names that
-come from keys, and its messages would have to be rewritten. This is a third of that code.
+Rejected: pydantic. It needs a second class for each entity, since lines, names that come from keys, and
+references cannot be filled in while it validates; and each of its messages has to be rephrased for models.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Syntax(ABC):
         """Return the value of *node*, which stands at *path*.
 
         Raises:
-            WrongValueError, NotAQuantity: the node is not written in this syntax.
+            WrongValueError, QuantityError: the node is not written in this syntax.
         """
 
     @abstractmethod
@@ -356,8 +356,10 @@ class MapOf(Syntax):
 
 @dataclass(frozen=True)
 class Shorter(Syntax):
-    """A record that may be written shorter: as the value of its main key ``key`` alone, as ``true`` (all by
-    default) or ``false`` (absent) if it is a ``switch``, or as nothing (all by default) if it may be ``empty``.
+    """A record that may be written shorter.
+
+    ``key``: as the value of its main key alone. ``switch``: as ``true`` (all by default) or ``false``
+    (absent). ``empty``: as nothing (all by default).
     """
 
     record: Syntax
@@ -383,6 +385,24 @@ class Shorter(Syntax):
         short += [{"type": "null"}] if self.empty else []
         marked = {SHORT: self.key} if self.key else {}
         return {"anyOf": [*short, self.record.schema(definitions)], **marked}
+
+
+@dataclass(frozen=True)
+class Shared(Syntax):
+    """A mapping written in ``syntax`` that other parts of the model need, too: ``make`` reads it once."""
+
+    syntax: Syntax
+    make: Callable[[Reading], Any]
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        if not isinstance(node.value, dict):
+            raise expected("a mapping of keys", node)
+        return reading.once(self.make)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return self.syntax.schema(definitions)
 
 
 # -- records
@@ -418,7 +438,7 @@ class Entry:
 
 
 @cache
-def entries(cls: type[Any]) -> tuple[Entry, ...]:
+def entries(cls: Any) -> tuple[Entry, ...]:
     """Return the declared fields of a dataclass."""
     hints = get_type_hints(cls, include_extras=True)
     found = []
@@ -457,36 +477,42 @@ class Record(Syntax):
         declared = entries(self.cls)
         keys = {one.key: one for one in declared if not one.others}
         others = next((one for one in declared if one.others), None)
+        wrong = self._misses_keys(keys, node, path, reading)
         rest: dict[str, Node] = {}
         values: dict[str, Any] = {}
-        right = True
         for key, below in node.items.items():
             entry = keys.get(key)
-            if entry is None and (others is not None or (self.kind and key == "kind")):
+            if entry is None:
                 rest[key] = below
-            elif entry is None:
-                known = [*keys, "kind"] if self.kind else list(keys)
-                what = f"unknown key{did_you_mean(key, known)}; valid here: {choices(known)}"
-                reading.problems.add((*path, key), what, below.where)
-                right = False
             elif not (below.value is None and entry.default is None):
                 fits, values[entry.attribute] = read_child(entry.syntax, below, (*path, key), reading)
-                right = right and fits
-        for entry in keys.values():
-            if entry.required and entry.key not in node.items:
-                reading.problems.add((*path, entry.key), "this key is missing", node.where)
-                right = False
+                wrong |= not fits
         if others is not None:
             fits, values[others.attribute] = read_child(others.syntax, Node(rest, node.where), path, reading)
-            right = right and fits
-        if not right:
+            wrong |= not fits
+        elif self._has_unknown_keys(rest, keys, path, reading):
+            wrong = True
+        if wrong:
             raise WrongValueError("")
         own = {one.name for one in fields(self.cls)} - {one.attribute for one in declared}
-        if "name" in own:
-            values["name"] = str(path[-1])
-        if "where" in own:
-            values["where"] = node.where
-        return self.cls(**values)
+        filled = {"name": str(path[-1]) if path else "", "where": node.where}
+        return self.cls(**values, **{name: value for name, value in filled.items() if name in own})
+
+    def _misses_keys(self, keys: Mapping[str, Entry], node: Node, path: Path, reading: Reading) -> bool:
+        missing = [key for key, entry in keys.items() if entry.required and key not in node.items]
+        for key in missing:
+            reading.problems.add((*path, key), "this key is missing", node.where)
+        return bool(missing)
+
+    def _has_unknown_keys(
+        self, rest: Mapping[str, Node], keys: Mapping[str, Entry], path: Path, reading: Reading
+    ) -> bool:
+        known = [*keys, "kind"] if self.kind else list(keys)
+        unknown = {key: node for key, node in rest.items() if key not in known}
+        for key, node in unknown.items():
+            what = f"unknown key{did_you_mean(key, known)}; valid here: {choices(known)}"
+            reading.problems.add((*path, key), what, node.where)
+        return bool(unknown)
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""

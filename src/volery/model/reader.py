@@ -1,40 +1,25 @@
-"""What a valid model still lacks for one fidelity: figures, code, languages that do not run yet.
+"""From a file to a checked ``System``: ``load``, ``check``, and ``check_ready`` for one fidelity.
 
-From a file to a checked ``System``: the door of this room.
-
-``load`` gives one allocation and one scenario; ``check`` tries them all.
+``load`` gives one allocation and one scenario; ``check`` tries them all. A model is read in one pass over its
+tree; here, what concerns several sections is checked and put together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import fields, replace
+from pathlib import Path as FilePath
 
 from volery.base.errors import ModelError, choices
-from volery.model.assembly import Assembly, Selection, assemble, change_from_option
-from volery.model.document import ModelForm, validate
-from volery.model.resolution import (
-    Context,
-    Surroundings,
-    catalogues,
-    chains,
-    check_all_variants,
-    check_names,
-    check_reach,
-    components,
-    environment,
-    instances,
-    interfaces,
-    limits,
-    networks,
-    places,
-    processors,
-    requirements,
-    with_catalogues,
-)
-from volery.model.system import Component, Figure, Instance, Interface, System, Vocabulary
-from volery.model.text import CollectedModelError, Problems
+from volery.model.assembly import NOT_PLACES, Assembly, Selection, assemble, change_from_option
+from volery.model.components import Component, Figure
+from volery.model.document import DOCUMENT, Document
+from volery.model.environment import Environment, Vehicle
+from volery.model.fields import TEXT, ListOf, read_child
+from volery.model.instances import Instance, TargetKind, check_cycles
+from volery.model.reading import Reading, Vocabulary
+from volery.model.system import Network, System
+from volery.model.text import CollectedModelError, Path
 
 FIDELITIES = ("times", "code", "firmware", "hardware")
 """Constant times · real component code · real autopilot firmware in the loop · real vehicles."""
@@ -73,19 +58,12 @@ def _missing_figures(system: System, instance: Instance) -> Iterator[ModelError]
         return
     kind = system.processor(instance.processor).kind
     component = instance.component
-    for operation in _offered(component, dict(system.interfaces)):
-        figures = component.operations.get(operation, ())
-        yield from _missing(instance, f"operations.{operation}", figures, kind)
+    for interface in component.provides.values():
+        for operation in system.interfaces[interface].operations:
+            figures = component.operations.get(operation, ())
+            yield from _missing(instance, f"operations.{operation}", figures, kind)
     if instance.activity is not None:
         yield from _missing(instance, "activation", component.activation, kind)
-
-
-def _offered(component: Component, interfaces: dict[str, Interface]) -> list[str]:
-    return [
-        operation
-        for interface in component.provides.values()
-        for operation in interfaces[interface].operations
-    ]
 
 
 def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: str) -> Iterator[ModelError]:
@@ -100,35 +78,47 @@ def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: s
 
 
 DEFAULT_FILE = "model.yaml"
-"""What a folder stands for."""
+"""The file that a folder stands for."""
+
+RESERVED = ("application", "environment")
+"""Names that messages, observables and ports use for the whole."""
 
 
 def load(
-    path: str | Path,
+    path: str | FilePath,
     vocabulary: Vocabulary,
     scenario: str | None = None,
     allocation: str | None = None,
     overrides: Iterable[str] = (),
 ) -> System:
-    """Read the model at *path* (a file, or a folder with a ``model.yaml``).
+    """Read a model.
 
-    *scenario* ``None``: as the model stands; *allocation* ``None``: the scenario's, or the first of the
-    model. *overrides* are texts ``path=value`` and win over both. Raises ``ModelError`` for what is wrong
-    with the model, all of it at once (``CollectedModelError``), and ``UsageError`` for a scenario or an
-    allocation it does not have.
+    Args:
+        path: The model's file, or a folder with a ``model.yaml``.
+        vocabulary: Names that are defined outside the model.
+        scenario: The scenario; None for the model without one.
+        allocation: The allocation; None for the scenario's, or the first of the model.
+        overrides: Changes ``path=value`` that win over both.
+
+    Raises:
+        ModelError: What is wrong with the model; all of it at once (``CollectedModelError``).
+        UsageError: The model has no such scenario or allocation.
     """
     options = tuple(overrides)
-    wanted = Selection(scenario, allocation, tuple(change_from_option(text) for text in options))
-    file = _file(Path(path))
-    made, problems = assemble(file, wanted)
-    form = validate(ModelForm, made.root, problems)
+    selection = Selection(scenario, allocation, tuple(change_from_option(text) for text in options))
+    file = FilePath(path) / DEFAULT_FILE if FilePath(path).is_dir() else FilePath(path)
+    made, problems = assemble(file, selection)
+    reading = Reading(made.root, problems, vocabulary, file.parent)
+    catalogues = _read_catalogues(reading)
+    _, document = read_child(DOCUMENT, made.root, (), reading)
+    if document is None:
+        problems.raise_if_any()
+    system = _resolve(reading, document, made)
     problems.raise_if_any()
-    assert form is not None, "a form that does not validate is a problem"
-    context = Context(form, vocabulary, problems, file.parent)
-    return _resolve(with_catalogues(context), made, options)
+    return replace(system, overrides=options, catalogues=catalogues, warnings=problems.warnings)
 
 
-def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
+def check(path: str | FilePath, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
     """Read the model with each of its allocations and each of its scenarios; return it as it stands.
 
     It has the warnings of all of them. Raises what ``load`` raises, for all of them together.
@@ -153,38 +143,132 @@ def check(path: str | Path, vocabulary: Vocabulary, overrides: Iterable[str] = (
     return replace(system, warnings=tuple(warnings))
 
 
-def _file(path: Path) -> Path:
-    return path / DEFAULT_FILE if path.is_dir() else path
+def _read_catalogues(reading: Reading) -> tuple[FilePath, ...]:
+    """Add the processors of the model's own catalogues to the vocabulary; return the files."""
+    path: Path = ("platform", "catalogues")
+    node = reading.root.at(path)
+    if node is None:
+        return ()
+    right, names = read_child(ListOf(TEXT, bare=True), node, path, reading)
+    files = tuple(reading.folder / name for name in names) if right else ()
+    known = dict(reading.vocabulary.processors)
+    for position, file in enumerate(files):
+        try:
+            known.update(reading.vocabulary.read_catalogue(file))
+        except ModelError as error:
+            reading.problems.add((*path, position), str(error))
+    reading.vocabulary = replace(reading.vocabulary, processors=known)
+    return files
 
 
-def _resolve(context: Context, made: Assembly, options: tuple[str, ...]) -> System:
-    problems: Problems = context.problems
-    check_names(context)
-    check_all_variants(context)
-    where = places(context, made.allocation, made.places)
-    known = interfaces(context)
-    library = components(context, known)
-    system = System(
-        name=context.form.name,
-        instances=instances(Surroundings(context, known, library), where),
-        processors=processors(context),
-        networks=networks(context),
-        environment=environment(context, where),
-        chains=chains(context),
-        requirements=requirements(context),
-        limits=limits(context),
-        components=library,
-        interfaces=known,
-        description=context.form.description,
+def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
+    """Put the sections of a document together, and check what concerns several of them."""
+    _check_names(reading)
+    _check_allocations(reading)
+    places = {name: str(node.value) for name, node in (made.places or {}).items()}
+    for name in reading.names(("application",)):
+        if name not in places:
+            path: Path = ("allocations", made.allocation) if made.allocation else ("application", name)
+            which = (
+                f"allocation {made.allocation!r}" if made.allocation else "this model has no allocation and"
+            )
+            reading.problems.add(path, f"{which} does not say where {name} runs")
+    surroundings = document.environment
+    instances = (
+        *(replace(one, processor=places.get(one.name)) for one in document.application),
+        *surroundings.components,
+    )
+    vehicles = [
+        replace(one, processor=places.get(one.name) or _carried_processor(reading, one))
+        for one in surroundings.vehicles
+    ]
+    environment = Environment(
+        **{one.name: getattr(surroundings, one.name) for one in fields(Environment)}
+        | {"vehicles": tuple(vehicles)}
+    )
+    check_cycles(reading, instances)
+    _check_reach(reading, instances, document.platform.networks)
+    return System(
+        name=document.name,
+        instances=instances,
+        processors=document.platform.processors,
+        networks=document.platform.networks,
+        environment=environment,
+        chains=document.chains,
+        requirements=document.requirements,
+        limits=document.run,
+        components=document.components,
+        interfaces=document.interfaces,
+        description=document.description,
         allocation=made.allocation,
         scenario=made.scenario,
-        allocations=tuple(context.form.allocations),
-        scenarios=tuple(context.form.scenarios),
-        overrides=options,
+        allocations=tuple(document.allocations),
+        scenarios=tuple(document.scenarios),
         sources=made.sources,
-        folder=context.folder,
-        catalogues=catalogues(context),
+        folder=reading.folder,
     )
-    check_reach(context, system.instances, system.networks)
-    problems.raise_if_any()
-    return replace(system, warnings=problems.warnings)
+
+
+def _check_names(reading: Reading) -> None:
+    """Report names that two things share: observables and allocations refer to things by their name."""
+    taken: dict[str, str] = dict.fromkeys(RESERVED, "a word of the model")
+    sections: tuple[tuple[Path, str], ...] = (
+        (("application",), "a component instance"),
+        (("environment", "components"), "a component instance"),
+        (("environment", "vehicles"), "a vehicle"),
+        (("platform", "processors"), "a processor"),
+        (("chains",), "a chain"),
+    )
+    for section, what in sections:
+        for name in reading.names(section):
+            if name in taken:
+                reading.problems.add(
+                    (*section, name), f"{name!r} is already {taken[name]}; choose another name"
+                )
+            taken.setdefault(name, what)
+
+
+def _check_allocations(reading: Reading) -> None:
+    """Report allocations, chosen or not, of instances and vehicles that do not exist."""
+    placeable = reading.names(("application",), ("environment", "vehicles"))
+    for allocation in reading.names(("allocations",)):
+        for name in reading.names(("allocations", allocation)):
+            path: Path = ("allocations", allocation, name)
+            if name in reading.names(("environment", "components")):
+                what = f"{name} belongs to the environment: it runs nowhere and costs nothing"
+                reading.problems.add(path, what)
+            elif name not in NOT_PLACES:
+                reading.known(path, name, "component instance or vehicle", placeable)
+
+
+def _carried_processor(reading: Reading, vehicle: Vehicle) -> str | None:
+    """Return the one computer that a vehicle carries: its node runs there unless it is allocated."""
+    processors = reading.root.at(("platform", "processors"))
+    carried = [
+        name
+        for name, node in (processors.items if processors else {}).items()
+        if (by := node.child("carried_by")) is not None and by.value == vehicle.name
+    ]
+    if len(carried) > 1:
+        reading.problems.add(
+            ("environment", "vehicles", vehicle.name),
+            f"it carries {' and '.join(carried)}: the allocation must say where its node runs, "
+            f"such as `{vehicle.name}: {carried[0]}`",
+        )
+    return carried[0] if len(carried) == 1 else None
+
+
+def _check_reach(reading: Reading, instances: tuple[Instance, ...], networks: tuple[Network, ...]) -> None:
+    """Report calls between two computers that no network joins. The environment is everywhere."""
+    processor_of = {instance.name: instance.processor for instance in instances}
+    for instance in instances:
+        for connection in instance.connections.values():
+            for target in connection.targets:
+                here, there = instance.processor, processor_of.get(target.name)
+                if target.kind is not TargetKind.INSTANCE or None in (here, there) or here == there:
+                    continue
+                if not any(here in network.between and there in network.between for network in networks):
+                    reading.problems.add(
+                        ("application", instance.name, connection.port),
+                        f"{instance.name} on {here} calls {target.name} on {there}: no network joins them",
+                    )

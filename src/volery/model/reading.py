@@ -1,7 +1,8 @@
 """One pass over a model's tree: where names are looked up and problems are collected.
 
-The names of vehicles, processors, components and so on are taken from the tree, not from what was read before.
-So references are checked where they stand, in any order of sections, and all problems are reported at once.
+The names of vehicles, processors, components and so on are taken from the tree, not from what was read
+before. So references are checked where they stand, in any order of sections, and all problems are reported at
+once.
 """
 
 from __future__ import annotations

@@ -1,259 +1,203 @@
-"""The system model as frozen data: what a run needs to know, with every name resolved and every unit SI.
+"""The system model as frozen data: one allocation and one scenario, with every name resolved and units SI.
 
-One ``System`` is one allocation and one scenario of a model: what was inherited, overridden or left to a
-default is settled. Times are ``int`` nanoseconds (``_ns``), everything else is SI and says its unit in its
-name; latitude and longitude are WGS-84 degrees. ``where`` is the line of the file that a thing was read from,
-for messages.
-
-A model may be made without a file: build these by hand, they are plain data.
+Times are ``int`` nanoseconds (``_ns``); everything else is SI, and a name that carries another unit says so.
+``where`` is the line of the file that a thing was read from, for messages. A model may be made without a
+file: build these classes by hand, they are plain data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
-from pathlib import Path
-from typing import TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+from typing import Annotated, Any, TypeVar
 
+from volery.base import units
 from volery.base.errors import Location, UsageError, choices, did_you_mean
 from volery.base.time import MINUTE, Ns
+from volery.base.units import Kind, QuantityError
+from volery.model.components import ROS_LANGUAGES, Component, Interface, check_frequency
 from volery.model.environment import Environment, Vehicle
-
-Value = bool | int | float | str | None | Sequence["Value"] | Mapping[str, "Value"]
-"""A parameter: what YAML can say. A number with a unit (``6 / h``) arrives as an SI number.
-"""
-
-VEHICLE_INTERFACES: Mapping[str, str] = {"Drone": "multirotor", "Rover": "rover"}
-"""Interfaces that a vehicle provides, and the kind of vehicle that does. The component commands it over the
-graph.
-"""
-
-ENVIRONMENT_INTERFACE = "Environment"
-"""The interface whose port hands a component the ``Environment``: places, roads, zones, workload.
-"""
-
-LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp", "rclcpp")
-"""Languages that a model may name. Which of them run is for the ``Vocabulary`` to say."""
-
-CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
-"""Languages that are compiled."""
-
-ROS_LANGUAGES = ("rospy", "rclpy", "roscpp", "rclcpp")
-"""Languages that bring ROS into the system by themselves."""
+from volery.model.fields import (
+    BANDWIDTH,
+    FREQUENCY,
+    LOSS,
+    PERIOD,
+    PROCESSOR,
+    PROCESSOR_KIND,
+    TEXT,
+    TIME,
+    VEHICLE,
+    Key,
+    ListOf,
+    MapOf,
+    OneOf,
+    Record,
+    Reference,
+    Schema,
+    Syntax,
+    Whole,
+    WrongValueError,
+)
+from volery.model.instances import Instance
+from volery.model.reading import Observable, Reading
+from volery.model.text import Node, Path
 
 SCHEDULERS = ("fixed-priority", "round-robin", "fifo")
-"""Fixed-priority is preemptive: a greater number is more urgent, equals go in order of arrival.
-"""
+"""Fixed-priority is preemptive: a greater number is more urgent, equals go in order of arrival."""
 
-PROVENANCES = ("estimated", "measured", "calculated", "required")
-"""Where a figure comes from (MARTE's NFP source)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Argument:
-    """An argument of an operation. ``type`` is text for people and generators: ``str``, ``Position[]``."""
-
-    name: str
-    type: str
+MAINS = "mains"
+"""Powers a computer that is not fed by the battery of its vehicle."""
 
 
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """An operation of an interface. ``returns`` is empty where nothing comes back."""
-
-    name: str
-    arguments: tuple[Argument, ...] = ()
-    returns: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Interface:
-    """A named set of operations. Without operations it stands for publish and subscribe: just needs ROS."""
-
-    name: str
-    operations: Mapping[str, Signature] = field(default_factory=dict)
-    where: Location | None = field(default=None, compare=False)
-
-    @property
-    def is_publish_subscribe(self) -> bool:
-        """True if ports of it are not connected: their component publishes and subscribes to topics."""
-        return not self.operations
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """What an operation or an activation takes, stated at a processor of the catalogue and a frequency.
-
-    ``energy_j`` is ``None`` where the model states none. What it is at another frequency is a law's to say.
-    """
-
-    time_ns: Ns
-    energy_j: float | None
-    processor: str
-    frequency_hz: float
-    provenance: str = "estimated"
-    where: Location | None = field(default=None, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Activity:
-    """An active component's flow of control.
-
-    ``period_ns`` is a promise that is checked against the releases seen; ``deadline_ns`` counts from each
-    release; ``start_ns`` delays the first. A greater ``priority`` is more urgent.
-    """
-
-    period_ns: Ns | None = None
-    deadline_ns: Ns | None = None
-    priority: int = 0
-    start_ns: Ns = 0
-
-
-@dataclass(frozen=True, slots=True)
-class RequiredPort:
-    """What a component needs: one provider of an interface, or any number (``many``: a list is injected)."""
-
-    name: str
-    interface: str
-    many: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Build:
-    """How C++ is compiled: options for the compiler, and libraries by the names that follow ``-l``."""
-
-    flags: tuple[str, ...] = ()
-    libraries: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Component:
-    """A kind of component in the library.
-
-    ``path`` is as written, relative to the model's folder (``System.file_of`` resolves it), and empty where
-    there is no code yet; of C++ it may be a folder. ``class_name`` is the usual one where the model states
-    none (``class_stated``). ``provides`` maps a port to its interface. ``activity`` is ``None`` for a passive
-    component.
-    ``operations`` and ``activation`` hold the figures of fidelity ``times``, one per processor kind.
-    """
-
-    name: str
-    language: str
-    path: str = ""
-    class_name: str = ""
-    class_stated: bool = False
-    provides: Mapping[str, str] = field(default_factory=dict)
-    requires: Mapping[str, RequiredPort] = field(default_factory=dict)
-    parameters: Mapping[str, Value] = field(default_factory=dict)
-    activity: Activity | None = None
-    operations: Mapping[str, tuple[Figure, ...]] = field(default_factory=dict)
-    activation: tuple[Figure, ...] = ()
-    build: Build = Build()
-    where: Location | None = field(default=None, compare=False)
-
-
-class TargetKind(Enum):
-    """What stands at the far end of a connection."""
-
-    INSTANCE = "instance"
-    VEHICLE = "vehicle"
-    ENVIRONMENT = "environment"
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """The far end of a connection: a provided ``port`` of an instance, a vehicle, or the environment."""
-
-    kind: TargetKind
-    name: str
-    port: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.name}.{self.port}" if self.port else self.name
-
-
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """A required port and what it is connected to: exactly one target, or any number if ``many``."""
-
-    port: str
-    interface: str
-    targets: tuple[Target, ...]
-    many: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Instance:
-    """A component that exists in the application or in the environment.
-
-    ``parameters`` and ``activity`` are the component's with the instance's own on top. ``processor`` is
-    ``None`` for the environment's components: their computing costs nothing. ``namespace`` and ``remap`` are
-    ROS's.
-    """
-
-    name: str
-    component: Component
-    connections: Mapping[str, Connection] = field(default_factory=dict)
-    parameters: Mapping[str, Value] = field(default_factory=dict)
-    activity: Activity | None = None
-    processor: str | None = None
-    namespace: str = "/"
-    remap: Mapping[str, str] = field(default_factory=dict)
-    where: Location | None = field(default=None, compare=False)
-
-    @property
-    def is_environment(self) -> bool:
-        """True for what surrounds the system (requesters, provider): allocated to nothing."""
-        return self.processor is None
+# -- the platform
 
 
 @dataclass(frozen=True, slots=True)
 class Processor:
-    """A computer: ``kind`` is its name in the catalogue.
+    """A computer.
 
-    ``carried_by`` names the vehicle it rides on; ``powered_by`` the vehicle whose battery its power drains,
-    ``None`` for mains. ``quantum_ns`` is the time slice of round-robin, ``None`` for the kernel's own choice.
-    ``context_switch_ns`` is charged when a core goes on with another task; ``load`` is the share of each
-    core, 0..1, that something else takes before all components.
+    ``powered_by`` names the vehicle whose battery it drains, None for mains. ``quantum_ns`` is None for the
+    kernel's default.
     """
 
     name: str
-    kind: str
-    frequency_hz: float
-    cores: int = 1
-    scheduler: str = "fixed-priority"
-    quantum_ns: Ns | None = None
-    carried_by: str | None = None
-    powered_by: str | None = None
-    context_switch_ns: Ns = 0
-    load: float = 0.0
+    kind: Annotated[str, Key("is"), PROCESSOR_KIND, "Kind of processor."]
+    frequency_hz: Annotated[float, FREQUENCY, "Frequency of all its cores."]
+    cores: Annotated[int, Whole(least=1), "Number of cores in use; by default, all that its kind has."] = 1
+    scheduler: Annotated[
+        str, OneOf(SCHEDULERS), "Scheduler; under `fixed-priority` a greater number is more urgent."
+    ] = "fixed-priority"
+    quantum_ns: Annotated[Ns | None, PERIOD, "Time slice of round-robin; by default, the kernel's."] = None
+    carried_by: Annotated[str | None, VEHICLE, "The vehicle that carries it."] = None
+    powered_by: Annotated[
+        str | None,
+        Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")), none=MAINS),
+        "The vehicle whose battery it drains; by default, the one that carries it.",
+    ] = None
+    context_switch_ns: Annotated[Ns, TIME, "Time that a core needs to go on with another task."] = 0
+    load: Annotated[float, LOSS, "Share of each core that something else takes before all components."] = 0.0
     where: Location | None = field(default=None, compare=False)
 
     @property
     def frequency_mhz(self) -> float:
-        """The same in MHz, which the laws of ROS calls are stated in."""
+        """The frequency in MHz, the unit of the laws of ROS calls."""
         return self.frequency_hz / 1e6
+
+
+def _with_kind(node: Node, path: Path, reading: Reading) -> Node:
+    """Add the number of cores from the catalogue, and the vehicle that carries the computer as its power."""
+    added = dict(node.items)
+    kind = reading.vocabulary.processors.get(str(added["is"].value)) if "is" in added else None
+    if kind is not None and ("cores" not in added or added["cores"].value is None):
+        added["cores"] = Node(kind.cores, node.where)
+    if "carried_by" in added and ("powered_by" not in added or added["powered_by"].value is None):
+        added["powered_by"] = added["carried_by"]
+    return replace(node, value=added)
+
+
+class _Processor(Record):
+    """A computer within the limits of its kind."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Processor:
+        """See ``Syntax``. A frequency between two that can be set is a warning."""
+        made: Processor = super().read(node, path, reading)
+        check_frequency(reading, path, made.kind, made.frequency_hz)
+        kind = reading.vocabulary.processors.get(made.kind)
+        if kind is None:
+            return made
+        if made.cores > kind.cores:
+            reading.problems.add((*path, "cores"), f"{made.kind} has {kind.cores} cores, not {made.cores}")
+        below = [one for one in kind.settings_hz if one < made.frequency_hz]
+        above = [one for one in kind.settings_hz if one > made.frequency_hz]
+        if made.frequency_hz not in kind.settings_hz and below and above:
+            reading.problems.warn(
+                (*path, "frequency"),
+                f"{made.kind} cannot be set to {made.frequency_hz / 1e6:g} MHz; "
+                f"the nearest settings are {below[-1] / 1e6:g} and {above[0] / 1e6:g} MHz",
+            )
+        return made
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """Joins processors. ``loss`` is the probability, 0..1, that one transmission is lost."""
+    """A network that joins processors."""
 
     name: str
-    between: tuple[str, ...]
-    bandwidth_bit_s: float
-    latency_ns: Ns
-    loss: float = 0.0
+    between: Annotated[tuple[str, ...], ListOf(PROCESSOR, least=2), "Processors that it joins."]
+    bandwidth_bit_s: Annotated[float, BANDWIDTH, "Bandwidth, shared by all that is sent."]
+    latency_ns: Annotated[Ns, TIME, "Time from the end of a transmission to its arrival."] = 0
+    loss: Annotated[float, LOSS, "Probability that one transmission is lost."] = 0.0
     where: Location | None = field(default=None, compare=False)
+
+
+class _Network(Record):
+    """A network that joins each processor once."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Network:
+        """See ``Syntax``."""
+        made: Network = super().read(node, path, reading)
+        if len(set(made.between)) != len(made.between):
+            reading.problems.add((*path, "between"), "a processor stands here twice")
+        return made
+
+
+PROCESSORS = MapOf(_Processor(Processor, prepare=_with_kind), values_only=True)
+NETWORKS = MapOf(_Network(Network), values_only=True)
+
+
+# -- requirements
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """A row of topics by their full names: a node hears one and says the next."""
+    """A chain of topics by their full names: a node receives one and publishes the next."""
 
     name: str
     topics: tuple[str, ...]
+
+
+class _Chain(Syntax):
+    """The full names of topics, in order."""
+
+    topics = ListOf(TEXT, least=1)
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Chain:
+        """See ``Syntax``."""
+        topics = self.topics.read(node, path, reading)
+        for place, topic in enumerate(topics):
+            if not topic.startswith("/"):
+                what = f"{topic!r}: write a topic's full name, such as '/{topic}'"
+                reading.problems.add((*path, place), what)
+        return Chain(str(path[-1]), topics)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return self.topics.schema(definitions)
+
+
+class _BoundValue(Syntax):
+    """A number in the unit of the observed quantity; it is read when the quantity is known."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        if isinstance(node.value, dict | list | bool) or node.value is None:
+            raise WrongValueError("a number, with the unit of the observed quantity, is expected")
+        return node.value
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": ["string", "number"]}
+
+
+@dataclass(frozen=True, slots=True)
+class BoundText:
+    """A bound on an observed quantity: exactly one of `max` and `min`, with its unit."""
+
+    observe: Annotated[str, TEXT, "What is observed: `<subject>.<quantity>`. See the list of observables."]
+    max: Annotated[Any, _BoundValue(), "Greatest value that is allowed, with its unit."] = None
+    min: Annotated[Any, _BoundValue(), "Least value that is allowed, with its unit."] = None
+    description: Annotated[str, TEXT, "What it is for."] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,77 +217,76 @@ class Bound:
     where: Location | None = field(default=None, compare=False)
 
     def holds(self, observed: float) -> bool:
-        """True if *observed* respects it; NaN (nothing was there to observe) never does."""
+        """Return whether *observed* respects the bound; NaN (nothing was observed) never does."""
         return observed <= self.bound if self.relation == "max" else observed >= self.bound
+
+
+class _Bound(Syntax):
+    """A bound on an observable, in its unit."""
+
+    text = Record(BoundText)
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Bound:
+        """See ``Syntax``."""
+        text: BoundText = self.text.read(node, path, reading)
+        observable = _observable(reading, (*path, "observe"), text.observe)
+        stated = [one for one in (("max", text.max), ("min", text.min)) if one[1] is not None]
+        if len(stated) != 1:
+            raise WrongValueError("give exactly one of max and min")
+        if observable is None:
+            raise WrongValueError("")
+        (relation, value), unit = stated[0], observable.unit
+        try:
+            number = units.read(value, Kind("bound", unit or "1", f"0.5 {unit}" if unit else "3"))
+        except QuantityError as error:
+            measured = f"measured in {unit}" if unit else "a plain number"
+            reading.problems.add((*path, relation), f"{text.observe} is {measured}: {error}")
+            raise WrongValueError("") from None
+        return Bound(str(path[-1]), text.observe, relation, number, unit, text.description, node.where)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return self.text.schema(definitions)
+
+
+def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
+    subject, _, quantity = text.rpartition(".")
+    kinds = {
+        "application": "application",
+        **dict.fromkeys(reading.names(("application",), ("environment", "components")), "component"),
+        **dict.fromkeys(reading.names(("platform", "processors")), "processor"),
+        **dict.fromkeys(reading.names(("environment", "vehicles")), "vehicle"),
+        **dict.fromkeys(reading.names(("chains",)), "chain"),
+    }
+    if not reading.known(path, subject, "subject to observe", kinds):
+        return None
+    kind = kinds[subject]
+    offered = {one.quantity: one for one in reading.vocabulary.observables if one.subject == kind}
+    return offered[quantity] if reading.known(path, quantity, f"quantity of a {kind}", offered) else None
+
+
+BOUND = _Bound()
+CHAINS = MapOf(_Chain(), values_only=True)
+BOUNDS = MapOf(BOUND, values_only=True)
 
 
 @dataclass(frozen=True, slots=True)
 class RunLimits:
-    """How long to run: at most ``duration_ns`` of simulated time, less if ``until`` holds before."""
+    """How long a run lasts."""
 
-    duration_ns: Ns
-    until: Bound | None = None
+    duration_ns: Annotated[Ns, PERIOD, "Longest simulated time."] = 15 * MINUTE
+    until: Annotated[Bound | None, BOUND, "Bound that ends the run as soon as it holds."] = None
+
+
+# -- the system
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file that the model was read from, to be attached to the trace. ``name`` is relative to the model's
-    folder.
-    """
+    """A file that the model was read from, for the trace. ``name`` is relative to the model's folder."""
 
     name: str
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Observable:
-    """A quantity that requirements may bound: ``<subject>.<quantity>``.
-
-    ``subject`` is the kind of thing it is of: ``component``, ``processor``, ``vehicle``,
-    ``chain`` or ``application``.
-    """
-
-    subject: str
-    quantity: str
-    unit: str
-    description: str
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessorKind:
-    """What the catalogue says of a processor: its cores and the range in which its laws are valid.
-
-    ``settings_hz`` are the frequencies within it that can be set, ascending; empty where they are not known.
-    """
-
-    cores: int
-    least_hz: float
-    greatest_hz: float
-    settings_hz: tuple[float, ...] = ()
-
-
-Kinds = Mapping[str, ProcessorKind]
-
-
-def _no_catalogue(file: Path) -> Kinds:
-    return {}
-
-
-@dataclass(frozen=True)
-class Vocabulary:
-    """Names that point out of the model, given from above: the model checks against them and knows no more.
-
-    ``languages`` are those that run today; others of ``LANGUAGES`` are valid in a model. ``faults`` are the
-    kinds that a scenario may inject. ``read_catalogue`` gives the processors of a catalogue that the model
-    brings along, or raises ``ModelError``.
-    """
-
-    processors: Mapping[str, ProcessorKind]
-    languages: frozenset[str]
-    autopilots: frozenset[str]
-    observables: tuple[Observable, ...] = ()
-    faults: frozenset[str] = frozenset()
-    read_catalogue: Callable[[Path], Kinds] = _no_catalogue
 
 
 @dataclass(frozen=True)
@@ -351,10 +294,9 @@ class System:
     """One allocation and one scenario of a model, checked.
 
     ``instances`` holds the application's components, then the environment's. ``allocation`` and ``scenario``
-    name what was chosen (``scenario`` empty: none), ``allocations`` and ``scenarios`` what there is to choose
-    from. ``overrides`` are the ``path=value`` texts that were applied. ``folder`` is where relative paths
-    start. ``catalogues`` are the files of processors that the model brings along. ``warnings`` say what is
-    doubtful about it.
+    name what was chosen (``scenario`` empty: none), ``allocations`` and ``scenarios`` the choices.
+    ``overrides`` are the ``path=value`` texts that were applied. ``folder`` is where relative paths start.
+    ``catalogues`` are the files of processors that the model refers to. ``warnings`` state what is doubtful.
     """
 
     name: str
@@ -364,7 +306,7 @@ class System:
     environment: Environment = field(default_factory=Environment)
     chains: tuple[Chain, ...] = ()
     requirements: tuple[Bound, ...] = ()
-    limits: RunLimits = field(default_factory=lambda: RunLimits(15 * MINUTE))
+    limits: RunLimits = RunLimits()
     components: Mapping[str, Component] = field(default_factory=dict)
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
     description: str = ""
@@ -374,8 +316,8 @@ class System:
     scenarios: tuple[str, ...] = ()
     overrides: tuple[str, ...] = ()
     sources: tuple[Source, ...] = ()
-    folder: Path = field(default=Path(), compare=False)
-    catalogues: tuple[Path, ...] = ()
+    folder: FilePath = field(default=FilePath(), compare=False)
+    catalogues: tuple[FilePath, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -384,40 +326,49 @@ class System:
         return self.environment.vehicles
 
     def instance(self, name: str) -> Instance:
-        """The component instance called *name*; ``UsageError`` lists those there are."""
+        """Return the component instance called *name*.
+
+        Raises:
+            UsageError: there is none; lists those there are.
+        """
         return _named(self.instances, name, "component instance")
 
     def processor(self, name: str) -> Processor:
-        """The processor called *name*; ``UsageError`` lists those there are."""
+        """Return the processor called *name*.
+
+        Raises:
+            UsageError: there is none; lists those there are.
+        """
         return _named(self.processors, name, "processor")
 
     def vehicle(self, name: str) -> Vehicle:
-        """The vehicle called *name*; ``UsageError`` lists those there are."""
+        """Return the vehicle called *name*.
+
+        Raises:
+            UsageError: there is none; lists those there are.
+        """
         return _named(self.vehicles, name, "vehicle")
 
     def network_between(self, one: str, other: str) -> Network | None:
-        """The first network of the model that joins two processors, ``None`` if none does."""
+        """Return the first network of the model that joins two processors, None if none does."""
         return next((net for net in self.networks if one in net.between and other in net.between), None)
 
-    def file_of(self, component: Component) -> Path:
-        """Where the component's code is."""
+    def file_of(self, component: Component) -> FilePath:
+        """Return the path of a component's code."""
         return self.folder / component.path
 
     @property
     def needs_ros(self) -> bool:
         """True if a component's language or a port without operations brings ROS into the system."""
-        return any(
-            instance.component.language in ROS_LANGUAGES
-            or any(self._is_topic_port(name) for name in _interfaces_of(instance.component))
-            for instance in self.instances
-        )
+        for instance in self.instances:
+            component = instance.component
+            ports = [*component.provides.values(), *(port.interface for port in component.requires.values())]
+            if component.language in ROS_LANGUAGES or any(map(self._is_topic_port, ports)):
+                return True
+        return False
 
     def _is_topic_port(self, interface: str) -> bool:
         return interface in self.interfaces and self.interfaces[interface].is_publish_subscribe
-
-
-def _interfaces_of(component: Component) -> list[str]:
-    return [*component.provides.values(), *(port.interface for port in component.requires.values())]
 
 
 Thing = TypeVar("Thing", Instance, Processor, Vehicle)

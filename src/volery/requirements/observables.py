@@ -18,7 +18,8 @@ from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
-from volery.model.system import Bound, Observable
+from volery.model.reading import Observable
+from volery.model.system import Bound
 from volery.requirements.ledgers import ChainLedger, ComponentLedger, Distribution, VehicleLedger
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (

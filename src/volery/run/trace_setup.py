@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volery.cost import NOT_COUNTED, ProcessorEntry
+from volery.model.components import CPP_LANGUAGES
 from volery.model.environment import Environment, Prism, Ways
-from volery.model.system import CPP_LANGUAGES, Instance, Processor, System
+from volery.model.instances import Instance
+from volery.model.system import Processor, System
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.cpp import core_of
 from volery.trace.attachments import (

@@ -22,7 +22,7 @@ from volery.components.cpp.bindings import (
 from volery.components.cpp.compiler import find_sources
 from volery.components.cpp.crash import Crash, read_crash
 from volery.components.cpp.framework import StepMeter
-from volery.model.system import Argument, Interface, Signature
+from volery.model.components import Argument, Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
 
 ROUTING = Interface(

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from volery.model.reader import load
-from volery.model.system import ProcessorKind, System, Vocabulary
+from volery.model.reading import ProcessorKind, Vocabulary
+from volery.model.system import System
 from volery.requirements.observables import OBSERVABLES
 
 CITY = """\
@@ -114,7 +115,6 @@ class Workshop:
             languages=frozenset({"python", "rospy"}),
             autopilots=frozenset({"ardupilot"}),
             observables=OBSERVABLES,
-            faults=frozenset({"link"}),
         )
 
     def change(self, old: str, new: str, name: str = "model.yaml") -> "Workshop":

@@ -317,7 +317,7 @@ SPOILT = {
         ("  workload:", "  faults: {f: {kind: meteor, vehicle: drone_1, at: 5 s}}\n  workload:"),
         "meteor",
         "environment.faults.f.kind",
-        ["no kind of fault named 'meteor'; there is link"],
+        ["no kind of fault named 'meteor'", "barometer-stuck, battery-cell-dead"],
     ),
     "unknown observable": (
         ("drone_1.landing_offset", "drone_1.landing_ofset"),

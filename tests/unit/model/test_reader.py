@@ -8,8 +8,11 @@ import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import MS, S
+from volery.model.components import Activity, Figure, Reference
+from volery.model.instances import Connection, Target, TargetKind
 from volery.model.reader import check, load
-from volery.model.system import Activity, Chain, Connection, Figure, ProcessorKind, Target, TargetKind
+from volery.model.reading import ProcessorKind
+from volery.model.system import Chain
 
 
 def test_units_are_si_and_times_nanoseconds(workshop):
@@ -91,7 +94,7 @@ def test_figures_stand_at_a_processor(workshop):
         (1 * MS, "intel-i5-3470"),
     ]
     order = workshop.load().components["DeliveryCentral"].operations["order"][0]
-    assert order == Figure(2 * MS, 0.003, "intel-i5-3470", 3e9, "estimated")
+    assert order == Figure(2 * MS, Reference("intel-i5-3470", 3e9), 0.003, "estimated")
 
 
 def test_the_class_is_the_components_name_in_camel_case(workshop):

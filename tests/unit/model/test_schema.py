@@ -40,3 +40,21 @@ def test_it_knows_paths():
     assert keys_at(("nowhere", "at", "all")) is None
     assert short_key(("environment", "vehicles", "d", "battery")) == "capacity"
     assert short_key(("environment", "workload")) is None
+
+
+def test_every_property_has_a_description():
+    def undescribed(place, path):
+        if isinstance(place, dict):
+            for name, below in place.get("properties", {}).items():
+                if not below.get("description"):
+                    yield f"{path}.{name}"
+            for key, below in place.items():
+                yield from undescribed(below, f"{path}.{key}")
+
+    assert list(undescribed(schema(), "")) == []
+
+
+def test_defaults_are_written_as_a_model_writes_them():
+    run = schema()["$defs"]["RunLimits"]["properties"]["duration"]
+    assert (run["default"], run["x-unit"]) == ("900 s", "s")
+    assert schema()["$defs"]["Processor"]["properties"]["scheduler"]["enum"][0] == "fixed-priority"

@@ -24,7 +24,8 @@ from volery.base.time import MS, Ns, S
 from volery.calibration.ros.probe_environment import roscpp_program
 from volery.components.cpp.compiler import find_sources
 from volery.components.programs import script_or_class
-from volery.model.system import Instance, System
+from volery.model.instances import Instance
+from volery.model.system import System
 from volery.ros.transports.ros1.master import Master, environment
 from volery.run.assembly.computers import commanded_by
 
@@ -61,7 +62,7 @@ def _check(system: System, instance: Instance) -> None:
         raise _cannot(instance, "commands a vehicle, which is nothing that a plain node can do")
     if component.language == "rospy":
         file = system.file_of(component)
-        if component.class_stated or script_or_class(file, component.class_name, component.where):
+        if component.stated_class or script_or_class(file, component.class_name, component.where):
             raise _cannot(instance, "is a class, and what is measured is scripts")
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import ModelError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.model.system import Interface, Signature
+from volery.model.components import Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
 
 HEADER = "volery/interfaces.h"

@@ -11,7 +11,7 @@ from volery.base.errors import Location, ModelError
 from volery.components.cpp import bindings
 from volery.components.cpp.bindings import CppOperation, RequiredPort
 from volery.components.cpp.compiler import CppToolchain, ReportProgress, Sources, cache_folder, find_sources
-from volery.model.system import Interface
+from volery.model.components import Interface
 from volery.ros import client_libraries
 
 RUNTIME = Path(__file__).parent / "runtime"

@@ -27,8 +27,10 @@ from volery.components.virtual_stdlib import virtual_modules
 from volery.cost.instrumentation import StepCounter
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
-from volery.model.system import VEHICLE_INTERFACES, Connection, System, TargetKind
-from volery.model.system import Instance as InstanceModel
+from volery.model.components import VEHICLE_INTERFACES
+from volery.model.instances import Connection, TargetKind
+from volery.model.instances import Instance as InstanceModel
+from volery.model.system import System
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
@@ -236,7 +238,7 @@ class Builder:
             return self._cpp.program(model)
         path = self._system.file_of(component)
         chosen = component.class_name
-        if component.language in PYTHON_ROS and not component.class_stated:
+        if component.language in PYTHON_ROS and not component.stated_class:
             chosen = script_or_class(path, chosen, component.where)
         return load_program(loader, model.name, path, chosen, component.where)
 

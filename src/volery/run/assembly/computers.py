@@ -33,9 +33,11 @@ from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.system import CPP_LANGUAGES, ROS_LANGUAGES, Figure, Instance, System, TargetKind
+from volery.model.components import CPP_LANGUAGES, ROS_LANGUAGES, Figure
+from volery.model.instances import Instance, TargetKind
 from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
+from volery.model.system import System
 from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.cpp import core_of, ns_per_step
 

@@ -40,15 +40,10 @@ from volery.components.cpp.framework import Counters, LoadedLibrary, StepMeter, 
 from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.kernel.api import Kernel
-from volery.model.system import (
-    CPP_LANGUAGES,
-    ENVIRONMENT_INTERFACE,
-    VEHICLE_INTERFACES,
-    Component,
-    Instance,
-    System,
-)
-from volery.model.system import Instance as InstanceModel
+from volery.model.components import CPP_LANGUAGES, ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component
+from volery.model.instances import Instance
+from volery.model.instances import Instance as InstanceModel
+from volery.model.system import System
 from volery.ros.client_libraries import roscpp
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph
@@ -289,7 +284,7 @@ def describe_component(system: System, component: Component) -> CppComponent:
 
 def _class_of(component: Component, system: System) -> str:
     """Its class, empty for a program of its own."""
-    if component.class_stated:
+    if component.stated_class:
         return component.class_name
     sources = find_sources(system.file_of(component), component.where)
     return "" if sources.defines_main() else component.class_name
@@ -342,7 +337,9 @@ class CppPrograms:
         if model.component.language == "roscpp":
             launch = self._launches.get(model.name, Launch())
             session = roscpp.Session(self._graph, model.name, launch, self._nodes)
-            made = CppProgram(self._kernel, model.name, compiled, roscpp.request_handlers(session), session.end)
+            made = CppProgram(
+                self._kernel, model.name, compiled, roscpp.request_handlers(session), session.end
+            )
         else:
             made = CppProgram(self._kernel, model.name, compiled)
         if counting is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from volery.kernel.api import Kernel
-from volery.model.environment import Fault
+from volery.model.faults import Fault
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.trace.events import Text
@@ -35,7 +35,7 @@ def inject(kernel: Kernel, airfield: SimulatedFleet, faults: Iterable[Fault]) ->
 def _act(kernel: Kernel, airfield: SimulatedFleet, fault: Fault, *, broken: bool) -> Callable[[], None]:
     def act() -> None:
         words = f"fault {fault.name}: {fault.kind}" if broken else f"fault {fault.name} is over"
-        kernel.record(Text(kernel.now(), fault.vehicle, WARNING, words))
-        KINDS[fault.kind](airfield.flights[fault.vehicle], broken)
+        kernel.record(Text(kernel.now(), fault.subject, WARNING, words))
+        KINDS[fault.kind](airfield.flights[fault.subject], broken)
 
     return act

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from volery.cost import load_catalogue
-from volery.model.system import ProcessorKind, Vocabulary
+from volery.model.reading import ProcessorKind, Vocabulary
 from volery.requirements.observables import OBSERVABLES
-from volery.run.assembly.faults import KINDS
 from volery.simulation.autopilots.firmware import firmwares
 
 LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
@@ -17,7 +16,7 @@ LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
 def vocabulary() -> Vocabulary:
     """What a model is checked against."""
     autopilots = frozenset(firmwares.names())
-    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, frozenset(KINDS), _kinds)
+    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, _kinds)
 
 
 def _kinds(*more: Path) -> dict[str, ProcessorKind]:

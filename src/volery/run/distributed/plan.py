@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, cast
 from volery.base.errors import CapabilityError, choices
 from volery.components.instance import Allocation
 from volery.cost.pricing import FREE, Pricing
-from volery.model.system import Bound, Instance, System
+from volery.model.instances import Instance
+from volery.model.system import Bound, System
 from volery.ros.graph import names
 from volery.run.assembly.computers import Platform
 

@@ -24,7 +24,7 @@ from volery.components.ports import Port, invoke
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import current_task
-from volery.model.system import Instance as InstanceModel
+from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
 from volery.ros.graph.callbacks import Work
