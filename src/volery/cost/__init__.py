@@ -1,26 +1,79 @@
-"""Laws of computing: what ROS calls, code and energy take on a processor of the catalogue.
+"""Cost of computing: execution time, energy and power on a processor of the catalogue.
 
-Imports ``base`` only. It must not know who calls, when, or what else runs: it turns a kind, an amount and a
-frequency into nanoseconds, joules or watts, and says where its figures come from and how far they reach. A
-missing figure is an ``EstimateError``, never zero.
+Other packages import from here and from ``cost.native``, not from the modules. ``ProcessorPrices`` is the way
+from a law to a price; the laws themselves are for calibration, which determines them, and for reports.
+``StepCounter`` counts what Python code does. The package does not know who calls, when, or what else runs:
+it turns an amount and a frequency into ns, J or W, and says where its figures come from and how far they
+are valid. A missing figure is an ``EstimateError``, never zero.
 """
 
-from volery.cost.catalogue import Catalogue, Figure, ProcessorEntry, load_catalogue
-from volery.cost.code_laws import CodeLaw
-from volery.cost.figures import PowerLaw, scale_energy, scale_time
-from volery.cost.ros_law import NOT_COUNTED, Price, RosLaw, Tariff
+from volery.cost.catalogue import (
+    Catalogue,
+    ProcessorEntry,
+    load_catalogue,
+    parse_catalogue,
+    read_catalogue,
+)
+from volery.cost.code_laws import Cache, CodeLaw, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
+from volery.cost.figures import (
+    Figure,
+    Line,
+    PowerLaw,
+    WithProvenance,
+    line_through,
+    scale_energy,
+    scale_time,
+)
+from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
+from volery.cost.pricing import (
+    FREE,
+    Basis,
+    Cost,
+    CountedPricing,
+    Pricing,
+    ProcessorPrices,
+    StatedCost,
+    StatedPricing,
+)
+from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS, OperationTable, operation_table
+from volery.cost.ros_law import NOT_COUNTED, CallFigures, Price, RosLaw, Tariff
 
 __all__ = [
+    "FREE",
     "NOT_COUNTED",
+    "OPERATIONS",
+    "STEPS_PER_NS",
+    "UNIFORM_COSTS",
+    "Basis",
+    "Cache",
+    "CallFigures",
     "Catalogue",
     "CodeLaw",
+    "CoreLaw",
+    "Cost",
+    "CountedPricing",
     "Figure",
+    "LibraryLaw",
+    "Line",
+    "MemoryLaw",
+    "OperationTable",
+    "OperationTiming",
     "PowerLaw",
     "Price",
+    "Pricing",
     "ProcessorEntry",
+    "ProcessorPrices",
     "RosLaw",
+    "StatedCost",
+    "StatedPricing",
+    "StepCounter",
     "Tariff",
+    "WithProvenance",
+    "line_through",
     "load_catalogue",
+    "operation_table",
+    "parse_catalogue",
+    "read_catalogue",
     "scale_energy",
     "scale_time",
 ]

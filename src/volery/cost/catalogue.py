@@ -1,4 +1,4 @@
-"""The catalogue of processors: data with provenance, read from ``catalogue.yaml``."""
+"""The catalogue of processors: data with provenance, read from ``catalogue.yaml`` and from a user's files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
-from volery.cost.code_laws import CodeLaw, CoreLaw
-from volery.cost.figures import Figure, PowerLaw, WithProvenance
+from volery.cost.code_laws import CodeLaw, CoreLaw, check_range
+from volery.cost.figures import PowerLaw, WithProvenance
 from volery.cost.ros_law import RosLaw
-
-__all__ = ["Catalogue", "Figure", "ProcessorEntry", "Settings", "load_catalogue", "parse_catalogue"]
 
 ROSCPP = "roscpp"
 
@@ -28,16 +26,15 @@ class Settings(WithProvenance):
     step_mhz: float = Field(gt=0)
 
     def mhz(self) -> tuple[float, ...]:
-        """All of them, ascending."""
+        """Return all of them in MHz, ascending."""
         count = round((self.greatest_mhz - self.least_mhz) / self.step_mhz)
         return tuple(self.least_mhz + number * self.step_mhz for number in range(count + 1))
 
 
 class ProcessorEntry(BaseModel):
-    """One kind of processor.
+    """One kind of processor: its cores, the frequency range of its laws, its settings, its laws.
 
-    Its cores, the range of frequencies that its laws hold for, the ``settings`` it has where they are known,
-    and its laws as far as there are figures.
+    A law is absent where there are no figures.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -55,23 +52,24 @@ class ProcessorEntry(BaseModel):
     core_model: CoreLaw | None = None
 
     def check_frequency(self, frequency_mhz: float) -> None:
-        """``EstimateError`` for a frequency outside the range that the laws of this processor hold for."""
-        if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
-            raise EstimateError(
-                f"{self.name}: {frequency_mhz:g} MHz is outside the range of its laws, "
-                f"{self.least_mhz:g} to {self.greatest_mhz:g} MHz"
-            )
+        """Raise ``EstimateError`` for a frequency outside the range of the laws."""
+        check_range(self.name, frequency_mhz, self.least_mhz, self.greatest_mhz)
 
     def set_to(self) -> tuple[float, ...]:
-        """The settings within the range of its laws, in MHz; empty where they are not known."""
+        """Return the settings within the range of the laws, in MHz; empty where they are not known."""
         known = self.settings.mhz() if self.settings else ()
         return tuple(one for one in known if self.least_mhz <= one <= self.greatest_mhz)
 
     def ros_law(self, language: str) -> RosLaw:
-        """The law of ROS calls for nodes written in *language* (``roscpp``, ``rospy``, ``rclpy``).
+        """Return the law of ROS calls for nodes of a client library.
 
         Where only roscpp's figures exist they are used, and the law's ``charged_as`` says so.
-        ``EstimateError`` if there are none at all.
+
+        Args:
+            language: ``roscpp``, ``rospy`` or ``rclpy``.
+
+        Raises:
+            EstimateError: There are no figures.
         """
         law = self.ros.get(language) or self.ros.get(ROSCPP)
         if law is None:
@@ -83,13 +81,13 @@ class ProcessorEntry(BaseModel):
         return law.model_copy(update={"processor": self.name, "charged_as": charged_as})
 
     def power_law(self) -> PowerLaw:
-        """The law of its power; ``EstimateError`` if there are no figures."""
+        """Return the law of electrical power; raise ``EstimateError`` without figures."""
         if self.power is None:
             raise EstimateError(f"{self.name}: the catalogue has no power figures for it")
         return self.power
 
     def code_law(self, language: str = "python") -> CodeLaw:
-        """The law of counted code; ``EstimateError`` if there are no figures."""
+        """Return the law of counted code; raise ``EstimateError`` without figures."""
         law = self.code.get(language)
         if law is None:
             raise EstimateError(
@@ -99,7 +97,7 @@ class ProcessorEntry(BaseModel):
         return law.model_copy(update={"processor": self.name})
 
     def core_law(self) -> CoreLaw:
-        """The law of compiled code; ``EstimateError`` if there are no figures."""
+        """Return the law of compiled code; raise ``EstimateError`` without figures."""
         if self.core_model is None:
             raise EstimateError(
                 f"{self.name}: the catalogue has no figures of compiled code for it; "
@@ -116,7 +114,7 @@ class Catalogue(BaseModel):
     processors: dict[str, ProcessorEntry]
 
     def processor(self, kind: str) -> ProcessorEntry:
-        """The entry of a kind; ``EstimateError`` with the valid names if there is none."""
+        """Return the entry of a kind; raise ``EstimateError`` with the valid names if there is none."""
         entry = self.processors.get(kind)
         if entry is None:
             hint = did_you_mean(kind, self.processors)
@@ -127,7 +125,7 @@ class Catalogue(BaseModel):
 
 
 def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
-    """A catalogue from YAML text. ``ModelError`` names the place of what is wrong."""
+    """Parse a catalogue from YAML text; raise ``ModelError`` naming the place of what is wrong."""
     try:
         data = YAML(typ="safe").load(text)
     except YAMLError as error:
@@ -140,15 +138,30 @@ def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
         return Catalogue.model_validate(data)
     except ValidationError as error:
         wrong = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")  # typos first
-        said = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in wrong[:3])
-        raise ModelError(said, name) from error
+        what = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in wrong[:3])
+        raise ModelError(what, name) from error
+
+
+def read_catalogue(file: Path) -> Catalogue:
+    """Read a user's catalogue; raise ``ModelError`` if it is missing or wrong."""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{file}: this catalogue cannot be read: {error}") from error
+    return parse_catalogue(text, str(file))
 
 
 def load_catalogue(*more: Path) -> Catalogue:
-    """The catalogue that comes with volery, and the entries of the files *more*.
+    """Return the catalogue that comes with volery, extended by files.
 
-    An entry of a name that is there already adds its laws to it, in place of those of the same library or
-    language. ``ModelError`` names a file that cannot be read, and the place in it of what is wrong.
+    An entry of an existing name adds its laws to that entry, in place of those of the same library or
+    language.
+
+    Args:
+        more: Catalogues of the user, in order.
+
+    Raises:
+        ModelError: A file cannot be read or is wrong.
     """
     found = dict(_shipped_catalogue().processors)
     for file in more:
@@ -164,26 +177,14 @@ def _shipped_catalogue() -> Catalogue:
 
 
 def _merge_entries(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry:
-    laws = {"ros": {**known.ros, **new.ros}, "code": {**known.code, **new.code}}
-    reach = {
-        "least_mhz": min(known.least_mhz, new.least_mhz),
-        "greatest_mhz": max(known.greatest_mhz, new.greatest_mhz),
-    }
     return known.model_copy(
         update={
-            **laws,
-            **reach,
+            "ros": {**known.ros, **new.ros},
+            "code": {**known.code, **new.code},
+            "least_mhz": min(known.least_mhz, new.least_mhz),
+            "greatest_mhz": max(known.greatest_mhz, new.greatest_mhz),
             "power": new.power or known.power,
             "settings": new.settings or known.settings,
             "core_model": new.core_model or known.core_model,
         }
     )
-
-
-def read_catalogue(file: Path) -> Catalogue:
-    """A user's catalogue. ``ModelError`` if there is no such file, or for what is wrong in it."""
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{file}: this catalogue cannot be read: {error}") from error
-    return parse_catalogue(text, str(file))

@@ -1,23 +1,4 @@
-"""What counted code costs on a processor.
-
-Law: time = reference time x slowdown x at_mhz / f. The reference time is what the code's operations take on
-the machine of the table in ``interpreter``; the slowdown is how many times as long a processor takes that
-runs at ``at_mhz``. That it goes with 1/f is what a Raspberry Pi 4 showed: 158.3 s at 1500 MHz and 401.5 s at
-600 MHz for the same Python program, 2.54 for 2.5 (C. Mehta, *Performance Analysis of Languages on Raspberry
-Pi*).
-
-Validity: pure Python, in files that are counted, with warm caches. The error has two parts: that of the
-operations, measured on whole programs, and that of the slowdown.
-
-What compiled code costs on a core: the figures of a model of its pipeline.
-
-Law: ``volery.cost.native.core_model`` executes what ran. Here stand the figures that it needs: for each class of
-operations how long it takes and how many a core starts per cycle, how wide the core is, how far it looks
-ahead, what a wrong prediction costs, and what calls of libraries cost.
-
-Cycles of the core, its caches included, do not depend on its frequency; the time that memory behind them
-takes does not depend on it either.
-"""
+"""Laws of the execution time of code: counted interpreted code, and compiled code on a model of a core."""
 
 from __future__ import annotations
 
@@ -29,7 +10,17 @@ from volery.cost.python_operations import STEPS_PER_NS, OperationTable, operatio
 
 
 class CodeLaw(WithProvenance):
-    """The law of one language on one kind of processor."""
+    """The law of counted code in one language on one kind of processor.
+
+    Law: time = reference time x slowdown x at_mhz / f. The reference time is what the code's operations take
+    on the machine of ``operation_table``; the slowdown is the quotient of the times of a processor that runs
+    at ``at_mhz`` and of that machine. The dependence on 1/f was confirmed on a Raspberry Pi 4: 158.3 s at
+    1500 MHz and 401.5 s at 600 MHz for the same Python program, 2.54 for 2.5 (C. Mehta, *Performance Analysis
+    of Languages on Raspberry Pi*).
+
+    Validity: pure Python, in files that are counted, with warm caches. The error has two parts: that of the
+    operations, measured on whole programs, and that of the slowdown.
+    """
 
     language: str
     slowdown: Figure
@@ -37,23 +28,23 @@ class CodeLaw(WithProvenance):
     processor: str = ""
 
     def ns_per_step(self, frequency_mhz: float) -> float:
-        """Target time of one counted step, ns."""
+        """Return the execution time of one counted step on the target, ns."""
         return self.slowdown.value * self.at_mhz / frequency_mhz / STEPS_PER_NS
 
     @property
     def operations(self) -> OperationTable:
-        """The table behind it."""
+        """Times of the interpreter's operations on the reference machine."""
         return operation_table()
 
     @property
     def error(self) -> float | None:
-        """Relative, to be expected of a program's time; ``None`` where the slowdown's is not known."""
+        """Relative error to be expected of a program's time; None where the slowdown's is not known."""
         if self.slowdown.error is None:
             return None
         return self.operations.mean_error + self.slowdown.error
 
     def how_good(self) -> str:
-        """In words: the error and what it consists of."""
+        """Return the expected error and its parts as a phrase."""
         table, slowdown = self.operations, self.slowdown
         whole = "unknown" if self.error is None else f"{self.error:.0%}"
         factor = "" if slowdown.error is None else f" within {slowdown.error:.0%}"
@@ -64,7 +55,7 @@ class CodeLaw(WithProvenance):
         )
 
     def warnings(self) -> tuple[str, ...]:
-        """What a report has to say where this law is used."""
+        """Return the warnings of a report that uses this law."""
         if self.slowdown.provenance == "measured":
             return ()
         return (
@@ -73,11 +64,8 @@ class CodeLaw(WithProvenance):
         )
 
 
-__all__ = ["Cache", "CoreLaw", "LibraryLaw", "MemoryLaw", "OperationTiming"]
-
-
 class OperationTiming(BaseModel):
-    """One class of operations: ``latency`` in cycles; ``per_cycle`` of them may start in a cycle."""
+    """One class of operations: ``latency`` in cycles, and how many may start in a cycle."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -86,16 +74,17 @@ class OperationTiming(BaseModel):
 
 
 class LibraryLaw(WithProvenance):
-    """Cycles of calls into libraries, by symbol; any other takes ``unknown``, and a report names it."""
+    """Cycles of calls into libraries by symbol; any other takes ``unknown`` cycles, and a report names it."""
 
     unknown: float
     calls: dict[str, float] = Field(default_factory=dict)
 
 
 class Cache(BaseModel):
-    """A cache of lines of 64 bytes, the one that was not used for longest leaves first.
+    """A set-associative cache with lines of 64 bytes and least-recently-used replacement.
 
-    ``latency``: cycles from a load that it serves to its use; the first one's is that of the operations.
+    ``latency`` is in cycles from a load that it serves to the use of the value. The first cache's latency is
+    that of the load operations.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -106,9 +95,11 @@ class Cache(BaseModel):
 
 
 class MemoryLaw(WithProvenance):
-    """What lies behind the first cache, from there on: ``caches`` with the first, then memory.
+    """The memory hierarchy: ``caches`` from the first one on, then memory.
 
-    ``latency_ns``: from a load that memory serves to its use; ``bytes_per_ns`` it gives to one core at most.
+    Attributes:
+        latency_ns: Time from a load that memory serves to the use of the value, ns.
+        bytes_per_ns: Bandwidth of memory for one core, bytes/ns.
     """
 
     caches: tuple[Cache, ...] = Field(min_length=1, max_length=4)
@@ -117,13 +108,21 @@ class MemoryLaw(WithProvenance):
 
 
 class CoreLaw(WithProvenance):
-    """A kind of core.
+    """Figures of a kind of core for ``native.core_model``, which executes the machine code that ran.
 
-    ``isa`` and ``cpu`` are LLVM's names; code is made for ``cpu``. ``window``: how many instructions may be
-    under way; ``refill``: cycles from the end of a mispredicted branch to the next instruction; ``forward``:
-    from a store to a load of the same place; ``tables``, ``history``: of the prediction of branches, and how
-    many taken ones it looks back on. ``error`` is the honest relative band, ``None`` where it is not known.
-    Without ``memory`` every access is taken to hit the first cache.
+    Cycles of a core and its caches do not depend on its frequency; the time of memory behind them does not
+    depend on it either. Without ``memory`` every access hits the first cache.
+
+    Attributes:
+        isa: Instruction set, LLVM's name.
+        cpu: Processor that code is generated for, LLVM's name.
+        width: Instructions that enter per cycle.
+        window: Entries of the reorder buffer.
+        refill: Cycles from the end of a mispredicted branch to the next instruction.
+        forward: Cycles from a store to a load of the same address (store-to-load forwarding).
+        tables: Tagged tables of the branch predictor.
+        history: Taken branches in the longest history of the branch predictor.
+        error: Relative error band, None where it is not known.
     """
 
     name: str = ""
@@ -143,13 +142,18 @@ class CoreLaw(WithProvenance):
     memory: MemoryLaw | None = None
 
     def how_good(self) -> str:
-        """The honest band, in words."""
+        """Return the error band as a phrase."""
         return "its error is not known" if self.error is None else f"within {self.error:.0%}"
 
     def check_frequency(self, frequency_mhz: float) -> None:
-        """``EstimateError`` for a frequency at which this core does not run."""
-        if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
-            raise EstimateError(
-                f"{self.name}: {frequency_mhz:g} MHz is outside the range of its laws, "
-                f"{self.least_mhz:g} to {self.greatest_mhz:g} MHz"
-            )
+        """Raise ``EstimateError`` for a frequency outside the range of the figures."""
+        check_range(self.name, frequency_mhz, self.least_mhz, self.greatest_mhz)
+
+
+def check_range(name: str, frequency_mhz: float, least_mhz: float, greatest_mhz: float) -> None:
+    """Raise ``EstimateError`` for a frequency of processor ``name`` outside the range of its laws."""
+    if not least_mhz <= frequency_mhz <= greatest_mhz:
+        raise EstimateError(
+            f"{name}: {frequency_mhz:g} MHz is outside the range of its laws, "
+            f"{least_mhz:g} to {greatest_mhz:g} MHz"
+        )

@@ -1,22 +1,10 @@
-"""What every number of the catalogue carries: where it comes from.
+"""Figures with provenance, and the two laws that carry a figure to another frequency: time and power.
 
-What a computer draws.
-
-Law: P = P_idle + k(f) busy, where busy is the number of busy cores (0 to all of them, fractions as an
-average) and k(f) = k(f0) f V(f)^2 / (f0 V(f0)^2), the dynamic power of CMOS logic (Chandrakasan, Sheng and
-Brodersen, *Low-Power CMOS Digital Design*, IEEE JSSC 27(4), 1992). V is a straight line between the two
-stated points and constant outside them. The linear step per busy core is that of Fan, Weber and Barroso
-(ISCA 2007).
-
-Validity: CPU-bound work. What runs (vector units, memory) changes it; the figures carry an error band.
-
-Figures stated at one frequency, at another one.
-
-Law: the same processor executes the same instructions in the same number of cycles, so time ~ 1/f, and the
-energy of an operation ~ V(f)^2 (see ``energy``). Source: the cycle-count view of MARTE's GQAM (``execTime``
-over the speed factor of the host). Validity: work bound by the core; memory-bound work gains less from a
-higher frequency, so the law is then optimistic upward and pessimistic downward. On another kind of processor
-it says nothing: that needs its own figure.
+Time: the same processor executes the same instructions in the same number of cycles, so time ~ 1/f, and the
+energy of an operation ~ V(f)^2. Source: the cycle-count view of MARTE's GQAM (``execTime`` over the speed
+factor of the host). Validity: work bound by the core. Memory-bound work gains less from a higher frequency,
+so the law is then optimistic upward and pessimistic downward. Between kinds of processors there is no such
+law: each needs its own figure.
 """
 
 from __future__ import annotations
@@ -32,7 +20,7 @@ Provenance = Literal["estimated", "measured", "calculated", "required"]
 
 
 class WithProvenance(BaseModel):
-    """Something somebody stated: how it came about, who says so, and where it holds."""
+    """Base of all figures and laws: how they were obtained, from which source, where they are valid."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,14 +31,14 @@ class WithProvenance(BaseModel):
 
 
 class Figure(WithProvenance):
-    """One number. ``error`` is its honest relative band (0.2: within 20 per cent), ``None`` where unknown."""
+    """One number. ``error`` is its relative error band (0.2: within 20 %), None where it is not known."""
 
     value: float
     error: float | None = None
 
 
 class Line(BaseModel):
-    """A quantity that is a straight line over the frequency: ``slope`` times frequency plus ``offset``."""
+    """A quantity that is linear in the frequency: slope times frequency plus ``offset``."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -59,19 +47,31 @@ class Line(BaseModel):
     per_ghz: float = 0.0
 
     def at(self, frequency_mhz: float) -> float:
-        """Its value at a frequency."""
+        """Return the value at a frequency in MHz."""
         return (self.per_mhz + self.per_ghz / 1000.0) * frequency_mhz + self.offset
 
 
 def line_through(points: dict[float, float]) -> Line:
-    """The line through two points (frequency in MHz, value)."""
+    """Return the line through two points {frequency in MHz: value}."""
     (low, at_low), (high, at_high) = sorted(points.items())
     slope = (at_high - at_low) / (high - low)
     return Line(per_mhz=slope, offset=at_low - slope * low)
 
 
 class PowerLaw(WithProvenance):
-    """Watts of one kind of processor, taken at its supply. ``volts`` maps MHz to core volts (two points)."""
+    """Electrical power of one kind of processor, taken at its supply.
+
+    Law: P = P_idle + k(f) busy, where busy is the number of busy cores (fractions as an average) and
+    k(f) = k(f0) f V(f)^2 / (f0 V(f0)^2), the dynamic power of CMOS logic (Chandrakasan, Sheng and Brodersen,
+    *Low-Power CMOS Digital Design*, IEEE JSSC 27(4), 1992). V is a straight line between the two stated
+    points and constant outside them. The linear step per busy core is that of Fan, Weber and Barroso (ISCA
+    2007). Validity: CPU-bound work; vector units and memory change it, and the figures carry an error band.
+
+    Attributes:
+        idle_w: Power with no core busy, W.
+        busy_core_w: Additional power of one busy core at ``busy_core_at_mhz``, W.
+        volts: Core voltage at two frequencies, {MHz: V}.
+    """
 
     idle_w: Figure
     busy_core_w: Figure
@@ -79,30 +79,30 @@ class PowerLaw(WithProvenance):
     volts: dict[float, float]
 
     def core_w(self, frequency_mhz: float) -> float:
-        """What one busy core draws on top of idle, watts."""
+        """Return the power of one busy core on top of idle, W."""
         ratio = self._volts(frequency_mhz) / self._volts(self.busy_core_at_mhz)
         return self.busy_core_w.value * frequency_mhz / self.busy_core_at_mhz * ratio * ratio
 
     def watts(self, busy_cores: float, frequency_mhz: float) -> float:
-        """What the computer draws with so many cores busy, watts."""
+        """Return the power with ``busy_cores`` cores busy, W."""
         return self.idle_w.value + busy_cores * self.core_w(frequency_mhz)
 
     def joules(self, busy_core_s: float, elapsed_s: float, frequency_mhz: float) -> float:
-        """Energy of *elapsed_s* seconds in which the cores were busy for *busy_core_s* seconds together."""
+        """Return the energy of ``elapsed_s`` seconds with ``busy_core_s`` core-seconds of work, J."""
         return self.idle_w.value * elapsed_s + self.core_w(frequency_mhz) * busy_core_s
 
     def band(self) -> float:
-        """The larger of its figures' relative errors."""
+        """Return the larger of the figures' relative errors, 0 where they are not known."""
         return max(self.idle_w.error or 0.0, self.busy_core_w.error or 0.0)
 
     def how_good(self) -> str:
-        """The band in words."""
+        """Return the error band as a phrase."""
         return f"within {self.band():.0%}" if self.band() else "its error is not known"
 
     def cycle_ratio(self, stated_mhz: float, frequency_mhz: float) -> float:
-        """Energy of one clock cycle at *frequency_mhz* over that at *stated_mhz*.
+        """Return the energy of a clock cycle at ``frequency_mhz`` over that at ``stated_mhz``.
 
-        The voltages' ratio squared.
+        It is the square of the ratio of voltages.
         """
         ratio = self._volts(frequency_mhz) / self._volts(stated_mhz)
         return ratio * ratio
@@ -114,32 +114,34 @@ class PowerLaw(WithProvenance):
 
 
 def scale_time(time: Ns, stated: tuple[str, float], wanted: tuple[str, float]) -> Ns:
-    """*time* stated at (kind of processor, MHz), at (kind, MHz) *wanted*.
+    """Scale an execution time to another frequency of the same kind of processor.
 
-    ``EstimateError`` for another kind.
+    Args:
+        time: Execution time, ns.
+        stated: Kind of processor and frequency in MHz that the time is stated at.
+        wanted: Kind of processor and frequency in MHz to scale to.
+
+    Raises:
+        EstimateError: The kinds differ, or a frequency is not above zero.
     """
-    _same_kind(stated[0], wanted[0])
-    _positive(stated[1], wanted[1])
+    _check_scaling(stated, wanted)
     return round(time * stated[1] / wanted[1])
 
 
 def scale_energy(
     joules: float, stated: tuple[str, float], wanted: tuple[str, float], power: PowerLaw
 ) -> float:
-    """*joules* of one operation, scaled like ``scale_time``; *power* is the law of that kind of processor."""
-    _same_kind(stated[0], wanted[0])
-    _positive(stated[1], wanted[1])
+    """Scale the energy of an operation, J, as ``scale_time`` does; ``power`` is the law of that kind."""
+    _check_scaling(stated, wanted)
     return joules * power.cycle_ratio(stated[1], wanted[1])
 
 
-def _same_kind(stated: str, wanted: str) -> None:
-    if stated != wanted:
+def _check_scaling(stated: tuple[str, float], wanted: tuple[str, float]) -> None:
+    kind, other = stated[0], wanted[0]
+    if kind != other:
         raise EstimateError(
-            f"a figure stated for {stated} says nothing about {wanted}: state one for {wanted} as well"
+            f"a figure stated for {kind} says nothing about {other}: state one for {other} as well"
         )
-
-
-def _positive(*frequencies_mhz: float) -> None:
-    for frequency in frequencies_mhz:
+    for _, frequency in (stated, wanted):
         if not frequency > 0.0:
             raise EstimateError(f"a frequency of {frequency:g} MHz: state one above zero")

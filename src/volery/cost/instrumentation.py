@@ -1,16 +1,16 @@
-"""What Python code costs, without touching the user's file: steps are counted as it runs.
+"""Counters for Python code: the cost of a component's file is counted as it runs, without changing the file.
 
-At import each straight run of statements is given one counter: an addition of the run's weight, in *steps*,
-to one cell (``instrumenting``). A step is a tenth of a nanosecond on the machine that the table of costs was
-measured on; the law that turns steps into time on a processor is given from above. Counting is deterministic,
-does not look at the host's clock, and covers the files that belong to a component; what a library computes
-inside a call (numpy, networkx) is not counted and has to be stated with ``volery.add_time``.
+At import one counter is inserted into the syntax tree for each straight run of statements: an addition of
+the run's weight, in steps, to one cell. What is executed a number of times that only the run can tell (the
+items of a comprehension, a lambda, the second operand of ``and``) has a counter of its own inside the
+expression. Operands without a call are too cheap for one: they are counted with their statement whether they
+are evaluated or not.
 
-Puts counters into a syntax tree: one addition for each straight run of statements.
-
-What is done a number of times that only the run can tell (the items of a comprehension, a lambda, the second
-operand of ``and``) gets a counter of its own inside the expression, if it is worth one: operands that call
-nothing are counted with their statement whether they are taken or not.
+A step is a tenth of a nanosecond on the machine of ``operation_table``; ``CodeLaw`` converts steps to the
+time of a processor. Counting is deterministic, does not read the host's clock, and covers the files of a
+component. What a library computes inside a call (numpy, networkx) is not counted and has to be stated with
+``volery.add_time``. ``sys.settrace`` and ``sys.monitoring`` were rejected: they slow code down several times
+and see lines or bytecode, not operations.
 """
 
 from __future__ import annotations
@@ -40,55 +40,71 @@ from volery.cost.python_operations import (
 
 CELL = "__volery_steps__"
 TICK = "__volery_tick_"
-TAKEN = "__volery_taken_by_"
+ITERATED = "__volery_iterated_by_"
+"""Names (or their beginnings) in the namespace of instrumented code: the cell that statements add to, the
+counters inside expressions by weight, and the functions that count the items of an argument."""
+
+UNIFORM_COSTS: Mapping[str, float] = dict.fromkeys(OPERATIONS, 1.0 / STEPS_PER_NS)
+"""One step for each operation, to count how often operations are executed."""
 
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 _DIVERTS = (ast.Return, ast.Break, ast.Continue, ast.Raise)
 _BODIES = ("body", "orelse", "finalbody", "handlers", "cases")
-_WORTH_A_TICK = (ast.Call, *_COMPREHENSIONS)
+_NEEDS_COUNTER = (ast.Call, *_COMPREHENSIONS)
 
 _LEADING_BITS = 5
+_MANY = 2**62
+_EMPTY: dict[str, str] = {}
+_VIEWS: tuple[type, ...] = (type(_EMPTY.keys()), type(_EMPTY.values()), type(_EMPTY.items()))
+_CONTAINERS: frozenset[type] = frozenset(
+    (list, tuple, dict, set, frozenset, range, str, bytes, bytearray, deque, *_VIEWS)
+)
+"""Types whose length is known without executing Python code."""
 
 
 class Weights:
-    """What operations and pieces of syntax weigh, in steps. ``weights["load"]`` is that of an operation.
+    """Weights of operations and syntax nodes in steps. ``weights["load"]`` is the weight of an operation.
 
-    Those of counters inside expressions keep five leading bits (3 %), so that not every expression needs an
-    iterator of its own, unless weights are to be *exact*.
+    Weights of counters inside expressions keep five leading bits (3 %) unless they are ``exact``, since each
+    different weight needs an iterator.
     """
 
     def __init__(self, steps: Mapping[str, float], exact: bool = False) -> None:
         self._steps = steps
         self._exact = exact
-        self._made: Mapping[str, list[tuple[str, int]]] = {}
+        self._constructions: Mapping[str, list[tuple[str, int]]] = {}
 
-    def look_at(self, tree: ast.Module) -> None:
-        """From now on *tree* is weighed: whose objects does it make?"""
-        self._made = construction_operations(tree)
+    def enter_module(self, tree: ast.Module) -> None:
+        """Use the classes of ``tree`` to recognise constructions."""
+        self._constructions = construction_operations(tree)
 
     def __getitem__(self, operation: str) -> float:
         return self._steps[operation]
 
     def of(self, node: ast.AST) -> float:
-        """Executing *node* once, without what has a counter of its own."""
+        """Return the weight of executing ``node`` once, without what has a counter of its own."""
         own = sum(self._steps[name] * times for name, times in self._operations(node))
         return own + sum(self.of(part) for part in _executed_parts(node))
 
     def of_tick(self, steps: float) -> int:
-        """The weight of a counter inside an expression that is to count *steps*."""
+        """Return the weight of a counter inside an expression that is to count ``steps``."""
         whole = round(steps)
         unit = 1 if self._exact else 1 << max(0, whole.bit_length() - _LEADING_BITS)
         return whole if unit == 1 else round(whole / unit) * unit
 
     def _operations(self, node: ast.AST) -> Iterable[tuple[str, int]]:
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self._made:
-            return self._made[node.func.id]
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id in self._constructions
+        ):
+            return self._constructions[node.func.id]
         return operations_of(node)
 
 
 def _executed_parts(node: ast.AST) -> Iterator[ast.AST]:
-    """What is executed with *node*, once each time that it is."""
+    """Yield the children that are executed once each time that ``node`` is."""
     if isinstance(node, ast.Lambda):
         return
     if isinstance(node, _COMPREHENSIONS):
@@ -101,42 +117,42 @@ def _executed_parts(node: ast.AST) -> Iterator[ast.AST]:
         yield from (node.target, node.value) if node.value else ()
     elif isinstance(node, ast.BoolOp):
         yield node.values[0]
-        yield from (value for value in node.values[1:] if not _worth_a_tick(value))
+        yield from (value for value in node.values[1:] if not _needs_counter(value))
     elif isinstance(node, ast.IfExp):
         yield node.test
-        yield from (value for value in (node.body, node.orelse) if not _worth_a_tick(value))
-    elif not isinstance(node, ast.While) and not _is_remark(node):
-        yield from _fields(node)
+        yield from (value for value in (node.body, node.orelse) if not _needs_counter(value))
+    elif not isinstance(node, ast.While):
+        yield from _children_outside_bodies(node)
 
 
-def _fields(node: ast.AST) -> Iterator[ast.AST]:
+def _children_outside_bodies(node: ast.AST) -> Iterator[ast.AST]:
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return  # a constant that stands alone is dropped by the compiler
     for name, value in ast.iter_fields(node):
         if name in _BODIES and isinstance(value, list):
             continue
-        yield from (
-            item for item in (value if isinstance(value, list) else [value]) if isinstance(item, ast.AST)
-        )
+        items = value if isinstance(value, list) else [value]
+        yield from (item for item in items if isinstance(item, ast.AST))
 
 
-def _is_remark(node: ast.AST) -> bool:
-    """A constant that stands alone, which the compiler drops."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-
-
-def _worth_a_tick(operand: ast.expr) -> bool:
-    return any(isinstance(part, _WORTH_A_TICK) for part in ast.walk(operand))
+def _needs_counter(operand: ast.expr) -> bool:
+    return any(isinstance(part, _NEEDS_COUNTER) for part in ast.walk(operand))
 
 
 def with_counters(tree: ast.Module, weights: Weights) -> tuple[ast.Module, set[int]]:
-    """*tree* with counters, and the weights of those that are inside expressions. Lines stay as they were."""
-    weights.look_at(tree)
-    counters = _Counters(weights)
-    counted: ast.Module = counters.visit(tree)
-    return ast.fix_missing_locations(counted), counters.ticks
+    """Insert counters into ``tree``; line numbers stay as they are.
+
+    Returns:
+        The tree, and the weights of the counters inside expressions.
+    """
+    weights.enter_module(tree)
+    inserter = _CounterInserter(weights)
+    counted: ast.Module = inserter.visit(tree)
+    return ast.fix_missing_locations(counted), inserter.ticks
 
 
-class _Counters(ast.NodeTransformer):
-    """``ticks`` are the weights of the counters that are inside expressions."""
+class _CounterInserter(ast.NodeTransformer):
+    """Inserts counters; ``ticks`` are the weights of those inside expressions."""
 
     def __init__(self, weights: Weights) -> None:
         self._weights = weights
@@ -145,7 +161,7 @@ class _Counters(ast.NodeTransformer):
     # -- statements
 
     def _block(self, body: list[ast.stmt], extra: float = 0) -> list[ast.stmt]:
-        """*body* cut into straight runs: a new one starts behind each statement that may leave the block."""
+        """Count each straight run of ``body``; a run ends with a statement that may leave the block."""
         counted: list[ast.stmt] = []
         run: list[ast.stmt] = []
         for statement in body:
@@ -156,12 +172,17 @@ class _Counters(ast.NodeTransformer):
         return counted + (self._run(run, extra) if run else [])
 
     def _run(self, statements: list[ast.stmt], extra: float) -> list[ast.stmt]:
+        """Put ``__volery_steps__[0] += steps`` before a straight run."""
         steps = round(extra + sum(self._weights.of(statement) for statement in statements))
         visited: list[ast.stmt] = [self.visit(statement) for statement in statements]
-        return [_add(steps, statements[0]), *visited] if steps else visited
+        if not steps:
+            return visited
+        cell = ast.Subscript(ast.Name(CELL, ast.Load()), ast.Constant(0), ast.Store())
+        counter = ast.AugAssign(cell, ast.Add(), ast.Constant(steps))
+        return [_at(counter, statements[0]), *visited]
 
     def visit_Module(self, node: ast.Module) -> ast.Module:
-        head = _prologue(node.body)
+        head = _prologue_length(node.body)
         node.body = node.body[:head] + self._block(node.body[head:])
         return node
 
@@ -178,21 +199,20 @@ class _Counters(ast.NodeTransformer):
         return node
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
-        """Bodies of compound statements become blocks; the rest is searched for lambdas and the like."""
-        extra = self._each_time(node)
+        """Make blocks of the bodies of compound statements; search the rest for lambdas and the like."""
+        extra = self._per_iteration(node)
         for name, value in ast.iter_fields(node):
             if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
                 setattr(node, name, self._block(value, extra if name == "body" else 0))
             elif isinstance(value, list):
-                setattr(
-                    node, name, [self.visit(item) if isinstance(item, ast.AST) else item for item in value]
-                )
+                visited = [self.visit(item) if isinstance(item, ast.AST) else item for item in value]
+                setattr(node, name, visited)
             elif isinstance(value, ast.AST):
                 setattr(node, name, self.visit(value))
         return node
 
-    def _each_time(self, node: ast.AST) -> float:
-        """What it takes to come into the body of *node* each time, beside the body."""
+    def _per_iteration(self, node: ast.AST) -> float:
+        """Return the weight of entering the body of ``node`` each time, without the body."""
         weights = self._weights
         if isinstance(node, (ast.For, ast.AsyncFor)):
             return weights[ROUND] + weights.of(node.target)
@@ -204,7 +224,7 @@ class _Counters(ast.NodeTransformer):
 
     def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
         steps = self._weights[ENTER] + self._weights.of(node.body)
-        node.body = self._ticking(steps, self.visit(node.body))
+        node.body = self._counted(steps, self.visit(node.body))
         return node
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
@@ -217,18 +237,19 @@ class _Counters(ast.NodeTransformer):
         return node
 
     def _operand(self, operand: ast.expr) -> ast.expr:
-        """One that may not be evaluated."""
-        if not _worth_a_tick(operand):
+        """Count an operand that may not be evaluated, if it is worth a counter."""
+        if not _needs_counter(operand):
             return operand
         steps = self._weights.of(operand)
-        return self._ticking(steps, self.visit(operand))
+        return self._counted(steps, self.visit(operand))
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        taker = _taker(node)
+        iterating = _iterating_call(node)
         self.generic_visit(node)
-        if taker:
-            things = node.args[0]
-            node.args = [_at(ast.Call(ast.Name(f"{TAKEN}{taker}__", ast.Load()), [things], []), things)]
+        if iterating:
+            argument = node.args[0]
+            counting = ast.Call(ast.Name(f"{ITERATED}{iterating}__", ast.Load()), [argument], [])
+            node.args = [_at(counting, argument)]
         return node
 
     def _visit_comprehension(self, node: Any) -> ast.AST:
@@ -238,26 +259,26 @@ class _Counters(ast.NodeTransformer):
             steps = pending + weights["loop"] + weights.of(generator.iter)
             generator.iter = self.visit(generator.iter)
             if number:  # the first one is evaluated with the statement
-                generator.iter = self._ticking(steps, generator.iter)
+                generator.iter = self._counted(steps, generator.iter)
             pending = weights[ITEM] + weights.of(generator.target)
             if generator.ifs:
                 steps = pending + sum(weights["branch"] + weights.of(test) for test in generator.ifs)
                 generator.ifs = [self.visit(test) for test in generator.ifs]
-                generator.ifs[0] = self._ticking(steps, generator.ifs[0])
+                generator.ifs[0] = self._counted(steps, generator.ifs[0])
                 pending = 0
         parts = [name for name in ("key", "value", "elt") if hasattr(node, name)]
         pending += weights[RESUME] if isinstance(node, ast.GeneratorExp) else 0
         pending += sum(weights.of(getattr(node, name)) for name in parts)
         for name in parts:
             setattr(node, name, self.visit(getattr(node, name)))
-        setattr(node, parts[-1], self._ticking(pending, getattr(node, parts[-1])))
+        setattr(node, parts[-1], self._counted(pending, getattr(node, parts[-1])))
         return node  # type: ignore[no-any-return] # it is one of four kinds of node
 
     visit_ListComp = visit_SetComp = _visit_comprehension  # noqa: N815 (ast's naming)
     visit_DictComp = visit_GeneratorExp = _visit_comprehension  # noqa: N815 (ast's naming)
 
-    def _ticking(self, steps: float, expression: ast.expr) -> ast.expr:
-        """``(__volery_tick_7__() or expression)``: the tick gives ``None``."""
+    def _counted(self, steps: float, expression: ast.expr) -> ast.expr:
+        """Return ``(__volery_tick_7__() or expression)``; the tick returns None."""
         weight = self._weights.of_tick(steps)
         if not weight:
             return expression
@@ -266,8 +287,11 @@ class _Counters(ast.NodeTransformer):
         return _at(ast.BoolOp(ast.Or(), [tick, expression]), expression)
 
 
-def _taker(node: ast.Call) -> str:
-    """The builtin or method that is about to go through the only argument; a generator counts its items."""
+def _iterating_call(node: ast.Call) -> str:
+    """Return the name of the builtin or method if the call iterates over its only argument, else "".
+
+    A generator counts its items itself.
+    """
     if len(node.args) != 1 or isinstance(node.args[0], (ast.Starred, ast.GeneratorExp)):
         return ""
     if isinstance(node.func, ast.Name) and node.func.id in ITERATING_BUILTINS:
@@ -278,15 +302,15 @@ def _taker(node: ast.Call) -> str:
 
 
 def _may_leave(statement: ast.stmt) -> bool:
-    """Whether what follows *statement* in its block may be left out."""
+    """Return whether the statements after ``statement`` in its block may be skipped."""
     if isinstance(statement, (*_FUNCTIONS, ast.ClassDef)):
         return False
     if isinstance(statement, _DIVERTS):
         return True
-    return any(_may_leave(child) for child in _statements_in(statement))
+    return any(_may_leave(child) for child in _child_statements(statement))
 
 
-def _statements_in(statement: ast.stmt) -> Iterator[ast.stmt]:
+def _child_statements(statement: ast.stmt) -> Iterator[ast.stmt]:
     for child in ast.iter_child_nodes(statement):
         if isinstance(child, ast.stmt):
             yield child
@@ -294,8 +318,8 @@ def _statements_in(statement: ast.stmt) -> Iterator[ast.stmt]:
             yield from child.body
 
 
-def _prologue(body: list[ast.stmt]) -> int:
-    """How many leading statements must stay first: the docstring and ``from __future__`` imports."""
+def _prologue_length(body: list[ast.stmt]) -> int:
+    """Return how many statements must stay first: the docstring and ``from __future__`` imports."""
     count = 0
     for number, statement in enumerate(body):
         docstring = (
@@ -307,12 +331,6 @@ def _prologue(body: list[ast.stmt]) -> int:
     return count
 
 
-def _add(steps: int, place: ast.stmt) -> ast.stmt:
-    """``__volery_steps__[0] += steps``."""
-    cell = ast.Subscript(ast.Name(CELL, ast.Load()), ast.Constant(0), ast.Store())
-    return _at(ast.AugAssign(cell, ast.Add(), ast.Constant(steps)), place)
-
-
 Node = TypeVar("Node", ast.stmt, ast.expr)
 
 
@@ -320,36 +338,26 @@ def _at(new: Node, place: ast.AST) -> Node:
     return ast.copy_location(new, place)
 
 
-UNIFORM_COSTS: Mapping[str, float] = dict.fromkeys(OPERATIONS, 1.0 / STEPS_PER_NS)
-"""One step for each operation: for those who want to know how often something is done, not what it takes."""
-
-_PLENTY = 2**62
-_EMPTY: dict[str, str] = {}
-_VIEWS: tuple[type, ...] = (type(_EMPTY.keys()), type(_EMPTY.values()), type(_EMPTY.items()))
-_PLAIN: frozenset[type] = frozenset(
-    (list, tuple, dict, set, frozenset, range, str, bytes, bytearray, deque, *_VIEWS)
-)
-"""Types whose length is known without executing anybody's code."""
-
-
 class StepCounter:
-    """Counts what instrumented code of one run executes. One flow of control runs at a time.
+    """Counts what the instrumented code of one run executes. One flow of control runs at a time.
 
-    *costs* are nanoseconds by the name of an operation, for all of ``operations.OPERATIONS``; by default
-    those that come with volery. Statements add to one cell. Inside expressions, where nothing can be
-    assigned, an iterator of ``None`` is advanced, one for each weight: that is cheap, false, and tells how
-    often it was done. *exact*: as many weights as it takes, not rounded.
+    Statements add to one cell. Inside expressions, where nothing can be assigned, an iterator of ``None`` is
+    advanced, one for each weight: that is cheap, its value is false, and its length hint tells how often it
+    was advanced.
+
+    Args:
+        costs: Times of all ``OPERATIONS``, ns; by default those that come with volery.
+        exact: Do not round the weights of counters inside expressions.
     """
 
     def __init__(self, costs: Mapping[str, float] | None = None, exact: bool = False) -> None:
         costs = operation_table().nanoseconds if costs is None else costs
-        steps = {name: STEPS_PER_NS * costs[name] for name in OPERATIONS}
-        self._weights = Weights(steps, exact)
+        self._weights = Weights({name: STEPS_PER_NS * costs[name] for name in OPERATIONS}, exact)
         self._cell = [0]
         self._ticks: dict[int, tuple[repeat[None], int]] = {}
 
     def take(self) -> int:
-        """Steps since it was last asked."""
+        """Return the steps since the last call."""
         steps, self._cell[0] = self._cell[0], 0
         for weight, (tick, left) in self._ticks.items():
             now_left = length_hint(tick)
@@ -359,28 +367,31 @@ class StepCounter:
         return steps
 
     def instrument(self, tree: ast.Module) -> ast.Module:
-        """*tree* with counters; line numbers stay as they were."""
+        """Insert counters into ``tree``; line numbers stay as they are."""
         counted, ticks = with_counters(tree, self._weights)
         for weight in sorted(ticks):
-            self._ticks.setdefault(weight, (repeat(None, _PLENTY), _PLENTY))
+            self._ticks.setdefault(weight, (repeat(None, _MANY), _MANY))
         return counted
 
     def names(self) -> dict[str, Any]:
-        """What a namespace needs for code that was instrumented here to run in it."""
+        """Return the names that instrumented code needs in its namespace."""
         return {
             CELL: self._cell,
-            **{f"{TAKEN}{name}__": self._taking(name) for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)},
+            **{
+                f"{ITERATED}{name}__": self._item_counter(name)
+                for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)
+            },
             **{f"{TICK}{weight}__": tick.__next__ for weight, (tick, _) in self._ticks.items()},
         }
 
-    def _taking(self, name: str) -> Callable[[Any], Any]:
-        """What the argument of builtin or method *name* goes through: it comes out as it was."""
+    def _item_counter(self, name: str) -> Callable[[Any], Any]:
+        """Return the function that counts the items of an argument of ``name`` and passes it on."""
         cell, weight, sorts = self._cell, self._weights[item_operation(name)], name == "sorted"
 
-        def take(things: Any) -> Any:
-            if type(things) in _PLAIN:
-                count = len(things)
+        def count_items(argument: Any) -> Any:
+            if type(argument) in _CONTAINERS:
+                count = len(argument)
                 cell[0] += round(weight * (count * count.bit_length() if sorts else count))
-            return things
+            return argument
 
-        return take
+        return count_items

@@ -1,17 +1,15 @@
-"""What CPython does for each kind of syntax, as names of operations that a table of costs prices.
+"""Operations of CPython: which ones a syntax node executes, and their times on the reference machine.
 
-The kinds are those that a reader of a source file can tell apart and that take different times: an attribute
-is looked up, a builtin is called, a function is entered. What depends on the types of the values is not told
-apart. Each rule below answers for one node alone; whoever counts adds up the nodes of a run of statements.
+Operations are distinguished as far as the source text tells them apart and their times differ: an attribute
+is looked up, a builtin is called, a function is entered. The types of values are not distinguished. Each rule
+gives the operations of one node without its children.
 
-What CPython's operations take on the machine that they were measured on: ``python.yaml``.
+Law: time of code = sum over its operations of (count) x (ns of one). The time of an operation depends on its
+neighbours and on the types of its operands, which the law leaves out; that is its error. Operations take
+longer in programs than alone in a loop, where a processor predicts every branch. ``in_context`` is this
+factor; the times in ``python.yaml`` contain it already. ``CodeLaw`` scales the times to other processors.
 
-Law: time of code = sum over its operations of (how often, counted as it runs) x (nanoseconds of one). What an
-operation takes depends on what stands beside it and on the types of its operands, which the law leaves out:
-that is its error. Operations take longer in programs than alone in a loop, where a processor foresees every
-branch; ``in_context`` is by how much, and is in the nanoseconds already.
-
-Other processors are reached by one factor, in ``code``.
+Bytecode was rejected as the unit: it changes with every minor version of CPython, and a count would too.
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ from ruamel.yaml import YAML
 from volery.cost.figures import WithProvenance
 
 Operations = Iterator[tuple[str, int]]
-"""Names of operations, each with how often it is done."""
+"""Names of operations, each with its count."""
 
 ENTER = "enter a function"
 ROUND = "round of a loop"
@@ -41,28 +39,28 @@ TIMED_BUILTINS = (
     "isinstance", "len", "list", "max", "min", "next", "ord", "range", "repr", "reversed", "round", "set",
     "sorted", "str", "sum", "super", "tuple", "type", "zip",
 )  # fmt: skip
-"""Builtins that have a time of their own, ``len()``; others count as any call."""
+"""Builtins with a time of their own, such as ``len()``; others count as any call."""
 
 TIMED_METHODS = (
     "add", "append", "discard", "endswith", "extend", "get", "heappop", "heappush", "index", "insert",
     "isdigit", "items", "join", "keys", "partition", "pop", "popleft", "remove", "setdefault", "split",
     "startswith", "strip", "update", "values",
 )  # fmt: skip
-"""Methods of Python's own types and functions of its modules, told by their names: ``.append()``."""
+"""Methods of Python's own types and functions of its modules, recognised by name: ``.append()``."""
 
 _MATHEMATICS = frozenset(name for name in vars(math) if not name.startswith("_"))
 
 ITERATING_BUILTINS = (
     "all", "any", "bytearray", "bytes", "dict", "list", "max", "min", "set", "sorted", "sum", "tuple",
 )  # fmt: skip
-"""Builtins that go through all items of their only argument."""
+"""Builtins that iterate over their only argument."""
 
 ITERATING_METHODS = ("extend", "join", "update")
-"""Methods that do."""
+"""Methods that iterate over their only argument."""
 
 
 def item_operation(name: str) -> str:
-    """The operation of going through one item; of ``sorted``, times the binary logarithm of their number."""
+    """Return the operation of one item of an iteration; ``sorted`` has n log2 n of them."""
     return f"item of {name}()"
 
 
@@ -119,22 +117,25 @@ OPERATIONS: Mapping[str, str] = {
         for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)
     },
 }
-"""Everything that a table of costs prices, with what it is."""
+"""All operations of a table of costs, with the syntax that each stands for."""
 
 
 def operations_of(node: ast.AST) -> Operations:
-    """The operations of executing *node* once, without its parts."""
+    """Yield the operations of executing ``node`` once, without its children."""
     found = _RULES.get(type(node))
     return found(node) if found else iter(())
 
 
 def construction_operations(tree: ast.AST) -> dict[str, list[tuple[str, int]]]:
-    """What making an object takes, for the classes in *tree* whose ``__init__`` Python writes itself."""
+    """Return the operations of constructing an object, by class, where ``__init__`` is generated.
+
+    These are the named tuples and dataclasses in ``tree``.
+    """
     classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    return {one.name: operations for one in classes if (operations := _written_by_python(one))}
+    return {one.name: operations for one in classes if (operations := _generated_init(one))}
 
 
-def _written_by_python(made: ast.ClassDef) -> list[tuple[str, int]]:
+def _generated_init(made: ast.ClassDef) -> list[tuple[str, int]]:
     if any(ast.unparse(base).endswith("NamedTuple") for base in made.bases):
         return [("construct a named tuple", 1)]
     fields = sum(isinstance(statement, ast.AnnAssign) for statement in made.body)
@@ -214,7 +215,7 @@ def _kind_by_name(name: str) -> str:
 
 
 def _is_class(name: str) -> bool:
-    """By the usual spelling: ``Position``, not ``LIMIT``."""
+    """Return whether a name is that of a class by the usual spelling: ``Position``, not ``LIMIT``."""
     bare = name.lstrip("_")
     return bare[:1].isupper() and not bare.isupper()
 
@@ -287,13 +288,13 @@ _RULES: Mapping[type[ast.AST], Callable[[Any], Operations]] = {
 
 
 STEPS_PER_NS = 10
-"""Counting is in whole steps: tenths of a nanosecond on the machine of the table."""
+"""Counting is in whole steps: tenths of a nanosecond on the reference machine."""
 
 
 class OperationTable(WithProvenance):
-    """Nanoseconds by the name of an operation, for one interpreter on one machine.
+    """Times by operation, ns, of one interpreter on one machine.
 
-    ``mean_error`` and ``worst_error`` are relative, over *programs* that the table was not made from.
+    ``mean_error`` and ``worst_error`` are relative, over ``programs`` that the table was not fitted to.
     """
 
     interpreter: str
@@ -307,6 +308,6 @@ class OperationTable(WithProvenance):
 
 @cache
 def operation_table() -> OperationTable:
-    """The table that counted Python is priced by. It was measured on a server processor."""
+    """Return the table that counted Python is priced by. It was measured on a server processor."""
     text = files("volery.cost").joinpath("python.yaml").read_text(encoding="utf-8")
     return OperationTable.model_validate(YAML(typ="safe").load(text))

@@ -1,4 +1,4 @@
-"""What a call into ROS costs the processor of the node that makes it.
+"""Cost of a call into ROS on the processor of the calling node.
 
 Law (Modeling and Performance Estimation of Robotic Systems using ROS, formulas 1 and 2):
 
@@ -8,22 +8,23 @@ Law (Modeling and Performance Estimation of Robotic Systems using ROS, formulas 
 f is the processor's frequency; x is the number of subscribers for ``publish`` and the time slept in
 microseconds for ``sleep``. Coefficients were fitted to the CPU time of the whole process (the calling thread
 and the client library's own threads) at two frequencies per processor; a call without x is the line through
-its two.
+its two points.
 
-Validity: between the two frequencies. No change was seen with publish rate, message size or queue size. Error
-against the measured ROS time of a whole controller: 17 to 42 per cent, always too little (its Table III).
+Validity: between the two frequencies. No dependence on publish rate, message size or queue size was
+observed. Error against the measured ROS time of a whole controller: 17 to 42 %, always too low (Table III).
 
-Who pays what: the paper states sums. Measurements of roscpp show that ``publish`` itself is flat and its
-part per subscriber is spent by the library's threads, and that a sleep's cost falls while it sleeps. So
+Threads that are charged: the paper states sums. Measurements of roscpp show that ``publish`` itself takes
+constant time and the library's threads spend the part per subscriber, and that the cost of a sleep falls
+while it sleeps. So
 
-* ``publish``: the constant part is the caller's, the part per subscriber is background;
+* ``publish``: the caller pays the constant part, the part per subscriber is background;
 * ``sleep``: all of it is background;
-* every other call: all of it is the caller's.
+* every other call: the caller pays all of it.
 
-Figures that were measured apart (``caller``, ``caller_per_x``) go before this rule.
+Separately measured figures (``caller``, ``caller_per_x``) take precedence over this rule.
 
-Some things happen to a node beside its calls (``BACKGROUND_EVENTS``): a message arrives, somebody connects, time passes
-in ``spin``. The paper does not price them; a law that has figures for them does, all in the background.
+A node also has costs beside its calls (``BACKGROUND_EVENTS``): a message arrives, a peer connects, time
+passes in ``spin``. The paper does not price them; a law with figures for them does, all in the background.
 """
 
 from __future__ import annotations
@@ -42,24 +43,27 @@ NOT_COUNTED = (
     "ROS discovery and the master",
     "connections, messages received and time spent in spin, where a law has no figures for them",
 )
-"""What the law leaves out, in words for a report."""
+"""What the law leaves out, as phrases for a report."""
 
 BACKGROUND_EVENTS = ("receive", "connect", "accept", "wait")
-"""A message is received; a subscription connects to a publisher; a publisher accepts a subscription's
-connection; x microseconds pass in ``spin``. Without a figure they cost nothing, and a report says so.
+"""Events beside calls, which cost nothing where a law has no figure.
+
+A message is received; a subscription connects to a publisher; a publisher accepts a subscription's
+connection; x microseconds pass in ``spin``.
 """
 
 WARM_CALLS = {"publish_next": "publish"}
-"""A call that finds the library's threads awake, since they have just sent or received, and what it costs
-where a law does not tell them apart.
-"""
+"""Calls shortly after the library has sent or received, when its threads are awake, and the call whose price
+holds where a law does not distinguish them."""
 
 _DEPENDENT = ("publish", "publish_next", "sleep", "wait")
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
+_MAX_CACHED = 4096
+"""Prices that a tariff keeps; sleeps of many different lengths must not fill the memory."""
 
 
 class Price(NamedTuple):
-    """Target time of one call, ns: what the caller pays before it goes on, what its process pays beside it.
+    """Execution time of one call on the target, ns: of the caller, and of its process in the background.
 
     ``flags`` say what is doubtful about it.
     """
@@ -69,12 +73,20 @@ class Price(NamedTuple):
     flags: tuple[str, ...] = ()
 
 
-class CallFigures(WithProvenance):
-    """What is known of one call.
+NO_PRICE = Price(0, 0)
 
-    Coefficients (``constant`` and, if it has an x, ``per_x``), or two points. ``caller`` and
-    ``caller_per_x`` are the parts of them that the calling thread spends, where that was measured. ``error``
-    is the relative band of a typical call.
+
+class CallFigures(WithProvenance):
+    """Figures of one call: coefficients over the frequency, or two points.
+
+    Attributes:
+        constant: Part without x, ns.
+        per_x: Part per x, ns, if the call has an x.
+        caller: Part of ``constant`` that the calling thread spends, ns, where it was measured.
+        caller_per_x: Part of ``per_x`` that the calling thread spends, ns.
+        error: Relative error band of a typical call.
+        points: Two measured points, {MHz: ns}, in place of ``constant`` and ``per_x``.
+        doubtful_mhz: Frequencies whose figure the note calls into question.
     """
 
     constant: Line | None = None
@@ -94,7 +106,7 @@ class CallFigures(WithProvenance):
         return self
 
     def lines(self) -> tuple[Line, Line | None]:
-        """The constant part and the part per x over the frequency, ns."""
+        """Return the constant part and the part per x over the frequency, ns."""
         if self.points is not None:
             return line_through(self.points), None
         assert self.constant is not None  # by validation
@@ -102,7 +114,7 @@ class CallFigures(WithProvenance):
 
 
 class RosLaw(WithProvenance):
-    """The law of one client library on one kind of processor. ``error`` is its relative band."""
+    """The law of one client library on one kind of processor. ``error`` is its relative error band."""
 
     client: str
     least_mhz: float
@@ -113,31 +125,31 @@ class RosLaw(WithProvenance):
     charged_as: str = ""
 
     def warnings(self, frequency_mhz: float) -> tuple[str, ...]:
-        """What a report has to say where this law is used at this frequency."""
-        said = []
+        """Return the warnings of a report that uses this law at a frequency in MHz."""
+        found = []
         if not self.least_mhz <= frequency_mhz <= self.greatest_mhz:
-            said.append(
+            found.append(
                 f"{self.processor} at {frequency_mhz:g} MHz is outside the range of its {self.client} "
                 f"figures, {self.least_mhz:g} to {self.greatest_mhz:g} MHz: extrapolated"
             )
         if self.charged_as:
-            said.append(
+            found.append(
                 f"{self.charged_as} nodes on {self.processor} are charged with {self.client} figures: "
                 f"no figures of {self.charged_as} are in the catalogue"
             )
-        return tuple(said)
+        return tuple(found)
 
     def price(self, call: str, x: float, frequency_mhz: float) -> Price:
-        """What one call takes; ``EstimateError`` for an unknown call or where a line goes below zero."""
+        """Return the price of one call. See ``Tariff``."""
         return self.at(frequency_mhz)(call, x)
 
     def at(self, frequency_mhz: float) -> Tariff:
-        """The law at one frequency, for whoever prices many calls."""
+        """Return the law at one frequency in MHz."""
         return Tariff(self, frequency_mhz)
 
 
 class Tariff:
-    """The prices of a law at one frequency: ``tariff(call, x)``."""
+    """The prices of a law at one frequency."""
 
     def __init__(self, law: RosLaw, frequency_mhz: float) -> None:
         self.law = law
@@ -152,11 +164,19 @@ class Tariff:
                 self._callers[call] = _at(frequency_mhz, figures.caller, figures.caller_per_x)
 
     def __call__(self, call: str, x: float = 0.0) -> Price:
-        """What one call takes; see ``RosLaw.price``."""
-        known = self._known.get((call, x))
-        return known if known is not None else self._work_out(call, x)
+        """Return the price of one call.
 
-    def _work_out(self, call: str, x: float) -> Price:
+        Args:
+            call: Name of the call or of a background event.
+            x: Number of subscribers of ``publish``, time slept in microseconds of ``sleep``.
+
+        Raises:
+            EstimateError: The call has no figure, or its line gives a negative time at this frequency.
+        """
+        known = self._known.get((call, x))
+        return known if known is not None else self._compute(call, x)
+
+    def _compute(self, call: str, x: float) -> Price:
         name = _SPIN.get(x, call) if call == "spin_once" else call
         if name in BACKGROUND_EVENTS and name not in self._parts:
             return NO_PRICE
@@ -181,11 +201,10 @@ class Tariff:
         return price
 
     def _split(self, name: str, constant: float, variable: float, x: float) -> Price:
+        """Divide the cost of a call between the caller and the background."""
         flags = self._flags(name)
         whole = round(constant + variable)
-        if (
-            name == "sleep" or name in BACKGROUND_EVENTS
-        ):  # a sleep's cost falls while it sleeps, whoever spends it
+        if name == "sleep" or name in BACKGROUND_EVENTS:  # a sleep's cost falls while it sleeps
             return Price(0, whole, flags)
         if name in self._callers:
             fixed, per_x = self._callers[name]
@@ -202,9 +221,3 @@ class Tariff:
 
 def _at(frequency_mhz: float, constant: Line, per_x: Line | None) -> tuple[float, float]:
     return constant.at(frequency_mhz), per_x.at(frequency_mhz) if per_x else 0.0
-
-
-NO_PRICE = Price(0, 0)
-
-_MAX_CACHED = 4096
-"""How many prices a tariff keeps; sleeps of many different lengths must not fill the memory."""
