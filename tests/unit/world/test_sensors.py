@@ -4,18 +4,13 @@ import numpy as np
 import pytest
 
 from volery.simulation.world.body_specs import Multirotor
-from volery.simulation.world.sensors import sensor_set
+from volery.simulation.world.sensors import sensor_suite
 from volery.simulation.world.state_layout import (
-    ACCEL,
-    BARO,
-    GPS_LEVEL,
-    GYRO,
     M_ACCEL,
     M_BARO,
     M_GPS,
     M_GYRO,
     M_MAG,
-    MAG,
 )
 from volery.simulation.world.world import World
 
@@ -43,20 +38,19 @@ def sampled(clock, frame):
 @pytest.mark.parametrize("sensors", ["consumer", "rtk"])
 def test_errors_have_the_declared_deviations(sampled, sensors):
     rows = sampled(sensors)
-    noises = sensor_set(sensors).noises
-    for sensor, column in (
-        (GYRO, M_GYRO),
-        (ACCEL, M_ACCEL),
-        (BARO, M_BARO),
-        (GPS_LEVEL, M_GPS),
-        (MAG, M_MAG),
+    suite = sensor_suite(sensors)
+    for error, column in (
+        (suite.gyro, M_GYRO),
+        (suite.accelerometer, M_ACCEL),
+        (suite.barometer, M_BARO),
+        (suite.gps.horizontal, M_GPS),
+        (suite.magnetometer, M_MAG),
     ):
-        noise = noises[sensor]
         series = rows[..., column]
-        steps = np.diff(series, axis=0)  # the slow part hardly moves in a second
-        assert steps.std() / 2**0.5 == pytest.approx(noise.white, rel=0.15)
-        spread = series.mean(axis=0).std()  # over vehicles: the slow part, hardly averaged by three minutes
-        assert spread == pytest.approx(noise.slow, rel=0.4)
+        steps = np.diff(series, axis=0)  # the bias hardly moves in a second
+        assert steps.std() / 2**0.5 == pytest.approx(error.white_sigma, rel=0.15)
+        spread = series.mean(axis=0).std()  # over vehicles: the bias, hardly averaged by three minutes
+        assert spread == pytest.approx(error.bias_sigma, rel=0.4)
 
 
 def test_every_instrument_of_every_vehicle_has_noise_of_its_own(sampled):

@@ -11,7 +11,7 @@ from volery.base.time import MS
 from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.simulation.world.body_step import digest_of
 from volery.simulation.world.environment_models import Terrain, Wind, magnetic_field
-from volery.simulation.world.sensors import declared_sigma, sensor_set
+from volery.simulation.world.sensors import declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     S_GUST,
     S_POSITION,
@@ -199,7 +199,7 @@ def test_declared_deviations_tell_the_sets_apart():
     assert declared_sigma("consumer").horizontal > 0.5
     assert declared_sigma("rtk").horizontal < 0.05
     assert declared_sigma("perfect") == (0.0, 0.0)
-    assert sensor_set("rtk").gps_fix == 6
+    assert sensor_suite("rtk").gps.fix_type == 6
 
 
 @pytest.mark.parametrize(

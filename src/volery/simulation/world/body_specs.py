@@ -1,7 +1,7 @@
-"""Bodies as frozen data, and how they become rows of parameters and first states for the compiled step.
+"""Bodies as frozen data, and how they become parameters and initial states of the compiled step.
 
 Defaults describe a quadrotor of 1.5 kg with 12-inch propellers on three lithium-polymer cells, and a rover
-the size of a large model car. Figures are estimated unless a file that makes one says otherwise.
+the size of a large model car. Figures are estimated unless the file that sets one says otherwise.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from math import pi, radians, sqrt
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.arithmetic import exponential, sine_cosine
-from volery.simulation.world.body_step import STEP_S
 from volery.simulation.world.dynamics import CELL_FULL_VOLTS
 from volery.simulation.world.environment_models import GUST_EVERY, Terrain, Wind, magnetic_field
-from volery.simulation.world.sensors import SLOW_EVERY, SensorSet, sensor_set
+from volery.simulation.world.sensors import fill_sensor_parameters, sensor_suite
 from volery.simulation.world.state_layout import (
     MULTIROTOR,
     P_CAPACITY,
@@ -26,39 +25,34 @@ from volery.simulation.world.state_layout import (
     P_DRIVE_EFFICIENCY,
     P_EFFICIENCY,
     P_FEET,
-    P_FIELD,
     P_FRICTION,
     P_FULL_VOLTS,
-    P_GPS_FIX,
-    P_GPS_PERIOD,
     P_GRAVITY,
     P_GRIP,
     P_GUST_DECAY,
-    P_GUST_KICK,
+    P_GUST_GAIN,
     P_IDLE_POWER,
     P_INERTIA,
     P_KIND,
+    P_MAGNETIC_FIELD,
     P_MASS,
-    P_PERFECT,
-    P_RANGE_TOP,
+    P_MAX_ROTOR_SPEED,
+    P_MAX_SPEED,
+    P_MAX_STEERING,
+    P_MAX_TURN_RATE,
     P_RESISTANCE,
     P_ROLLING,
     P_ROTOR_LAG,
     P_ROTOR_SPIN,
-    P_ROTOR_TOP,
     P_ROTOR_X,
     P_ROTOR_Y,
-    P_SENSOR,
-    P_SKID,
+    P_SKID_STEERED,
     P_SPEED_LAG,
-    P_SPEED_TOP,
     P_SPIN_DAMPING,
-    P_STEER_LAG,
-    P_STEER_TOP,
+    P_STEERING_LAG,
     P_STIFFNESS,
     P_THRUST,
     P_TORQUE,
-    P_TURN_TOP,
     P_WHEELBASE,
     ROVER,
     S_ATTITUDE,
@@ -67,6 +61,7 @@ from volery.simulation.world.state_layout import (
     S_ON_GROUND,
     S_POSITION,
     S_RESTING,
+    STEP_S,
     Array,
 )
 
@@ -99,7 +94,7 @@ _ROVER_POSITIVE = (
 
 
 def _above_zero(noun: str, spec: object, names: tuple[str, ...]) -> None:
-    """Refuse a body whose figures would divide by zero or turn a law round."""
+    """Raise ``UsageError`` for parameters that must be above zero and are not."""
     for name in names:
         value = getattr(spec, name)
         if not all(figure > 0.0 for figure in (value if isinstance(value, tuple) else (value,))):
@@ -108,8 +103,13 @@ def _above_zero(noun: str, spec: object, names: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class Battery:
-    """A lithium-polymer pack: capacity in ampere-hours, cells in series, resistance of the pack, fraction
-    left.
+    """A lithium-polymer pack.
+
+    Args:
+        capacity_ah: Capacity [A h].
+        cells: Number of cells in series.
+        resistance_ohm: Resistance of the whole pack [ohm].
+        left: Fraction of the charge left at the start, above 0 and at most 1.
     """
 
     capacity_ah: float = 5.0
@@ -126,8 +126,12 @@ class Battery:
 
 @dataclass(frozen=True)
 class Rotor:
-    """A rotor's place forward and left of the centre [m]; ``spin`` +1 if its reaction turns the body to the
-    left.
+    """Position of a rotor and its sense of rotation.
+
+    Args:
+        forward: Distance forward of the centre [m].
+        left: Distance left of the centre [m].
+        spin: +1 if the reaction torque turns the body to the left, else -1.
     """
 
     forward: float
@@ -136,10 +140,13 @@ class Rotor:
 
 
 def x_frame(arm: float) -> tuple[Rotor, Rotor, Rotor, Rotor]:
-    """Four rotors on arms at 45 degrees, *arm* metres from the centre, in ArduPilot's motor order for QUAD/X.
+    """Return four rotors on arms at 45 degrees, in ArduPilot's motor order for QUAD/X.
 
     Front right and rear left turn anticlockwise seen from above (reaction to the right), the other two
     clockwise.
+
+    Args:
+        arm: Distance of the rotors from the centre [m].
     """
     side = arm * sqrt(0.5)
     return Rotor(side, -side, -1), Rotor(-side, side, -1), Rotor(side, side, 1), Rotor(-side, -side, 1)
@@ -147,11 +154,35 @@ def x_frame(arm: float) -> tuple[Rotor, Rotor, Rotor, Rotor]:
 
 @dataclass(frozen=True)
 class Multirotor:
-    """A body under four rotors. Masses kg, lengths m, inertia kg m^2 about forward, left, up."""
+    """A body with four rotors.
+
+    Args:
+        at: Initial position east, north, up about the world's origin [m]; the height is the ground's.
+        heading_deg: Initial heading, clockwise from north [degrees].
+        sensors: Name of the sensor suite.
+        added_sensors: Names of sensors of the entry point group ``volery.sensors`` that are mounted.
+        battery: The battery.
+        mass: Mass [kg].
+        inertia: Principal moments of inertia about forward, left, up [kg m^2].
+        rotors: The four rotors.
+        thrust_coefficient: k_T in thrust = k_T w^2 [N s^2].
+        propeller_diameter: Diameter [m].
+        figure_of_merit: Ideal over real induced power of a rotor in hover, 0..1.
+        efficiency: Efficiency of motor and speed controller, 0..1.
+        top_speed: Rotor speed at full throttle and full battery [rad/s].
+        rotor_lag: Time constant of rotor speed [s].
+        drag_linear: Linear drag coefficient [N s/m].
+        drag_quadratic: Quadratic drag coefficient [N s^2/m^2].
+        spin_damping: Damping of body rates [N m s/rad].
+        feet: Half length, half width and depth below the centre of the landing gear [m].
+        friction: Coulomb friction coefficient of the feet.
+        idle_power: Power of autopilot, receivers and sensors [W].
+    """
 
     at: Vector = (0.0, 0.0, 0.0)
     heading_deg: float = 0.0
     sensors: str = "consumer"
+    added_sensors: tuple[str, ...] = ()
     battery: Battery = Battery()
     mass: float = 1.5
     inertia: Vector = (0.020, 0.020, 0.036)
@@ -174,7 +205,7 @@ class Multirotor:
 
     @property
     def torque_coefficient(self) -> float:
-        """k_Q = k_T^1.5 / (FM sqrt(2 rho A)): see ``multirotor``."""
+        """k_Q = k_T^1.5 / (FM sqrt(2 rho A)) [N m s^2]: see ``dynamics``."""
         disc = pi * self.propeller_diameter**2 / 4.0
         induced = sqrt(2.0 * AIR_DENSITY * disc)
         coefficient: float = (
@@ -184,17 +215,40 @@ class Multirotor:
 
     @property
     def hover_speed(self) -> float:
-        """Rotor speed at which four rotors carry the weight [rad/s]."""
+        """Rotor speed at which the thrust equals the weight [rad/s]."""
         return sqrt(self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient))
 
 
 @dataclass(frozen=True)
 class Rover:
-    """A car-like rover, or a skid-steered one. Speeds m/s, lags s, angles degrees."""
+    """A rover that steers like a car, or is skid-steered.
+
+    Args:
+        at: Initial position east, north, up about the world's origin [m]; the height is the ground's.
+        heading_deg: Initial heading, clockwise from north [degrees].
+        sensors: Name of the sensor suite.
+        added_sensors: Names of sensors of the entry point group ``volery.sensors`` that are mounted.
+        battery: The battery.
+        mass: Mass [kg].
+        wheelbase: Distance between the axles [m].
+        steer_top_deg: Largest steering angle [degrees].
+        steer_lag: Time constant of steering [s].
+        speed_top: Speed at full throttle [m/s].
+        speed_lag: Time constant of speed [s].
+        rolling: Rolling resistance coefficient.
+        efficiency: Efficiency of the drive, 0..1.
+        drag_linear: Linear drag coefficient [N s/m].
+        drag_quadratic: Quadratic drag coefficient [N s^2/m^2].
+        grip: Largest acceleration that the tyres give [m/s^2].
+        skid: Whether it is skid-steered: steering then commands a turn rate.
+        turn_top_deg: Skid-steered: turn rate at full steering [degrees/s].
+        idle_power: Power of autopilot, receivers and sensors [W].
+    """
 
     at: Vector = (0.0, 0.0, 0.0)
     heading_deg: float = 0.0
     sensors: str = "consumer"
+    added_sensors: tuple[str, ...] = ()
     battery: Battery = Battery(capacity_ah=10.0)
     mass: float = 8.0
     wheelbase: float = 0.4
@@ -218,24 +272,13 @@ class Rover:
 BodySpec = Multirotor | Rover
 
 
-def _fill_sensors(row: Array, sensors: SensorSet) -> None:
-    for index, noise in enumerate(sensors.noises):
-        decay = exponential(-SLOW_EVERY * STEP_S / noise.time)
-        at = P_SENSOR + 4 * index
-        row[at : at + 4] = noise.white, noise.slow, decay, noise.slow * sqrt(1.0 - decay * decay)
-    row[P_GPS_PERIOD] = round(1.0 / (sensors.gps_rate * STEP_S))
-    row[P_GPS_FIX] = sensors.gps_fix
-    row[P_RANGE_TOP] = sensors.range_top
-    row[P_PERFECT] = float(sensors.perfect)
-
-
 def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     weight = spec.mass * STANDARD_GRAVITY
     row[P_KIND] = MULTIROTOR
     row[P_INERTIA : P_INERTIA + 3] = spec.inertia
     row[P_SPIN_DAMPING] = spec.spin_damping
     row[P_FEET : P_FEET + 3] = spec.feet
-    row[P_STIFFNESS] = weight / 4.0 / 0.005  # stands 5 mm deep in its four springs
+    row[P_STIFFNESS] = weight / 4.0 / 0.005  # the springs of the feet yield by 5 mm at rest
     row[P_DAMPING] = sqrt(spec.mass * row[P_STIFFNESS]) * 0.8  # a little below critical for four feet
     row[P_FRICTION] = spec.friction
     for index, rotor in enumerate(spec.rotors):
@@ -245,26 +288,33 @@ def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     row[P_THRUST] = spec.thrust_coefficient
     row[P_TORQUE] = spec.torque_coefficient
     row[P_ROTOR_LAG] = spec.rotor_lag
-    row[P_ROTOR_TOP] = spec.top_speed
+    row[P_MAX_ROTOR_SPEED] = spec.top_speed
     row[P_EFFICIENCY] = spec.efficiency
 
 
 def _fill_rover(row: Array, spec: Rover) -> None:
     row[P_KIND] = ROVER
     row[P_WHEELBASE] = spec.wheelbase
-    row[P_STEER_TOP] = radians(spec.steer_top_deg)
-    row[P_STEER_LAG] = spec.steer_lag
-    row[P_SPEED_TOP] = spec.speed_top
+    row[P_MAX_STEERING] = radians(spec.steer_top_deg)
+    row[P_STEERING_LAG] = spec.steer_lag
+    row[P_MAX_SPEED] = spec.speed_top
     row[P_SPEED_LAG] = spec.speed_lag
     row[P_ROLLING] = spec.rolling
     row[P_DRIVE_EFFICIENCY] = spec.efficiency
-    row[P_SKID] = float(spec.skid)
-    row[P_TURN_TOP] = radians(spec.turn_top_deg)
+    row[P_SKID_STEERED] = float(spec.skid)
+    row[P_MAX_TURN_RATE] = radians(spec.turn_top_deg)
     row[P_GRIP] = spec.grip
 
 
 def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -> None:
-    """Write what the compiled step needs to know of *spec* into its row."""
+    """Write the parameters of a body into its state row.
+
+    Args:
+        row: The body's row, zeros before.
+        spec: The body.
+        frame: The world's local frame, which gives the magnetic field.
+        wind: The wind, which gives the correlation time of gusts.
+    """
     row[P_MASS] = spec.mass
     row[P_DRAG_LINEAR] = spec.drag_linear
     row[P_DRAG_QUADRATIC] = spec.drag_quadratic
@@ -274,19 +324,19 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
     row[P_FULL_VOLTS] = 0.0
     row[P_IDLE_POWER] = spec.idle_power
     decay = exponential(-GUST_EVERY * STEP_S / wind.gust_time)
-    row[P_GUST_DECAY], row[P_GUST_KICK] = decay, sqrt(1.0 - decay * decay)
+    row[P_GUST_DECAY], row[P_GUST_GAIN] = decay, sqrt(1.0 - decay * decay)
     row[P_GRAVITY] = STANDARD_GRAVITY
-    row[P_FIELD : P_FIELD + 3] = magnetic_field(frame)
+    row[P_MAGNETIC_FIELD : P_MAGNETIC_FIELD + 3] = magnetic_field(frame)
     if isinstance(spec, Multirotor):
         _fill_multirotor(row, spec)
         row[P_FULL_VOLTS] = spec.battery.cells * CELL_FULL_VOLTS
     else:
         _fill_rover(row, spec)
-    _fill_sensors(row, sensor_set(spec.sensors))
+    fill_sensor_parameters(row, sensor_suite(spec.sensors))
 
 
 def fill_state(row: Array, spec: BodySpec, terrain: Terrain) -> None:
-    """At rest on the ground at ``spec.at`` (its height is the ground's), heading where it says."""
+    """Write the initial state: at rest on the ground at ``spec.at``, with the spec's heading."""
     ground = terrain.height(spec.at[0], spec.at[1])
     depth = spec.feet[2] - 0.005 if isinstance(spec, Multirotor) else 0.0
     row[S_POSITION : S_POSITION + 3] = spec.at[0], spec.at[1], ground + depth

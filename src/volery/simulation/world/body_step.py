@@ -42,11 +42,9 @@ from volery.simulation.world.state_layout import (
     P_MASS,
     S_AMPS,
     S_ATTITUDE,
-    S_AWAKE,
     S_CONTACT_SPEED,
     S_CONTACTS,
     S_DISTANCE,
-    S_FORCE,
     S_GROUND,
     S_GUST,
     S_ON_GROUND,
@@ -54,19 +52,22 @@ from volery.simulation.world.state_layout import (
     S_POSITION,
     S_RATES,
     S_RESTING,
+    S_SPECIFIC_FORCE,
+    S_STARTED,
     S_VELOCITY,
     S_VOLTS,
+    STEP_S,
     U_PAYLOAD,
     U_THROTTLE,
     U_WIND,
-    W_AIR,
-    W_BEFORE,
+    W_AIR_VELOCITY,
     W_GROUND,
+    W_LAST_VELOCITY,
     W_ROTATION,
     W_SLOPE,
+    W_SLOPE_SUM,
+    W_STATE,
     W_THROTTLE,
-    W_TOTAL,
-    W_Y,
     Advance,
     Array,
     Bodies,
@@ -86,7 +87,6 @@ def world_sources() -> list[Path]:
     return list(Path(__file__).parent.glob("*.py"))
 
 
-STEP_S = 0.002
 _STILL_SPEED = 0.02  # [m/s]
 _STILL_RATE = 0.05  # [rad/s]
 _LIGHT = 0.7  # of its weight: a body whose rotors lift less than this stays where it landed
@@ -105,22 +105,22 @@ def _integrate(row: Array, flying: bool) -> None:
     """The classical fourth-order Runge-Kutta step (Kutta 1901) of the integrated columns."""
     resting = row[S_RESTING] > 0.5
     for i in range(INTEGRATED):
-        row[W_Y + i] = row[i]
+        row[W_STATE + i] = row[i]
     _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        row[W_TOTAL + i] = row[W_SLOPE + i]
-        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+        row[W_SLOPE_SUM + i] = row[W_SLOPE + i]
+        row[W_STATE + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
     _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
-        row[W_Y + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
+        row[W_SLOPE_SUM + i] += 2.0 * row[W_SLOPE + i]
+        row[W_STATE + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
     _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        row[W_TOTAL + i] += 2.0 * row[W_SLOPE + i]
-        row[W_Y + i] = row[i] + STEP_S * row[W_SLOPE + i]
+        row[W_SLOPE_SUM + i] += 2.0 * row[W_SLOPE + i]
+        row[W_STATE + i] = row[i] + STEP_S * row[W_SLOPE + i]
     _slope(row, flying, resting)
     for i in range(INTEGRATED):
-        row[i] += STEP_S / 6.0 * (row[W_TOTAL + i] + row[W_SLOPE + i])
+        row[i] += STEP_S / 6.0 * (row[W_SLOPE_SUM + i] + row[W_SLOPE + i])
 
 
 @njit(cache=False)
@@ -149,7 +149,7 @@ def _settle_flyer(row: Array) -> None:
     """Contact, rest and power at the end of a multirotor's step."""
     touching = _touches(row)
     if touching and row[S_ON_GROUND] == 0.0:
-        row[S_CONTACT_SPEED] = max(0.0, -row[W_BEFORE + 2])
+        row[S_CONTACT_SPEED] = max(0.0, -row[W_LAST_VELOCITY + 2])
         row[S_CONTACTS] += 1.0
     row[S_ON_GROUND] = 1.0 if touching else 0.0
     light = total_thrust(row) < _LIGHT * row[P_MASS] * row[P_GRAVITY]
@@ -183,11 +183,11 @@ def _settle_rover(row: Array, height_before: float) -> None:
 @njit(cache=False)
 def _felt(row: Array) -> None:
     """The step's mean specific force in body axes, and the way gone."""
-    ae = (row[S_VELOCITY] - row[W_BEFORE]) / STEP_S
-    an = (row[S_VELOCITY + 1] - row[W_BEFORE + 1]) / STEP_S
-    au = (row[S_VELOCITY + 2] - row[W_BEFORE + 2]) / STEP_S + row[P_GRAVITY]
+    ae = (row[S_VELOCITY] - row[W_LAST_VELOCITY]) / STEP_S
+    an = (row[S_VELOCITY + 1] - row[W_LAST_VELOCITY + 1]) / STEP_S
+    au = (row[S_VELOCITY + 2] - row[W_LAST_VELOCITY + 2]) / STEP_S + row[P_GRAVITY]
     for axis in range(3):
-        row[S_FORCE + axis] = (
+        row[S_SPECIFIC_FORCE + axis] = (
             row[W_ROTATION + axis] * ae + row[W_ROTATION + 3 + axis] * an + row[W_ROTATION + 6 + axis] * au
         )
     square = 0.0
@@ -219,8 +219,8 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
     key = bodies.keys[body]
     flying = row[P_KIND] == MULTIROTOR
     for axis in range(3):
-        row[W_BEFORE + axis] = row[S_VELOCITY + axis]
-        row[W_AIR + axis] = row[U_WIND + axis] + row[S_GUST + axis]
+        row[W_LAST_VELOCITY + axis] = row[S_VELOCITY + axis]
+        row[W_AIR_VELOCITY + axis] = row[U_WIND + axis] + row[S_GUST + axis]
     row[W_GROUND] = row[S_GROUND]
     _integrate(row, flying)
     height_before = row[S_POSITION + 2]
@@ -247,10 +247,10 @@ def start_body(bodies: Bodies, body: int, row: Array) -> None:
     """What the instruments show at the first grid step, before anything moved."""
     rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     for axis in range(3):
-        row[S_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
+        row[S_SPECIFIC_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
     _power(row, row[P_KIND] == MULTIROTOR)
     sample_sensors(row, bodies.keys[body], bodies.reached[body])
-    row[S_AWAKE] = 1.0
+    row[S_STARTED] = 1.0
 
 
 def _compose(sources: str) -> Advance:
@@ -260,7 +260,7 @@ def _compose(sources: str) -> Advance:
             return
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
-            if row[S_AWAKE] == 0.0:
+            if row[S_STARTED] == 0.0:
                 start_body(bodies, body, row)
             while bodies.reached[body] < goals[body]:
                 for i in range(4):

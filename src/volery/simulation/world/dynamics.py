@@ -55,23 +55,23 @@ from volery.simulation.world.state_layout import (
     P_IDLE_POWER,
     P_INERTIA,
     P_MASS,
+    P_MAX_ROTOR_SPEED,
+    P_MAX_SPEED,
+    P_MAX_STEERING,
+    P_MAX_TURN_RATE,
     P_RESISTANCE,
     P_ROLLING,
     P_ROTOR_LAG,
     P_ROTOR_SPIN,
-    P_ROTOR_TOP,
     P_ROTOR_X,
     P_ROTOR_Y,
-    P_SKID,
+    P_SKID_STEERED,
     P_SPEED_LAG,
-    P_SPEED_TOP,
     P_SPIN_DAMPING,
-    P_STEER_LAG,
-    P_STEER_TOP,
+    P_STEERING_LAG,
     P_STIFFNESS,
     P_THRUST,
     P_TORQUE,
-    P_TURN_TOP,
     P_WHEELBASE,
     S_ATTITUDE,
     S_CHARGE,
@@ -82,14 +82,14 @@ from volery.simulation.world.state_layout import (
     S_VELOCITY,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
-    W_AIR,
+    W_AIR_VELOCITY,
     W_FORCE,
     W_GROUND,
     W_ROTATION,
     W_SLOPE,
+    W_STATE,
     W_THROTTLE,
     W_TORQUE,
-    W_Y,
     Array,
 )
 
@@ -184,14 +184,14 @@ def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, f
 def _tread(row: Array, x: float, y: float, z: float) -> None:
     """Add to force and torque what the ground does to a foot at x, y, z in body axes."""
     _, _, height = _to_world(row, x, y, z)
-    depth = row[W_GROUND] - row[W_Y + S_POSITION + 2] - height
+    depth = row[W_GROUND] - row[W_STATE + S_POSITION + 2] - height
     if depth <= 0.0:
         return
-    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
+    p, q, r = row[W_STATE + S_RATES], row[W_STATE + S_RATES + 1], row[W_STATE + S_RATES + 2]
     east, north, up = _to_world(row, q * z - r * y, r * x - p * z, p * y - q * x)
-    east += row[W_Y + S_VELOCITY]
-    north += row[W_Y + S_VELOCITY + 1]
-    up += row[W_Y + S_VELOCITY + 2]
+    east += row[W_STATE + S_VELOCITY]
+    north += row[W_STATE + S_VELOCITY + 1]
+    up += row[W_STATE + S_VELOCITY + 2]
     normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * up)
     grip = row[P_FRICTION] * normal / max(sqrt(east * east + north * north), _SLIP)
     row[W_FORCE] -= grip * east
@@ -216,11 +216,13 @@ def _stand(row: Array) -> None:
 @njit(cache=False)
 def _spin_up(row: Array) -> None:
     """Rotor speeds, charge and energy: what changes even in a body at rest."""
-    power = electrical_power(row, W_Y)
-    volts, amps = volts_amps(row, W_Y, power)
-    top = row[P_ROTOR_TOP] * volts / row[P_FULL_VOLTS]
+    power = electrical_power(row, W_STATE)
+    volts, amps = volts_amps(row, W_STATE, power)
+    top = row[P_MAX_ROTOR_SPEED] * volts / row[P_FULL_VOLTS]
     for i in range(4):
-        row[W_SLOPE + S_ROTORS + i] = (row[W_THROTTLE + i] * top - row[W_Y + S_ROTORS + i]) / row[P_ROTOR_LAG]
+        row[W_SLOPE + S_ROTORS + i] = (row[W_THROTTLE + i] * top - row[W_STATE + S_ROTORS + i]) / row[
+            P_ROTOR_LAG
+        ]
     row[W_SLOPE + S_CHARGE] = amps
     row[W_SLOPE + S_ENERGY] = volts * amps
 
@@ -232,29 +234,29 @@ def _loads(row: Array) -> None:
     for axis in range(3):
         row[W_TORQUE + axis] = 0.0
     for i in range(4):
-        square = row[W_Y + S_ROTORS + i] * row[W_Y + S_ROTORS + i]
+        square = row[W_STATE + S_ROTORS + i] * row[W_STATE + S_ROTORS + i]
         thrust = row[P_THRUST] * square * row[U_MOTOR_HEALTH + i]
         lift += thrust
         row[W_TORQUE] += row[P_ROTOR_Y + i] * thrust
         row[W_TORQUE + 1] -= row[P_ROTOR_X + i] * thrust
         row[W_TORQUE + 2] += row[P_ROTOR_SPIN + i] * row[P_TORQUE] * square
-    ve = row[W_Y + S_VELOCITY] - row[W_AIR]
-    vn = row[W_Y + S_VELOCITY + 1] - row[W_AIR + 1]
-    vu = row[W_Y + S_VELOCITY + 2] - row[W_AIR + 2]
+    ve = row[W_STATE + S_VELOCITY] - row[W_AIR_VELOCITY]
+    vn = row[W_STATE + S_VELOCITY + 1] - row[W_AIR_VELOCITY + 1]
+    vu = row[W_STATE + S_VELOCITY + 2] - row[W_AIR_VELOCITY + 2]
     drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * sqrt(ve * ve + vn * vn + vu * vu)
     row[W_FORCE] = row[W_ROTATION + 2] * lift - drag * ve
     row[W_FORCE + 1] = row[W_ROTATION + 5] * lift - drag * vn
     row[W_FORCE + 2] = row[W_ROTATION + 8] * lift - drag * vu
     for axis in range(3):
-        row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_Y + S_RATES + axis]
+        row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_STATE + S_RATES + axis]
 
 
 @njit(cache=False)
 def _turn(row: Array) -> None:
     """Rates of change of the attitude quaternion and of the body rates, by Euler's equations."""
-    p, q, r = row[W_Y + S_RATES], row[W_Y + S_RATES + 1], row[W_Y + S_RATES + 2]
-    w, x = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 1]
-    y, z = row[W_Y + S_ATTITUDE + 2], row[W_Y + S_ATTITUDE + 3]
+    p, q, r = row[W_STATE + S_RATES], row[W_STATE + S_RATES + 1], row[W_STATE + S_RATES + 2]
+    w, x = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 1]
+    y, z = row[W_STATE + S_ATTITUDE + 2], row[W_STATE + S_ATTITUDE + 3]
     row[W_SLOPE + S_ATTITUDE] = 0.5 * (-x * p - y * q - z * r)
     row[W_SLOPE + S_ATTITUDE + 1] = 0.5 * (w * p + y * r - z * q)
     row[W_SLOPE + S_ATTITUDE + 2] = 0.5 * (w * q - x * r + z * p)
@@ -273,13 +275,13 @@ def multirotor_slope(row: Array, resting: bool) -> None:
         for i in range(S_ROTORS):
             row[W_SLOPE + i] = 0.0
         return
-    rotation_matrix(row, W_Y + S_ATTITUDE, W_ROTATION)
+    rotation_matrix(row, W_STATE + S_ATTITUDE, W_ROTATION)
     _loads(row)
     reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
-    if row[W_Y + S_POSITION + 2] - row[W_GROUND] < reach:
+    if row[W_STATE + S_POSITION + 2] - row[W_GROUND] < reach:
         _stand(row)
     for axis in range(3):
-        row[W_SLOPE + S_POSITION + axis] = row[W_Y + S_VELOCITY + axis]
+        row[W_SLOPE + S_POSITION + axis] = row[W_STATE + S_VELOCITY + axis]
         row[W_SLOPE + S_VELOCITY + axis] = row[W_FORCE + axis] / row[P_MASS]
     row[W_SLOPE + S_VELOCITY + 2] -= row[P_GRAVITY]
     _turn(row)
@@ -317,7 +319,7 @@ def drive_power(row: Array, speed: float, acceleration: float) -> float:
 @njit(cache=False)
 def turn_rate(row: Array, speed: float, steer: float) -> float:
     """Heading's rate of change [rad/s, anticlockwise] at a speed and a steering angle (skid: a turn rate)."""
-    if row[P_SKID] > 0.5:
+    if row[P_SKID_STEERED] > 0.5:
         rate = steer
     else:
         s, c = sine_cosine(steer)
@@ -332,23 +334,23 @@ def rover_slope(row: Array, resting: bool) -> None:
     """The state's rate of change; commands are steering (left positive) and throttle."""
     for i in range(INTEGRATED):
         row[W_SLOPE + i] = 0.0
-    speed = row[W_Y + S_SPEED]
-    skid = row[P_SKID] > 0.5
-    top = row[P_TURN_TOP] if skid else row[P_STEER_TOP]
+    speed = row[W_STATE + S_SPEED]
+    skid = row[P_SKID_STEERED] > 0.5
+    top = row[P_MAX_TURN_RATE] if skid else row[P_MAX_STEERING]
     power = row[P_IDLE_POWER] + row[U_PAYLOAD]
     if not resting:
-        row[W_SLOPE + S_STEER] = (row[W_THROTTLE] * top - row[W_Y + S_STEER]) / row[P_STEER_LAG]
-        wanted = row[W_THROTTLE + 1] * row[P_SPEED_TOP]
+        row[W_SLOPE + S_STEER] = (row[W_THROTTLE] * top - row[W_STATE + S_STEER]) / row[P_STEERING_LAG]
+        wanted = row[W_THROTTLE + 1] * row[P_MAX_SPEED]
         push = (wanted - speed) / row[P_SPEED_LAG]
         row[W_SLOPE + S_SPEED] = min(max(push, -row[P_GRIP]), row[P_GRIP])
-        rate = turn_rate(row, speed, row[W_Y + S_STEER])
-        w, z = row[W_Y + S_ATTITUDE], row[W_Y + S_ATTITUDE + 3]
+        rate = turn_rate(row, speed, row[W_STATE + S_STEER])
+        w, z = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 3]
         row[W_SLOPE + S_ATTITUDE] = -0.5 * z * rate
         row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * w * rate
         row[W_SLOPE + S_POSITION] = speed * (w * w - z * z)
         row[W_SLOPE + S_POSITION + 1] = speed * 2.0 * w * z
         power += drive_power(row, speed, row[W_SLOPE + S_SPEED])
-    volts, amps = volts_amps(row, W_Y, power)
+    volts, amps = volts_amps(row, W_STATE, power)
     row[W_SLOPE + S_CHARGE] = amps
     row[W_SLOPE + S_ENERGY] = volts * amps
 

@@ -32,7 +32,7 @@ from numba import njit
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.arithmetic import exponential, gaussian, logarithm, sine_cosine
-from volery.simulation.world.state_layout import P_GUST_DECAY, P_GUST_KICK, S_GUST, U_GUST, Array
+from volery.simulation.world.state_layout import P_GUST_DECAY, P_GUST_GAIN, S_GUST, U_GUST, Array
 
 _SEA_LEVEL_PA = 101325.0
 _SEA_LEVEL_K = 288.15
@@ -212,7 +212,7 @@ def advance_gust(row: Array, key: np.uint64, k: int) -> None:
     if deviation == 0.0:
         return
     decay = row[P_GUST_DECAY]
-    kick = row[P_GUST_KICK] * deviation
+    kick = row[P_GUST_GAIN] * deviation
     for axis in range(3):
         strength = kick if axis < 2 else 0.5 * kick
         row[S_GUST + axis] = decay * row[S_GUST + axis] + strength * gaussian(key, _STREAM + axis, k)

@@ -1,15 +1,19 @@
-"""Sensors: what a body's instruments report of its true state.
+"""Sensors of a body: their declared parameters, the compiled sampling of the built-in ones, and added ones.
 
-* Law of each error: white noise plus a slow part that is first-order Gauss-Markov, e' = -e/T + s sqrt(2/T) n
-  (IEEE Std 952 calls it exponentially correlated). Sampled at fixed steps of the grid; noise is a function of
-  (seed, sensor, step), never of who looks.
-* ``CONSUMER``: figures of the kind data sheets give for MPU-6000, IST8310, MS5611 and u-blox NEO-M8N class
-  parts; ``RTK``: the same with a u-blox ZED-F9P class receiver and a base station. Estimated, not measured.
-* Left out: latency, temperature, vibration, multipath near walls, magnetic disturbance by currents.
+* Error law of every sensor: white noise plus a first-order Gauss-Markov bias, b' = -b/T + s sqrt(2/T) n (IEEE
+  Std 952: exponentially correlated). Noise is a function of (seed, sensor, grid step), never of who reads it.
+* Built-in sensors are compiled into the step. A package adds its own by an entry point of the group
+  ``volery.sensors``: either a ``SensorSuite``, which replaces the parameters of the built-in ones, or a
+  ``Sensor``, which is evaluated outside of the compiled step and costs nothing where none is mounted.
+* ``consumer``: figures of the kind that data sheets give for MPU-6000, IST8310, MS5611 and u-blox NEO-M8N
+  class parts; ``rtk``: the same with a u-blox ZED-F9P class receiver and a base station. Estimated, not
+  measured.
+* Not modelled: latency, temperature, vibration, multipath near walls, magnetic disturbance by currents.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple
@@ -18,14 +22,15 @@ import numpy as np
 from numba import njit
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.simulation.world.arithmetic import gaussian
+from volery.base.frames import Quaternion, Vector
+from volery.base.registry import Registry
+from volery.base.seeds import key
+from volery.base.time import Ns
+from volery.simulation.world.arithmetic import exponential, gaussian
 from volery.simulation.world.state_layout import (
-    ACCEL,
-    BARO,
-    GPS_HEIGHT,
-    GPS_LEVEL,
-    GPS_SPEED,
-    GYRO,
+    BIAS_DECAY,
+    BIAS_GAIN,
+    BIAS_SIGMA,
     M_ACCEL,
     M_ACCEL_BIAS,
     M_BARO,
@@ -42,99 +47,192 @@ from volery.simulation.world.state_layout import (
     M_MAG_BIAS,
     M_MAG_COUNT,
     M_RANGE,
-    MAG,
-    P_FIELD,
+    P_ACCEL_ERROR,
+    P_BARO_ERROR,
     P_GPS_FIX,
+    P_GPS_HORIZONTAL_ERROR,
     P_GPS_PERIOD,
-    P_RANGE_TOP,
-    P_SENSOR,
-    RANGE,
-    S_FORCE,
+    P_GPS_VELOCITY_ERROR,
+    P_GPS_VERTICAL_ERROR,
+    P_GYRO_ERROR,
+    P_MAG_ERROR,
+    P_MAGNETIC_FIELD,
+    P_MAX_RANGE,
+    P_PERFECT,
+    P_RANGE_ERROR,
     S_GROUND,
     S_POSITION,
     S_RATES,
+    S_SPECIFIC_FORCE,
     S_VELOCITY,
-    SENSOR_DECAY,
-    SENSOR_KICK,
-    SENSOR_SLOW,
-    SENSOR_WHITE,
+    STEP_S,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_MAG_BLOCKED,
     W_ROTATION,
+    WHITE_SIGMA,
     Array,
 )
 
 RTK_FIX = 6  # MAVLink's GPS_FIX_TYPE_RTK_FIXED
-SLOW_EVERY = 50  # steps: slow errors and the field instruments move at 10 Hz
-AIR_EVERY = 25  # barometer, magnetometer and range-finder: 20 Hz
-_GYRO, _ACCEL, _MAG, _BARO, _GPS, _SPEED, _RANGE, _SLOW = 1, 4, 7, 10, 11, 14, 17, 20
+BIAS_EVERY = 50  # grid steps: biases change at 10 Hz
+SLOW_SENSORS_EVERY = 25  # grid steps: barometer, magnetometer and range finder sample at 20 Hz
+
+# Streams of noise: the first of each sensor's. They are part of every trace: never renumber one.
+_GYRO_STREAM, _ACCEL_STREAM, _MAG_STREAM, _BARO_STREAM = 1, 4, 7, 10
+_GPS_STREAM, _GPS_VELOCITY_STREAM, _RANGE_STREAM, _BIAS_STREAM = 11, 14, 17, 20
 
 
-class Noise(NamedTuple):
-    """One sensor's error: white and slow standard deviation (SI) and the slow part's correlation time [s]."""
-
-    white: float
-    slow: float
-    time: float
-
-    @property
-    def variance(self) -> float:
-        """Of both parts together."""
-        return self.white * self.white + self.slow * self.slow
+# --- declared parameters ---
 
 
 @dataclass(frozen=True)
-class SensorSet:
-    """A vehicle's instruments, noises in the order of ``columns``; rate in Hz, range-finder's reach in m."""
+class ErrorModel:
+    """Error of one measured quantity, per axis.
+
+    Args:
+        white_sigma: Standard deviation of the white noise of a sample [unit of the quantity].
+        bias_sigma: Standard deviation of the bias [unit of the quantity].
+        correlation_time: Time constant of the bias [s], above 0.
+    """
+
+    white_sigma: float = 0.0
+    bias_sigma: float = 0.0
+    correlation_time: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.white_sigma < 0.0 or self.bias_sigma < 0.0 or self.correlation_time <= 0.0:
+            raise UsageError(f"{self}: give standard deviations of at least 0 and a correlation time above 0")
+
+    @property
+    def variance(self) -> float:
+        """Variance of white noise and bias together."""
+        return self.white_sigma * self.white_sigma + self.bias_sigma * self.bias_sigma
+
+    def decay(self, period: float) -> float:
+        """Return the factor on the bias over *period* [s]."""
+        return float(exponential(-period / self.correlation_time))
+
+
+@dataclass(frozen=True)
+class Gyroscope(ErrorModel):
+    """Three-axis gyroscope [rad/s], sampled at 500 Hz."""
+
+    white_sigma: float = 0.003
+    bias_sigma: float = 0.0005
+    correlation_time: float = 300.0
+
+
+@dataclass(frozen=True)
+class Accelerometer(ErrorModel):
+    """Three-axis accelerometer [m/s^2], sampled at 500 Hz."""
+
+    white_sigma: float = 0.06
+    bias_sigma: float = 0.015
+    correlation_time: float = 300.0
+
+
+@dataclass(frozen=True)
+class Magnetometer(ErrorModel):
+    """Three-axis magnetometer [gauss], sampled at 20 Hz."""
+
+    white_sigma: float = 0.003
+    bias_sigma: float = 0.002
+    correlation_time: float = 600.0
+
+
+@dataclass(frozen=True)
+class Barometer(ErrorModel):
+    """Barometer [m of pressure altitude], sampled at 20 Hz."""
+
+    white_sigma: float = 0.12
+    bias_sigma: float = 0.15
+    correlation_time: float = 400.0
+
+
+@dataclass(frozen=True)
+class RangeFinder(ErrorModel):
+    """Downward range finder [m], sampled at 20 Hz.
+
+    Only the white part of its error is simulated.
+
+    Args:
+        max_range: Largest distance that is measured [m].
+    """
+
+    white_sigma: float = 0.02
+    bias_sigma: float = 0.01
+    correlation_time: float = 100.0
+    max_range: float = 30.0
+
+
+@dataclass(frozen=True)
+class GpsReceiver:
+    """Satellite receiver.
+
+    Args:
+        horizontal: Error of each horizontal axis [m].
+        vertical: Error of the height [m].
+        velocity: Error of each axis of the velocity [m/s]; only its white part is simulated.
+        rate: Fixes per second [Hz].
+        fix_type: MAVLink GPS_FIX_TYPE that it reaches; from ``RTK_FIX`` on the autopilot takes its height.
+    """
+
+    horizontal: ErrorModel = ErrorModel(0.15, 0.7, 300.0)
+    vertical: ErrorModel = ErrorModel(0.3, 1.2, 300.0)
+    velocity: ErrorModel = ErrorModel(0.05, 0.02, 30.0)
+    rate: float = 5.0
+    fix_type: int = 3
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.rate * STEP_S <= 1.0:
+            raise UsageError(
+                f"a GPS rate of {self.rate} Hz: give one above 0 and at most {1.0 / STEP_S:g} Hz"
+            )
+
+
+@dataclass(frozen=True)
+class SensorSuite:
+    """Built-in sensors of a vehicle.
+
+    Args:
+        name: Name by which a vehicle's ``sensors`` selects it.
+        gyro: Parameters of the gyroscope; likewise the next ones.
+        perfect: The autopilot's estimate is the true state; errors should then be zero.
+    """
 
     name: str
-    noises: tuple[Noise, ...]
-    gps_rate: float
-    gps_fix: int
-    range_top: float = 30.0
+    gyro: ErrorModel = Gyroscope()
+    accelerometer: ErrorModel = Accelerometer()
+    magnetometer: ErrorModel = Magnetometer()
+    barometer: ErrorModel = Barometer()
+    gps: GpsReceiver = GpsReceiver()
+    range_finder: RangeFinder = RangeFinder()
     perfect: bool = False
 
 
-_GYRO_NOISE = Noise(white=0.003, slow=0.0005, time=300.0)
-_ACCEL_NOISE = Noise(white=0.06, slow=0.015, time=300.0)
-_MAG_NOISE = Noise(white=0.003, slow=0.002, time=600.0)
-_BARO_NOISE = Noise(white=0.12, slow=0.15, time=400.0)
-_RANGE_NOISE = Noise(white=0.02, slow=0.01, time=100.0)
-_QUIET = Noise(0.0, 0.0, 1.0)
-
-SENSOR_SETS: dict[str, SensorSet] = {
-    "consumer": SensorSet(
-        "consumer",
-        (
-            _GYRO_NOISE,
-            _ACCEL_NOISE,
-            _MAG_NOISE,
-            _BARO_NOISE,
-            Noise(white=0.15, slow=0.7, time=300.0),
-            Noise(white=0.3, slow=1.2, time=300.0),
-            Noise(white=0.05, slow=0.02, time=30.0),
-            _RANGE_NOISE,
-        ),
-        gps_rate=5.0,
-        gps_fix=3,
-    ),
-    "rtk": SensorSet(
+SENSOR_SUITES: dict[str, SensorSuite] = {
+    "consumer": SensorSuite("consumer"),
+    "rtk": SensorSuite(
         "rtk",
-        (
-            _GYRO_NOISE,
-            _ACCEL_NOISE,
-            _MAG_NOISE,
-            _BARO_NOISE,
-            Noise(white=0.008, slow=0.01, time=300.0),
-            Noise(white=0.015, slow=0.015, time=300.0),
-            Noise(white=0.02, slow=0.005, time=30.0),
-            _RANGE_NOISE,
+        gps=GpsReceiver(
+            horizontal=ErrorModel(0.008, 0.01, 300.0),
+            vertical=ErrorModel(0.015, 0.015, 300.0),
+            velocity=ErrorModel(0.02, 0.005, 30.0),
+            rate=10.0,
+            fix_type=RTK_FIX,
         ),
-        gps_rate=10.0,
-        gps_fix=RTK_FIX,
     ),
-    "perfect": SensorSet("perfect", (_QUIET,) * 8, gps_rate=10.0, gps_fix=RTK_FIX, perfect=True),
+    "perfect": SensorSuite(
+        "perfect",
+        gyro=ErrorModel(),
+        accelerometer=ErrorModel(),
+        magnetometer=ErrorModel(),
+        barometer=ErrorModel(),
+        gps=GpsReceiver(ErrorModel(), ErrorModel(), ErrorModel(), rate=10.0, fix_type=RTK_FIX),
+        range_finder=RangeFinder(0.0, 0.0, 1.0),
+        perfect=True,
+    ),
 }
 
 
@@ -145,75 +243,220 @@ class Sigma(NamedTuple):
     vertical: float
 
 
-def sensor_set(name: str) -> SensorSet:
-    """The set of that *name*; a ``UsageError`` lists the valid names."""
-    if name not in SENSOR_SETS:
-        hint = did_you_mean(name, SENSOR_SETS)
-        raise UsageError(f"no sensor set named {name!r}{hint}; there is {choices(SENSOR_SETS)}")
-    return SENSOR_SETS[name]
-
-
 def declared_sigma(name: str) -> Sigma:
-    """How far a position from the set's receiver is from the truth, one standard deviation.
+    """Return how far a position from the suite's receiver is from the true one, one standard deviation.
 
     Horizontal: root of the sum of both axes' variances (the "drms" of receivers' data sheets). Vertical: the
-    receiver's height, and where that is not a real-time kinematic fix the barometer's error beside it.
+    receiver's height, and without a real-time kinematic fix also the barometer's error.
     """
-    chosen = sensor_set(name)
-    level = chosen.noises[GPS_LEVEL].variance
-    height = chosen.noises[GPS_HEIGHT].variance
-    air = 0.0 if chosen.gps_fix >= RTK_FIX else chosen.noises[BARO].variance
-    return Sigma(horizontal=sqrt(2.0 * level), vertical=sqrt(height + air))
+    suite = sensor_suite(name)
+    air = 0.0 if suite.gps.fix_type >= RTK_FIX else suite.barometer.variance
+    return Sigma(
+        horizontal=sqrt(2.0 * suite.gps.horizontal.variance), vertical=sqrt(suite.gps.vertical.variance + air)
+    )
+
+
+# --- sensors added by a package ---
+
+
+class SensorInput(NamedTuple):
+    """True state of a body at a sampling step, for an added sensor.
+
+    Args:
+        time: Time of the step [ns].
+        position: East, north, up about the world's origin [m].
+        velocity: East, north, up [m/s].
+        attitude: Quaternion (w, x, y, z) from body (forward, left, up) to east, north, up.
+        rates: Body rates about forward, left, up [rad/s].
+        specific_force: Forward, left, up [m/s^2].
+        air_velocity: Velocity of the air, east, north, up [m/s]: mean wind and gust.
+        ground: Height of the ground straight below, up [m].
+    """
+
+    time: Ns
+    position: Vector
+    velocity: Vector
+    attitude: Quaternion
+    rates: Vector
+    specific_force: Vector
+    air_velocity: Vector
+    ground: float
+
+
+@dataclass(frozen=True)
+class Sensor(ABC):
+    """A sensor that a package adds: derive from it, and name an instance in the group ``volery.sensors``.
+
+    Args:
+        name: Name by which the sensor is mounted and read.
+        error: Error of each measured component, in the component's unit.
+        rate: Samples per second [Hz]; samples lie on the world's grid of 2 ms.
+    """
+
+    name: str
+    error: ErrorModel
+    rate: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.rate * STEP_S <= 1.0:
+            raise UsageError(
+                f"sensor {self.name}: a rate of {self.rate} Hz; give one up to {1.0 / STEP_S:g} Hz"
+            )
+
+    @abstractmethod
+    def ideal(self, state: SensorInput) -> tuple[float, ...]:
+        """Return the measured components without error: a pure function of *state*."""
+
+    def output(self, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the reading for *values* with errors: override it to saturate or to quantise."""
+        return values
+
+
+class Measurement(NamedTuple):
+    """One sample of an added sensor: time of its grid step [ns], and its components."""
+
+    time: Ns
+    values: tuple[float, ...]
+
+
+class MountedSensor:
+    """One added sensor on one body: takes its samples in order and keeps the last."""
+
+    def __init__(self, sensor: Sensor, seed: int, body: int) -> None:
+        self._sensor = sensor
+        self._key = np.uint64(key(seed, f"world/body/{body}/sensor/{sensor.name}"))
+        self._every = round(1.0 / (sensor.rate * STEP_S))
+        self._decay = sensor.error.decay(self._every * STEP_S)
+        self._bias: list[float] = []
+        self.next_step = 0
+        """Grid step of the next sample."""
+        self.last = Measurement(0, ())
+
+    def sample(self, state: SensorInput) -> None:
+        """Take the sample of ``next_step``, at which *state* is the body's."""
+        k, error = self.next_step, self._sensor.error
+        ideal = self._sensor.ideal(state)
+        gain = error.bias_sigma * (sqrt(1.0 - self._decay * self._decay) if self._bias else 1.0)
+        before = self._bias or [0.0] * len(ideal)
+        self._bias = [
+            self._decay * bias + gain * gaussian(self._key, 2 * axis, k) for axis, bias in enumerate(before)
+        ]
+        noisy = tuple(
+            value + bias + error.white_sigma * gaussian(self._key, 2 * axis + 1, k)
+            for axis, (value, bias) in enumerate(zip(ideal, self._bias, strict=True))
+        )
+        self.last = Measurement(state.time, self._sensor.output(noisy))
+        self.next_step = k + self._every
+
+
+sensors: Registry[SensorSuite | Sensor] = Registry("volery.sensors", "sensor")
+"""Sensor suites and sensors of other packages."""
+
+
+def sensor_suite(name: str) -> SensorSuite:
+    """Return the suite called *name*, built in or of an entry point.
+
+    Raises:
+        UsageError: There is none of that name; the text lists the valid ones.
+    """
+    if name in SENSOR_SUITES:
+        return SENSOR_SUITES[name]
+    if name not in sensors.names():
+        hint = did_you_mean(name, SENSOR_SUITES)
+        raise UsageError(f"no sensor set named {name!r}{hint}; there is {choices(SENSOR_SUITES)}")
+    found = sensors.load(name)
+    if not isinstance(found, SensorSuite):
+        raise UsageError(
+            f"{name!r} is a single sensor, not a suite: list it under the vehicle's added sensors"
+        )
+    return found
+
+
+def added_sensor(name: str) -> Sensor:
+    """Return the sensor that a package registered as *name*.
+
+    Raises:
+        UsageError: There is none of that name, or it is a suite.
+    """
+    found = sensors.load(name)
+    if not isinstance(found, Sensor):
+        raise UsageError(f"{name!r} is a suite of sensors: give it as the vehicle's sensors")
+    return found
+
+
+# --- compiled sampling ---
+
+
+def fill_sensor_parameters(row: Array, suite: SensorSuite) -> None:
+    """Write the parameters of *suite* into a state row."""
+    for at, error in (
+        (P_GYRO_ERROR, suite.gyro),
+        (P_ACCEL_ERROR, suite.accelerometer),
+        (P_MAG_ERROR, suite.magnetometer),
+        (P_BARO_ERROR, suite.barometer),
+        (P_GPS_HORIZONTAL_ERROR, suite.gps.horizontal),
+        (P_GPS_VERTICAL_ERROR, suite.gps.vertical),
+        (P_GPS_VELOCITY_ERROR, suite.gps.velocity),
+        (P_RANGE_ERROR, suite.range_finder),
+    ):
+        decay = error.decay(BIAS_EVERY * STEP_S)
+        row[at + WHITE_SIGMA] = error.white_sigma
+        row[at + BIAS_SIGMA] = error.bias_sigma
+        row[at + BIAS_DECAY] = decay
+        row[at + BIAS_GAIN] = error.bias_sigma * sqrt(1.0 - decay * decay)
+    row[P_GPS_PERIOD] = round(1.0 / (suite.gps.rate * STEP_S))
+    row[P_GPS_FIX] = suite.gps.fix_type
+    row[P_MAX_RANGE] = suite.range_finder.max_range
+    row[P_PERFECT] = float(suite.perfect)
 
 
 @njit(cache=False)
-def _drift(row: Array, key: np.uint64, k: int) -> None:
-    """Move every slow error by one period."""
-    stream = _SLOW
-    for sensor, first, axes in (
-        (GYRO, M_GYRO_BIAS, 3),
-        (ACCEL, M_ACCEL_BIAS, 3),
-        (MAG, M_MAG_BIAS, 3),
-        (BARO, M_BARO_BIAS, 1),
-        (GPS_LEVEL, M_GPS_BIAS, 2),
-        (GPS_HEIGHT, M_GPS_BIAS + 2, 1),
+def _advance_biases(row: Array, key: np.uint64, k: int) -> None:
+    """Advance every bias by one period."""
+    stream = _BIAS_STREAM
+    for error, first, axes in (
+        (P_GYRO_ERROR, M_GYRO_BIAS, 3),
+        (P_ACCEL_ERROR, M_ACCEL_BIAS, 3),
+        (P_MAG_ERROR, M_MAG_BIAS, 3),
+        (P_BARO_ERROR, M_BARO_BIAS, 1),
+        (P_GPS_HORIZONTAL_ERROR, M_GPS_BIAS, 2),
+        (P_GPS_VERTICAL_ERROR, M_GPS_BIAS + 2, 1),
     ):
-        at = P_SENSOR + 4 * sensor
         for axis in range(axes):
-            kick = row[at + SENSOR_KICK] if k > 0 else row[at + SENSOR_SLOW]
-            decayed = row[at + SENSOR_DECAY] * row[first + axis]
-            row[first + axis] = decayed + kick * gaussian(key, stream, k)
+            gain = row[error + BIAS_GAIN] if k > 0 else row[error + BIAS_SIGMA]
+            decayed = row[error + BIAS_DECAY] * row[first + axis]
+            row[first + axis] = decayed + gain * gaussian(key, stream, k)
             stream += 1
 
 
 @njit(cache=False)
-def _inertial(row: Array, key: np.uint64, k: int) -> None:
-    gyro = row[P_SENSOR + 4 * GYRO + SENSOR_WHITE]
-    accel = row[P_SENSOR + 4 * ACCEL + SENSOR_WHITE]
+def _sample_inertial(row: Array, key: np.uint64, k: int) -> None:
+    gyro = row[P_GYRO_ERROR + WHITE_SIGMA]
+    accel = row[P_ACCEL_ERROR + WHITE_SIGMA]
     for axis in range(3):
         sign = 1.0 if axis == 0 else -1.0
         row[M_GYRO + axis] = sign * row[S_RATES + axis] + row[M_GYRO_BIAS + axis]
-        row[M_ACCEL + axis] = sign * row[S_FORCE + axis] + row[M_ACCEL_BIAS + axis]
-        if gyro > 0.0:
-            row[M_GYRO + axis] += gyro * gaussian(key, _GYRO + axis, k)
-            row[M_ACCEL + axis] += accel * gaussian(key, _ACCEL + axis, k)
+        row[M_ACCEL + axis] = sign * row[S_SPECIFIC_FORCE + axis] + row[M_ACCEL_BIAS + axis]
+        if gyro > 0.0 or accel > 0.0:
+            row[M_GYRO + axis] += gyro * gaussian(key, _GYRO_STREAM + axis, k)
+            row[M_ACCEL + axis] += accel * gaussian(key, _ACCEL_STREAM + axis, k)
 
 
 @njit(cache=False)
-def _barometer(row: Array, key: np.uint64, k: int) -> None:
+def _sample_barometer(row: Array, key: np.uint64, k: int) -> None:
     if row[U_BARO_BLOCKED] != 0.0:
         return
-    noise = row[P_SENSOR + 4 * BARO + SENSOR_WHITE] * gaussian(key, _BARO, k)
+    noise = row[P_BARO_ERROR + WHITE_SIGMA] * gaussian(key, _BARO_STREAM, k)
     row[M_BARO] = row[S_POSITION + 2] + row[M_BARO_BIAS] + noise
     row[M_BARO_COUNT] += 1.0
 
 
 @njit(cache=False)
-def _compass(row: Array, key: np.uint64, k: int) -> None:
+def _sample_magnetometer(row: Array, key: np.uint64, k: int) -> None:
     if row[U_MAG_BLOCKED] != 0.0:
         return
-    white = row[P_SENSOR + 4 * MAG + SENSOR_WHITE]
-    north, east, down = row[P_FIELD], row[P_FIELD + 1], row[P_FIELD + 2]
+    white = row[P_MAG_ERROR + WHITE_SIGMA]
+    north, east, down = row[P_MAGNETIC_FIELD], row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD + 2]
     for axis in range(3):
         sign = 1.0 if axis == 0 else -1.0
         field = (
@@ -221,34 +464,34 @@ def _compass(row: Array, key: np.uint64, k: int) -> None:
             + row[W_ROTATION + 3 + axis] * north
             - row[W_ROTATION + 6 + axis] * down
         )
-        error = row[M_MAG_BIAS + axis] + white * gaussian(key, _MAG + axis, k)
+        error = row[M_MAG_BIAS + axis] + white * gaussian(key, _MAG_STREAM + axis, k)
         row[M_MAG + axis] = sign * field + error
     row[M_MAG_COUNT] += 1.0
 
 
 @njit(cache=False)
-def _range_finder(row: Array, key: np.uint64, k: int) -> None:
+def _sample_range_finder(row: Array, key: np.uint64, k: int) -> None:
     slant = (row[S_POSITION + 2] - row[S_GROUND]) / max(row[W_ROTATION + 8], 0.1)
-    slant += row[P_SENSOR + 4 * RANGE + SENSOR_WHITE] * gaussian(key, _RANGE, k)
-    seen = slant <= row[P_RANGE_TOP] and row[W_ROTATION + 8] > 0.5
-    row[M_RANGE] = max(slant, 0.0) if seen else -1.0
+    slant += row[P_RANGE_ERROR + WHITE_SIGMA] * gaussian(key, _RANGE_STREAM, k)
+    in_range = slant <= row[P_MAX_RANGE] and row[W_ROTATION + 8] > 0.5
+    row[M_RANGE] = max(slant, 0.0) if in_range else -1.0
 
 
 @njit(cache=False)
-def _satellites(row: Array, key: np.uint64, k: int) -> None:
+def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
     if row[U_GPS_BLOCKED] != 0.0:
         row[M_GPS_FIX] = 0.0
         return
-    level = row[P_SENSOR + 4 * GPS_LEVEL + SENSOR_WHITE]
-    height = row[P_SENSOR + 4 * GPS_HEIGHT + SENSOR_WHITE]
-    speed = row[P_SENSOR + 4 * GPS_SPEED + SENSOR_WHITE]
+    horizontal = row[P_GPS_HORIZONTAL_ERROR + WHITE_SIGMA]
+    vertical = row[P_GPS_VERTICAL_ERROR + WHITE_SIGMA]
+    speed = row[P_GPS_VELOCITY_ERROR + WHITE_SIGMA]
     for axis in range(3):
         source = 1 - axis if axis < 2 else 2
         sign = 1.0 if axis < 2 else -1.0
-        white = level if axis < 2 else height
-        error = row[M_GPS_BIAS + axis] + white * gaussian(key, _GPS + axis, k)
+        white = horizontal if axis < 2 else vertical
+        error = row[M_GPS_BIAS + axis] + white * gaussian(key, _GPS_STREAM + axis, k)
         row[M_GPS + axis] = sign * row[S_POSITION + source] + error
-        noise = speed * gaussian(key, _SPEED + axis, k)
+        noise = speed * gaussian(key, _GPS_VELOCITY_STREAM + axis, k)
         row[M_GPS_VELOCITY + axis] = sign * row[S_VELOCITY + source] + noise
     row[M_GPS_FIX] = row[P_GPS_FIX]
     row[M_GPS_COUNT] += 1.0
@@ -256,13 +499,13 @@ def _satellites(row: Array, key: np.uint64, k: int) -> None:
 
 @njit(cache=False)
 def sample_sensors(row: Array, key: np.uint64, k: int) -> None:
-    """Take the samples that fall due at step *k*; ``W_ROTATION`` is the body's at that step."""
-    if k % SLOW_EVERY == 0:
-        _drift(row, key, k)
-    _inertial(row, key, k)
-    if k % AIR_EVERY == 0:
-        _barometer(row, key, k)
-        _compass(row, key, k)
-        _range_finder(row, key, k)
+    """Take the samples that are due at step *k*; ``W_ROTATION`` holds the attitude of that step."""
+    if k % BIAS_EVERY == 0:
+        _advance_biases(row, key, k)
+    _sample_inertial(row, key, k)
+    if k % SLOW_SENSORS_EVERY == 0:
+        _sample_barometer(row, key, k)
+        _sample_magnetometer(row, key, k)
+        _sample_range_finder(row, key, k)
     if k % int(row[P_GPS_PERIOD]) == 0:
-        _satellites(row, key, k)
+        _sample_gps(row, key, k)

@@ -1,9 +1,12 @@
-"""Where each quantity stands in the arrays that the compiled step works on: one row a body, columns named
-here.
+"""Declared layout of the state rows that the compiled step works on: one row of floats per body.
 
-Compiled code reads these names as constants, and one row a body keeps all that a step touches close together.
-SI units; ``S_`` state, ``U_`` inputs, ``M_`` measurements, ``P_`` parameters, ``W_`` scratch. A composer (an
-autopilot's flight loops) adds columns of its own from ``WORLD`` on.
+Each field is declared once, in order, with its width, unit and axes; its column follows from the fields
+before it, so two fields cannot overlap and a new field only shifts the later ones. The columns are module
+constants, which numba compiles into the code as literals. Structured arrays were rejected: the integrator
+treats the first columns as one vector, which records do not allow without copies.
+
+Prefixes: ``S_`` state, ``U_`` inputs, ``M_`` measurements, ``P_`` parameters, ``W_`` scratch. The flight
+stack continues the layout with ``Layout(after=WORLD_LAYOUT)``. SI units.
 """
 
 from __future__ import annotations
@@ -16,141 +19,207 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# --- state: what RK4 integrates -----------------------------------------------------------------------------
-S_POSITION = 0  # east, north, up about the world's origin [m]
-S_VELOCITY = 3  # east, north, up [m/s]
-S_ATTITUDE = 6  # quaternion w, x, y, z; body (forward, left, up) to east, north, up
-S_RATES = 10  # body rates about forward, left, up [rad/s]
-S_ROTORS = 13  # four rotor speeds [rad/s]; rover: steering angle [rad], wheel speed [m/s], 0, 0
-S_CHARGE = 17  # charge drawn from the battery [A s]
-S_ENERGY = 18  # energy drawn at the battery's terminals [J]
-INTEGRATED = 19
-# --- state: what follows from it at the end of a step -------------------------------------------------------
-S_VOLTS = 19
-S_AMPS = 20
-S_ON_GROUND = 21  # 1 while any foot or wheel touches
-S_RESTING = 22  # 1 while it neither moves nor can
-S_CONTACT_SPEED = 23  # downward speed at the last touch-down [m/s]
-S_CONTACTS = 24  # touch-downs so far
-S_FORCE = 25  # specific force forward, left, up: what an ideal accelerometer feels [m/s^2]
-S_GUST = 28  # east, north, up [m/s]
-S_GROUND = 31  # height of the ground straight below [m up]
-S_PAYLOAD_ENERGY = 32  # of the energy, that of the on-board computers [J]
-S_DISTANCE = 33  # path length flown or driven [m]
-S_AWAKE = 34  # 1 once the first samples are taken
-STATE = 35
-_U = STATE
+STEP_S = 0.002
+"""Grid step of the world [s]: 500 Hz."""
 
-# --- inputs -------------------------------------------------------------------------------------------------
-U_THROTTLE = _U  # four motor commands 0..1; rover: steering -1..1, throttle -1..1 (used by `bodies` alone)
-U_PAYLOAD = _U + 4  # electrical power of on-board computers [W]
-U_WIND = _U + 5  # mean wind, east, north, up: where the air goes [m/s]
-U_MOTOR_HEALTH = _U + 8  # four factors 0..1 on rotor thrust
-U_GPS_BLOCKED = _U + 12  # 1: the receiver sees no satellites
-U_GUST = _U + 13  # standard deviation of gusts [m/s]
-U_BARO_BLOCKED = _U + 14
-U_MAG_BLOCKED = _U + 15
-INPUTS = _U + 16
-_M = INPUTS
 
-# --- measurements: the last sample of each sensor, in the autopilot's axes ----------------------------------
-M_GYRO = _M  # rates forward, right, down [rad/s]
-M_ACCEL = _M + 3  # specific force forward, right, down [m/s^2]
-M_MAG = _M + 6  # field forward, right, down [gauss]
-M_BARO = _M + 9  # pressure altitude about the world's origin [m up]
-M_GPS = _M + 10  # north, east, down about the world's origin [m]
-M_GPS_VELOCITY = _M + 13  # north, east, down [m/s]
-M_GPS_FIX = _M + 16  # 0 none, 3 three-dimensional, 6 real-time kinematic, fixed (MAVLink's GPS_FIX_TYPE)
-M_GPS_COUNT = _M + 17  # fixes so far: a new one when it grows
-M_RANGE = _M + 18  # distance to the ground along the body's down axis [m]; -1 out of range
-M_BARO_COUNT = _M + 19
-M_MAG_COUNT = _M + 20
-M_GYRO_BIAS = _M + 21  # the sensors' slowly varying errors: a composer must not read these
-M_ACCEL_BIAS = _M + 24
-M_MAG_BIAS = _M + 27
-M_BARO_BIAS = _M + 30
-M_GPS_BIAS = _M + 31
-MEASUREMENTS = _M + 34
-_P = MEASUREMENTS
+class Field(NamedTuple):
+    """One declared field: it takes *width* columns from *column* on."""
 
-# --- parameters of all bodies -------------------------------------------------------------------------------
+    name: str
+    column: int
+    width: int
+    unit: str
+    axes: str
+    meaning: str
+
+
+class Layout:
+    """Allots consecutive columns to fields in the order of their declaration.
+
+    Args:
+        after: The layout that this one continues; ``None``: columns start at 0.
+    """
+
+    def __init__(self, after: Layout | None = None) -> None:
+        self.start = self.end = after.end if after else 0
+        self.fields: list[Field] = []
+
+    def add(self, name: str, unit: str, meaning: str, width: int = 1, axes: str = "") -> int:
+        """Declare a field and return its first column.
+
+        Args:
+            name: Name of the module constant that holds the column.
+            unit: SI unit, ``1`` for a ratio, a flag or a count.
+            meaning: What the field holds.
+            width: Number of columns, at least 1.
+            axes: What the columns stand for, in order, where there are several.
+        """
+        field = Field(name, self.end, width, unit, axes, meaning)
+        self.fields.append(field)
+        self.end += width
+        return field.column
+
+
+ENU = "east, north, up"
+FLU = "forward, left, up"
+NED = "north, east, down"
+FRD = "forward, right, down"
+MOTORS = "motor 0 to motor 3"
+
+WORLD_LAYOUT = Layout()
+_add = WORLD_LAYOUT.add
+
+# --- state that RK4 integrates ---
+S_POSITION = _add("S_POSITION", "m", "about the world's origin", 3, ENU)
+S_VELOCITY = _add("S_VELOCITY", "m/s", "over the ground", 3, ENU)
+S_ATTITUDE = _add("S_ATTITUDE", "1", f"quaternion from body ({FLU}) to world ({ENU})", 4, "w, x, y, z")
+S_RATES = _add("S_RATES", "rad/s", "body rates", 3, FLU)
+S_ROTORS = _add(
+    "S_ROTORS", "rad/s", "rotor speeds; rover: steering angle [rad], wheel speed [m/s], 0, 0", 4, MOTORS
+)
+S_CHARGE = _add("S_CHARGE", "A s", "charge drawn from the battery")
+S_ENERGY = _add("S_ENERGY", "J", "energy drawn at the battery's terminals")
+INTEGRATED = WORLD_LAYOUT.end
+"""Number of columns that the integrator advances; they are the first of a row."""
+
+# --- state derived at the end of a step ---
+S_VOLTS = _add("S_VOLTS", "V", "at the battery's terminals")
+S_AMPS = _add("S_AMPS", "A", "drawn from the battery")
+S_ON_GROUND = _add("S_ON_GROUND", "1", "1 while a foot or a wheel touches the ground")
+S_RESTING = _add("S_RESTING", "1", "1 while the body stands still and its thrust cannot lift it")
+S_CONTACT_SPEED = _add("S_CONTACT_SPEED", "m/s", "downward speed at the last touch-down")
+S_CONTACTS = _add("S_CONTACTS", "1", "number of touch-downs")
+S_SPECIFIC_FORCE = _add("S_SPECIFIC_FORCE", "m/s^2", "reading of an ideal accelerometer", 3, FLU)
+S_GUST = _add("S_GUST", "m/s", "gust velocity at the body", 3, ENU)
+S_GROUND = _add("S_GROUND", "m", "height of the ground straight below, up")
+S_PAYLOAD_ENERGY = _add("S_PAYLOAD_ENERGY", "J", "part of S_ENERGY that the on-board computers used")
+S_DISTANCE = _add("S_DISTANCE", "m", "length of the path flown or driven")
+S_STARTED = _add("S_STARTED", "1", "1 once the first samples are taken")
+STATE = WORLD_LAYOUT.end
+"""Number of columns of the state; they come before all others."""
+
+# --- inputs ---
+U_THROTTLE = _add(
+    "U_THROTTLE",
+    "1",
+    "motor commands 0..1 without an autopilot; rover: steering, throttle -1..1",
+    4,
+    MOTORS,
+)
+U_PAYLOAD = _add("U_PAYLOAD", "W", "electrical power of the on-board computers")
+U_WIND = _add("U_WIND", "m/s", "mean velocity of the air", 3, ENU)
+U_MOTOR_HEALTH = _add("U_MOTOR_HEALTH", "1", "factor 0..1 on rotor thrust", 4, MOTORS)
+U_GPS_BLOCKED = _add("U_GPS_BLOCKED", "1", "1: the receiver sees no satellites")
+U_GUST = _add("U_GUST", "m/s", "standard deviation of gusts")
+U_BARO_BLOCKED = _add("U_BARO_BLOCKED", "1", "1: the barometer gives no new samples")
+U_MAG_BLOCKED = _add("U_MAG_BLOCKED", "1", "1: the magnetometer gives no new samples")
+
+# --- measurements: last sample of each sensor, in the axes of autopilots ---
+M_GYRO = _add("M_GYRO", "rad/s", "body rates", 3, FRD)
+M_ACCEL = _add("M_ACCEL", "m/s^2", "specific force", 3, FRD)
+M_MAG = _add("M_MAG", "gauss", "magnetic field", 3, FRD)
+M_BARO = _add("M_BARO", "m", "pressure altitude about the world's origin, up")
+M_GPS = _add("M_GPS", "m", "position about the world's origin", 3, NED)
+M_GPS_VELOCITY = _add("M_GPS_VELOCITY", "m/s", "velocity over the ground", 3, NED)
+M_GPS_FIX = _add("M_GPS_FIX", "1", "MAVLink GPS_FIX_TYPE: 0 none, 3 three-dimensional, 6 RTK fixed")
+M_GPS_COUNT = _add("M_GPS_COUNT", "1", "number of fixes; grows with each new one")
+M_RANGE = _add("M_RANGE", "m", "distance to the ground along the body's down axis; -1 out of range")
+M_BARO_COUNT = _add("M_BARO_COUNT", "1", "number of barometer samples")
+M_MAG_COUNT = _add("M_MAG_COUNT", "1", "number of magnetometer samples")
+SAMPLES_END = WORLD_LAYOUT.end
+"""First column after the samples that an autopilot may read."""
+M_GYRO_BIAS = _add("M_GYRO_BIAS", "rad/s", "true bias; not for autopilots, as the four below", 3, FRD)
+M_ACCEL_BIAS = _add("M_ACCEL_BIAS", "m/s^2", "true bias", 3, FRD)
+M_MAG_BIAS = _add("M_MAG_BIAS", "gauss", "true bias", 3, FRD)
+M_BARO_BIAS = _add("M_BARO_BIAS", "m", "true bias, up")
+M_GPS_BIAS = _add("M_GPS_BIAS", "m", "true bias", 3, NED)
+
+# --- parameters of all bodies ---
 MULTIROTOR = 0.0
 ROVER = 1.0
-P_KIND = _P
-P_MASS = _P + 1
-P_INERTIA = _P + 2  # about forward, left, up [kg m^2]
-P_DRAG_LINEAR = _P + 5  # [N s/m]
-P_DRAG_QUADRATIC = _P + 6  # [N s^2/m^2]
-P_SPIN_DAMPING = _P + 7  # [N m s/rad]
-P_FEET = _P + 8  # half length, half width, depth below the centre [m]
-P_STIFFNESS = _P + 11  # of one foot [N/m]
-P_DAMPING = _P + 12  # of one foot [N s/m]
-P_FRICTION = _P + 13  # Coulomb's coefficient
-P_CAPACITY = _P + 14  # [A s]
-P_CELLS = _P + 15
-P_RESISTANCE = _P + 16  # of the whole battery [ohm]
-P_IDLE_POWER = _P + 17  # autopilot, receivers and sensors [W]
-P_GUST_DECAY = _P + 18  # factor over one gust period
-P_GUST_KICK = _P + 19
-P_GRAVITY = _P + 20
-P_SENSOR = _P + 21  # sigma, bias sigma, decay and kick of each sensor: see SENSOR columns below
-# --- multirotor ---------------------------------------------------------------------------------------------
-P_ROTOR_X = _P + 60  # four, forward of the centre [m]
-P_ROTOR_Y = _P + 64  # four, left of the centre [m]
-P_ROTOR_SPIN = (
-    _P + 68
-)  # four, +1 where the reaction torque is about +up (the rotor turns clockwise from above)
-P_THRUST = _P + 72  # k_T, thrust = k_T w^2 [N s^2]
-P_TORQUE = _P + 73  # k_Q, torque = k_Q w^2 [N m s^2]
-P_ROTOR_LAG = _P + 74  # [s]
-P_ROTOR_TOP = _P + 75  # speed at full throttle and full battery [rad/s]
-P_EFFICIENCY = _P + 76  # of motor and speed controller
-P_FULL_VOLTS = _P + 77
-# --- rover --------------------------------------------------------------------------------------------------
-P_WHEELBASE = _P + 60
-P_STEER_TOP = _P + 61  # [rad]
-P_STEER_LAG = _P + 62  # [s]
-P_SPEED_TOP = _P + 63  # at full throttle [m/s]
-P_SPEED_LAG = _P + 64  # [s]
-P_ROLLING = _P + 65  # rolling resistance coefficient
-P_DRIVE_EFFICIENCY = _P + 66
-P_SKID = _P + 67  # 1: turns on the spot, steering is a turn rate
-P_TURN_TOP = _P + 68  # skid: turn rate at full steering [rad/s]
-P_GRIP = _P + 69  # largest lateral acceleration [m/s^2]
-PARAMETERS = _P + 80
+P_KIND = _add("P_KIND", "1", "MULTIROTOR or ROVER")
+P_MASS = _add("P_MASS", "kg", "mass")
+P_INERTIA = _add("P_INERTIA", "kg m^2", "principal moments of inertia", 3, FLU)
+P_DRAG_LINEAR = _add("P_DRAG_LINEAR", "N s/m", "linear drag coefficient")
+P_DRAG_QUADRATIC = _add("P_DRAG_QUADRATIC", "N s^2/m^2", "quadratic drag coefficient")
+P_SPIN_DAMPING = _add("P_SPIN_DAMPING", "N m s/rad", "damping of body rates")
+P_FEET = _add("P_FEET", "m", "position of the feet", 3, "half length, half width, depth below the centre")
+P_STIFFNESS = _add("P_STIFFNESS", "N/m", "spring of one foot")
+P_DAMPING = _add("P_DAMPING", "N s/m", "damper of one foot")
+P_FRICTION = _add("P_FRICTION", "1", "Coulomb friction coefficient")
+P_CAPACITY = _add("P_CAPACITY", "A s", "battery capacity")
+P_CELLS = _add("P_CELLS", "1", "battery cells in series")
+P_RESISTANCE = _add("P_RESISTANCE", "ohm", "resistance of the whole battery")
+P_IDLE_POWER = _add("P_IDLE_POWER", "W", "power of autopilot, receivers and sensors")
+P_GUST_DECAY = _add("P_GUST_DECAY", "1", "factor on a gust over one gust period")
+P_GUST_GAIN = _add("P_GUST_GAIN", "1", "gain on a gust's driving noise")
+P_GRAVITY = _add("P_GRAVITY", "m/s^2", "acceleration of gravity")
+P_MAGNETIC_FIELD = _add("P_MAGNETIC_FIELD", "gauss", "the earth's field at the world's origin", 3, NED)
 
-# --- parameters of sensors, from P_SENSOR on: white sigma, slow sigma, slow decay, slow kick ----------------
-GYRO, ACCEL, MAG, BARO, GPS_LEVEL, GPS_HEIGHT, GPS_SPEED, RANGE = range(8)
-SENSOR_WHITE, SENSOR_SLOW, SENSOR_DECAY, SENSOR_KICK = range(4)
-P_GPS_PERIOD = _P + 53  # in steps
-P_GPS_FIX = _P + 54
-P_RANGE_TOP = _P + 55  # [m]
-P_FIELD = _P + 56  # the earth's magnetic field, north, east, down [gauss]
-P_PERFECT = _P + 59  # 1: sensors without error, estimate taken from the truth
+# --- parameters of sensors: four columns of error parameters for each measured quantity ---
+WHITE_SIGMA, BIAS_SIGMA, BIAS_DECAY, BIAS_GAIN = range(4)
+"""Offsets into the error parameters of one quantity."""
+ERROR = "white sigma, bias sigma, bias decay per period [1], gain on the bias's driving noise"
+P_GYRO_ERROR = _add("P_GYRO_ERROR", "rad/s", "gyroscope", 4, ERROR)
+P_ACCEL_ERROR = _add("P_ACCEL_ERROR", "m/s^2", "accelerometer", 4, ERROR)
+P_MAG_ERROR = _add("P_MAG_ERROR", "gauss", "magnetometer", 4, ERROR)
+P_BARO_ERROR = _add("P_BARO_ERROR", "m", "barometer", 4, ERROR)
+P_GPS_HORIZONTAL_ERROR = _add("P_GPS_HORIZONTAL_ERROR", "m", "GPS position, per horizontal axis", 4, ERROR)
+P_GPS_VERTICAL_ERROR = _add("P_GPS_VERTICAL_ERROR", "m", "GPS height", 4, ERROR)
+P_GPS_VELOCITY_ERROR = _add("P_GPS_VELOCITY_ERROR", "m/s", "GPS velocity, per axis", 4, ERROR)
+P_RANGE_ERROR = _add("P_RANGE_ERROR", "m", "range finder", 4, ERROR)
+P_GPS_PERIOD = _add("P_GPS_PERIOD", "1", "grid steps between two fixes")
+P_GPS_FIX = _add("P_GPS_FIX", "1", "MAVLink GPS_FIX_TYPE that the receiver reaches")
+P_MAX_RANGE = _add("P_MAX_RANGE", "m", "reach of the range finder")
+P_PERFECT = _add("P_PERFECT", "1", "1: sensors without error, and the estimate is the true state")
 
-# --- scratch: nothing in it outlives a step -----------------------------------------------------------
-W_Y = PARAMETERS  # the state at which a slope is taken
-W_SLOPE = W_Y + INTEGRATED
-W_TOTAL = W_SLOPE + INTEGRATED
-W_ROTATION = W_TOTAL + INTEGRATED  # 3 x 3 by rows: body axes to east, north, up
-W_FORCE = W_ROTATION + 9  # east, north, up [N]
-W_TORQUE = W_FORCE + 3  # forward, left, up [N m]
-W_AIR = W_TORQUE + 3  # velocity of the air, held over a step [m/s]
-W_GROUND = W_AIR + 3  # height of the ground, held over a step [m up]
-W_THROTTLE = W_GROUND + 1  # the motor commands of a step
-W_BEFORE = W_THROTTLE + 4  # velocity before the step [m/s]
-W_BELIEF = W_BEFORE + 3  # 3 x 3 by rows: a composer's idea of forward, right, down to north, east, down
-W_TURN = W_BELIEF + 9
-WORLD = W_TURN + 3
-"""Columns of the world; a composer's own begin here."""
+# --- parameters of multirotors ---
+P_ROTOR_X = _add("P_ROTOR_X", "m", "rotor positions forward of the centre", 4, MOTORS)
+P_ROTOR_Y = _add("P_ROTOR_Y", "m", "rotor positions left of the centre", 4, MOTORS)
+P_ROTOR_SPIN = _add(
+    "P_ROTOR_SPIN", "1", "+1: reaction torque about up (rotor turns clockwise from above), or -1", 4, MOTORS
+)
+P_THRUST = _add("P_THRUST", "N s^2", "k_T in thrust = k_T w^2")
+P_TORQUE = _add("P_TORQUE", "N m s^2", "k_Q in torque = k_Q w^2")
+P_ROTOR_LAG = _add("P_ROTOR_LAG", "s", "time constant of rotor speed")
+P_MAX_ROTOR_SPEED = _add("P_MAX_ROTOR_SPEED", "rad/s", "at full throttle and full battery")
+P_EFFICIENCY = _add("P_EFFICIENCY", "1", "efficiency of motor and speed controller")
+P_FULL_VOLTS = _add("P_FULL_VOLTS", "V", "open-circuit voltage of the full battery")
+
+# --- parameters of rovers ---
+P_WHEELBASE = _add("P_WHEELBASE", "m", "distance between the axles")
+P_MAX_STEERING = _add("P_MAX_STEERING", "rad", "largest steering angle")
+P_STEERING_LAG = _add("P_STEERING_LAG", "s", "time constant of steering")
+P_MAX_SPEED = _add("P_MAX_SPEED", "m/s", "at full throttle")
+P_SPEED_LAG = _add("P_SPEED_LAG", "s", "time constant of speed")
+P_ROLLING = _add("P_ROLLING", "1", "rolling resistance coefficient")
+P_DRIVE_EFFICIENCY = _add("P_DRIVE_EFFICIENCY", "1", "efficiency of the drive")
+P_SKID_STEERED = _add("P_SKID_STEERED", "1", "1: turns on the spot; steering commands a turn rate")
+P_MAX_TURN_RATE = _add("P_MAX_TURN_RATE", "rad/s", "skid-steered: turn rate at full steering")
+P_GRIP = _add("P_GRIP", "m/s^2", "largest acceleration that the tyres give")
+
+# --- scratch: not kept from one step to the next ---
+W_STATE = _add("W_STATE", "mixed", "state at which a slope is taken", INTEGRATED, "as the integrated state")
+W_SLOPE = _add("W_SLOPE", "mixed", "rate of change of the state", INTEGRATED, "as the integrated state")
+W_SLOPE_SUM = _add("W_SLOPE_SUM", "mixed", "sum of RK4's slopes", INTEGRATED, "as the integrated state")
+W_ROTATION = _add("W_ROTATION", "1", f"matrix from body ({FLU}) to world ({ENU})", 9, "3 x 3 by rows")
+W_FORCE = _add("W_FORCE", "N", "force without gravity", 3, ENU)
+W_TORQUE = _add("W_TORQUE", "N m", "torque", 3, FLU)
+W_AIR_VELOCITY = _add("W_AIR_VELOCITY", "m/s", "velocity of the air, constant over a step", 3, ENU)
+W_GROUND = _add("W_GROUND", "m", "height of the ground, constant over a step, up")
+W_THROTTLE = _add("W_THROTTLE", "1", "motor commands of a step, as U_THROTTLE", 4, MOTORS)
+W_LAST_VELOCITY = _add("W_LAST_VELOCITY", "m/s", "velocity before the step", 3, ENU)
+WORLD = WORLD_LAYOUT.end
+"""Number of columns of the world; the flight stack's columns begin here."""
 
 
 class Bodies(NamedTuple):
-    """All that the compiled step reads and writes.
+    """All arrays that the compiled step reads and writes.
 
-    ``rows`` (bodies, WORLD + the composer's columns); ``keys`` (bodies) of noise; ``reached`` (bodies): the
-    grid step each row stands at; ``heights`` (posts north, posts east) and ``grid`` (west edge, south edge,
-    spacing) of the terrain.
+    ``rows`` (bodies, WORLD + the flight stack's columns); ``keys`` (bodies) of the noise; ``reached``
+    (bodies): grid step of each row; ``heights`` (posts north, posts east) and ``grid`` (west edge, south
+    edge, spacing) of the terrain, in metres.
     """
 
     rows: Array
@@ -161,4 +230,4 @@ class Bodies(NamedTuple):
 
 
 Advance = Callable[[Bodies, NDArray[np.int64]], None]
-"""The compiled step: brings every body to its goal step. Composed by import, not by passing functions."""
+"""The compiled step: advances every body to its goal step. Composed by import, not by passing functions."""

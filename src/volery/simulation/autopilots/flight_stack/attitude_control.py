@@ -21,19 +21,19 @@ from numba import njit
 from volery.simulation.autopilots.flight_stack.flight_layout import (
     IDLE,
     K_ACCEL,
-    K_ACCEL_SMOOTH,
+    K_AT_LOWER_LIMIT,
     K_ATTITUDE,
-    K_DEMAND,
-    K_HOVER,
+    K_FILTERED_ACCEL,
+    K_HOVER_THROTTLE,
     K_LANDED,
-    K_LANDED_FOR,
-    K_LOWER_LIMIT,
+    K_LANDED_TIME,
+    K_LAST_RATES,
     K_MOTORS,
-    K_RATE_BEFORE,
+    K_RATE_DERIVATIVE,
     K_RATE_INTEGRAL,
-    K_RATE_SLOPE,
     K_RATES,
     K_SPOOL,
+    K_TARGET_QUATERNION,
     K_THROTTLE,
     K_VELOCITY,
     K_YAW_SPEED,
@@ -41,8 +41,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
 )
 from volery.simulation.autopilots.flight_stack.guidance import approach
 from volery.simulation.world.arithmetic import clip
-from volery.simulation.world.body_step import STEP_S
-from volery.simulation.world.state_layout import P_ROTOR_SPIN, P_ROTOR_X, P_ROTOR_Y, Array
+from volery.simulation.world.state_layout import P_ROTOR_SPIN, P_ROTOR_X, P_ROTOR_Y, STEP_S, Array
 
 _PERIOD = 0.01  # [s]
 _SURE = 1.0  # [s]
@@ -53,24 +52,24 @@ def detect_landing(row: Array, control: int) -> None:
     """One guidance period of the detector."""
     motion = 0.0
     for axis in range(3):
-        smooth = row[K_ACCEL_SMOOTH + axis]
+        smooth = row[K_FILTERED_ACCEL + axis]
         smooth += 0.06 * (row[K_ACCEL + axis] - smooth)  # 1 Hz
-        row[K_ACCEL_SMOOTH + axis] = smooth
+        row[K_FILTERED_ACCEL + axis] = smooth
         motion += smooth * smooth
     if row[K_LANDED] > 0.5:
-        row[K_LANDED_FOR] = 0.0
+        row[K_LANDED_TIME] = 0.0
         flying = control not in (OFF, IDLE) and row[K_SPOOL] >= 1.0
-        if flying and row[K_THROTTLE] > 0.8 * row[K_HOVER]:
+        if flying and row[K_THROTTLE] > 0.8 * row[K_HOVER_THROTTLE]:
             row[K_LANDED] = 0.0
         return
     quiet = motion < 1.0 and abs(row[K_VELOCITY + 2]) < 1.0
-    low = row[K_LOWER_LIMIT] > 0.5 or row[K_THROTTLE] < 0.3 * row[K_HOVER]
+    low = row[K_AT_LOWER_LIMIT] > 0.5 or row[K_THROTTLE] < 0.3 * row[K_HOVER_THROTTLE]
     if quiet and low:
-        row[K_LANDED_FOR] += _PERIOD
-        if row[K_LANDED_FOR] >= _SURE:
+        row[K_LANDED_TIME] += _PERIOD
+        if row[K_LANDED_TIME] >= _SURE:
             row[K_LANDED] = 1.0
     else:
-        row[K_LANDED_FOR] = 0.0
+        row[K_LANDED_TIME] = 0.0
 
 
 _ATTITUDE_GAIN = 4.5  # [1/s]
@@ -95,7 +94,12 @@ _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 def _rate_targets(row: Array) -> tuple[float, float, float]:
     """Rates that turn the attitude into the demanded one, forward, right, down [rad/s]."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
-    tw, tx, ty, tz = row[K_DEMAND], row[K_DEMAND + 1], row[K_DEMAND + 2], row[K_DEMAND + 3]
+    tw, tx, ty, tz = (
+        row[K_TARGET_QUATERNION],
+        row[K_TARGET_QUATERNION + 1],
+        row[K_TARGET_QUATERNION + 2],
+        row[K_TARGET_QUATERNION + 3],
+    )
     ew = w * tw + x * tx + y * ty + z * tz
     sign = 2.0 if ew >= 0.0 else -2.0
     roll = sign * (w * tx - x * tw - y * tz + z * ty)
@@ -118,10 +122,10 @@ def _torque(row: Array, axis: int, wanted: float) -> float:
     else:
         grown = row[K_RATE_INTEGRAL + axis] + _I[axis] * error * STEP_S
         row[K_RATE_INTEGRAL + axis] = clip(grown, -_I_MOST, _I_MOST)
-    slope = (rate - row[K_RATE_BEFORE + axis]) / STEP_S
-    row[K_RATE_BEFORE + axis] = rate
-    row[K_RATE_SLOPE + axis] += _SLOPE_FILTER * (slope - row[K_RATE_SLOPE + axis])
-    torque: float = _P[axis] * error + row[K_RATE_INTEGRAL + axis] - _D[axis] * row[K_RATE_SLOPE + axis]
+    slope = (rate - row[K_LAST_RATES + axis]) / STEP_S
+    row[K_LAST_RATES + axis] = rate
+    row[K_RATE_DERIVATIVE + axis] += _SLOPE_FILTER * (slope - row[K_RATE_DERIVATIVE + axis])
+    torque: float = _P[axis] * error + row[K_RATE_INTEGRAL + axis] - _D[axis] * row[K_RATE_DERIVATIVE + axis]
     return torque
 
 
@@ -148,7 +152,7 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     low, high = low * scale, high * scale
     wanted = row[K_THROTTLE] * row[K_SPOOL]
     collective = clip(wanted, -low, max(1.0 - high, -low))
-    row[K_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
+    row[K_AT_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
     room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
     yaw = clip(yaw, -room, room)
     for i in range(4):
@@ -165,10 +169,10 @@ def run_attitude_loops(row: Array, control: int) -> None:
             row[K_MOTORS + i] = min(idle, row[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
         for axis in range(3):
             row[K_RATE_INTEGRAL + axis] = 0.0
-            row[K_RATE_BEFORE + axis] = row[K_RATES + axis]
-            row[K_RATE_SLOPE + axis] = 0.0
+            row[K_LAST_RATES + axis] = row[K_RATES + axis]
+            row[K_RATE_DERIVATIVE + axis] = 0.0
         row[K_SPOOL] = 0.0
-        row[K_LOWER_LIMIT] = 1.0
+        row[K_AT_LOWER_LIMIT] = 1.0
         return
     row[K_SPOOL] = min(1.0, row[K_SPOOL] + STEP_S / _SPOOL_TIME)
     roll_rate, pitch_rate, yaw_rate = _rate_targets(row)

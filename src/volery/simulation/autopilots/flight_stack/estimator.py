@@ -20,31 +20,29 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     K_AIDED,
     K_ALIGNED,
     K_ATTITUDE,
+    K_BARO_OFFSET,
     K_COVARIANCE,
     K_EULER,
     K_GPS_AGE,
-    K_GPS_LEVEL,
+    K_GPS_INNOVATION,
     K_GYRO_BIAS,
     K_HEADING_ERROR,
-    K_HEIGHT_ZERO,
     K_ORIGIN,
     K_POSITION,
     K_RATES,
-    K_SEEN_BARO,
-    K_SEEN_GPS,
-    K_SEEN_MAG,
-    K_SPREAD,
+    K_SIGMA,
+    K_USED_BARO,
+    K_USED_GPS,
+    K_USED_MAG,
     K_VELOCITY,
+    W_CORRECTION,
+    W_DCM,
 )
 from volery.simulation.world.arithmetic import arc_tangent2, sine_cosine, wrap_angle
-from volery.simulation.world.body_step import STEP_S
 from volery.simulation.world.dynamics import rotation_matrix
 from volery.simulation.world.sensors import RTK_FIX
 from volery.simulation.world.state_layout import (
-    BARO,
-    GPS_HEIGHT,
-    GPS_LEVEL,
-    GPS_SPEED,
+    BIAS_SIGMA,
     M_ACCEL,
     M_BARO,
     M_BARO_COUNT,
@@ -55,20 +53,21 @@ from volery.simulation.world.state_layout import (
     M_GYRO,
     M_MAG,
     M_MAG_COUNT,
-    P_FIELD,
+    P_BARO_ERROR,
+    P_GPS_HORIZONTAL_ERROR,
+    P_GPS_VELOCITY_ERROR,
+    P_GPS_VERTICAL_ERROR,
     P_GRAVITY,
+    P_MAGNETIC_FIELD,
     P_PERFECT,
-    P_SENSOR,
     S_ATTITUDE,
-    S_FORCE,
     S_POSITION,
     S_RATES,
+    S_SPECIFIC_FORCE,
     S_VELOCITY,
-    SENSOR_SLOW,
-    SENSOR_WHITE,
-    W_BELIEF,
+    STEP_S,
     W_ROTATION,
-    W_TURN,
+    WHITE_SIGMA,
     Array,
 )
 
@@ -117,29 +116,38 @@ def _turn_body(row: Array, x: float, y: float, z: float) -> None:
 
 
 @njit(cache=False)
+def _horizontal(row: Array, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the north and east components of a vector in body axes."""
+    return (
+        row[W_DCM] * x + row[W_DCM + 1] * y + row[W_DCM + 2] * z,
+        row[W_DCM + 3] * x + row[W_DCM + 4] * y + row[W_DCM + 5] * z,
+    )
+
+
+@njit(cache=False)
 def _correct(row: Array, integral: float) -> None:
     """Turn the attitude by *turn* about north, east, down and move the gyro bias the other way."""
     for axis in range(3):
         angle = (
-            row[W_BELIEF + axis] * row[W_TURN]
-            + row[W_BELIEF + 3 + axis] * row[W_TURN + 1]
-            + row[W_BELIEF + 6 + axis] * row[W_TURN + 2]
+            row[W_DCM + axis] * row[W_CORRECTION]
+            + row[W_DCM + 3 + axis] * row[W_CORRECTION + 1]
+            + row[W_DCM + 6 + axis] * row[W_CORRECTION + 2]
         )
         row[K_GYRO_BIAS + axis] -= integral * angle
     bx = (
-        row[W_BELIEF] * row[W_TURN]
-        + row[W_BELIEF + 3] * row[W_TURN + 1]
-        + row[W_BELIEF + 6] * row[W_TURN + 2]
+        row[W_DCM] * row[W_CORRECTION]
+        + row[W_DCM + 3] * row[W_CORRECTION + 1]
+        + row[W_DCM + 6] * row[W_CORRECTION + 2]
     )
     by = (
-        row[W_BELIEF + 1] * row[W_TURN]
-        + row[W_BELIEF + 4] * row[W_TURN + 1]
-        + row[W_BELIEF + 7] * row[W_TURN + 2]
+        row[W_DCM + 1] * row[W_CORRECTION]
+        + row[W_DCM + 4] * row[W_CORRECTION + 1]
+        + row[W_DCM + 7] * row[W_CORRECTION + 2]
     )
     bz = (
-        row[W_BELIEF + 2] * row[W_TURN]
-        + row[W_BELIEF + 5] * row[W_TURN + 1]
-        + row[W_BELIEF + 8] * row[W_TURN + 2]
+        row[W_DCM + 2] * row[W_CORRECTION]
+        + row[W_DCM + 5] * row[W_CORRECTION + 1]
+        + row[W_DCM + 8] * row[W_CORRECTION + 2]
     )
     _turn_body(row, bx, by, bz)
 
@@ -150,15 +158,11 @@ def _predict(row: Array) -> None:
     for axis in range(3):
         row[K_RATES + axis] = row[M_GYRO + axis] - row[K_GYRO_BIAS + axis]
     _turn_body(row, row[K_RATES] * STEP_S, row[K_RATES + 1] * STEP_S, row[K_RATES + 2] * STEP_S)
-    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
+    rotation_matrix(row, K_ATTITUDE, W_DCM)
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     aided = row[K_AIDED] > 0.5
     for axis in range(3):
-        accel = (
-            row[W_BELIEF + 3 * axis] * fx
-            + row[W_BELIEF + 3 * axis + 1] * fy
-            + row[W_BELIEF + 3 * axis + 2] * fz
-        )
+        accel = row[W_DCM + 3 * axis] * fx + row[W_DCM + 3 * axis + 1] * fy + row[W_DCM + 3 * axis + 2] * fz
         if axis == 2:
             accel += row[P_GRAVITY]
         accel += row[K_ACCEL_BIAS + axis]
@@ -221,11 +225,11 @@ def _fuse_velocity(row: Array, axis: int, innovation: float, variance: float) ->
 
 
 @njit(cache=False)
-def _variance(row: Array, sensor: int) -> float:
-    """What the instrument's maker declares: white and slow error together."""
-    white = row[P_SENSOR + 4 * sensor + SENSOR_WHITE]
-    slow = row[P_SENSOR + 4 * sensor + SENSOR_SLOW]
-    declared: float = white * white + slow * slow
+def _variance(row: Array, error: int) -> float:
+    """Return the declared variance of the sensor whose error parameters are in column *error*."""
+    white = row[error + WHITE_SIGMA]
+    bias = row[error + BIAS_SIGMA]
+    declared: float = white * white + bias * bias
     return declared
 
 
@@ -253,8 +257,8 @@ def _aid(row: Array) -> None:
         for axis in range(2):
             row[K_VELOCITY + axis] = row[M_GPS_VELOCITY + axis]
             row[K_ACCEL_BIAS + axis] = 0.0
-            _trust(row, axis, _variance(row, GPS_LEVEL), _variance(row, GPS_SPEED))
-        row[K_HEIGHT_ZERO] = row[M_BARO] + row[M_GPS + 2]
+            _trust(row, axis, _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR))
+        row[K_BARO_OFFSET] = row[M_BARO] + row[M_GPS + 2]
     if not wanted and row[K_AIDED] > 0.5:
         row[K_AIDED] = 0.0
         for axis in range(2):
@@ -265,24 +269,24 @@ def _aid(row: Array) -> None:
 @njit(cache=False)
 def _hear_satellites(row: Array) -> None:
     """Fuse a new fix, and let the tilt take over part of what the filter calls an acceleration error."""
-    level, speed = _variance(row, GPS_LEVEL), _variance(row, GPS_SPEED)
+    level, speed = _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
     worst = 0.0
     for axis in range(2):
         missed = row[M_GPS + axis] - row[K_POSITION + axis]
         worst = max(worst, _fuse_position(row, axis, missed, level))
         _fuse_velocity(row, axis, row[M_GPS_VELOCITY + axis] - row[K_VELOCITY + axis], speed)
-    row[K_GPS_LEVEL] = worst
+    row[K_GPS_INNOVATION] = worst
     if row[M_GPS_FIX] >= RTK_FIX:
-        _fuse_position(row, 2, row[M_GPS + 2] - row[K_POSITION + 2], _variance(row, GPS_HEIGHT))
-        row[K_HEIGHT_ZERO] = row[M_BARO] + row[K_POSITION + 2]
+        _fuse_position(row, 2, row[M_GPS + 2] - row[K_POSITION + 2], _variance(row, P_GPS_VERTICAL_ERROR))
+        row[K_BARO_OFFSET] = row[M_BARO] + row[K_POSITION + 2]
     _fuse_velocity(row, 2, row[M_GPS_VELOCITY + 2] - row[K_VELOCITY + 2], 4.0 * speed)
     share = _TILT_GAIN * min(row[K_GPS_AGE], _STALE)
     north, east = share * row[K_ACCEL_BIAS], share * row[K_ACCEL_BIAS + 1]
     row[K_ACCEL_BIAS] -= north
     row[K_ACCEL_BIAS + 1] -= east
-    row[W_TURN] = east / row[P_GRAVITY]
-    row[W_TURN + 1] = -north / row[P_GRAVITY]
-    row[W_TURN + 2] = 0.0
+    row[W_CORRECTION] = east / row[P_GRAVITY]
+    row[W_CORRECTION + 1] = -north / row[P_GRAVITY]
+    row[W_CORRECTION + 2] = 0.0
     _correct(row, _TILT_INTEGRAL / _TILT_GAIN)
     row[K_GPS_AGE] = 0.0
 
@@ -291,12 +295,11 @@ def _hear_satellites(row: Array) -> None:
 def _feel_gravity(row: Array, gravity: float) -> None:
     """Without satellites: what the accelerometer calls up is up."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
-    north = row[W_BELIEF] * fx + row[W_BELIEF + 1] * fy + row[W_BELIEF + 2] * fz
-    east = row[W_BELIEF + 3] * fx + row[W_BELIEF + 4] * fy + row[W_BELIEF + 5] * fz
+    north, east = _horizontal(row, fx, fy, fz)
     share = _GRAVITY_GAIN * _FUSE_S / gravity
-    row[W_TURN] = -east * share
-    row[W_TURN + 1] = north * share
-    row[W_TURN + 2] = 0.0
+    row[W_CORRECTION] = -east * share
+    row[W_CORRECTION + 1] = north * share
+    row[W_CORRECTION + 2] = 0.0
     _correct(row, 0.02)
 
 
@@ -304,14 +307,13 @@ def _feel_gravity(row: Array, gravity: float) -> None:
 def _hear_compass(row: Array) -> None:
     """Turn towards the heading in which the measured field points as the earth's does here."""
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
-    north = row[W_BELIEF] * mx + row[W_BELIEF + 1] * my + row[W_BELIEF + 2] * mz
-    east = row[W_BELIEF + 3] * mx + row[W_BELIEF + 4] * my + row[W_BELIEF + 5] * mz
-    declination = arc_tangent2(row[P_FIELD + 1], row[P_FIELD])
+    north, east = _horizontal(row, mx, my, mz)
+    declination = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
     error = wrap_angle(arc_tangent2(east, north) - declination)
     row[K_HEADING_ERROR] = error
-    row[W_TURN] = 0.0
-    row[W_TURN + 1] = 0.0
-    row[W_TURN + 2] = -_HEADING_GAIN * _FUSE_S * error
+    row[W_CORRECTION] = 0.0
+    row[W_CORRECTION + 1] = 0.0
+    row[W_CORRECTION + 2] = -_HEADING_GAIN * _FUSE_S * error
     _correct(row, _HEADING_INTEGRAL / _HEADING_GAIN)
 
 
@@ -323,23 +325,23 @@ def _fuse(row: Array) -> None:
     for axis in range(3):
         if axis == 2 or row[K_AIDED] > 0.5:
             _spread(row, axis)
-    if row[M_BARO_COUNT] != row[K_SEEN_BARO]:
-        row[K_SEEN_BARO] = row[M_BARO_COUNT]
+    if row[M_BARO_COUNT] != row[K_USED_BARO]:
+        row[K_USED_BARO] = row[M_BARO_COUNT]
         if not (row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5):
-            missed = row[K_HEIGHT_ZERO] - row[M_BARO] - row[K_POSITION + 2]
-            _fuse_position(row, 2, missed, _variance(row, BARO))
-    if row[M_MAG_COUNT] != row[K_SEEN_MAG]:
-        row[K_SEEN_MAG] = row[M_MAG_COUNT]
+            missed = row[K_BARO_OFFSET] - row[M_BARO] - row[K_POSITION + 2]
+            _fuse_position(row, 2, missed, _variance(row, P_BARO_ERROR))
+    if row[M_MAG_COUNT] != row[K_USED_MAG]:
+        row[K_USED_MAG] = row[M_MAG_COUNT]
         _hear_compass(row)
-    if row[M_GPS_COUNT] != row[K_SEEN_GPS] and row[K_AIDED] > 0.5:
-        row[K_SEEN_GPS] = row[M_GPS_COUNT]
+    if row[M_GPS_COUNT] != row[K_USED_GPS] and row[K_AIDED] > 0.5:
+        row[K_USED_GPS] = row[M_GPS_COUNT]
         _hear_satellites(row)
     if row[K_AIDED] < 0.5 or row[K_GPS_AGE] > _STALE:
         _feel_gravity(row, row[P_GRAVITY])
     for index in range(2):
         at = K_COVARIANCE + 12 * index
-        row[K_SPREAD + index] = sqrt(max(row[at], 0.0))
-        row[K_SPREAD + 2 + index] = sqrt(max(row[at + 3], 0.0))
+        row[K_SIGMA + index] = sqrt(max(row[at], 0.0))
+        row[K_SIGMA + 2 + index] = sqrt(max(row[at + 3], 0.0))
 
 
 @njit(cache=False)
@@ -354,11 +356,10 @@ def _align(row: Array) -> None:
     row[K_ATTITUDE + 1] = sr * cp
     row[K_ATTITUDE + 2] = cr * sp
     row[K_ATTITUDE + 3] = -sr * sp
-    rotation_matrix(row, K_ATTITUDE, W_BELIEF)
+    rotation_matrix(row, K_ATTITUDE, W_DCM)
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
-    north = row[W_BELIEF] * mx + row[W_BELIEF + 1] * my + row[W_BELIEF + 2] * mz
-    east = row[W_BELIEF + 3] * mx + row[W_BELIEF + 4] * my + row[W_BELIEF + 5] * mz
-    yaw = arc_tangent2(row[P_FIELD + 1], row[P_FIELD]) - arc_tangent2(east, north)
+    north, east = _horizontal(row, mx, my, mz)
+    yaw = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD]) - arc_tangent2(east, north)
     sy, cy = sine_cosine(0.5 * yaw)
     row[K_ATTITUDE] = cr * cp * cy + sr * sp * sy
     row[K_ATTITUDE + 1] = sr * cp * cy - cr * sp * sy
@@ -377,7 +378,7 @@ def _know(row: Array) -> None:
         row[K_VELOCITY + axis] = sign * row[S_VELOCITY + source]
         force = 0.0
         for body_axis in range(3):
-            force += row[W_ROTATION + 3 * source + body_axis] * row[S_FORCE + body_axis]
+            force += row[W_ROTATION + 3 * source + body_axis] * row[S_SPECIFIC_FORCE + body_axis]
         gravity = row[P_GRAVITY] if axis == 2 else 0.0
         row[K_ACCEL + axis] = sign * force + gravity
         row[K_RATES + axis] = row[S_RATES + axis] if axis == 0 else -row[S_RATES + axis]
@@ -401,8 +402,8 @@ def initialise_estimate(row: Array) -> None:
         _know(row)
     else:
         _align(row)
-        row[K_HEIGHT_ZERO] = row[M_BARO]
-        _trust(row, 2, _variance(row, BARO), 0.01)
+        row[K_BARO_OFFSET] = row[M_BARO]
+        _trust(row, 2, _variance(row, P_BARO_ERROR), 0.01)
     _euler(row)
 
 

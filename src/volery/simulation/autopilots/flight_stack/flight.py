@@ -29,7 +29,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     C_AIDED,
     C_CONTROL,
     FLIGHT,
-    K_HOVER,
+    K_HOVER_THROTTLE,
     K_LANDED,
     K_MOTORS,
     K_POSITION,
@@ -42,15 +42,15 @@ from volery.simulation.autopilots.flight_stack.state_estimate import Airframe, E
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.body_step import digest_of, start_body, step_body, world_sources
 from volery.simulation.world.environment_models import Terrain, Wind
-from volery.simulation.world.sensors import Sigma, declared_sigma, sensor_set
+from volery.simulation.world.sensors import Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     M_GYRO,
-    M_GYRO_BIAS,
     MULTIROTOR,
     P_KIND,
     S_AMPS,
-    S_AWAKE,
     S_CHARGE,
+    S_STARTED,
+    SAMPLES_END,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_MAG_BLOCKED,
@@ -68,7 +68,7 @@ _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 @njit(cache=False)
 def _boot(row: Array) -> None:
     """What an autopilot believes before its first step."""
-    row[K_HOVER] = _FIRST_HOVER
+    row[K_HOVER_THROTTLE] = _FIRST_HOVER
     row[K_LANDED] = 1.0
     initialise_estimate(row)
 
@@ -99,7 +99,7 @@ def _compose(sources: str) -> Advance:
             return
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
-            if row[S_AWAKE] == 0.0:
+            if row[S_STARTED] == 0.0:
                 start_body(bodies, body, row)
                 _boot(row)
             while bodies.reached[body] < goals[body]:
@@ -187,7 +187,7 @@ class Flight:
         """True for a multirotor, False for a rover."""
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         """Of the full battery [A s]."""
-        self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_set(self.spec.sensors))
+        self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
         self._seen: Estimate | None = None
 
     def look(self) -> Estimate:
@@ -200,7 +200,7 @@ class Flight:
         row = self._world.arrays.rows[self._body]
         rows = (
             row[K_POSITION:VISIBLE].tolist(),
-            row[M_GYRO:M_GYRO_BIAS].tolist(),
+            row[M_GYRO:SAMPLES_END].tolist(),
             row[S_CHARGE : S_AMPS + 1].tolist(),
         )
         self._seen = Estimate(self._airframe, time, rows)

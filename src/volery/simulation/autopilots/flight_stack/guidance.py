@@ -30,24 +30,24 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     C_TILT,
     C_VELOCITY,
     C_YAW,
-    C_YAW_IS,
+    C_YAW_MODE,
     C_YAW_RATE,
     CLIMB,
     IDLE,
     K_ACCEL,
+    K_AT_LOWER_LIMIT,
     K_ATTITUDE,
     K_CONTROL,
-    K_DEMAND,
     K_EULER,
-    K_HOVER,
+    K_HOVER_THROTTLE,
     K_LANDED,
-    K_LOWER_LIMIT,
     K_ORIGIN,
     K_POSITION,
     K_SPOOL,
     K_TARGET,
     K_TARGET_ACCEL,
     K_TARGET_EULER,
+    K_TARGET_QUATERNION,
     K_TARGET_VELOCITY,
     K_THROTTLE,
     K_VELOCITY,
@@ -139,7 +139,7 @@ def _upright(row: Array) -> float:
 def _disturbance(row: Array, axis: int) -> float:
     """What the thrust now balances besides inertia (drag, wind, a wrong hover throttle) [m/s^2]."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
-    lift = row[K_THROTTLE] / row[K_HOVER] * _GRAVITY
+    lift = row[K_THROTTLE] / row[K_HOVER_THROTTLE] * _GRAVITY
     if axis == 0:
         thrust = -2.0 * (x * z + w * y) * lift
     elif axis == 1:
@@ -246,7 +246,7 @@ def _wanted_accel(row: Array, axis: int, gain: float, integral: float, hold: boo
 @njit(cache=False)
 def _turn(row: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
-    kind = int(row[C_YAW_IS])
+    kind = int(row[C_YAW_MODE])
     if kind == 2:
         wanted = row[C_YAW_RATE]
     elif kind == 1:
@@ -271,10 +271,10 @@ def _demand_angles(row: Array, roll: float, pitch: float) -> None:
     sr, cr = sine_cosine(0.5 * roll)
     sp, cp = sine_cosine(0.5 * pitch)
     sy, cy = sine_cosine(0.5 * yaw)
-    row[K_DEMAND] = cr * cp * cy + sr * sp * sy
-    row[K_DEMAND + 1] = sr * cp * cy - cr * sp * sy
-    row[K_DEMAND + 2] = cr * sp * cy + sr * cp * sy
-    row[K_DEMAND + 3] = cr * cp * sy - sr * sp * cy
+    row[K_TARGET_QUATERNION] = cr * cp * cy + sr * sp * sy
+    row[K_TARGET_QUATERNION + 1] = sr * cp * cy - cr * sp * sy
+    row[K_TARGET_QUATERNION + 2] = cr * sp * cy + sr * cp * sy
+    row[K_TARGET_QUATERNION + 3] = cr * cp * sy - sr * sp * cy
 
 
 @njit(cache=False)
@@ -300,10 +300,10 @@ def _learn_hover(row: Array) -> None:
     steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
     level = row[K_ATTITUDE + 1] ** 2 + row[K_ATTITUDE + 2] ** 2 < 0.002
     if steady and level and abs(row[K_ACCEL + 2]) < 1.0:
-        learnt = row[K_HOVER] + GUIDE_S / _LEARN_TIME * (row[K_THROTTLE] - row[K_HOVER])
+        learnt = row[K_HOVER_THROTTLE] + GUIDE_S / _LEARN_TIME * (row[K_THROTTLE] - row[K_HOVER_THROTTLE])
         learnt = clip(learnt, 0.125, 0.6875)
-        row[K_VELOCITY_INTEGRAL + 2] += _GRAVITY * (learnt / row[K_HOVER] - 1.0)
-        row[K_HOVER] = learnt
+        row[K_VELOCITY_INTEGRAL + 2] += _GRAVITY * (learnt / row[K_HOVER_THROTTLE] - 1.0)
+        row[K_HOVER_THROTTLE] = learnt
 
 
 @njit(cache=False)
@@ -338,10 +338,10 @@ def _follow_plane(row: Array, control: int) -> None:
 def _follow_height(row: Array, control: int) -> None:
     """Lift so that the vehicle follows the target in height."""
     _shape_height(row, control)
-    lower = row[K_LOWER_LIMIT] > 0.5
+    lower = row[K_AT_LOWER_LIMIT] > 0.5
     down = _wanted_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
     lift = clip(_GRAVITY - down, 0.0, _MOST_LIFT * _GRAVITY)
-    row[K_THROTTLE] = clip(row[K_HOVER] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
+    row[K_THROTTLE] = clip(row[K_HOVER_THROTTLE] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
     _learn_hover(row)
 
 

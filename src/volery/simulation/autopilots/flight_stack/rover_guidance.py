@@ -15,7 +15,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     C_THROTTLE,
     C_VELOCITY,
     C_YAW,
-    C_YAW_IS,
+    C_YAW_MODE,
     C_YAW_RATE,
     DRIVE,
     IDLE,
@@ -35,10 +35,10 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
 from volery.simulation.autopilots.flight_stack.guidance import approach, ramp
 from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, wrap_angle
 from volery.simulation.world.state_layout import (
-    P_SKID,
-    P_SPEED_TOP,
-    P_STEER_TOP,
-    P_TURN_TOP,
+    P_MAX_SPEED,
+    P_MAX_STEERING,
+    P_MAX_TURN_RATE,
+    P_SKID_STEERED,
     P_WHEELBASE,
     Array,
 )
@@ -62,11 +62,11 @@ def _forward_speed(row: Array) -> float:
 @njit(cache=False)
 def _steer_for(row: Array, rate: float, speed: float) -> float:
     """Steering -1..1, right positive, that turns at *rate* clockwise [rad/s] at a *speed*."""
-    if row[P_SKID] > 0.5:
-        return clip(rate / row[P_TURN_TOP], -1.0, 1.0)
+    if row[P_SKID_STEERED] > 0.5:
+        return clip(rate / row[P_MAX_TURN_RATE], -1.0, 1.0)
     pace = speed if abs(speed) > 0.3 else (0.3 if speed >= 0.0 else -0.3)
     angle = arc_tangent2(rate * row[P_WHEELBASE] * (1.0 if pace > 0.0 else -1.0), abs(pace))
-    return clip(angle / row[P_STEER_TOP], -1.0, 1.0)
+    return clip(angle / row[P_MAX_STEERING], -1.0, 1.0)
 
 
 @njit(cache=False)
@@ -78,7 +78,7 @@ def _throttle_for(row: Array, wanted: float) -> float:
         return 0.0
     grown = row[K_SPEED_INTEGRAL] + _SPEED_INTEGRAL * miss * _PERIOD
     row[K_SPEED_INTEGRAL] = clip(grown, -0.3, 0.3)
-    return clip(wanted / row[P_SPEED_TOP] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
+    return clip(wanted / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
 
 
 @njit(cache=False)
@@ -100,7 +100,7 @@ def _to_point(row: Array) -> tuple[float, float]:
 @njit(cache=False)
 def _along(row: Array) -> tuple[float, float]:
     """Speed and turn rate as told."""
-    kind = int(row[C_YAW_IS])
+    kind = int(row[C_YAW_MODE])
     rate = 0.0
     if kind == 1:
         rate = clip(_TURN_GAIN * wrap_angle(row[C_YAW] - row[K_EULER + 2]), -1.5, 1.5)

@@ -16,15 +16,15 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     K_ATTITUDE,
     K_EULER,
     K_GPS_AGE,
-    K_GPS_LEVEL,
+    K_GPS_INNOVATION,
     K_HEADING_ERROR,
-    K_HOVER,
+    K_HOVER_THROTTLE,
     K_LANDED,
     K_MOTORS,
     K_ORIGIN,
     K_POSITION,
     K_RATES,
-    K_SPREAD,
+    K_SIGMA,
     K_TARGET,
     K_TARGET_EULER,
     K_TARGET_VELOCITY,
@@ -32,10 +32,8 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     K_VELOCITY,
 )
 from volery.simulation.world.environment_models import pressure_at
-from volery.simulation.world.sensors import SensorSet
+from volery.simulation.world.sensors import SensorSuite
 from volery.simulation.world.state_layout import (
-    GPS_LEVEL,
-    GPS_SPEED,
     M_ACCEL,
     M_BARO,
     M_GPS,
@@ -78,7 +76,7 @@ class Airframe:
     frame: LocalFrame
     flying: bool
     capacity_as: float
-    sensors: SensorSet
+    sensors: SensorSuite
 
 
 def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
@@ -86,16 +84,16 @@ def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
     north, east, down, *velocity = sensed[M_GPS - M_GYRO : M_GPS_VELOCITY - M_GYRO + 3]
     latitude, longitude, amsl = about.frame.from_ned((north, east, down))
     kind = int(sensed[M_GPS_FIX - M_GYRO])
-    level, height, speed = about.sensors.noises[GPS_LEVEL : GPS_SPEED + 1]
+    receiver = about.sensors.gps
     return GpsFix(
         fix_type=kind,
         latitude=latitude,
         longitude=longitude,
         amsl=amsl,
         velocity=(velocity[0], velocity[1], velocity[2]),
-        h_acc=sqrt(level.variance) if kind else inf,
-        v_acc=sqrt(height.variance) if kind else inf,
-        speed_acc=sqrt(speed.variance) if kind else inf,
+        h_acc=sqrt(receiver.horizontal.variance) if kind else inf,
+        v_acc=sqrt(receiver.vertical.variance) if kind else inf,
+        speed_acc=sqrt(receiver.velocity.variance) if kind else inf,
         eph=1.21 if kind else inf,
         epv=2.0 if kind else inf,
         satellites=10 if kind else 0,
@@ -200,7 +198,7 @@ class Estimate:
     @property
     def spread(self) -> tuple[float, float, float, float]:
         """The estimator's own standard deviations: plane, height [m]; speed in the plane, up [m/s]."""
-        return self._four(K_SPREAD)
+        return self._four(K_SIGMA)
 
     @property
     def heading_error(self) -> float:
@@ -210,7 +208,7 @@ class Estimate:
     @property
     def gps_innovation(self) -> float:
         """Last difference of fix and estimate in the plane, in standard deviations of it."""
-        return self._one(K_GPS_LEVEL)
+        return self._one(K_GPS_INNOVATION)
 
     @property
     def gyro(self) -> Vector:
@@ -297,7 +295,7 @@ class Estimate:
     @property
     def hover_throttle(self) -> float:
         """Collective that is learnt to carry the weight."""
-        return self._one(K_HOVER)
+        return self._one(K_HOVER_THROTTLE)
 
     @property
     def landed(self) -> bool:
