@@ -32,7 +32,7 @@ from volery.calibration.ros.probe_environment import Pace, check_client, own_mas
 from volery.calibration.ros.results import format_line, ros_law, write_entry
 from volery.calibration.validation.comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
 from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
-from volery.cli.measure import tables
+from volery.cli.commands.validate import comparison_tables
 from volery.cost import load_catalogue
 from volery.model.reader import load
 from volery.model.system import System
@@ -139,7 +139,7 @@ def show(console: Console, one: Campaign) -> None:
         sure = f"known to {cost.half_width:.0%}, quartiles ±{cost.spread / 2:.0%}"
         console.print(f"  {call:<18}{format_line(cost.whole, call):<20}{sure}", highlight=False)
     system, found = one.result()
-    console.print(*tables(found, system))
+    console.print(*comparison_tables(found, system))
     off = median(abs(node.difference) for node in found)
     far = [node.node for node in found if not node.holds]
     console.print(

@@ -98,8 +98,8 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     return kernel, autopilot, ours
 
 
-COMMANDS = [*sorted(_vehicle()[1].face.firmware.commands), 510, 511, 512, 520]
-PARAMETERS = sorted(FIRMWARE.kinds["multirotor"].supported_parameters)
+COMMANDS = [*sorted(_vehicle()[1].face.firmware.commands.commands), 510, 511, 512, 520]
+PARAMETERS = sorted(FIRMWARE.kinds["multirotor"].rules.parameters.supported)
 LISTENED = sorted(_vehicle()[1].face.listens_to)
 
 

@@ -80,7 +80,7 @@ def execute(load: Workload) -> Outcome:
             for pause, amount in bursts:
                 kernel.sleep_until(kernel.now() + pause)
                 asked = kernel.now()
-                kernel.pay(amount)
+                kernel.consume(amount)
                 jobs.append(Job(name, priority, amount, asked, kernel.now()))
 
         return run

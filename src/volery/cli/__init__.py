@@ -1,4 +1,4 @@
-"""The command line: parse, wire, show. It has no logic of its own.
+"""The command line: parse options, call the library, show results.
 
-Each command is one module and imports what it calls when it is called, so that ``volery --help`` is quick.
+The commands are in ``volery.cli.commands``, one file for each subject; the other files are shared by them.
 """

@@ -1,4 +1,4 @@
-"""Where words go: results to standard output, progress and complaints to standard error."""
+"""Where text goes: results to standard output, progress and errors to standard error."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rich.console import Console, RenderableType
 from rich.table import Column, Table
 
 
-def table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
-    """A table as all commands show theirs."""
+def make_table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
+    """Return a table in the style of all commands."""
     return Table(
         *headings,
         title=title,
@@ -24,14 +24,14 @@ def table(*headings: Column | str, title: str | None = None, show_header: bool =
     )
 
 
-def figures(heading: str) -> Column:
-    """A column of numbers."""
+def number_column(heading: str) -> Column:
+    """Return a column whose cells are aligned to the right."""
     return Column(heading, justify="right")
 
 
 @dataclass(frozen=True)
 class Output:
-    """How a command was asked to speak."""
+    """Output of one command, as its options ``--quiet``, ``--json`` and ``--debug`` choose it."""
 
     quiet: bool = False
     json: bool = False
@@ -41,26 +41,26 @@ class Output:
 
     @property
     def shows_progress(self) -> bool:
-        """True if somebody watches: progress is no part of a result."""
+        """True if standard error is a terminal and ``--quiet`` is not given."""
         return not self.quiet and self.notes.is_terminal
 
     def show(self, *things: RenderableType) -> None:
-        """Tables and sentences for people; not with ``--quiet`` or ``--json``."""
+        """Print tables and sentences for people, unless ``--quiet`` or ``--json`` is given."""
         if not (self.quiet or self.json):
             for thing in things:
                 self.results.print(thing)
 
     def note(self, text: str) -> None:
-        """A remark beside the result."""
+        """Print a remark on standard error, unless ``--quiet`` is given."""
         if not self.quiet:
             self.notes.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def complain(self, text: str) -> None:
-        """What is wrong; said in any case."""
+        """Print an error on standard error in any case."""
         self.notes.print(text, markup=False, highlight=False, soft_wrap=True, style="red")
 
     def give(self, data: Any) -> None:
-        """The result as JSON, with ``--json``."""
+        """Print the result as JSON if ``--json`` is given. A string is printed as it is."""
         if self.json:
             text = data if isinstance(data, str) else json.dumps(data, indent=2, ensure_ascii=False)
             self.results.print(text, markup=False, highlight=False, soft_wrap=True)

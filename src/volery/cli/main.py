@@ -1,88 +1,53 @@
-"""``volery``: all commands."""
+"""``volery``: the application, made from the files in ``volery.cli.commands``."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pkgutil import iter_modules
 from typing import Annotated
 
 import typer
 
-from volery.cli.commands import bags, costs, models, ros, runs, vehicles
-from volery.cli.console import Output
-from volery.cli.endings import FAILED
-
-app = typer.Typer(
-    help="Model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-COMMANDS: tuple[Callable[..., None], ...] = (
-    runs.demo,
-    runs.new,
-    runs.doctor,
-    runs.simulate,
-    runs.report,
-    vehicles.fly,
-    vehicles.vehicle,
-    vehicles.conformance,
-    ros.bridge,
-    ros.interfaces,
-    ros.graph,
-    costs.cost,
-    costs.measure,
-)
-GROUPS: tuple[tuple[str, str, tuple[Callable[..., None], ...]], ...] = (
-    (
-        "model",
-        "Look at a model without running it.",
-        (models.check, models.show, models.schema, models.observables),
-    ),
-    (
-        "bag",
-        "Recordings of ROS topics: rosbag 1, rosbag 2 and MCAP.",
-        (bags.info, bags.play, bags.record, bags.convert),
-    ),
-    (
-        "calibrate",
-        "Measure what computing takes on this machine.",
-        (costs.ros, costs.python, costs.processor, costs.components),
-    ),
-)
-
-for command in COMMANDS:
-    app.command()(command)
-for name, told, members in GROUPS:
-    group = typer.Typer(help=told, no_args_is_help=True)
-    for member in members:
-        group.command()(member)
-    app.add_typer(group, name=name)
+from volery.cli import commands
+from volery.cli.command import SECTIONS, Commands
 
 
-def version(wanted: bool) -> None:
-    """Print the version and stop."""
+def _version(wanted: bool) -> None:
     if wanted:
-        from volery.run.recording import own_version
-
-        typer.echo(f"volery {own_version()}")
+        try:
+            typer.echo(f"volery {version('volery')}")
+        except PackageNotFoundError:  # run from a checkout
+            typer.echo("volery 0")
         raise typer.Exit
 
 
-@app.callback()
-def root(
+def _root(
     show_version: Annotated[
-        bool, typer.Option("--version", callback=version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers."""
 
 
+def _application() -> typer.Typer:
+    app = typer.Typer(
+        callback=_root,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="markdown",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    names = [f"{commands.__name__}.{one.name}" for one in iter_modules(commands.__path__)]
+    found: list[Commands] = [import_module(name).commands for name in names]
+    for one in sorted(found, key=lambda one: SECTIONS.index(one.section)):
+        one.add_to(app)
+    return app
+
+
+app = _application()
+
+
 def main() -> None:
-    """The entry point."""
-    try:
-        app(prog_name="volery")
-    except ImportError as error:
-        Output().complain(f"volery: a part is missing: {error}; `volery doctor` says how to get it")
-        sys.exit(FAILED)
+    """Run the command line of this process."""
+    app(prog_name="volery")

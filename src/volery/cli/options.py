@@ -1,4 +1,4 @@
-"""Options and arguments that several commands have."""
+"""Options and arguments that several commands take, each declared once."""
 
 from __future__ import annotations
 
@@ -7,41 +7,63 @@ from typing import Annotated
 
 import typer
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but what is wrong.")]
+from volery.base.errors import UsageError
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-Seed = Annotated[int, typer.Option(help="Seeds every random stream of the run.")]
-Out = Annotated[Path | None, typer.Option(help="The run folder; by default a new one in ./runs.")]
+Seed = Annotated[int, typer.Option(help="Seed of every random stream of the run.")]
+Out = Annotated[Path | None, typer.Option(help="Run folder; by default a new one in ./runs.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the model; may be repeated."),
 ]
 Fidelity = Annotated[
     str,
-    typer.Option(metavar="times|code", help="Stated times, or the cost of the components' own code."),
+    typer.Option(metavar="times|code", help="Charge stated times, or the cost of the components' own code."),
 ]
-On = Annotated[
-    list[str],
-    typer.Option(metavar="URL", help="sim:ardupilot, ardupilot+tcp://127.0.0.1:5760 ...; one per vehicle."),
+Scenario = Annotated[str | None, typer.Option(help="Scenario of the model.")]
+Allocation = Annotated[str | None, typer.Option(help="Allocation of the model; by default its first.")]
+Model = Annotated[Path, typer.Argument(help="Model file, or folder with a model.yaml.")]
+Speed = Annotated[
+    str, typer.Option(metavar="max|FACTOR", help="Simulated seconds per second, for simulated vehicles.")
 ]
-Listen = Annotated[
-    str | None,
-    typer.Option(metavar="URL", help="tcp://HOST:PORT or udp://:PORT; without it, send to UDP 14550."),
-]
-Scenario = Annotated[str | None, typer.Option(help="A scenario of the model.")]
-Allocation = Annotated[str | None, typer.Option(help="An allocation of the model; by default its first.")]
-OnGraph = Annotated[str, typer.Option("--graph", metavar="ros1|ros2", help="The graph.")]
+
+OnGraph = Annotated[str, typer.Option("--graph", metavar="ros1|ros2", help="ROS graph.")]
 Topics = Annotated[
     list[str] | None, typer.Option("--topic", metavar="NAME", help="Only this topic; may be repeated.")
 ]
-Recording = Annotated[Path, typer.Argument(help="A .bag or .mcap file, or the folder of a rosbag 2.")]
-Model = Annotated[Path, typer.Argument(help="A model file, or a folder with a model.yaml.")]
-IntoCatalogue = Annotated[
-    Path, typer.Option(metavar="FILE", help="The catalogue to write the entry into; made if need be.")
+Recording = Annotated[Path, typer.Argument(help=".bag or .mcap file, or the folder of a rosbag 2.")]
+NewRecording = Annotated[
+    Path, typer.Argument(help="NAME.bag for a rosbag 1; any other name for the folder of a rosbag 2.")
 ]
+
 CATALOGUE = Path("catalogue.yaml")
-"""Where `volery calibrate` writes by default."""
-EntryName = Annotated[str, typer.Option(help="The entry's name; by default made from the processor's.")]
-Frequency = Annotated[
-    float | None, typer.Option(metavar="MHZ", help="Of all cores, where it can be set (needs root).")
+"""Default of ``CatalogueFile``."""
+CatalogueFile = Annotated[
+    Path, typer.Option(metavar="FILE", help="Catalogue to write the entry into; created if missing.")
 ]
+EntryName = Annotated[
+    str, typer.Option(help="Name of the entry; by default made from the name of this processor.")
+]
+Frequency = Annotated[
+    float | None,
+    typer.Option(metavar="MHZ", help="Frequency to set on all cores while measuring (needs root)."),
+]
+
+
+def parse_speed(speed: str) -> float | None:
+    """Return the simulated seconds per second, or None for ``max``.
+
+    Raises:
+        UsageError: *speed* is neither ``max`` nor a positive finite number.
+    """
+    if speed == "max":
+        return None
+    try:
+        pace = float(speed)
+    except ValueError:
+        pace = 0.0
+    if not 0.0 < pace < float("inf"):
+        raise UsageError(f"--speed {speed}: give max, or simulated seconds per second such as 1 or 10")
+    return pace

@@ -1,37 +1,36 @@
-"""What the commands share that run something: how fast it is to go, and how it ended."""
+"""What commands that run something share: the run folder, the picture of the run, how it ended."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from rich.traceback import Traceback
 
-from volery.base.errors import UsageError
+from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
-from volery.cli.endings import BAD_INPUT, BAD_INPUTS, FAILED, OK
 from volery.report.terminal import summary_table
 from volery.requirements.record import RequirementRecord
 from volery.run.result import Run
 
-
-def pace_of(speed: str) -> float | None:
-    """Simulated seconds per second; ``None`` for as fast as it goes."""
-    if speed == "max":
-        return None
-    try:
-        pace = float(speed)
-    except ValueError:
-        pace = 0.0
-    if not 0.0 < pace < float("inf"):
-        raise UsageError(f"--speed {speed}: max, or how many simulated seconds per second, such as 1 or 10")
-    return pace
+RUNS = Path("runs")
 
 
-def tell(output: Output, run: Run) -> int:
-    """Show a run that has ended, say where it is kept; the exit status."""
+def next_folder(name: str) -> Path:
+    """Return the path of a run folder that does not exist yet, such as ``runs/hospital-delivery-3``."""
+    stem = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "run"
+    taken = [path.name.removeprefix(f"{stem}-") for path in RUNS.glob(f"{stem}-*")]
+    number = max((int(text) for text in taken if text.isdigit()), default=0) + 1
+    return RUNS / f"{stem}-{number}"
+
+
+def show_outcome(output: Output, run: Run) -> int:
+    """Show a finished run and where it is kept. Return the exit status."""
     output.show(summary_table(run.record))
     output.give(run.record.model_dump_json(by_alias=True, indent=2))
     if run.folder is not None:
         report = run.folder / "report.html"
-        output.note(f"{'report: ' + str(report) if report.exists() else 'run folder: ' + str(run.folder)}")
+        output.note(f"report: {report}" if report.exists() else f"run folder: {run.folder}")
     if run.error is not None:
         if output.debug:
             output.notes.print(Traceback.from_exception(type(run.error), run.error, run.error.__traceback__))
@@ -44,18 +43,15 @@ def tell(output: Output, run: Run) -> int:
     for problem in run.problems:
         output.complain(f"volery: {problem}")
     for name in run.left:
-        output.complain(f"volery: {name} did not end when it was told to")
-    if isinstance(run.error, BAD_INPUTS):
+        output.complain(f"volery: {name} did not end when it was cancelled")
+    if isinstance(run.error, BAD_INPUT_ERRORS):
         return BAD_INPUT
     return OK if run.ok else FAILED
 
 
 def unmet(name: str, found: RequirementRecord) -> str:
-    """A requirement that was not met, in one sentence."""
-    seen = (
-        "nothing was there to observe"
-        if found.observed is None
-        else f"{found.observed:g} {found.unit}".strip()
-    )
+    """Return one sentence about a requirement that was not met."""
     bound = f"{found.relation} {found.bound:g} {found.unit}".strip()
-    return f"the requirement {name!r} is not met: {found.observable} is {seen}, {bound} was asked"
+    value = "" if found.observed is None else f"{found.observed:g} {found.unit}".strip()
+    seen = f"is {value}" if value else "was never observed"
+    return f"the requirement {name!r} is not met: {found.observable} {seen}, required is {bound}"

@@ -1,10 +1,11 @@
-"""What a run says while it goes on: simulated time, speed, what the vehicles do, where the parcels are."""
+"""Progress of runs on the terminal: simulated time, speed, state of each vehicle, parcels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from time import perf_counter
 
 from rich.console import Group, RenderableType
 from rich.live import Live
@@ -15,46 +16,44 @@ from rich.text import Text
 from volery.base.time import clock, to_seconds
 from volery.cli.console import Output
 from volery.run.progress import Progress
-from volery.run.recording import Stopwatch
 
-BETWEEN_S = 0.1
-"""Wall seconds between two pictures: drawing takes longer than a simulated second."""
+DRAWING_PERIOD_S = 0.1
+"""Wall seconds between two drawings: to draw takes longer than to simulate one second."""
 
 Show = Callable[[Progress], None]
 
 
-class Seldom:
-    """Passes on what it is shown, unless it did so a moment ago."""
+class RateLimited:
+    """Calls *show* at most once in ``DRAWING_PERIOD_S``."""
 
     def __init__(self, show: Show) -> None:
         self._show = show
-        self._watch = Stopwatch()
         self._next = 0.0
 
     def __call__(self, progress: Progress) -> None:
-        """Show it, or not."""
-        now = self._watch.seconds()
+        """Show *progress* if the last drawing is old enough."""
+        now = perf_counter()
         if now >= self._next:
-            self._next = now + BETWEEN_S
+            self._next = now + DRAWING_PERIOD_S
             self._show(progress)
 
 
-class Pictures:
-    """The pictures of the runs under way, one below the other."""
+class LiveProgress:
+    """Drawings of one or several runs, one below the other."""
 
     def __init__(self, live: Live) -> None:
         self._live = live
-        self._watch = Stopwatch()
+        self._start = perf_counter()
         self._drawn: dict[str, RenderableType] = {}
 
     def show(self, title: str, progress: Progress) -> None:
-        """Draw the run called *title* anew."""
-        self._drawn[title] = picture(title, progress, self._watch.seconds())
+        """Redraw the run called *title*."""
+        self._drawn[title] = draw_progress(title, progress, perf_counter() - self._start)
         self._live.update(Group(*self._drawn.values()))
 
 
-def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
-    """One line about the run and one for each vehicle."""
+def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableType:
+    """Return one line for the run and one for each vehicle."""
     simulated = to_seconds(progress.now)
     line = Text(f"{title}  ", style="bold")
     line.append(clock(progress.now)[:-4], style="cyan")
@@ -62,32 +61,27 @@ def picture(title: str, progress: Progress, wall_s: float) -> RenderableType:
         line.append(f"  {simulated / wall_s:,.0f}× real time", style="dim")
     parcels = ", ".join(f"{count} {state}" for state, count in progress.parcels.items())
     line.append(f"  {parcels}" if parcels else "")
-    if not progress.limit:
-        return Group(line, _vehicles(progress))
-    bar = ProgressBar(total=progress.limit, completed=progress.now, width=40)
-    return Group(line, bar, _vehicles(progress))
-
-
-def _vehicles(progress: Progress) -> Table:
-    table = Table.grid(padding=(0, 2))
+    vehicles = Table.grid(padding=(0, 2))
     for one in progress.vehicles:
-        doing = f"{one.height:.1f} m" if one.armed else "on the ground"
-        table.add_row(f"  {one.name}", one.mode, "armed" if one.armed else "", doing)
-    return table
+        height = f"{one.height:.1f} m" if one.armed else "on the ground"
+        vehicles.add_row(f"  {one.name}", one.mode, "armed" if one.armed else "", height)
+    if not progress.limit:
+        return Group(line, vehicles)
+    return Group(line, ProgressBar(total=progress.limit, completed=progress.now, width=40), vehicles)
 
 
 @contextmanager
-def drawn(output: Output) -> Iterator[Pictures | None]:
-    """Pictures on the terminal for as long as the context lasts; ``None`` where nobody watches."""
+def live_progress(output: Output) -> Iterator[LiveProgress | None]:
+    """Draw on the terminal within the context; yield None if progress is not shown."""
     if not output.shows_progress:
         yield None
         return
     with Live(console=output.notes, transient=True, refresh_per_second=8) as live:
-        yield Pictures(live)
+        yield LiveProgress(live)
 
 
 @contextmanager
-def shown(output: Output, title: str) -> Iterator[Show | None]:
-    """What one run is to call; ``None`` where nobody watches."""
-    with drawn(output) as pictures:
-        yield None if pictures is None else Seldom(partial(pictures.show, title))
+def run_progress(output: Output, title: str) -> Iterator[Show | None]:
+    """Yield the function to which one run reports its progress, or None if it is not shown."""
+    with live_progress(output) as drawings:
+        yield None if drawings is None else RateLimited(partial(drawings.show, title))

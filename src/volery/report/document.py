@@ -23,7 +23,7 @@ from rich.console import RenderableType
 
 from volery.base.errors import UsageError
 from volery.report.digest import Digest, Json
-from volery.report.document import all_comparisons
+from volery.report.comparison import all_comparisons
 from volery.report.grids import (
     Cell,
     CellStatus,
@@ -47,8 +47,9 @@ from volery.report.grids import (
 )
 from volery.report.terminal import comparison_table
 from volery.requirements.accounts import Accounts
-from volery.requirements.observables import DELIVERED, Observers, bounds_of
+from volery.requirements.observables import DELIVERED
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record, write_record
+from volery.requirements.verdicts import Observers, bounds_of
 from volery.trace.attachments import WORLD_ATTACHMENT, scenery_from_json
 from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME

@@ -10,7 +10,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from volery.report.document import all_comparisons, cost_matrix, outcome_comparison, requirements_comparison
+from volery.report.comparison import all_comparisons, cost_matrix, outcome_comparison, requirements_comparison
 from volery.report.grids import Cell, Grid, all_grids, cost_grid, labels
 from volery.requirements.record import RunRecord
 

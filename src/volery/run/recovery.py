@@ -8,7 +8,7 @@ from pathlib import Path
 from volery.base.errors import UsageError, VoleryError
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
-from volery.requirements.observables import Observers
+from volery.requirements.verdicts import Observers
 from volery.run.assembly.computers import Platform
 from volery.run.recording import TRACE_FILE, Recording
 from volery.run.result import Run

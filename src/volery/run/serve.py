@@ -39,7 +39,7 @@ class VehicleServer:
         self._autopilot = self.airfield.autopilots[name]
         codec = self.airfield.codec(name)
         self.protocol = codec.name
-        usual = self.airfield.family(name).stations
+        usual = self.airfield.family(name).default_links
         stations = [(parse_listen(text), use) for text, use in usual] if address is None else [(address, "")]
         self.addresses = [one for one, _ in stations]
         self.links: list[CodedLink] = []

@@ -13,7 +13,7 @@ from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
 from volery.model.reader import load
 from volery.model.system import System
-from volery.requirements.observables import Observers
+from volery.requirements.verdicts import Observers
 from volery.run.assembly.components import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp

@@ -159,7 +159,7 @@ def test_modes_show_the_recorded_bits(kind: str, bench: Any, facts: Any) -> None
     rig = bench(kind)
     rig.run(1.0)
     seen = set()
-    for number in rig.autopilot.firmware.modes:
+    for number in rig.autopilot.vehicle.rules.modes:
         for armed in (False, True):
             rig.vehicle.armed = False
             rig.mode(number)

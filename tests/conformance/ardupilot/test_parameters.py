@@ -154,10 +154,10 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     read |= {
         f"RC{channel}_{part}" for channel in range(1, 17) for part in ("MIN", "TRIM", "MAX", "DZ", "REVERSED")
     }
-    stated = set(FIRMWARE.kinds["multirotor"].supported_parameters) | set(
-        FIRMWARE.kinds["rover"].supported_parameters
+    stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
+        FIRMWARE.kinds["rover"].rules.parameters.supported
     )
     assert stated == read
     for firmware in FIRMWARE.kinds.values():
-        names = {parameter.name for parameter in firmware.parameters()}
-        assert set(firmware.supported_parameters) <= names
+        names = {parameter.name for parameter in firmware.rules.parameters.defaults()}
+        assert set(firmware.rules.parameters.supported) <= names

@@ -87,7 +87,7 @@ def test_an_accepted_mode_shows_at_the_next_heartbeat_only(bench: Any) -> None:
 
 
 def test_every_recorded_mode_has_its_bits(facts: dict[str, Any]) -> None:
-    modes = FIRMWARE.kinds["multirotor"].modes
+    modes = FIRMWARE.kinds["multirotor"].rules.modes
     for number, base in facts["modes"]:
         unstreamed = number == 0x00060000 and base == 1
         assert unstreamed or modes[number].base_mode == base & ~128
@@ -209,12 +209,12 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
     read |= set(re.findall(r'seconds_parameter\("([A-Z0-9_]+)"', source))
     read |= {"BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"}
-    stated = set(FIRMWARE.kinds["multirotor"].supported_parameters) | set(
-        FIRMWARE.kinds["rover"].supported_parameters
+    stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
+        FIRMWARE.kinds["rover"].rules.parameters.supported
     )
     assert stated == read
     for firmware in FIRMWARE.kinds.values():
-        assert set(firmware.supported_parameters) <= {parameter.name for parameter in firmware.parameters()}
+        assert set(firmware.rules.parameters.supported) <= {parameter.name for parameter in firmware.rules.parameters.defaults()}
     assert REAL32 == 9
 
 

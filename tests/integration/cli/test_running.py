@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.cli.folders import example
+from volery.cli.commands.demo import example
 from volery.requirements.record import read_record
 
 pytestmark = pytest.mark.integration

@@ -98,7 +98,7 @@ def test_landing_ends_what_others_have_under_way(pair: Fleet) -> None:
         except Overridden as error:
             raised.append(error)
 
-    kernel.spawn(go_far, "far", kernel.current().place)  # type: ignore[union-attr]
+    kernel.spawn(go_far, "far", kernel.current().context)  # type: ignore[union-attr]
     sleep(kernel, 3 * S)
     pair.land()
     assert [type(error) for error in raised] == [Overridden]

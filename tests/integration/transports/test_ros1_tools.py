@@ -86,7 +86,7 @@ def test_rosservice_is_told_why_not(ours: Ours, ros: Run) -> None:
             node.spin()
 
     node.serve("set", SET_BOOL, refuse)
-    ours.graph.kernel.spawn(spin, "spins", node.place)
+    ours.graph.kernel.spawn(spin, "spins", node.context)
     assert "the key is missing" in ros("rosservice", "call", "/set", "data: true", fails=True)
 
 

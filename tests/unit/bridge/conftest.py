@@ -33,7 +33,7 @@ class Aviary:
             self.graph, ours, "/drone_1", VehicleNodeOptions(geoid=LevelGeoid(geoid), **options)
         )
         self.node.start(ExecutionContext("mavros"), self.kernel.root)
-        self.user = self.graph.node("user", place=ExecutionContext("user"))
+        self.user = self.graph.node("user", context=ExecutionContext("user"))
         self.got: dict[str, list[Any]] = {}
 
     def _price(self, node: Any, call: str, x: float) -> Cost:

@@ -110,7 +110,7 @@ def test_nested_calls_over_two_processors_under_preemption():
     def urgent(processor, at, amount):
         def body():
             kernel.sleep_until(int(at * MS))
-            kernel.pay(int(amount * MS))
+            kernel.consume(int(amount * MS))
 
         kernel.spawn(body, "urgent", ExecutionContext("urgent", processor, 9))
 

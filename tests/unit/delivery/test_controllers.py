@@ -109,7 +109,7 @@ def ask(bench, instance, *steps):
     for at, call in steps:
         when = round(at * S)
         body = lambda call=call: answers.append(call(instance.object))  # noqa: E731 (bound in a loop)
-        bench.kernel.call_at(when, lambda body=body: bench.kernel.spawn(body, "central", instance.place))
+        bench.kernel.call_at(when, lambda body=body: bench.kernel.spawn(body, "central", instance.context))
     return answers
 
 

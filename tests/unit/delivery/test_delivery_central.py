@@ -114,7 +114,7 @@ class Service:
 
         when = round(seconds * S)
         self.bench.kernel.call_at(
-            when, lambda: self.bench.kernel.spawn(body, "requester", self.central.place)
+            when, lambda: self.bench.kernel.spawn(body, "requester", self.central.context)
         )
 
     def run(self, seconds=600):

@@ -24,7 +24,7 @@ def route(make_bench, city):
             by_degrees = {(place.latitude, place.longitude): name for name, place in places.items()}
             found.extend((by_degrees[point.latitude, point.longitude], point.altitude) for point in points)
 
-        bench.kernel.call_at(1, lambda: bench.kernel.spawn(body, "asker", instance.place))
+        bench.kernel.call_at(1, lambda: bench.kernel.spawn(body, "asker", instance.context))
         bench.run(1)
         assert bench.failures == []
         return found

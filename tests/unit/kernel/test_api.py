@@ -203,4 +203,4 @@ def test_what_a_task_costs_nowhere_is_forgotten(kernel: Kernel) -> None:
     task = kernel.spawn(lambda: sleep(kernel, MS), "t", ExecutionContext("t", meter=lambda: next(meter)))
     task.charge(5)
     kernel.run(LONG)
-    assert task.debt == 0
+    assert task.pending_ns == 0

@@ -26,7 +26,7 @@ def compute(
 
     def body() -> None:
         kernel.sleep_until(at * MS)
-        kernel.pay(ms * MS)
+        kernel.consume(ms * MS)
 
     kernel.spawn(body, name, ExecutionContext(name, processor, priority))
 
@@ -66,12 +66,12 @@ def test_who_is_done_at_the_instant_of_its_preemption_is_done(virtual: VirtualKe
     done: list[int] = []
 
     def low() -> None:
-        virtual.pay(5 * MS)
+        virtual.consume(5 * MS)
         done.append(virtual.now())
 
     def high() -> None:
         virtual.sleep_until(5 * MS)
-        virtual.pay(10 * MS)
+        virtual.consume(10 * MS)
 
     virtual.spawn(
         high, "high", ExecutionContext("high", core, 9)
@@ -158,17 +158,17 @@ def test_nested_calls_over_two_processors_with_preemption(virtual: VirtualKernel
     ) -> None:
         radio.carry(200)
         with executing_in(virtual, place):
-            virtual.pay(ms_before * MS)
+            virtual.consume(ms_before * MS)
             if inner is not None:
                 inner()
-            virtual.pay(ms_after * MS)
+            virtual.consume(ms_after * MS)
         radio.carry(200)
 
     def a() -> None:
-        virtual.pay(4 * MS)
+        virtual.consume(4 * MS)
         c = ExecutionContext("c", onboard, None)
         call(ExecutionContext("b", ground, 5), 3, 1, inner=lambda: call(c, 2, 0))
-        virtual.pay(1 * MS)
+        virtual.consume(1 * MS)
         result.append(virtual.now() / MS)
 
     virtual.spawn(a, "a", ExecutionContext("a", onboard, 1))
@@ -194,7 +194,7 @@ def test_a_passive_component_computes_at_its_callers_priority(virtual: VirtualKe
 
     def caller() -> None:
         with executing_in(virtual, ExecutionContext("passive", core, None)):
-            virtual.pay(4 * MS)
+            virtual.consume(4 * MS)
 
     virtual.spawn(caller, "caller", ExecutionContext("caller", core, 5))
     compute(virtual, core, "middle", at=1, ms=2, priority=3)
@@ -241,9 +241,9 @@ def test_going_on_with_the_same_task_takes_no_context_switch(virtual: VirtualKer
     core = Processor(virtual, "cpu", context_switch=1 * MS)
 
     def body() -> None:
-        virtual.pay(2 * MS)
+        virtual.consume(2 * MS)
         virtual.sleep_until(10 * MS)
-        virtual.pay(2 * MS)
+        virtual.consume(2 * MS)
 
     virtual.spawn(body, "a", ExecutionContext("a", core))
     virtual.run(S)
@@ -255,7 +255,7 @@ def test_nor_does_it_when_something_happens_meanwhile(virtual: VirtualKernel, sl
 
     def body() -> None:
         for _ in range(3):
-            virtual.pay(2 * MS)
+            virtual.consume(2 * MS)
 
     virtual.spawn(body, "a", ExecutionContext("a", core))
     for when in range(10):
@@ -269,7 +269,7 @@ def test_a_job_that_ends_with_its_turn_is_done(virtual: VirtualKernel, slices: S
     done: list[float] = []
 
     def body() -> None:
-        virtual.pay(8 * MS)
+        virtual.consume(8 * MS)
         done.append(virtual.now() / MS)
 
     virtual.spawn(body, "a", ExecutionContext("a", core))
@@ -284,7 +284,7 @@ def test_what_happens_at_the_instant_a_job_ends_comes_in_the_order_asked_for(vir
     seen: list[str] = []
 
     def body() -> None:
-        virtual.pay(5 * MS)
+        virtual.consume(5 * MS)
         seen.append("done")
 
     virtual.call_at(5 * MS, lambda: seen.append("asked for before"))

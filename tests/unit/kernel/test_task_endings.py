@@ -41,7 +41,7 @@ def test_an_end_comes_at_the_next_interaction_point_and_not_before(kernel: Kerne
     [
         lambda kernel: sleep(kernel, 3600 * S),
         lambda kernel: kernel.sleep_until(0),
-        lambda kernel: kernel.pay(0),
+        lambda kernel: kernel.consume(0),
         lambda kernel: kernel.park(0, "nothing"),
         lambda kernel: Event(kernel, "event").is_set(),
         lambda kernel: Queue(kernel, "queue").put(1),
@@ -341,7 +341,7 @@ def test_a_task_ended_while_it_computes_leaves_the_processor_clean(virtual: Virt
 
     def compute(amount: int) -> Callable[[], None]:
         def body() -> None:
-            virtual.pay(amount)
+            virtual.consume(amount)
             ends.append(virtual.now())
 
         return body

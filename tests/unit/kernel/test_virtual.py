@@ -330,7 +330,7 @@ class Accused:
     def __init__(self) -> None:
         self.whom: list[tuple[str, int]] = []
 
-    def accuse(self, task: Task, now: int, what: str) -> None:
+    def report_stall(self, task: Task, now: int, what: str) -> None:
         self.whom.append((task.name, now))
 
 
@@ -355,7 +355,7 @@ def test_the_watchdog_accuses_who_does_not_move_and_nobody_else() -> None:
 
     def look(moment: float, task: Task | None, time: int) -> None:
         kernel.task, kernel.time = task, time
-        dog.look(moment)
+        dog.check(moment)
 
     look(0.0, a, 5)
     look(9.0, a, 6)  # time has moved

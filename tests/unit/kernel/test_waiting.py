@@ -371,7 +371,7 @@ def test_waits_of_the_house_end_no_activation(
     flag = Event(virtual, "flag")
 
     def body() -> None:
-        virtual.pay(10 * MS)
+        virtual.consume(10 * MS)
         radio.carry(1)
         with lock:
             changed.wait_for(lambda: False, within=5 * MS)
@@ -426,7 +426,7 @@ def test_at_pays_before_it_goes_and_before_it_leaves(
             assert task.priority == 4
             task.charge(5 * MS)
         left.append(virtual.now())
-        assert task.place.component == "caller"
+        assert task.context.component == "caller"
         task.charge(2 * MS)
 
     virtual.spawn(body, "caller", ExecutionContext("caller", core, 4))
@@ -449,7 +449,7 @@ def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, 
         with pytest.raises(ZeroDivisionError):
             visit(task)
         left.append(virtual.now())
-        assert len(task.places) == 1
+        assert len(task.contexts) == 1
 
     virtual.spawn(body, "caller", ExecutionContext("caller", core))
     virtual.run(S)
@@ -475,7 +475,7 @@ def test_a_task_that_is_ended_at_a_place_owes_nothing(virtual: VirtualKernel, co
     virtual.run(S)
     assert core.busy_ns(virtual.now()) == 0
     assert len(tasks[0].places) == 1
-    assert tasks[0].debt == 0
+    assert tasks[0].pending_ns == 0
 
 
 def test_a_meter_is_pulled_at_every_interaction_point(

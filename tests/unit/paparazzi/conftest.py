@@ -129,7 +129,7 @@ class Craft:
     @property
     def block_name(self) -> str:
         """Of the flight plan."""
-        navigation = self.autopilot.vehicle.memory.navigation
+        navigation = self.autopilot.vehicle.firmware_state.navigation
         name: str = navigation.plan.blocks[navigation.block].name
         return name
 

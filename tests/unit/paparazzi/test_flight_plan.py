@@ -16,7 +16,7 @@ Make = Callable[..., Any]
 
 def waypoint(craft: Any, name: str) -> tuple[float, float, float]:
     """North, east, down, as it stands now."""
-    east, north, up = craft.autopilot.vehicle.memory.navigation.point(name)
+    east, north, up = craft.autopilot.vehicle.firmware_state.navigation.point(name)
     return north, east, -up
 
 
@@ -98,11 +98,11 @@ def test_a_line_is_kept(craft: Any) -> None:
         across = (end[0] - start[0]) * (east - start[1]) - (end[1] - start[1]) * (north - start[0])
         assert abs(across) / length < 1.0
     assert craft.last("ROTORCRAFT_NAV_STATUS")["horizontal_mode"] in (0, 1)
-    craft.until(lambda: craft.autopilot.vehicle.memory.navigation.stage == 1, 20.0)
+    craft.until(lambda: craft.autopilot.vehicle.firmware_state.navigation.stage == 1, 20.0)
     craft.run(9.0)
-    assert craft.autopilot.vehicle.memory.navigation.stage == 1  # it stays ten seconds at p2
+    assert craft.autopilot.vehicle.firmware_state.navigation.stage == 1  # it stays ten seconds at p2
     craft.run(2.0)
-    assert craft.autopilot.vehicle.memory.navigation.stage == 2
+    assert craft.autopilot.vehicle.firmware_state.navigation.stage == 2
 
 
 def test_the_route_comes_back_to_its_start(craft: Any) -> None:
@@ -214,10 +214,10 @@ def test_a_moved_waypoint_is_flown_to_and_told(craft: Any) -> None:
 
 @pytest.mark.parametrize("number", [0, 10, 255])
 def test_waypoints_that_are_none_are_not_moved(craft: Any, number: int) -> None:
-    before = list(craft.autopilot.vehicle.memory.navigation.waypoints)
+    before = list(craft.autopilot.vehicle.firmware_state.navigation.waypoints)
     craft.send("MOVE_WP", wp_id=number, lat=1, lon=1, alt=1)
     craft.run(0.1)
-    assert craft.autopilot.vehicle.memory.navigation.waypoints == before
+    assert craft.autopilot.vehicle.firmware_state.navigation.waypoints == before
 
 
 def test_coming_from_guided_into_nav_it_goes_on_with_its_block(craft: Any) -> None:

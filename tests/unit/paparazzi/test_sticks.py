@@ -23,7 +23,7 @@ def hold(craft: Any, seconds: float, **sticks: int) -> None:
 def test_a_frame_makes_the_radio_ok_and_silence_loses_it(craft: Any) -> None:
     craft.sticks(mode=AUTO2)
     craft.run(0.1)
-    radio = craft.autopilot.vehicle.memory.radio
+    radio = craft.autopilot.vehicle.firmware_state.radio
     vehicle = craft.autopilot.vehicle
     assert radio.status(vehicle) == OK
     craft.run(0.6)

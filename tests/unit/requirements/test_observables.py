@@ -8,7 +8,8 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.base.units import unit
 from volery.model.system import Bound
-from volery.requirements.observables import OBSERVABLES, Observers, bounds_of, judge, make_observer
+from volery.requirements.observables import OBSERVABLES, make_observer
+from volery.requirements.verdicts import Observers, bounds_of, judge
 from volery.trace.attachments import (
     ChainSetup,
     ComponentSetup,

@@ -65,7 +65,7 @@ def test_no_simulated_response_is_longer_than_its_bound(costs, starts, cores):
     def loop(cost, period):
         rate = Rate(kernel, period * MS)
         for _ in range(12):
-            kernel.pay(cost * MS)
+            kernel.consume(cost * MS)
             rate.sleep()
 
     for number, (name, cost, start) in enumerate(zip(names, costs, starts, strict=False)):
@@ -119,7 +119,7 @@ def test_bursts_of_messages_stay_within_their_bounds(arrivals, cores, promised):
             end_activation(kernel)
             kernel.sleep_until(due)
             current_task(kernel).release(due)
-            kernel.pay(cost * MS)
+            kernel.consume(cost * MS)
 
     names = [f"t{number}" for number in range(len(arrivals))]
     for number, name in enumerate(names):

@@ -18,7 +18,7 @@ def loaded(share, cores=2, seed=1, work=0):
     kernel = VirtualKernel(events.append)
     processor = Processor(kernel, "onboard", cores=cores)
     start_background_load(kernel, processor, ProcessorModel("onboard", "any", 1e9, cores, load=share), seed)
-    kernel.spawn(lambda: kernel.pay(work), "loop", ExecutionContext("loop", processor, 99))
+    kernel.spawn(lambda: kernel.consume(work), "loop", ExecutionContext("loop", processor, 99))
     kernel.run(1 * S)
     kernel.close()
     return [event for event in events if isinstance(event, Slice)]

@@ -1,4 +1,1 @@
-"""What each command is called, takes, and tells ``--help``.
-
-What it does stands in a module of ``volery.cli``, imported when it is called: ``--help`` is quick.
-"""
+"""The commands of ``volery``. See ``volery.cli.command`` for how to add one."""

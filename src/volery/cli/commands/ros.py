@@ -1,53 +1,73 @@
-"""Real ROS: the bridge, its interfaces, the graph."""
+"""``volery bridge``, ``volery graph`` and ``volery export-messages``: real ROS graphs."""
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Column, Table
 
-from volery.cli.console import Output
-from volery.cli.endings import run_command
-from volery.cli.options import Debug, Json, Quiet, Seed
+from volery.base.errors import UsageError
+from volery.base.time import S, clock, from_seconds
+from volery.cli.command import OK, Commands
+from volery.cli.console import Output, make_table
+from volery.cli.options import Seed
+
+if TYPE_CHECKING:
+    from volery.ros.graph.snapshot import GraphSnapshot
+    from volery.trace.events import Event
+
+commands = Commands("ROS")
 
 
+@commands.add("quiet", "debug")
 def bridge(
-    url: Annotated[str, typer.Argument(metavar="URL", help="ardupilot+serial:///dev/ttyUSB0, sim:px4 ...")],
-    graph: Annotated[
-        str, typer.Option(metavar="ros1|ros2", help="The graph to put the vehicle on.")
-    ] = "ros1",
+    output: Output,
+    url: Annotated[
+        str,
+        typer.Argument(
+            metavar="URL", help="Address of the vehicle, such as ardupilot+serial:///dev/ttyUSB0 or sim:px4."
+        ),
+    ],
+    graph: Annotated[str, typer.Option(metavar="ros1|ros2", help="ROS graph.")] = "ros1",
     names: Annotated[
         str,
         typer.Option(
             metavar="mavros|roscopter|pprzros",
-            help="Whose names: pprzros for Paparazzi, the others for all; else the usual ones.",
+            help="Names of topics and services. pprzros is for Paparazzi only.",
         ),
     ] = "",
-    namespace: Annotated[str, typer.Option(metavar="/NAME", help="Where they begin, such as /mavros.")] = "",
-    rate: Annotated[int, typer.Option(help="What the autopilot is asked for, Hz; 0: nothing.")] = 10,
+    namespace: Annotated[
+        str, typer.Option(metavar="/NAME", help="Namespace of the names, such as /mavros.")
+    ] = "",
+    rate: Annotated[
+        int, typer.Option(help="Rate that is requested from the autopilot, Hz; 0 requests nothing.")
+    ] = 10,
     enable_control: Annotated[
-        bool, typer.Option("--enable-control", help="Take roscopter's send_rc; MAVROS's names need no leave.")
+        bool,
+        typer.Option(
+            "--enable-control", help="Accept roscopter's send_rc. MAVROS's names do not need this option."
+        ),
     ] = False,
-    source_system: Annotated[int, typer.Option(help="The MAVLink system id that it speaks as.")] = 255,
+    source_system: Annotated[int, typer.Option(help="MAVLink system id of the bridge.")] = 255,
     geoid: Annotated[
-        str, typer.Option(metavar="egm96|METRES", help="Mean sea level above the ellipsoid.")
+        str, typer.Option(metavar="egm96|METRES", help="Height of mean sea level above the ellipsoid.")
     ] = "egm96",
-    speed: Annotated[float, typer.Option(help="Of a simulated vehicle: seconds per second.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option(help="Simulated seconds per second, for a simulated vehicle.")
+    ] = 1.0,
     seed: Seed = 1,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
+) -> int:
     """Put a vehicle on a real ROS graph under the names of MAVROS, roscopter or pprzros, until Ctrl-C.
 
-    In real time, over serial lines (57600 baud unless the address says ?baud=...), UDP and TCP; a link that
-    breaks is opened again.
+    Works in real time over serial lines (57600 baud unless the address says ?baud=...), UDP and TCP. A link
+    that breaks is opened again.
     """
-    from volery.cli import bridge as command
-    from volery.run.bridge import BridgeOptions
+    from volery.run.bridge import Bridge, BridgeOptions
 
-    output = Output(quiet, False, debug)
-    wanted = BridgeOptions(
+    options = BridgeOptions(
         url=url,
         graph=graph,
         names=names,
@@ -59,34 +79,119 @@ def bridge(
         speed=speed,
         seed=seed,
     )
-    run_command(output, lambda: command.bridge(output, wanted))
+    notes = BridgeNotes(output)
+    made = Bridge(options, notes.record)
+    below = made.namespace.rstrip("/")
+    output.show(f"bridging {url} to {graph} under {made.names}'s names, {below}/...; Ctrl-C stops it")
+    made.every(S, lambda: notes.status(made.kernel.now(), made.status))
+    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))  # of a service
+    try:
+        made.run()
+    except KeyboardInterrupt:
+        output.note("stopped")
+    return OK
 
 
-def interfaces(
-    packages: Annotated[list[str], typer.Argument(help="Such as roscopter, mavros_msgs, pprzros_msgs.")],
-    out: Annotated[Path, typer.Option(help="Where they go, a folder each.")] = Path(),
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Write packages of messages and services, so that rostopic and rosservice know their types."""
-    from volery.cli import interfaces as command
+class BridgeNotes:
+    """Prints the events of a bridge, and its status when it changes."""
 
-    output = Output(quiet, False, debug)
-    run_command(output, lambda: command.interfaces(output, packages, out))
+    def __init__(self, output: Output) -> None:
+        self._output = output
+        self._last = ""
+
+    def record(self, event: Event) -> None:
+        """Print a link that is lost or restored, or a warning."""
+        from volery.trace.events import LinkState, Text
+
+        if isinstance(event, LinkState):
+            self._output.note(f"{clock(event.at)}  link {event.state}: {event.detail}")
+        elif isinstance(event, Text):
+            self._output.note(f"{clock(event.at)}  {event.text}")
+
+    def status(self, now: int, text: str) -> None:
+        """Print *text* if it differs from the last status."""
+        if text != self._last:
+            self._last = text
+            self._output.note(f"{clock(now)}  {text}")
 
 
+@commands.add("quiet", "json", "debug")
 def graph(
+    output: Output,
     source: Annotated[
-        str, typer.Argument(metavar="ros1|ros2|FOLDER", help="A real graph, or the folder of a run.")
+        str, typer.Argument(metavar="ros1|ros2|FOLDER", help="A real ROS graph, or a run folder.")
     ],
-    within: Annotated[float, typer.Option(help="Count the rates of a real graph for so many seconds.")] = 2.0,
-    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it.")] = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
-    debug: Debug = False,
-) -> None:
+    within: Annotated[
+        float, typer.Option(help="Seconds for which the rates of a real graph are counted.")
+    ] = 2.0,
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Also draw the graph as SVG.")] = None,
+) -> int:
     """Show the nodes, topics, rates and connections of a ROS graph."""
-    from volery.cli import graph as command
+    if not 0.0 <= within < 3600.0:
+        raise UsageError(f"--within {within:g}: give seconds from 0 to 3600")
+    seen = _read_graph(source, within)
+    output.give(seen.as_dict())
+    output.show(*_graph_tables(seen))
+    if svg is not None:
+        from volery.report.graph_picture import graph_svg
 
-    output = Output(quiet, as_json, debug)
-    run_command(output, lambda: command.graph(output, command.Wanted(source, within, svg)))
+        try:
+            svg.write_text(graph_svg(seen), encoding="utf-8")
+        except OSError as error:
+            raise UsageError(f"{svg} cannot be written: {error.strerror or error}") from error
+        output.note(f"drawn in {svg}")
+    return OK
+
+
+def _read_graph(source: str, within: float) -> GraphSnapshot:
+    from volery.report.graph_picture import graph_of_run
+    from volery.ros.graph.snapshot import snapshot
+    from volery.run.assembly.ros_graphs import GRAPHS, on_graph
+
+    folder = Path(source)
+    if source not in GRAPHS and folder.is_dir():
+        return graph_of_run(folder)
+    if source not in GRAPHS and folder.exists():
+        raise UsageError(f"{folder} is not a run folder")
+    with on_graph(source, "volery graph") as there:
+        return snapshot(there, from_seconds(within))
+
+
+def _graph_tables(seen: GraphSnapshot) -> list[Table]:
+    nodes = make_table(_folded("node"), "publishes", "subscribes", "serves", title="nodes")
+    for name in seen.nodes:
+        published = sum(name in line.publishers for line in seen.topics)
+        subscribed = sum(name in line.subscribers for line in seen.topics)
+        served = sum(service.server == name for service in seen.services)
+        nodes.add_row(name, *(str(count or "") for count in (published, subscribed, served)))
+    topics = make_table(
+        _folded("topic and type"), "Hz", _folded("publishers"), _folded("subscribers"), title="topics"
+    )
+    for line in seen.topics:
+        rate = "" if line.rate is None else f"{line.rate:.3g}"
+        topics.add_row(
+            f"{line.name}\n[dim]{line.type}", rate, "\n".join(line.publishers), "\n".join(line.subscribers)
+        )
+    return [nodes, topics]
+
+
+def _folded(heading: str) -> Column:
+    """Return a column that folds long names instead of cutting them off."""
+    return Column(heading, overflow="fold")
+
+
+@commands.add("quiet", "debug")
+def export_messages(
+    output: Output,
+    packages: Annotated[
+        list[str], typer.Argument(help="Packages, such as roscopter, mavros_msgs, pprzros_msgs.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder in which each package gets a folder.")] = Path(),
+) -> int:
+    """Write packages of messages and services, so that rostopic and rosservice know their types."""
+    from volery.ros.transports.ros1.package_export import write_package
+
+    for package in packages:
+        output.show(f"written: {write_package(package, out)}")
+    output.show(f"for ROS 1's tools: export PYTHONPATH={out.resolve()}:$PYTHONPATH")
+    return OK

@@ -182,7 +182,7 @@ class PrivateGraph:
     def open(self, commander: str = "commander", **options: str) -> Driver:
         """A driver of the vehicle, on a node called *commander*."""
         place = ExecutionContext(f"{commander} of {self._vehicle}")
-        node = self.graph.node(commander, f"/{self._vehicle}", place=place)
+        node = self.graph.node(commander, f"/{self._vehicle}", context=place)
         stated = {"namespace": self._how.namespace, **options}
         return self._how.open_driver(self._kernel, node, self._vehicle, stated)
 

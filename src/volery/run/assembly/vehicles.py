@@ -87,6 +87,7 @@ def open_vehicles(
 def _open_simulated(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
+    from volery.run.assembly.simulated_fleet import fleet_of
 
     wanted = [
         parse_simulated(address, name, KINDS[kinds[name]], stated.home) for name, address in addresses.items()
@@ -169,7 +170,7 @@ class RealGraphs:
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
         node = self.graph(address.carrier).node(
-            f"volery_{name}", anonymous=True, place=ExecutionContext(name)
+            f"volery_{name}", anonymous=True, context=ExecutionContext(name)
         )
         namespace = address.path.rstrip("/")
         stated = {"namespace": namespace} if namespace else {}

@@ -57,7 +57,7 @@ class Apron:
         )
         self.graph = EmbeddedGraph(self.kernel, unrecorded=True)
         self.autopilot.join(self.graph, f"/d/{package}", ExecutionContext("d"))
-        self.node = self.graph.node("program", place=ExecutionContext("program"))
+        self.node = self.graph.node("program", context=ExecutionContext("program"))
         self.seen: dict[str, Any] = {}
         self.counts: dict[str, int] = {}
         self._publishers: dict[str, Any] = {}
@@ -126,11 +126,11 @@ class Apron:
 
     @property
     def mode(self) -> int:
-        return int(self.autopilot.vehicle.memory.mode)
+        return int(self.autopilot.vehicle.firmware_state.mode)
 
     @property
     def status(self) -> int:
-        return int(self.autopilot.vehicle.memory.status)
+        return int(self.autopilot.vehicle.firmware_state.status)
 
     @property
     def place(self) -> tuple[float, float, float]:

@@ -42,7 +42,7 @@ class Flown:
         stated = VehicleNodeOptions(geoid=LevelGeoid(GEOID_M), **{**rates, **options})
         self.node = VehicleNode(self.graph, self.interpreter, "/d", stated)
         self.node.start(ExecutionContext("bridge"), self.kernel.root)
-        self.user = self.graph.node("user", place=ExecutionContext("user"))
+        self.user = self.graph.node("user", context=ExecutionContext("user"))
         self.frames: list[Frame] = []
         self._latest: dict[str, Any] = {}
         self._publishers: dict[str, Any] = {}

@@ -26,7 +26,7 @@ class FakeNode:
 
     def __init__(self, graph: EmbeddedGraph, namespace: str, hardware: str = "A3") -> None:
         self.kernel = graph.kernel
-        self.node = node = graph.node("dji_sdk", place=ExecutionContext("aircraft"))
+        self.node = node = graph.node("dji_sdk", context=ExecutionContext("aircraft"))
         self.hardware = hardware
         self.status, self.mode, self.health, self.switch = (1 if hardware == "M100" else 0), 6, 5, 8000.0
         self.north = self.east = self.up = 0.0
@@ -148,7 +148,7 @@ class Bench:
         self.kernel = VirtualKernel(record=self.events.append)
         self.graph = EmbeddedGraph(self.kernel, unrecorded=True)
         self.node = FakeNode(self.graph, "/dji_sdk", hardware)
-        commander = self.graph.node("commander", place=ExecutionContext("commander"))
+        commander = self.graph.node("commander", context=ExecutionContext("commander"))
         self.driver = open_driver(self.kernel, commander, "d", {"namespace": "/dji_sdk", **options})
         self.drone = Drone(self.kernel, "d", self.driver)
 

@@ -71,7 +71,7 @@ def test_it_is_heard_once_it_has_said_which_aircraft_it_is(bench: Make) -> None:
 
 def test_nobody_there_is_told_with_the_topic_that_is_missing(bench: Make) -> None:
     made = bench()
-    lonely = made.graph.node("lonely", place=ExecutionContext("lonely"))
+    lonely = made.graph.node("lonely", context=ExecutionContext("lonely"))
     driver = open_driver(made.kernel, lonely, "d", {"namespace": "/elsewhere/dji_sdk"})
 
     def body() -> None:
@@ -88,7 +88,7 @@ def test_nobody_there_is_told_with_the_topic_that_is_missing(bench: Make) -> Non
 )
 def test_options_that_make_no_sense(bench: Make, options: dict[str, str], wrong: str) -> None:
     made = bench()
-    node = made.graph.node("other", place=ExecutionContext("other"))
+    node = made.graph.node("other", context=ExecutionContext("other"))
     with pytest.raises(UsageError, match=wrong):
         open_driver(made.kernel, node, "d", options)
     assert DRIVER.on_link is None

@@ -25,7 +25,7 @@ class Pair:
         self.wire = GraphWire(self.kernel, Random(5), faults)
         self.graph = private_graph(self.kernel, self.wire, as_bytes=faults is not None)
         here = ExecutionContext("here")
-        talker, listener = (self.graph.node(name, place=here) for name in ("talker", "listener"))
+        talker, listener = (self.graph.node(name, context=here) for name in ("talker", "listener"))
         self.heard: list[tuple[int, float]] = []
         group = listener.group(lambda work: work.run())
         listener.subscribe("chat", "std_msgs/Float32", self._take, group=group)

@@ -289,7 +289,7 @@ out((rospy.get_name(), rospy.get_namespace(), rospy.get_caller_id(), rospy.resol
 
 
 def test_a_node_that_is_there_already_is_taken_over(stage: Any) -> None:
-    stage.nodes["n"] = stage.graph.node("made_before", place=ExecutionContext("n"))
+    stage.nodes["n"] = stage.graph.node("made_before", context=ExecutionContext("n"))
     stage.component("n", 'rospy.init_node("n")\nout(rospy.get_name())')
     assert stage.run() == ["/made_before"]
     assert stage.graph.node_names() == ["/made_before"]

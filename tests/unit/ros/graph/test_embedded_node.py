@@ -39,14 +39,14 @@ def test_invalid_node_names_are_refused(rig: Any, name: str, namespace: str) -> 
 
 
 def test_a_name_is_taken_until_its_node_leaves(rig: Any) -> None:
-    first = rig.graph.node("nav", place=ExecutionContext("one"))
+    first = rig.graph.node("nav", context=ExecutionContext("one"))
     with pytest.raises(UsageError, match=r"/nav is there already \(of component one\).*component two"):
-        rig.graph.node("nav", place=ExecutionContext("two"))
+        rig.graph.node("nav", context=ExecutionContext("two"))
     assert rig.graph.node("nav", "/other").name == "/other/nav"
     assert rig.graph.node("nav", anonymous=True).name == "/nav_1"
     assert rig.graph.node("nav", anonymous=True).name == "/nav_2"
     first.close()
-    assert rig.graph.node("nav", place=ExecutionContext("two")).name == "/nav"
+    assert rig.graph.node("nav", context=ExecutionContext("two")).name == "/nav"
     assert rig.graph.node_names() == ["/nav", "/nav_1", "/nav_2", "/other/nav"]
 
 

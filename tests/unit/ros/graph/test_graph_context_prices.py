@@ -88,7 +88,7 @@ def test_the_cost_of_a_sleep_is_spent_during_it(rig: Any) -> None:
 
 def test_house_code_pays_in_the_background(rig: Any) -> None:
     rig.prices["init"] = type("P", (), {"caller": 5 * US, "background": 1 * US})()
-    rig.graph.node("n", place=ExecutionContext("n", rig.processor))
+    rig.graph.node("n", context=ExecutionContext("n", rig.processor))
     rig.kernel.run(MS)
     assert [(event.start, event.end) for event in rig.of(Slice)] == [(0, 6 * US)]
 
@@ -96,11 +96,11 @@ def test_house_code_pays_in_the_background(rig: Any) -> None:
 def test_a_passive_callee_pays_where_it_computes(rig: Any) -> None:
     """Whoever calls a publisher from another place pays the caller's part there."""
     rig.prices["publish"] = type("P", (), {"caller": 10 * US, "background": 3 * US})()
-    node = rig.graph.node("callee", place=ExecutionContext("callee", rig.processor, priority=None))
+    node = rig.graph.node("callee", context=ExecutionContext("callee", rig.processor, priority=None))
     publisher = node.advertise("chat", STRING)
 
     def caller() -> None:
-        with executing_in(rig.kernel, node.place):
+        with executing_in(rig.kernel, node.context):
             publisher.publish(messages.new(STRING))
 
     rig.run(caller)

@@ -1,4 +1,4 @@
-"""``volery doctor``: what is installed, what each missing part would enable, how to get it."""
+"""``volery doctor``: installed parts, what each missing part would enable, how to install it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from importlib.util import find_spec
 
 from rich.text import Text
 
+from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
-from volery.cli.endings import FAILED, OK
 
-LEAST_PYTHON = (3, 11)
+commands = Commands("First steps")
+
+MINIMUM_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True)
 class Part:
-    """Something that may be installed: how to find it, what it is for, how to get it."""
+    """Something that may be installed.
+
+    ``find`` returns a version or a path, or an empty text if the part is missing.
+    """
 
     name: str
     find: Callable[[], str]
@@ -41,7 +46,7 @@ class Finding:
 
 
 def distribution(name: str) -> Callable[[], str]:
-    """Finds a Python package by the name it is installed under."""
+    """Return a function that finds a Python package by the name it is installed under."""
 
     def find() -> str:
         try:
@@ -53,7 +58,7 @@ def distribution(name: str) -> Callable[[], str]:
 
 
 def module(name: str) -> Callable[[], str]:
-    """Finds a Python module wherever it comes from, such as Debian's or a sourced workspace."""
+    """Return a function that finds a Python module of any origin, such as Debian's."""
 
     def find() -> str:
         found = find_spec(name)
@@ -63,34 +68,32 @@ def module(name: str) -> Callable[[], str]:
 
 
 def program(*names: str) -> Callable[[], str]:
-    """Finds a program by any of its names."""
+    """Return a function that finds a program by any of *names*."""
     return lambda: next((found for name in names if (found := shutil.which(name))), "")
 
 
 def _python() -> str:
-    return platform.python_version() if sys.version_info >= LEAST_PYTHON else ""
+    return platform.python_version() if sys.version_info >= MINIMUM_PYTHON else ""
 
 
-def _needed(name: str, enables: str) -> Part:
+def _core(name: str, enables: str) -> Part:
     return Part(name, distribution(name), enables, f"pip install {name}", needed=True)
 
 
 PARTS: tuple[Part, ...] = (
     Part("Python 3.11 or newer", _python, "everything", "apt install python3", needed=True),
-    _needed("greenlet", "component code that blocks, in virtual time"),
-    _needed("numpy", "arrays of the world's state"),
-    _needed("numba", "the compiled world: physics and inner control loops"),
-    _needed("pymavlink", "MAVLink: ArduPilot and ground stations"),
-    _needed("pyserial", "radios and cables to real vehicles"),
-    _needed("rosbags", "ROS message types without ROS"),
-    _needed("mcap", "traces that Foxglove opens"),
-    _needed("pydantic", "models and run records"),
-    _needed("ruamel.yaml", "models with line numbers"),
-    _needed("jinja2", "reports"),
-    Part(
-        "mavsdk", distribution("mavsdk"), "flying `volery vehicle` with MAVSDK", "pip install 'mavsdk>=3,<4'"
-    ),
-    Part("MAVProxy", distribution("MAVProxy"), "fly `volery vehicle` by typing", "pip install MAVProxy"),
+    _core("greenlet", "component code that blocks, in virtual time"),
+    _core("numpy", "arrays of the world's state"),
+    _core("numba", "the compiled world: physics and inner control loops"),
+    _core("pymavlink", "MAVLink: ArduPilot, PX4 and ground stations"),
+    _core("pyserial", "radios and cables to real vehicles"),
+    _core("rosbags", "ROS message types without ROS"),
+    _core("mcap", "traces that Foxglove opens"),
+    _core("pydantic", "models and run records"),
+    _core("ruamel.yaml", "models with line numbers"),
+    _core("jinja2", "reports"),
+    Part("mavsdk", distribution("mavsdk"), "to fly `volery serve` with MAVSDK", "pip install 'mavsdk>=3,<4'"),
+    Part("MAVProxy", distribution("MAVProxy"), "to fly `volery serve` by typing", "pip install MAVProxy"),
     Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),
     Part("rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"),
     Part(
@@ -102,31 +105,30 @@ PARTS: tuple[Part, ...] = (
     Part(
         "LLVM 17 to 19",
         program("opt-19", "opt-18", "opt-17", "opt"),
-        "what blocks of C++ code cost on another processor",
+        "cost of C++ code on another processor",
         "apt install clang-19 llvm-19",
     ),
     Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
     Part(
         "a browser",
         program("chromium", "chromium-browser", "google-chrome", "firefox"),
-        "looking at report.html",
+        "to open report.html",
         "apt install chromium",
     ),
 )
 
 
-def examine() -> list[Finding]:
-    """Look for every part."""
-    return [Finding(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
-
-
+@commands.add("json", "debug")
 def doctor(output: Output) -> int:
-    """Show what there is; 0 if nothing that is needed is missing."""
-    findings = examine()
+    """Show which parts are installed, what each missing part would enable, and how to install it.
+
+    Exit status: 0 if no necessary part is missing, 1 otherwise.
+    """
+    findings = [Finding(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
     for one in findings:
         output.show(_line(one))
     missing = [one.name for one in findings if one.needed and not one.found]
-    output.show(f"missing: {', '.join(missing)}" if missing else "everything that is needed is here")
+    output.show(f"missing: {', '.join(missing)}" if missing else "every necessary part is installed")
     output.give({"ok": not missing, "parts": [asdict(one) for one in findings]})
     return FAILED if missing else OK
 

@@ -1,0 +1,149 @@
+"""How a command is declared, called and ended.
+
+A file in ``volery.cli.commands`` declares its commands with a ``Commands`` object called ``commands``.
+``volery.cli.main`` finds every such file, so a new command is one new file and nothing else. These files
+import the library inside their functions: ``volery --help`` imports all of them and must stay quick.
+
+A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
+control the output (``--quiet``, ``--json``, ``--debug``) are added here.
+"""
+
+from __future__ import annotations
+
+import inspect
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import typer
+
+from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
+from volery.cli.console import Output
+from volery.cli.options import Debug, Json, Quiet
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+OK, FAILED, BAD_INPUT = 0, 1, 2
+
+BAD_INPUT_ERRORS = (ModelError, UsageError, EstimateError, CapabilityError)
+"""Errors that the user corrects in a file or in the call."""
+
+SECTIONS = ("First steps", "Simulate", "Fly", "ROS", "Cost of computing")
+"""Headings of ``volery --help``, in order."""
+
+OutputOption = Literal["quiet", "json", "debug"]
+_OUTPUT_OPTIONS: dict[OutputOption, Any] = {"quiet": Quiet, "json": Json, "debug": Debug}
+
+Command = TypeVar("Command", bound=Callable[..., int])
+
+
+class Commands:
+    """The commands of one file, at the top level or in a *group* such as ``volery bag``."""
+
+    def __init__(self, section: str, *, group: str = "", summary: str = "") -> None:
+        self.section, self.group, self.summary = section, group, summary
+        self.members: list[tuple[str, Callable[..., None]]] = []
+
+    def add(self, *options: OutputOption, name: str | None = None) -> Callable[[Command], Command]:
+        """Register the decorated function as a command that takes these output options.
+
+        Args:
+            options: Which of ``quiet``, ``json`` and ``debug`` the command takes.
+            name: Name of the command, by default that of the function.
+        """
+
+        def register(function: Command) -> Command:
+            self.members.append(
+                (name or function.__name__.replace("_", "-"), _command_line_function(function, options))
+            )
+            return function
+
+        return register
+
+    def add_to(self, app: typer.Typer) -> None:
+        """Add the commands to *app*."""
+        target = app
+        if self.group:
+            target = typer.Typer(help=self.summary, no_args_is_help=True)
+            app.add_typer(target, name=self.group, rich_help_panel=self.section)
+        for name, function in self.members:
+            target.command(name, rich_help_panel=None if self.group else self.section)(function)
+
+
+def _command_line_function(
+    function: Callable[..., int], options: tuple[OutputOption, ...]
+) -> Callable[..., None]:
+    """Return *function* as Typer calls it: with output options in the place of its ``output``."""
+
+    def call(**arguments: Any) -> None:
+        output = Output(**{option: arguments.pop(option) for option in options})
+        raise typer.Exit(exit_status(output, lambda: function(output, **arguments)))
+
+    signature = inspect.signature(function, eval_str=True)
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    own = [one.replace(kind=keyword) for one in signature.parameters.values() if one.name != "output"]
+    added = [
+        inspect.Parameter(
+            option, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_OUTPUT_OPTIONS[option]
+        )
+        for option in options
+    ]
+    parameters = own + added
+    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # read by inspect.signature
+    call.__annotations__ = {one.name: one.annotation for one in parameters}
+    call.__doc__ = function.__doc__
+    return call
+
+
+def exit_status(output: Output, command: Callable[[], int]) -> int:
+    """Call *command* and return its exit status; an exception becomes a message and a status."""
+    try:
+        with resend_lost_interrupts():
+            return command()
+    except VoleryError as error:
+        if output.debug:
+            output.notes.print_exception()
+        output.complain(f"volery: {error}")
+        return BAD_INPUT if isinstance(error, BAD_INPUT_ERRORS) else FAILED
+    except KeyboardInterrupt:
+        output.complain("volery: interrupted")
+        return FAILED
+    except Exception as error:
+        if output.debug:
+            output.notes.print_exception()
+        output.complain(
+            f"volery: internal error: {type(error).__name__}: {error}\n"
+            "  --debug shows where. Please report it together with the command."
+        )
+        return FAILED
+
+
+RESEND_AFTER_S = 0.05
+"""Seconds after which a lost Ctrl-C is sent again: the callback that lost it has returned by then."""
+
+
+@contextmanager
+def resend_lost_interrupts() -> Iterator[None]:
+    """Send SIGINT again when a Ctrl-C is lost in a callback that cannot raise.
+
+    numba's compiler calls back into Python from C code. A ``KeyboardInterrupt`` that is raised there is
+    reported as unraisable and dropped.
+    """
+    before = sys.unraisablehook
+
+    def hook(lost: UnraisableHookArgs) -> None:
+        if lost.exc_type is KeyboardInterrupt:
+            main = threading.main_thread().ident or 0
+            threading.Timer(RESEND_AFTER_S, signal.pthread_kill, (main, signal.SIGINT)).start()
+        else:
+            before(lost)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before

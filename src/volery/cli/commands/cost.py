@@ -1,0 +1,215 @@
+"""``volery cost`` and ``volery profile``: the cost of compiled code on the core of another processor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Column, Table
+from rich.text import Text
+
+from volery.base.errors import EstimateError, UsageError
+from volery.cli.command import FAILED, OK, Commands
+from volery.cli.console import Output, make_table, number_column
+from volery.cli.options import Allocation, Model, Overrides, Scenario, Seed
+
+if TYPE_CHECKING:
+    from volery.calibration.component_profile import ComponentProfile
+    from volery.cost.catalogue import Catalogue
+    from volery.cost.code_laws import CoreLaw
+    from volery.cost.native.program_estimate import ProgramEstimate, SourceLineCost
+
+commands = Commands("Cost of computing")
+
+TOP = 8
+"""Number of source lines in the table."""
+VISIBLE_SHARE, HIGH_SHARE = 0.0005, 0.05
+"""Shares of the cycles from which on a line of the listing is marked."""
+
+
+@commands.add("quiet", "json", "debug")
+def cost(
+    output: Output,
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Sources in C or C++.")],
+    on: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND[@MHZ]", help="Processor, such as rpi4-cortex-a72@600MHz or intel-i5-3470."
+        ),
+    ] = "rpi4-cortex-a72",
+    entry: Annotated[
+        str,
+        typer.Option(metavar="CALL", help="Function to call, such as 'step(3, 0.5)'; by default main."),
+    ] = "",
+    before: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CALL", help="Call to make first without counting it; may be repeated."),
+    ] = None,
+    argument: Annotated[
+        list[str] | None, typer.Option("--arg", help="Argument for main; may be repeated.")
+    ] = None,
+    flag: Annotated[
+        list[str] | None, typer.Option(help="Compiler flag, such as -Iinclude; may be repeated.")
+    ] = None,
+    link: Annotated[
+        list[str] | None, typer.Option(help="Linker flag, such as -lpthread; may be repeated.")
+    ] = None,
+    catalogue: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Catalogue that `volery calibrate processor` wrote.")
+    ] = None,
+    listing: Annotated[
+        bool, typer.Option("--listing", help="Show the sources with each line's share of the cycles.")
+    ] = False,
+) -> int:
+    """Estimate what C or C++ code costs on another processor.
+
+    The code runs once on this machine and its basic blocks are counted. Each block costs what a model of the
+    processor's core computes for it. The result is time, cycles, instructions, energy, the most expensive
+    lines, and what is left out. Needs LLVM (Debian: clang-19 and llvm-19).
+    """
+    from volery.cost.catalogue import load_catalogue
+    from volery.cost.native.compilation import compile_program
+    from volery.cost.native.instrumented_run import Invocation
+    from volery.cost.native.program_estimate import estimate_program
+
+    known = load_catalogue(*([catalogue] if catalogue else []))
+    law, mhz = _core_law(known, on)
+    program = compile_program(files, law, flag or ())
+    invocation = Invocation(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
+    found = estimate_program(program, invocation)
+    seconds = found.seconds(mhz)
+    try:  # what the busy core draws above idle
+        joules: float | None = known.processor(law.name).power_law().core_w(mhz) * seconds
+    except EstimateError:
+        joules = None
+    within = f", within {law.error:.0%}" if law.error else ""
+    output.show(Text(f"{law.name} at {mhz:g} MHz ({law.provenance}{within})", style="bold"))
+    output.show(_estimate_table(law, mhz, found, joules), _line_table(found.places[:TOP]))
+    for remark in found.left_out:
+        output.show(Text(f"note: {remark}", style="dim"))
+    if listing:
+        for source in files:
+            output.show(_listing(source, found.places))
+    output.give(
+        {
+            "processor": law.name,
+            "frequency_mhz": mhz,
+            "time_s": seconds,
+            "cycles": found.cycles,
+            "memory_s": found.memory_ns * 1e-9,
+            "instructions": found.instructions,
+            "energy_j": joules,
+            "provenance": law.provenance,
+            "error": law.error,
+            "lines": [{"source": one.source, "share": one.share} for one in found.places[:50]],
+            "library_calls": found.library_calls,
+            "left_out": list(found.left_out),
+        }
+    )
+    return OK
+
+
+def _core_law(known: Catalogue, on: str) -> tuple[CoreLaw, float]:
+    """Return the law of the core and the frequency [MHz] that ``KIND[@MHZ]`` names."""
+    kind, _, frequency = on.partition("@")
+    law = known.processor(kind).core_law()
+    text = frequency.lower().removesuffix("mhz")
+    try:
+        mhz = float(text) if frequency else law.greatest_mhz
+    except ValueError:
+        raise UsageError(f"--on {on}: give a frequency such as {kind}@{law.greatest_mhz:g}MHz") from None
+    law.check_frequency(mhz)
+    return law, mhz
+
+
+def _estimate_table(law: CoreLaw, mhz: float, found: ProgramEstimate, joules: float | None) -> Table:
+    shown = make_table(show_header=False)
+    shown.add_row("time", _si(found.seconds(mhz), "s"))
+    shown.add_row("cycles", f"{found.cycles:,.0f}")
+    if law.memory is not None:
+        waits = f"{_si(found.memory_ns * 1e-9, 's')} of the time, at any frequency"
+        shown.add_row("memory", waits if found.memory_ns else "all accesses hit the caches")
+    shown.add_row("instructions", f"{found.instructions:,.0f}  (without those of libraries)")
+    shown.add_row(
+        "energy", "unknown: no power figures" if joules is None else f"{_si(joules, 'J')} above idle"
+    )
+    return shown
+
+
+def _line_table(places: tuple[SourceLineCost, ...]) -> Table:
+    listed = make_table(
+        number_column("cycles"), Column("line", overflow="fold"), number_column("entries"), title="where"
+    )
+    for one in places:
+        file, _, line = one.source.rpartition(":")
+        listed.add_row(f"{one.share:.1%}", f"{Path(file).name}:{line}", f"{one.entries:,}")
+    return listed
+
+
+def _listing(source: Path, places: tuple[SourceLineCost, ...]) -> Text:
+    """Return the file with the share of the cycles before each line."""
+    shares = {one.source: one.share for one in places}
+    listed = Text(f"\n{source}\n", no_wrap=True, overflow="ignore")
+    for number, line in enumerate(source.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        share = shares.get(f"{source.resolve()}:{number}", shares.get(f"{source}:{number}", 0.0))
+        mark = f"{share:6.1%}" if share >= VISIBLE_SHARE else " " * 6
+        listed.append(f"{mark} ", style="yellow" if share >= HIGH_SHARE else "dim")
+        listed.append(f"{number:5} {line}\n", style="" if share >= VISIBLE_SHARE else "dim")
+    return listed
+
+
+def _si(value: float, unit: str) -> str:
+    for factor, prefix in ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
+        if abs(value) >= factor:
+            return f"{value / factor:.4g} {prefix}{unit}"
+    return f"{value:.4g} {unit}"
+
+
+@commands.add("quiet", "json", "debug")
+def profile(
+    output: Output,
+    model: Model,
+    seed: Seed = 1,
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+) -> int:
+    """Profile a model's C++ components on the cores that they are allocated to.
+
+    The model runs once while the components record which basic blocks they enter. A model of the core
+    computes the cost of each block from this trace. The costs are stored with the compiled code: later runs
+    at fidelity `code` charge them, until the code changes. Needs LLVM (Debian: clang-19 and llvm-19).
+    """
+    from volery.calibration.component_profile import profile_components
+    from volery.cli.progress import run_progress
+    from volery.model.reader import load
+    from volery.run.assembly.vocabulary import vocabulary
+    from volery.run.result import Options
+
+    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    with run_progress(output, f"{system.name}, traced") as show:
+        profiles, run = profile_components(system, Options(seed=seed, show=show, tell=output.note))
+    output.show(_profile_table(profiles))
+    output.give([asdict(one) for one in profiles])
+    if run.error is not None:
+        output.complain(f"volery: the profiled run failed: {run.error}")
+        return FAILED
+    return OK
+
+
+def _profile_table(profiles: Sequence[ComponentProfile]) -> Table:
+    listed = make_table(
+        "component", "core", number_column("blocks"), number_column("profiled"), number_column("followed")
+    )
+    for one in profiles:
+        listed.add_row(
+            f"{one.component} ({', '.join(one.instances)})",
+            one.core,
+            f"{one.blocks:,}",
+            f"{one.met:,}",
+            f"{one.followed:.1%} of {one.entered:,}",
+        )
+    return listed

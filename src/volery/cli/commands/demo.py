@@ -1,0 +1,192 @@
+"""``volery demo`` and ``volery new``: the examples that come with volery.
+
+The demo runs the delivery service on two allocations at once, each in a process of its own. Ctrl-C reaches
+every process of the terminal: each simulation ends in order and this process waits for them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import volery
+from volery.base.errors import UsageError
+from volery.cli.command import FAILED, OK, Commands
+from volery.cli.console import Output
+from volery.cli.options import Seed
+
+if TYPE_CHECKING:
+    from volery.cli.progress import LiveProgress
+    from volery.requirements.record import RunRecord
+    from volery.run.progress import Progress
+
+commands = Commands("First steps")
+
+DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
+POLL_PERIOD_S = 0.1
+"""Wall seconds between two reads of the progress that the processes send."""
+
+
+def example(name: str) -> Path:
+    """Return the path of an example of the package, or of the checkout that contains the package."""
+    package = Path(volery.__file__).parent
+    for folder in (package / "examples", package.parents[1] / "examples"):
+        if (folder / name).exists():
+            return folder / name
+    raise UsageError(f"this installation has no example {name!r}; install volery from a complete checkout")
+
+
+@commands.add("quiet", "json", "debug")
+def demo(
+    output: Output,
+    out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs/demo"),
+    seed: Seed = 7,
+) -> int:
+    """Deliver three parcels across a city with two allocations side by side, and write a report.
+
+    Exit status: 0 if both runs completed, even if a requirement was not met.
+    """
+    from volery.cli.outcome import unmet
+    from volery.model.reader import load
+    from volery.report.document import write_comparison
+    from volery.report.terminal import short_comparison
+    from volery.run.assembly.vocabulary import vocabulary
+    from volery.run.recording import make_folder
+
+    model = example(DEMO_MODEL)
+    names = load(model, vocabulary()).allocations[:2]
+    outcomes = run_all(output, {name: Job(model, name, seed, make_folder(out / name)) for name in names})
+    records = [outcome.record for outcome in outcomes.values()]
+    parcels = [
+        f"{name}: {parcel.state} at {parcel.history[-1].at_s:.0f} s {parcel.history[-1].detail}".rstrip()
+        for name, parcel in records[0].parcels.items()
+    ]
+    output.show(*parcels, short_comparison(records, list(outcomes)))
+    output.give(f"[{', '.join(record.model_dump_json(by_alias=True) for record in records)}]")
+    for name, outcome in outcomes.items():
+        for requirement, found in outcome.record.requirements.items():
+            if found.met is False:
+                output.note(f"{name}: {unmet(requirement, found)}")
+        for problem in outcome.problems:
+            output.complain(f"volery: {name}: {problem}")
+        output.note(f"report: {outcome.folder / 'report.html'}")
+    comparison = write_comparison([outcome.folder for outcome in outcomes.values()], out)
+    output.note(f"side by side: {comparison}")
+    return OK if all(outcome.completed for outcome in outcomes.values()) else FAILED
+
+
+@commands.add("quiet", "debug")
+def new(
+    output: Output, folder: Annotated[Path, typer.Argument(help="Folder to create; new or empty.")]
+) -> int:
+    """Create a small model that runs, to start from."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} exists and is not an empty folder; choose another name")
+    starter = example(STARTER_MODEL)
+    try:
+        shutil.copytree(starter, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror or error}") from error
+    output.show(
+        f"made {folder}: a model, two components and a mission",
+        f"  volery model check {folder}",
+        f"  volery simulate {folder}",
+        f"  volery fly {folder / 'mission.py'} --on sim:ardupilot",
+    )
+    return OK
+
+
+# -- several simulations at once
+
+
+@dataclass(frozen=True)
+class Job:
+    """A simulation to run at fidelity ``code``."""
+
+    model: Path
+    allocation: str
+    seed: int
+    out: Path
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """Result of a job. Unlike a ``Run`` it can be sent between processes."""
+
+    record: RunRecord
+    folder: Path
+    problems: tuple[str, ...]
+
+    @property
+    def completed(self) -> bool:
+        """True if the run completed and everything could be written."""
+        return self.record.outcome.status == "completed" and not self.problems
+
+
+def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
+    """Run all *jobs* and return their outcomes by name. Raises the error of the first that cannot start."""
+    from volery.cli.progress import live_progress
+
+    context = multiprocessing.get_context("spawn")
+    reports = context.SimpleQueue()
+    with (
+        live_progress(output) as drawings,
+        _interrupts_ignored(),
+        ProcessPoolExecutor(len(jobs), context, _Reports.open, (reports if drawings else None,)) as pool,
+    ):
+        futures = {name: pool.submit(_run, name, job) for name, job in jobs.items()}
+        _draw_until_done(list(futures.values()), reports, drawings)
+    return {name: future.result() for name, future in futures.items()}
+
+
+def _draw_until_done(futures: list[Future[JobOutcome]], reports: Any, drawings: LiveProgress | None) -> None:
+    while wait(futures, timeout=POLL_PERIOD_S).not_done:
+        while drawings is not None and not reports.empty():
+            drawings.show(*reports.get())
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """Leave SIGINT to the processes that run the simulations; the terminal sends it to them as well."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class _Reports:
+    """The queue for progress, set once when a process starts: a queue cannot be sent later."""
+
+    queue: Any = None
+
+    @classmethod
+    def open(cls, queue: Any) -> None:
+        cls.queue = queue
+
+    @classmethod
+    def sender(cls, name: str) -> Callable[[Progress], None] | None:
+        from volery.cli.progress import RateLimited
+
+        queue = cls.queue
+        return None if queue is None else RateLimited(lambda progress: queue.put((name, progress)))
+
+
+def _run(name: str, job: Job) -> JobOutcome:
+    """Run *job* in its own process."""
+    from volery.run.result import Options
+    from volery.run.simulate import simulate
+
+    options = Options(fidelity="code", seed=job.seed, out=job.out, show=_Reports.sender(name))
+    run = simulate(job.model, options, allocation=job.allocation)
+    problems = [] if run.completed else [f"{run.record.outcome.status}: {run.record.outcome.reason}"]
+    return JobOutcome(run.record, job.out, (*problems, *run.problems))

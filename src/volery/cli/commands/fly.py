@@ -1,0 +1,82 @@
+"""``volery fly``: a mission on a simulated or a real vehicle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.base.errors import UsageError
+from volery.cli.command import Commands
+from volery.cli.console import Output
+from volery.cli.options import Out, Seed, Speed, parse_speed
+
+commands = Commands("Fly")
+
+
+@commands.add("quiet", "json", "debug")
+def fly(
+    output: Output,
+    mission: Annotated[Path, typer.Argument(help="Python file with `def mission(drone: Drone)`.")],
+    on: Annotated[
+        list[str],
+        typer.Option(
+            metavar="URL",
+            help="Address of a vehicle, such as sim:ardupilot or ardupilot+tcp://127.0.0.1:5760; "
+            "may be repeated.",
+        ),
+    ],
+    seed: Seed = 1,
+    speed: Speed = "max",
+    fence: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Geofence in GeoJSON: inclusion polygon and no-fly zones."),
+    ] = None,
+    ceiling: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Greatest height above home; 120 if nothing else is stated."),
+    ] = None,
+    reserve: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE", help="Battery reserve, such as 20%; below it the vehicle only returns or lands."
+        ),
+    ] = None,
+    out: Out = None,
+) -> int:
+    """Fly a mission on a simulated or a real vehicle; the mission file is the same for both."""
+    from volery.cli.outcome import next_folder, show_outcome
+    from volery.cli.progress import run_progress
+    from volery.run.assembly.fences import read_fence
+    from volery.run.fly import Restrictions
+    from volery.run.fly import fly as run_flight
+    from volery.run.recording import make_folder
+    from volery.run.result import Options
+
+    if not mission.is_file():
+        expected = "a Python file with `def mission(drone: Drone)` is expected"
+        raise UsageError(f"there is no file {str(mission)!r}; {expected}")
+    pace = parse_speed(speed)
+    restrictions = Restrictions(
+        fence=read_fence(fence) if fence is not None else None,
+        highest=ceiling,
+        battery_reserve=_share(reserve) if reserve is not None else None,
+    )
+    folder = make_folder(out or next_folder(mission.stem))
+    with run_progress(output, f"{mission.name} on {', '.join(on)}") as show:
+        options = Options(fidelity="hardware", seed=seed, pace=pace, out=folder, show=show, tell=output.note)
+        run = run_flight(mission, on, options, restrictions)
+    return show_outcome(output, run)
+
+
+def _share(reserve: str) -> float:
+    """Parse ``20%`` or ``0.2``."""
+    number = reserve.removesuffix("%")
+    try:
+        share = float(number) / (100.0 if number != reserve else 1.0)
+    except ValueError:
+        share = -1.0
+    if not 0.0 <= share < 1.0:
+        raise UsageError(f"--reserve {reserve}: give a share of the battery, such as 20% or 0.2")
+    return share

@@ -1,0 +1,93 @@
+"""``volery simulate`` and ``volery report``: runs of a model and their reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.command import OK, Commands
+from volery.cli.console import Output
+from volery.cli.options import (
+    Allocation,
+    Fidelity,
+    Model,
+    Out,
+    Overrides,
+    Scenario,
+    Seed,
+    Speed,
+    parse_speed,
+)
+
+commands = Commands("Simulate")
+
+
+@commands.add("quiet", "json", "debug")
+def simulate(
+    output: Output,
+    model: Model,
+    fidelity: Fidelity = "code",
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    seed: Seed = 1,
+    overrides: Overrides = None,
+    speed: Speed = "max",
+    graph: Annotated[
+        str,
+        typer.Option(
+            metavar="ros1|ros2", help="Run each component as a process on that ROS graph, in real time."
+        ),
+    ] = "",
+    out: Out = None,
+) -> int:
+    """Run a model in virtual time and judge its requirements.
+
+    Exit status: 0 if the run completed and met every requirement, 2 for bad input, 1 otherwise.
+    """
+    from volery.cli.outcome import next_folder, show_outcome
+    from volery.cli.progress import run_progress
+    from volery.model.reader import load
+    from volery.run.assembly.vocabulary import vocabulary
+    from volery.run.recording import make_folder
+    from volery.run.result import Options
+    from volery.run.simulate import simulate as run_simulation
+
+    pace = parse_speed(speed)
+    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    folder = make_folder(out or next_folder(system.name))  # before anything that takes time
+    title = " · ".join(filter(None, (system.name, system.allocation, system.scenario)))
+    with run_progress(output, title) as show:
+        options = Options(
+            fidelity=fidelity, seed=seed, pace=pace, out=folder, show=show, tell=output.note, graph=graph
+        )
+        run = run_simulation(system, options)
+    return show_outcome(output, run)
+
+
+@commands.add("quiet", "json", "debug")
+def report(
+    output: Output,
+    folders: Annotated[list[Path], typer.Argument(help="A run folder; several are compared.")],
+) -> int:
+    """Write the report of a run again from its trace, or compare several runs.
+
+    Also writes the report of a run that was killed.
+    """
+    from volery.report.document import recover
+    from volery.report.terminal import comparison_table, summary_table
+
+    found = [recover(folder) for folder in folders]
+    records = [one.record for one in found]
+    if len(records) == 1:
+        output.show(summary_table(records[0]))
+    else:
+        output.show(comparison_table(records, [folder.name for folder in folders]))
+    as_text = [record.model_dump_json(by_alias=True, indent=2) for record in records]
+    output.give(as_text[0] if len(as_text) == 1 else f"[{', '.join(as_text)}]")
+    for one in found:
+        output.note(f"report: {one.report}")
+        if one.lost:
+            output.note(f"  {one.lost}")
+    return OK
