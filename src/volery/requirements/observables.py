@@ -1,17 +1,16 @@
-"""Observers: one quantity each, folded over the events of a run as they come.
+"""The quantities that requirements may bound: one table of what there is and how each is observed.
 
-The same observer serves a run under way and a trace read back. It keeps what its quantity needs and no more;
-nothing that was observed is not a number (NaN), never zero.
+An observer folds one quantity of one subject over the events of a run; the same observer serves a run in
+progress and a trace that is read back. It keeps what its quantity needs and no more. Where nothing was
+observed the value is NaN, never zero.
 
-The published list of what requirements may bound, and the bounds themselves.
-
-``OBSERVABLES`` is the list; ``make_observer`` makes one of its quantities for a subject; ``Observers`` watches all
-that a set of bounds needs and gives the verdicts.
+A new observable: one entry of ``TABLE``. Checks of models, the list of ``volery model observables`` and the
+reference follow from it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
@@ -19,7 +18,6 @@ from typing import Any
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
 from volery.model.reading import Observable
-from volery.model.system import Bound
 from volery.requirements.ledgers import ChainLedger, ComponentLedger, Distribution, VehicleLedger
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
@@ -31,18 +29,22 @@ from volery.trace.events import (
     Message,
     Milestone,
     Operation,
-    Record,
     Slice,
     VehicleState,
-    Verdict,
 )
 
 PERIOD_TOLERANCE = 0.1
-"""A release is in time if it comes at most this share of the period late."""
+"""A release is in time if it is at most this share of the period late."""
 
 PARCEL_KIND = "parcel"
 ORDERED, DELIVERED, FAILED = "ordered", "delivered", "failed"
-"""The states of a parcel that quantities are defined by. What lies between is the application's own."""
+"""The states of a parcel that quantities are defined by. An application may have others in between."""
+
+LANDINGS = ("land", "return_home")
+"""Operations that end on the ground."""
+
+TRAVELS = ("goto", "drive")
+"""Operations that go to a point."""
 
 OK = "ok"
 
@@ -51,8 +53,8 @@ OK = "ok"
 class Observer:
     """One quantity of one subject.
 
-    ``listens`` names the events that matter to it; others may be left out. ``value`` is what it comes to at a
-    time in the run.
+    ``listens`` are the kinds of events that matter to it; others may be left out. ``take`` adds an event.
+    ``value`` returns the quantity at a time of the run.
     """
 
     listens: tuple[type[Any], ...]
@@ -60,7 +62,7 @@ class Observer:
     value: Callable[[Ns], float]
 
     def __call__(self, event: Event) -> None:
-        """Take an event into account."""
+        """Add an event, if its kind matters."""
         if isinstance(event, self.listens):
             self.take(event)
 
@@ -73,7 +75,7 @@ Make = Callable[[str, RunSetup], Observer]
 
 
 def _response(reading: Callable[[Distribution], float | None]) -> Make:
-    """Of activations from release to end; of calls as callers saw them if there are no activations."""
+    """Observe activations from release to end; without any, calls from the call to its return."""
 
     def make(component: str, setup: RunSetup) -> Observer:
         ledger = ComponentLedger(ComponentSetup(component), "")
@@ -101,8 +103,12 @@ def _largest(spread: Distribution) -> float | None:
     return spread.largest if spread.count else None
 
 
+def _p95(spread: Distribution) -> float | None:
+    return spread.quantile(0.95)
+
+
 def _deadline_misses(component: str, setup: RunSetup) -> Observer:
-    seen = [0, 0]  # activations with a deadline, those of them that missed it
+    seen = [0, 0]  # activations with a deadline, missed deadlines
 
     def take(event: Activation) -> None:
         if event.component == component and event.deadline != NONE:
@@ -122,7 +128,7 @@ def _activations(component: str, setup: RunSetup) -> Observer:
 
 
 def _period_violations(component: str, setup: RunSetup) -> Observer:
-    """A release that is late violates it; releases in between, such as those by messages, do not."""
+    """Count late releases. Releases in between, such as those by messages, do not matter."""
     period = next((one.period for one in setup.components if one.name == component), NONE)
     longest = round(period * (1.0 + PERIOD_TOLERANCE))
     seen = [NONE, 0]  # the last release, violations
@@ -185,7 +191,7 @@ def _utilisation(processor: str, setup: RunSetup) -> Observer:
 
 
 def _worst(names: tuple[str, ...], error: Callable[[Operation], float]) -> Make:
-    """The greatest error of the operations of some names that succeeded."""
+    """Observe the greatest error of the successful operations of some names."""
 
     def make(vehicle: str, setup: RunSetup) -> Observer:
         worst = [nan]
@@ -200,7 +206,7 @@ def _worst(names: tuple[str, ...], error: Callable[[Operation], float]) -> Make:
 
 
 def _larger(one: float, other: float) -> float:
-    """The larger one; NaN gives way to a number."""
+    """Return the larger number; NaN only if both are."""
     return other if isnan(one) or other > one else one
 
 
@@ -219,7 +225,7 @@ def _vehicle(reading: Callable[[VehicleLedger], float]) -> Make:
 
 
 def _least_battery(vehicle: str, setup: RunSetup) -> Observer:
-    least = [nan]  # negated, as _larger wants it
+    least = [nan]  # negated, for _larger
 
     def take(event: VehicleState) -> None:
         if event.vehicle == vehicle:
@@ -236,7 +242,7 @@ def _failed_operations(vehicle: str, setup: RunSetup) -> Observer:
 
 
 def _parcels(state: str) -> Make:
-    """How many parcels ever were in a state."""
+    """Count the parcels that ever were in a state."""
 
     def make(application: str, setup: RunSetup) -> Observer:
         seen: dict[str, None] = {}
@@ -251,7 +257,7 @@ def _parcels(state: str) -> Make:
 
 
 def _delivery_time(reading: Callable[[Distribution], float | None]) -> Make:
-    """From a parcel's first state to its delivery."""
+    """Observe times from a parcel's first state to its delivery."""
 
     def make(application: str, setup: RunSetup) -> Observer:
         since: dict[str, Ns] = {}
@@ -290,119 +296,134 @@ def _latency(reading: Callable[[Distribution], float | None]) -> Make:
     return make
 
 
-LANDINGS = ("land", "return_home")
-"""Operations that end on the ground."""
+# -- the table
 
-TRAVELS = ("goto", "drive")
-"""Operations that go to a point."""
-
-COMPONENT: dict[str, Make] = {
-    "response_time": _response(_largest),
-    "response_time_mean": _response(Distribution.mean),
-    "response_time_p95": _response(lambda spread: spread.quantile(0.95)),
-    "deadline_misses": _deadline_misses,
-    "period_violations": _period_violations,
-    "activations": _activations,
-    "cpu_time": _cpu_time,
-    "utilisation": _component_utilisation,
-    "failures": _component_failures,
-}
-PROCESSOR: dict[str, Make] = {"utilisation": _utilisation}
-VEHICLE: dict[str, Make] = {
-    "landing_offset": _worst(LANDINGS, lambda event: event.true_horizontal),
-    "goto_error": _worst(TRAVELS, lambda event: event.true_horizontal),
-    "goto_error_vertical": _worst(TRAVELS, lambda event: event.true_vertical),
-    "goto_error_by_estimate": _worst(TRAVELS, lambda event: event.estimate_horizontal),
-    "battery_min": _least_battery,
-    "distance": _vehicle(lambda ledger: ledger.distance),
-    "airborne_time": _vehicle(lambda ledger: to_seconds(ledger.airborne)),
-    "energy": _vehicle(lambda ledger: ledger.joules if ledger.metered else nan),
-    "failures": _failed_operations,
-}
-CHAIN: dict[str, Make] = {
-    "latency": _latency(_largest),
-    "latency_mean": _latency(Distribution.mean),
-    "latency_p95": _latency(lambda spread: spread.quantile(0.95)),
-}
-APPLICATION: dict[str, Make] = {
-    "ordered": _parcels(ORDERED),
-    "delivered": _parcels(DELIVERED),
-    "undelivered": _parcels(FAILED),
-    "delivery_time_max": _delivery_time(_largest),
-    "delivery_time_mean": _delivery_time(Distribution.mean),
-    "messages_lost": _lost_messages,
-    "failures": _failures,
-}
-"""By the quantity's name."""
-
-
-_DESCRIBED: dict[str, dict[str, tuple[str, str]]] = {
-    "component": {
-        "response_time": ("s", "longest response: of activations from release to end, else of calls served"),
-        "response_time_mean": ("s", "mean response"),
-        "response_time_p95": ("s", "response that 95 % do not exceed, at most 0.2 % too high"),
-        "deadline_misses": ("", "activations that ended after their deadline"),
-        "period_violations": ("", "releases that came more than 10 % of the promised period late"),
-        "activations": ("", "activations that ended"),
-        "cpu_time": ("s", "execution time on its processor"),
-        "utilisation": ("", "execution time as a share of the run; 1 is one core all the time"),
-        "failures": ("", "how often it failed"),
-    },
-    "processor": {
-        "utilisation": ("", "busy share of all its cores over the run, 0..1"),
-    },
-    "vehicle": {
-        "landing_offset": ("m", "worst true horizontal distance from where a landing was asked"),
-        "goto_error": ("m", "worst true horizontal distance from an asked point on arrival"),
-        "goto_error_vertical": ("m", "worst true vertical distance from an asked point on arrival"),
-        "goto_error_by_estimate": ("m", "worst horizontal distance from an asked point by its own estimate"),
-        "battery_min": ("", "least charge of the battery, 0..1"),
-        "distance": ("m", "length of the way it went"),
-        "airborne_time": ("s", "time armed and above the ground"),
-        "energy": ("J", "energy drawn from the battery"),
-        "failures": ("", "operations that did not succeed"),
-    },
-    "chain": {
-        "latency": ("s", "greatest age of what arrived at the end of a chain of topics"),
-        "latency_mean": ("s", "mean age"),
-        "latency_p95": ("s", "age that 95 % do not exceed, at most 0.2 % too high"),
-    },
-    "application": {
-        "ordered": ("", "parcels ordered"),
-        "delivered": ("", "parcels delivered"),
-        "undelivered": ("", "parcels that were given up"),
-        "delivery_time_max": ("s", "longest time from a parcel's first state to its delivery"),
-        "delivery_time_mean": ("s", "mean time from a parcel's first state to its delivery"),
-        "messages_lost": ("", "ROS messages lost on the way"),
-        "failures": ("", "failures of components and of the run"),
-    },
-}
-_MAKERS: dict[str, dict[str, Make]] = {
-    "component": COMPONENT,
-    "processor": PROCESSOR,
-    "vehicle": VEHICLE,
-    "chain": CHAIN,
-    "application": APPLICATION,
-}
-
-OBSERVABLES: tuple[Observable, ...] = tuple(
-    Observable(subject, quantity, unit, description)
-    for subject, quantities in _DESCRIBED.items()
-    for quantity, (unit, description) in quantities.items()
+TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
+    (
+        "component",
+        "response_time",
+        "s",
+        "longest response: of activations from release to end, else of calls served",
+        _response(_largest),
+    ),
+    ("component", "response_time_mean", "s", "mean response", _response(Distribution.mean)),
+    (
+        "component",
+        "response_time_p95",
+        "s",
+        "response that 95 % do not exceed, at most 0.2 % too high",
+        _response(_p95),
+    ),
+    ("component", "deadline_misses", "", "activations that ended after their deadline", _deadline_misses),
+    (
+        "component",
+        "period_violations",
+        "",
+        "releases that came more than 10 % of the promised period late",
+        _period_violations,
+    ),
+    ("component", "activations", "", "activations that ended", _activations),
+    ("component", "cpu_time", "s", "execution time on its processor", _cpu_time),
+    (
+        "component",
+        "utilisation",
+        "",
+        "execution time as a share of the run; 1 is one core all the time",
+        _component_utilisation,
+    ),
+    ("component", "failures", "", "number of its failures", _component_failures),
+    ("processor", "utilisation", "", "busy share of all its cores over the run, 0..1", _utilisation),
+    (
+        "vehicle",
+        "landing_offset",
+        "m",
+        "worst true horizontal distance from the commanded landing point",
+        _worst(LANDINGS, lambda event: event.true_horizontal),
+    ),
+    (
+        "vehicle",
+        "goto_error",
+        "m",
+        "worst true horizontal distance from a commanded point on arrival",
+        _worst(TRAVELS, lambda event: event.true_horizontal),
+    ),
+    (
+        "vehicle",
+        "goto_error_vertical",
+        "m",
+        "worst true vertical distance from a commanded point on arrival",
+        _worst(TRAVELS, lambda event: event.true_vertical),
+    ),
+    (
+        "vehicle",
+        "goto_error_by_estimate",
+        "m",
+        "worst horizontal distance from a commanded point by its own estimate",
+        _worst(TRAVELS, lambda event: event.estimate_horizontal),
+    ),
+    ("vehicle", "battery_min", "", "least charge of the battery, 0..1", _least_battery),
+    ("vehicle", "distance", "m", "length of its path", _vehicle(lambda ledger: ledger.distance)),
+    (
+        "vehicle",
+        "airborne_time",
+        "s",
+        "time armed and above the ground",
+        _vehicle(lambda ledger: to_seconds(ledger.airborne)),
+    ),
+    (
+        "vehicle",
+        "energy",
+        "J",
+        "energy drawn from the battery",
+        _vehicle(lambda ledger: ledger.joules if ledger.metered else nan),
+    ),
+    ("vehicle", "failures", "", "operations that did not succeed", _failed_operations),
+    ("chain", "latency", "s", "greatest age of data at the end of a chain of topics", _latency(_largest)),
+    ("chain", "latency_mean", "s", "mean age", _latency(Distribution.mean)),
+    ("chain", "latency_p95", "s", "age that 95 % do not exceed, at most 0.2 % too high", _latency(_p95)),
+    ("application", "ordered", "", "parcels ordered", _parcels(ORDERED)),
+    ("application", "delivered", "", "parcels delivered", _parcels(DELIVERED)),
+    ("application", "undelivered", "", "parcels that were given up", _parcels(FAILED)),
+    (
+        "application",
+        "delivery_time_max",
+        "s",
+        "longest time from a parcel's first state to its delivery",
+        _delivery_time(_largest),
+    ),
+    (
+        "application",
+        "delivery_time_mean",
+        "s",
+        "mean time from a parcel's first state to its delivery",
+        _delivery_time(Distribution.mean),
+    ),
+    ("application", "messages_lost", "", "ROS messages lost on the way", _lost_messages),
+    ("application", "failures", "", "failures of components and of the run", _failures),
 )
+"""Subject, quantity, unit, description and observer of everything that can be observed."""
+
+OBSERVABLES = tuple(Observable(*row[:4]) for row in TABLE)
 """Everything that can be observed. An empty unit stands for a count or a share."""
+
+_MAKERS = {(subject, quantity): make for subject, quantity, _, _, make in TABLE}
 
 
 def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
-    """The observer of ``<subject>.<quantity>``: ``observer("drone_control.deadline_misses")``.
+    """Return the observer of ``<subject>.<quantity>``: ``make_observer("drone_control.deadline_misses")``.
 
-    *setup* says what the subject is and what its model promises; without it the kind is that of the first
-    kind in the list that has such a quantity. Raises ``UsageError`` for a quantity that is not in the list.
+    Args:
+        expression: What to observe.
+        setup: The kinds of subjects, and what the model promises of them. Without it the subject is of the
+            first kind in the table that has such a quantity.
+
+    Raises:
+        UsageError: the quantity is not in the table.
     """
     circumstances = setup or RunSetup()
     subject, _, quantity = expression.rpartition(".")
     kind = _kind(subject, quantity, circumstances)
-    make = _MAKERS[kind].get(quantity)
+    make = _MAKERS.get((kind, quantity))
     if make is None or not subject:
         known = [one.quantity for one in OBSERVABLES if one.subject == kind]
         raise UsageError(
@@ -424,50 +445,3 @@ def _kind(subject: str, quantity: str, setup: RunSetup) -> str:
         if any(one.name == subject for one in things):
             return kind
     return next((one.subject for one in OBSERVABLES if one.quantity == quantity), "component")
-
-
-def bounds_of(setup: RunSetup) -> tuple[Bound, ...]:
-    """The requirements of a run whose trace was read back."""
-    return tuple(
-        Bound(one.name, one.observable, one.relation, one.bound, one.unit) for one in setup.requirements
-    )
-
-
-class Observers:
-    """A tap of the stream that watches what *bounds* are about."""
-
-    def __init__(self, bounds: Iterable[Bound], setup: RunSetup | None = None) -> None:
-        self._watched = [(bound, make_observer(bound.observe, setup)) for bound in bounds]
-        self._listening: dict[type[Any], list[Callable[[Any], None]]] = {}
-        for _, watching in self._watched:
-            for kind in watching.listens:
-                self._listening.setdefault(kind, []).append(watching.take)
-
-    def __call__(self, event: Event) -> None:
-        """Take an event into account."""
-        for take in self._listening.get(type(event), ()):
-            take(event)
-
-    def listener(self, kind: type[Any]) -> Record | None:
-        """Who is to be told events of *kind*; ``None`` if they change no verdict."""
-        takers = self._listening.get(kind, [])
-        return takers[0] if len(takers) == 1 else self if takers else None
-
-    def values(self, at: Ns) -> Iterator[tuple[Bound, float]]:
-        """Each bound and what was observed until *at*; NaN where nothing was there to observe."""
-        for bound, watching in self._watched:
-            yield bound, watching.value(at)
-
-    def verdicts(self, at: Ns) -> tuple[Verdict, ...]:
-        """Judge: one verdict for each bound, at the end of a run."""
-        return tuple(judge(bound, value, at) for bound, value in self.values(at))
-
-    def all_hold(self, at: Ns) -> bool:
-        """True if every bound holds, as the model's ``until`` asks."""
-        return all(bound.holds(value) for bound, value in self.values(at))
-
-
-def judge(bound: Bound, observed: float, at: Ns) -> Verdict:
-    """The verdict on one bound. What could not be observed is not met."""
-    met = not isnan(observed) and bound.holds(observed)
-    return Verdict(at, bound.name, bound.observe, bound.relation, bound.bound, observed, met)
