@@ -211,7 +211,7 @@ def _check_where(address: Address, wanted: str) -> None:
             f"{address}: that vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
         )
     if wanted in ("", own):
-        served = f"`volery vehicle {address.driver} --graph ros1`"
+        served = f"`volery serve {address.driver} --graph ros1`"
         raise CapabilityError(
             f"{address}: {address.driver} is on a graph by itself, under {own}'s names "
             f"(a simulated one: {served}); for others say --names {choices(MAVLINK_NAMES)}"

@@ -39,7 +39,7 @@ def connect(
     with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
-        vehicle.wait_heard()
+        vehicle.wait_connected()
         try:
             yield vehicle
         finally:
@@ -75,7 +75,7 @@ def connect_fleet(
     kinds = {name: kind if isinstance(kind, type) else kind.get(name, Drone) for name in urls}
     with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
-        fleet.each(lambda vehicle: vehicle.wait_heard(), "be heard")
+        fleet.each(lambda vehicle: vehicle.wait_connected(), "be heard")
         try:
             yield fleet
         finally:

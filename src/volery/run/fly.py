@@ -145,7 +145,7 @@ class _Flight:
 
     def _fly(self, vehicle: Vehicle) -> None:
         try:
-            vehicle.wait_heard()
+            vehicle.wait_connected()
             self._mission(vehicle)
         except VoleryError as error:
             self._fail(error)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from volery.cost import NOT_COUNTED, ProcessorEntry
+from volery.cost import NOT_COUNTED, Basis, ProcessorPrices
 from volery.model.components import CPP_LANGUAGES
 from volery.model.environment import Environment, Prism, Ways
 from volery.model.instances import Instance
@@ -57,7 +57,7 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
             *(_component(instance) for instance in system.instances),
             *_vehicle_nodes(system),
         ),
-        processors=tuple(_processor(model, platform.entry(model.name)) for model in system.processors),
+        processors=tuple(_processor(model, platform.prices[model.name]) for model in system.processors),
         vehicles=tuple(VehicleSetup(one.name, one.autopilot, one.kind) for one in system.vehicles),
         chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
         requirements=tuple(
@@ -99,16 +99,16 @@ def _vehicle_nodes(system: System) -> Iterable[ComponentSetup]:
             yield ComponentSetup(node_name(vehicle.name), "MAVROS", "roscpp", vehicle.processor, active=True)
 
 
-def _processor(model: Processor, entry: ProcessorEntry) -> ProcessorSetup:
-    power = entry.power
+def _processor(model: Processor, prices: ProcessorPrices) -> ProcessorSetup:
+    power = prices.entry.power
     return ProcessorSetup(
         name=model.name,
         kind=model.kind,
         frequency_mhz=model.frequency_mhz,
         scheduler=model.scheduler,
         cores=model.cores,
-        idle_w=power.watts(0.0, model.frequency_mhz) if power else None,
-        busy_w=power.watts(model.cores, model.frequency_mhz) if power else None,
+        idle_w=prices.watts(0.0) if power else None,
+        busy_w=prices.watts(model.cores) if power else None,
         power_error=power.band() or None if power else None,
     )
 
@@ -119,32 +119,20 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
     for one in system.processors:
         first.setdefault(one.kind, one)
     for kind, model in first.items():
-        entry = platform.entry(model.name)
-        for law in entry.ros.values():
-            warning = "; ".join(law.model_copy(update={"processor": kind}).warnings(model.frequency_mhz))
-            yield LawSetup(f"{law.client} calls on {kind}", law.source, law.provenance, law.validity, warning)
-        if fidelity == "code":
-            yield from _code_laws(system, entry, kind)
-        if entry.power is not None:
-            name = f"power of {kind}"
-            validity = f"{entry.power.validity}; {entry.power.how_good()}"
-            yield LawSetup(name, entry.power.source, entry.power.provenance, validity)
+        prices = platform.prices[model.name]
+        code = _code_bases(system, prices, kind) if fidelity == "code" else ()
+        for basis in (*prices.ros_basis(), *code, *prices.power_basis()):
+            yield LawSetup(basis.law, basis.source, basis.provenance, basis.validity, basis.warning)
 
 
-def _code_laws(system: System, entry: ProcessorEntry, kind: str) -> Iterable[LawSetup]:
+def _code_bases(system: System, prices: ProcessorPrices, kind: str) -> Iterable[Basis]:
     """The laws that the code of components is counted by, as far as there are such components."""
     kinds = {one.name: one.kind for one in system.processors}
     there = [one for one in system.instances if kinds.get(one.processor or "") == kind and one.component.path]
     if any(one.component.language not in CPP_LANGUAGES for one in there):
-        for code in entry.code.values():
-            warning = "; ".join(code.model_copy(update={"processor": kind}).warnings())
-            name = f"counted {code.language} code on {kind}"
-            validity = f"{code.validity}; {code.how_good()}"
-            yield LawSetup(name, code.source, code.provenance, validity, warning)
-    core = next(filter(None, (core_of(system, "code", one) for one in there)), None)
-    if core is not None:
-        validity = f"code whose data stay in the first cache; {core.how_good()}"
-        yield LawSetup(f"counted C++ code on {kind}", core.source, core.provenance, validity)
+        yield from prices.code_basis()
+    if any(core_of(system, "code", one) for one in there):
+        yield prices.compiled_code_basis()
 
 
 def _missing_networks(system: System) -> Iterable[str]:

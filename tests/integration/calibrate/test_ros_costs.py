@@ -111,7 +111,7 @@ def model(folder: Path, text: str) -> Path:
 
 
 def test_a_models_nodes_are_measured_and_estimated(ros: None, tmp_path: Path) -> None:
-    command = ["measure", str(model(tmp_path, MODEL)), "--runs", "1", "--seconds", "1", "--json"]
+    command = ["validate", str(model(tmp_path, MODEL)), "--runs", "1", "--seconds", "1", "--json"]
     done = CliRunner().invoke(app, command)
     [talker] = json.loads(done.stdout)["nodes"]
     assert (talker["node"], talker["language"]) == ("talker", "rospy")

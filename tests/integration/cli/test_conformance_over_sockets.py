@@ -26,7 +26,7 @@ def address() -> Iterator[str]:
         port = listener.getsockname()[1]
     where = f"tcp://{HERE}:{port}"
     served = subprocess.Popen(
-        [*COMMAND, "vehicle", "ardupilot", "--listen", where, "--speed", FASTER],
+        [*COMMAND, "serve", "ardupilot", "--listen", where, "--speed", FASTER],
         stdout=subprocess.PIPE,
         text=True,
     )

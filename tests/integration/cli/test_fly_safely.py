@@ -187,7 +187,7 @@ def test_missions_that_state_nonsense(fly: Any, line: str, status: int, says: st
         ("drone.takeoff(float('nan'))", "give metres above home, above 0"),
         ("drone.manual_control(0, 0, 2, 0)", "throttle=2; it goes from 0 to 1"),
         ("drone.manual_control(0, 0, 0.5, float('nan'))", "yaw=nan; it goes from -1 to 1"),
-        ("drone.stabilize()", "no stick sample is newer than 1 s"),
+        ("drone.stabilize()", "no manual control is newer than 1 s"),
         ("drone.kill(sure=False)", "if that is meant: sure=True"),
     ],
 )
@@ -240,7 +240,7 @@ def test_a_fence_as_a_map_editor_writes_it(tmp_path: Path) -> None:
 def test_an_autopilot_of_another_make_answers(fly: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    command = [sys.executable, "-c", "from volery.cli.main import main; main()", "vehicle", "ardupilot"]
+    command = [sys.executable, "-c", "from volery.cli.main import main; main()", "serve", "ardupilot"]
     listen = ["--listen", f"tcp://127.0.0.1:{port}"]
     with subprocess.Popen([*command, *listen], stdout=subprocess.PIPE) as served:
         try:

@@ -47,7 +47,7 @@ def test_udp_answering_at_the_uplink_port() -> None:
         drone = Drone(kernel, "drone_1", open_driver(kernel, ours, "drone_1", {}))
         kernel.start()
         with kernel.adopt("script"):
-            drone.wait_heard()
+            drone.wait_connected()
             assert drone.telemetry.changed.wait_for(lambda: "GET_SETTING" in heard, 60 * 10**9)
         drone.close()
         deaf.close()
@@ -104,7 +104,7 @@ def test_another_autopilot_than_the_one_meant() -> None:
                     LinkGarbled, match="MAVLink arrives, not pprzlink: an autopilot of another make"
                 ),
             ):
-                drone.wait_heard()
+                drone.wait_connected()
         finally:
             drone.close()
             assert kernel.close() == []

@@ -30,7 +30,7 @@ def said_to_the_user(url: str, within: float = 1.5) -> LinkError:
     kernel.start()
     try:
         with kernel.adopt("script"), pytest.raises(LinkError) as caught:
-            drone.wait_heard(within)
+            drone.wait_connected(within)
     finally:
         drone.close()
         assert kernel.close() == []

@@ -63,7 +63,7 @@ def test_the_command_ends_with_status_2_and_no_traceback(nothing_installed: None
 
 
 def test_measuring_a_model_without_nodes(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["measure", str(tmp_path / "nowhere.yaml")])
+    done = CliRunner().invoke(app, ["validate", str(tmp_path / "nowhere.yaml")])
     assert done.exit_code == 2
-    done = CliRunner().invoke(app, ["measure", str(tmp_path), "--runs", "0"])
+    done = CliRunner().invoke(app, ["validate", str(tmp_path), "--runs", "0"])
     assert "--runs 0: at least one is needed" in done.stderr

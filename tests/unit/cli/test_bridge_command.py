@@ -3,9 +3,9 @@
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.bridge import Told
+from volery.cli.command import BAD_INPUT
+from volery.cli.commands.ros import BridgeNotes
 from volery.cli.console import Output
-from volery.cli.endings import BAD_INPUT
 from volery.cli.main import app
 from volery.trace.events import LinkState, Text
 
@@ -27,7 +27,7 @@ def said_of(*arguments: str) -> str:
             "of vehicles that speak pprzlink; this one goes by mavros or roscopter",
         ),
         (("sim:dji", "--names", "pprzros"), "this one goes by mavros or roscopter"),
-        (("sim:dji",), "`volery vehicle dji --graph ros1`"),
+        (("sim:dji",), "`volery serve dji --graph ros1`"),
         (("sim:dji",), "for others say --names mavros or roscopter"),
         (("paparazzi+ros1:///", "--names", "pprzros"), "on a graph by itself, under pprzros's names"),
         (("mavros+ros1:///mavros",), "on a graph already, under mavros's names"),
@@ -46,14 +46,14 @@ def test_what_makes_no_sense(arguments: tuple[str, ...], says: str) -> None:
     assert says in said_of(*arguments)
 
 
-def test_what_happens_is_told_when_it_changes(capsys: pytest.CaptureFixture[str]) -> None:
-    told = Told(Output())
-    for text in ("nobody", "nobody", "an autopilot"):
-        told.status(1_000_000_000, text)
-    told.record(LinkState(2_000_000_000, "tcp://x", "lost", "the other side closed the connection"))
-    told.record(Text(3_000_000_000, "bridge", 4, "message dropped"))
+def test_a_status_is_printed_when_it_changes(capsys: pytest.CaptureFixture[str]) -> None:
+    notes = BridgeNotes(Output())
+    for text in ("no autopilot", "no autopilot", "an autopilot"):
+        notes.status(1_000_000_000, text)
+    notes.record(LinkState(2_000_000_000, "tcp://x", "lost", "the other side closed the connection"))
+    notes.record(Text(3_000_000_000, "bridge", 4, "message dropped"))
     assert [line.split("  ")[1] for line in capsys.readouterr().err.splitlines()] == [
-        "nobody",
+        "no autopilot",
         "an autopilot",
         "link lost: the other side closed the connection",
         "message dropped",

@@ -18,10 +18,11 @@ from volery.base.errors import (
     UsageError,
 )
 from volery.cli.console import Output
-from volery.cli.doctor import PARTS, Part, doctor, module, program
-from volery.cli.endings import BAD_INPUT, FAILED, OK, status_of
-from volery.cli.folders import example, next_folder
+from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
+from volery.cli.commands.demo import example
+from volery.cli.commands.doctor import PARTS, Part, doctor, module, program
 from volery.cli.main import app
+from volery.cli.outcome import next_folder
 
 
 def run(*arguments: str):
@@ -51,7 +52,7 @@ def test_what_a_command_raises_becomes_a_status_and_a_message(error, status, cap
     def command() -> int:
         raise error
 
-    assert status_of(Output(quiet=True), command) == status
+    assert exit_status(Output(quiet=True), command) == status
     said = capsys.readouterr()
     assert said.err.startswith("volery: ")
     assert "Traceback" not in said.err
@@ -59,13 +60,13 @@ def test_what_a_command_raises_becomes_a_status_and_a_message(error, status, cap
 
 
 def test_debug_shows_where(capsys):
-    assert status_of(Output(debug=True), lambda: 1 // 0) == FAILED
+    assert exit_status(Output(debug=True), lambda: 1 // 0) == FAILED
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_help_is_quick_to_import():
     """The commands import what they call when they are called."""
-    heavy = ("numba", "pymavlink", "rosbags", "matplotlib")
+    heavy = ("numba", "jinja2", "pydantic", "pymavlink", "rosbags", "shapely", "numpy", "matplotlib")
     script = f"import sys, volery.cli.main; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -159,7 +160,7 @@ def test_new_does_not_write_over_anything(tmp_path):
     [
         (("--fidelity", "firmware"), "not there yet"),
         (("--fidelity", "guess"), "no fidelity 'guess'"),
-        (("--speed", "fast"), "--speed fast: max, or how many simulated seconds per second"),
+        (("--speed", "fast"), "--speed fast: give max, or simulated seconds per second"),
         (("--speed", "0"), "--speed 0"),
         (("--allocation", "quick"), "no allocation named 'quick'"),
         (("--scenario", "storm"), "no scenario named 'storm'"),
@@ -184,8 +185,8 @@ def test_simulate_refuses_what_makes_no_sense(arguments, complaint):
         (("--listen", "serial:///dev/x"), "one listens at tcp://HOST:PORT"),
     ],
 )
-def test_vehicle_refuses_what_makes_no_sense(arguments, complaint):
-    result = run("vehicle", *arguments)
+def test_serve_refuses_what_makes_no_sense(arguments, complaint):
+    result = run("serve", *arguments)
     assert result.exit_code == BAD_INPUT, result.output
     assert complaint in text(result)
 
@@ -210,7 +211,7 @@ def test_an_example_that_is_not_there():
 
 def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
     assert doctor(Output()) == OK
-    assert "everything that is needed is here" in capsys.readouterr().out
+    assert "every necessary part is installed" in capsys.readouterr().out
     assert all(part.get for part in PARTS)
     assert module("no_such_module_anywhere")() == ""
     assert program("no-such-program-anywhere", "sh")().endswith("sh")
@@ -218,7 +219,7 @@ def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
 
 def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
     lost = Part("gyro", lambda: "", "everything", "pip install gyro", needed=True)
-    monkeypatch.setattr("volery.cli.doctor.PARTS", (lost,))
+    monkeypatch.setattr("volery.cli.commands.doctor.PARTS", (lost,))
     assert doctor(Output()) == FAILED
     said = capsys.readouterr().out
     assert "pip install gyro" in said

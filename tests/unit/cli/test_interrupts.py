@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from volery.cli.interrupts import insisted_on
+from volery.cli.command import resend_lost_interrupts
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def lost(error):
 
 
 def test_a_lost_interrupt_comes_again(struck):
-    with insisted_on():
+    with resend_lost_interrupts():
         sys.unraisablehook(lost(KeyboardInterrupt))
     assert struck.wait(30)
 
@@ -33,7 +33,7 @@ def test_other_errors_are_told_as_ever(monkeypatch, struck):
     told = []
     monkeypatch.setattr(sys, "unraisablehook", told.append)
     fault = lost(ValueError)
-    with insisted_on():
+    with resend_lost_interrupts():
         sys.unraisablehook(fault)
     assert told == [fault]
     assert sys.unraisablehook == told.append

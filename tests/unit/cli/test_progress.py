@@ -6,7 +6,7 @@ from rich.console import Console
 
 from volery.base.time import MINUTE, S
 from volery.cli.console import Output
-from volery.cli.progress import picture, shown
+from volery.cli.progress import draw_progress, run_progress
 from volery.run.progress import Progress, VehicleProgress
 
 PROGRESS = Progress(
@@ -19,7 +19,7 @@ PROGRESS = Progress(
 
 def test_it_tells_time_speed_vehicles_and_parcels():
     console = Console(file=io.StringIO(), width=100)
-    console.print(picture("delivery", PROGRESS, 0.5))
+    console.print(draw_progress("delivery", PROGRESS, 0.5))
     said = console.file.getvalue()
     for piece in ("delivery", "0:01:23", "166× real time", "1 delivered, 2 in the air", "GUIDED", "25.0 m"):
         assert piece in said
@@ -27,12 +27,12 @@ def test_it_tells_time_speed_vehicles_and_parcels():
 
 
 def test_nobody_watches_a_pipe():
-    with shown(Output(notes=Console(file=io.StringIO())), "x") as show:
+    with run_progress(Output(notes=Console(file=io.StringIO())), "x") as show:
         assert show is None
 
 
 def test_a_terminal_is_drawn_on():
     screen = io.StringIO()
-    with shown(Output(notes=Console(file=screen, force_terminal=True, width=100)), "delivery") as show:
+    with run_progress(Output(notes=Console(file=screen, force_terminal=True, width=100)), "delivery") as show:
         show(PROGRESS)
     assert "drone_1" in screen.getvalue()

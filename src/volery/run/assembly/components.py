@@ -24,7 +24,7 @@ from volery.components.programs import (
     start,
 )
 from volery.components.virtual_stdlib import virtual_modules
-from volery.cost.instrumentation import StepCounter
+from volery.cost import StepCounter
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.model.components import VEHICLE_INTERFACES
@@ -61,7 +61,7 @@ class UnattendedVehicle:
     def come_to_rest(self) -> str:
         """Land it if it is armed and nobody else has it; says what was done."""
         vehicle = self._open_on(self._graph.node(f"safety_of_{self.name}"))
-        vehicle.wait_heard()
+        vehicle.wait_connected()
         return vehicle.come_to_rest()
 
 

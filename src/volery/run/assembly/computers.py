@@ -17,17 +17,16 @@ payload power for the next period: the battery is late by one period and misses 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
-from volery.base.errors import EstimateError, choices
+from volery.base.errors import EstimateError
 from volery.base.seeds import stream
 from volery.base.time import MS, Ns, S
 from volery.components.instance import Allocation
 from volery.components.ports import Transfer
-from volery.cost import Price, ProcessorEntry, Tariff, load_catalogue, scale_energy, scale_time
-from volery.cost.pricing import FREE, Cost, CountedPricing, Pricing, StatedPricing
+from volery.cost import FREE, Price, Pricing, ProcessorPrices, StatedCost, Tariff, load_catalogue
 from volery.kernel.api import Action, Kernel
 from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
@@ -39,7 +38,7 @@ from volery.model.system import Network as NetworkModel
 from volery.model.system import Processor as ProcessorModel
 from volery.model.system import System
 from volery.ros.graph.interface import NodeId, Route
-from volery.run.assembly.cpp import core_of, ns_per_step
+from volery.run.assembly.cpp import core_of
 
 if TYPE_CHECKING:
     from volery.run.assembly.simulated_fleet import SimulatedFleet
@@ -125,6 +124,10 @@ VEHICLE_NODE_LANGUAGE = "roscpp"
 """The node that serves a vehicle stands for MAVROS, which is written with roscpp."""
 
 
+def _stated_costs(figures: Iterable[Figure]) -> tuple[StatedCost, ...]:
+    return tuple(StatedCost(one.processor, one.frequency_hz, one.time_ns, one.energy_j) for one in figures)
+
+
 class Platform:
     """The computers of one run."""
 
@@ -134,12 +137,16 @@ class Platform:
         self._fidelity = fidelity
         self._models = {model.name: model for model in system.processors}
         known = load_catalogue(*system.catalogues)
-        self._entries = {model.name: known.processor(model.kind) for model in system.processors}
+        self.prices = {
+            model.name: ProcessorPrices(model.name, known.processor(model.kind), model.frequency_hz)
+            for model in system.processors
+        }
         self.processors = {model.name: self._processor(model) for model in system.processors}
         for model in system.processors:
             start_background_load(kernel, self.processors[model.name], model, seed)
-        self._networks = {model.name: self._network(model, seed) for model in system.networks}
+        self.networks = {model.name: self._network(model, seed) for model in system.networks}
         self._languages = {instance.name: ros_language(instance) for instance in system.instances}
+
         self._tariffs: dict[tuple[str, str], Tariff] = {}
         self.warnings: dict[str, None] = dict.fromkeys(system.warnings)  # an ordered set
 
@@ -163,9 +170,6 @@ class Platform:
             stream=stream(seed, f"network/{model.name}"),
         )
 
-    def entry(self, processor: str) -> ProcessorEntry:
-        """What the catalogue says of the kind of *processor*."""
-        return self._entries[processor]
 
     # -- what components are given
 
@@ -184,48 +188,20 @@ class Platform:
         """What the own computing of *instance* costs, at this run's fidelity."""
         if instance.processor is None:
             return FREE
-        component = instance.component
+        component, prices = instance.component, self.prices[instance.processor]
         if self._fidelity == "code" and component.path:
             if component.language not in CPP_LANGUAGES:
-                return self._counted(instance, instance.processor)
-            core = core_of(self._system, self._fidelity, instance)
-            if core is not None:
-                return CountedPricing(ns_per_step(core, self._models[instance.processor].frequency_mhz))
+                pricing = prices.python_code()
+                self.warnings.update(dict.fromkeys(pricing.warnings))
+                return pricing
+            if core_of(self._system, self._fidelity, instance) is not None:
+                return prices.compiled_code()
             if not (component.activation or component.operations):
                 what = f"what {instance.name} computes is not counted: it is C++"
                 self.warnings[f"{what}; state times in the model, or call uc_add_times()"] = None
                 return FREE
-        return self._stated(instance, instance.processor)
-
-    def _counted(self, instance: Instance, processor: str) -> Pricing:
-        law = self._entries[processor].code_law()
-        self.warnings.update(dict.fromkeys(law.warnings()))
-        return CountedPricing(law.ns_per_step(self._models[processor].frequency_mhz))
-
-    def _stated(self, instance: Instance, processor: str) -> Pricing:
-        component = instance.component
-        scale = partial(self._scaled, instance, processor)
-        return StatedPricing(
-            {name: scale(name, figures) for name, figures in component.operations.items()},
-            scale("activation", component.activation) if component.activation else None,
-        )
-
-    def _scaled(self, instance: Instance, processor: str, what: str, figures: tuple[Figure, ...]) -> Cost:
-        """The figure that is stated for this kind of processor, at the frequency that it runs at."""
-        model = self._models[processor]
-        fitting = [one for one in figures if one.processor == model.kind]
-        if not fitting:
-            stated = choices({one.processor for one in figures})
-            raise EstimateError(
-                f"{instance.name}: the time of {what!r} is stated for {stated}, but it is allocated to "
-                f"{processor}, of kind {model.kind}: state one for {model.kind} as well"
-            )
-        figure = min(fitting, key=lambda one: abs(one.frequency_hz - model.frequency_hz))
-        there, here = (figure.processor, figure.frequency_hz / 1e6), (model.kind, model.frequency_mhz)
-        time = scale_time(figure.time_ns, there, here)
-        if figure.energy_j is None:
-            return Cost(time)
-        return Cost(time, scale_energy(figure.energy_j, there, here, self._entries[processor].power_law()))
+        operations = {name: _stated_costs(figures) for name, figures in component.operations.items()}
+        return prices.stated(instance.name, operations, _stated_costs(component.activation or ()))
 
     # -- what the graph is given
 
@@ -237,13 +213,11 @@ class Platform:
         return self._tariff(node.processor, language)(call, x)
 
     def _tariff(self, processor: str, language: str) -> Tariff:
-        tariff = self._tariffs.get((processor, language))
-        if tariff is None:
-            law = self._entries[processor].ros_law(language)
-            tariff = law.at(self._models[processor].frequency_mhz)
-            self._tariffs[processor, language] = tariff
-            self.warnings.update(dict.fromkeys(tariff.warnings))
-        return tariff
+        known = self._tariffs.get((processor, language))
+        if known is None:
+            known = self._tariffs[processor, language] = self.prices[processor].ros_calls(language)
+            self.warnings.update(dict.fromkeys(known.warnings))
+        return known
 
     def foresee(self) -> None:
         """Look up every law that nodes will need, so that what is missing or doubtful is known before the
@@ -282,7 +256,7 @@ class Platform:
         if one == other or not one or not other:
             return None
         model = self._system.network_between(one, other)
-        return self._networks[model.name] if model else None
+        return self.networks[model.name] if model else None
 
     # -- power
 
@@ -296,8 +270,7 @@ class Platform:
 
     def watts(self, processor: str, busy_cores: float) -> float:
         """What a processor draws with so many cores busy on average; ``EstimateError`` without figures."""
-        law = self._entries[processor].power_law()
-        return law.watts(busy_cores, self._models[processor].frequency_mhz)
+        return self.prices[processor].watts(busy_cores)
 
 
 FEED_PERIOD: Ns = 500 * MS

@@ -37,8 +37,7 @@ from volery.components.cpp.compiler import (
 )
 from volery.components.cpp.cpp_program import CppProgram
 from volery.components.cpp.framework import Counters, LoadedLibrary, StepMeter, ToSteps
-from volery.cost import load_catalogue
-from volery.cost.code_laws import CoreLaw
+from volery.cost import CoreLaw, load_catalogue
 from volery.kernel.api import Kernel
 from volery.model.components import CPP_LANGUAGES, ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component
 from volery.model.instances import Instance
@@ -49,16 +48,11 @@ from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph
 
 if TYPE_CHECKING:
-    from volery.cost.native.compilation import Program
+    from volery.cost.native import Program
 
-Cycles = np.ndarray[Any, np.dtype[Any]]
-"""Of each block."""
 
 _FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros)')
-"""Symbols of the border and of client libraries: what calls into these take has prices of its own."""
-
-STEPS_PER_CYCLE = 1000
-"""Steps of a cycle: costs are whole numbers of them, so that sums are exact on every machine."""
+"""Symbols of the framework and of client libraries, whose calls have prices of their own."""
 
 
 def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None:
@@ -75,11 +69,6 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
     return None if known is None or known.core_model is None else known.core_law()
 
 
-def ns_per_step(law: CoreLaw, frequency_mhz: float) -> float:
-    """The time of a step on a core; ``EstimateError`` for a frequency outside the law's range."""
-    law.check_frequency(frequency_mhz)
-    return 1000.0 / frequency_mhz / STEPS_PER_CYCLE
-
 
 def compiler_options(include: Sequence[Path], flags: Sequence[str]) -> list[str]:
     """What the compiler of counted and traced code is told."""
@@ -91,7 +80,7 @@ class CountingCompiler:
 
     def __init__(self, law: CoreLaw, frequency_mhz: float) -> None:
         self._law, self._mhz = law, frequency_mhz
-        self._cycles: Cycles | None = None
+        self._steps: np.ndarray[Any, np.dtype[np.int64]] | None = None
         self.estimated = ""
 
     def __call__(
@@ -109,23 +98,23 @@ class CountingCompiler:
         return [made]
 
     def _price(self, costs: Path) -> None:
-        """With the costs that were learnt meanwhile, or those that were found when it was compiled."""
-        from volery.cost.native import load_costs
+        """Use the costs of a profile, or those that were found when the code was compiled."""
+        from volery.cost.native import block_steps, load_costs
 
         with np.load(costs) as found:
-            learnt = load_costs(str(found["key"]))
+            profiled = load_costs(str(found["key"]))
             cycles, memory = (found["cycles"], found["memory"])
             self.estimated = str(found["estimated"])
-            if learnt is not None:
-                cycles, memory, self.estimated = learnt.cycles, learnt.memory, ""
-            self._cycles = (cycles + memory * self._mhz / 1000.0) * found["theirs"]
+            if profiled is not None:
+                cycles, memory, self.estimated = profiled.cycles, profiled.memory, ""
+            self._steps = block_steps(cycles, memory, self._mhz, found["charged"])
 
     def _digest(self, plain: Sequence[Path]) -> str:
         from volery.cost.native import METHOD
 
         contents = (sha256(one.read_bytes()).hexdigest() for one in plain)
-        told = " ".join((METHOD, self._law.model_dump_json(), *contents))
-        return sha256(told.encode()).hexdigest()[:32]
+        text = " ".join(("charged", METHOD, self._law.model_dump_json(), *contents))
+        return sha256(text.encode()).hexdigest()[:32]
 
     def _make(
         self, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str], made: Path
@@ -135,21 +124,21 @@ class CountingCompiler:
         new = made.with_suffix(".new.o")
         found = instrument(sources, self._law, new, compiler_options(include, flags))
         costs = found.costs
-        theirs = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
+        charged = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
         np.savez(
             made.with_suffix(".npz"),
             cycles=costs.cycles,
             memory=costs.memory,
-            theirs=theirs,
+            charged=charged,
             key=found.key,
             estimated=found.estimated,
         )
         new.replace(made)
 
     def to_steps(self) -> ToSteps:
-        """What counts amount to in steps, once it has compiled. All numbers are whole: nothing is rounded."""
-        assert self._cycles is not None
-        steps = np.rint(self._cycles * STEPS_PER_CYCLE).astype(np.int64)
+        """Return the conversion of counts into steps, once compiled. Whole numbers: nothing is rounded."""
+        assert self._steps is not None
+        steps = self._steps
 
         def to_steps(counters: Counters) -> int:
             return int((np.ctypeslib.as_array(counters).view(np.int64) * steps).sum())
@@ -172,8 +161,7 @@ class TracingCompiler:
         self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
     ) -> list[Path]:
         """One object that tells, and what it tells it to. The compiler's own words come first."""
-        from volery.cost.native.compilation import compile_program
-        from volery.cost.native.instrumented_run import runtime_objects
+        from volery.cost.native import compile_program, runtime_objects
 
         compile_each(tools, sources, include, flags)
         self.program = compile_program(sources, self.law, compiler_options(include, flags))

@@ -30,7 +30,7 @@ from volery.trace.events import VehicleState
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, open_link, parse
 from volery.vehicles.driver import Driver, DriverFactory, drivers
-from volery.vehicles.limits import home_violation
+from volery.vehicles.limits import Bounds
 from volery.vehicles.telemetry import Attitude
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _open_simulated(
 
 def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:
     home = wanted.home
-    found = home_violation(fence, home) if fence is not None else ""
+    found = Bounds(home, Limits(), fence).home_violation
     if found:
         raise UsageError(f"{wanted.vehicle.name}: the fence excludes home: {found}")
 
@@ -271,13 +271,13 @@ class ObservedVehicles:
 
     def progress(self) -> tuple[VehicleProgress, ...]:
         """What those that have been heard do now."""
-        heard = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.heard >= 0]
+        heard = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.last_message_ns >= 0]
         return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in heard)
 
     def record_states(self) -> None:
         """Record the state of every vehicle that has been heard."""
         for vehicle in self._vehicles:
-            if vehicle.telemetry.heard >= 0:
+            if vehicle.telemetry.last_message_ns >= 0:
                 self._kernel.record(self._state(vehicle))
 
     def _state(self, vehicle: Vehicle) -> VehicleState:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from volery.base.errors import CapabilityError, choices
 from volery.components.instance import Allocation
-from volery.cost.pricing import FREE, Pricing
+from volery.cost import FREE, Pricing
 from volery.model.instances import Instance
 from volery.model.system import Bound, System
 from volery.ros.graph import names
