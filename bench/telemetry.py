@@ -177,7 +177,7 @@ def many(chunks: Chunks, seconds: float) -> None:
         file.write_text("\n".join(f"{when} {data.hex()}" for when, data in chunks))
         ports = ",".join(str(link.port) for link in links)
         child = subprocess.Popen([sys.executable, __file__, "--replay", str(file), "--ports", ports])
-        while not all(drone.telemetry.heard >= 0 for drone in drones):
+        while not all(drone.telemetry.last_message_ns >= 0 for drone in drones):
             sleep(0.1)
         heard = sum(link.statistics.frames for link in links)
         start, began = process_time(), perf_counter()

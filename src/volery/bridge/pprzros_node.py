@@ -60,7 +60,7 @@ class PprzrosNode:
             self._fresh.append((frame, self._kernel.now()))
 
     def _run(self, place: ExecutionContext, scope: Scope) -> None:
-        node = self._graph.node("pprzros", self.namespace, place=place)
+        node = self._graph.node("pprzros", self.namespace, context=place)
         publisher = node.advertise(TO_ROS, TYPE)
         self._listen(node, replace(place, deadline=None, on_release=None), scope)
         rate = node.rate(PERIOD)

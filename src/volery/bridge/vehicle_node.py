@@ -102,7 +102,7 @@ class VehicleNode:
 
     def _run(self, place: ExecutionContext, scope: Scope) -> None:
         options = self.options
-        node = self._graph.node(options.names.node, self.namespace, place=place)
+        node = self._graph.node(options.names.node, self.namespace, context=place)
         aside = replace(place, deadline=None, on_release=None)
         offering = options.names.offer(
             InterfaceContext(

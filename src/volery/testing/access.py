@@ -224,7 +224,7 @@ class ByGraph(Access):
     def _commander(self, vehicle: str, options: dict[str, str]) -> tuple[Driver, str]:
         how = graph_access(self._autopilot, vehicle)
         name = f"commander_{next(self._numbers)}"
-        node = self._graph.node(name, f"/{vehicle}", place=ExecutionContext(name))
+        node = self._graph.node(name, f"/{vehicle}", context=ExecutionContext(name))
         driver = how.open_driver(self._kernel, node, vehicle, {"namespace": how.namespace, **options})
         return driver, node.name
 

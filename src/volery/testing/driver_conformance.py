@@ -139,7 +139,7 @@ def _real(wanted: list[Check], stage: RealStage, fly: bool, told: Show) -> list[
     stage.kernel.start()
     try:
         with stage.kernel.adopt("conformance"):
-            stage.drone.wait_heard()
+            stage.drone.wait_connected()
             try:
                 for one in wanted:
                     told(one, None)
@@ -174,7 +174,7 @@ class _LackingError(Exception):
 
 
 def _play(one: Check, stage: Stage) -> str | None:
-    stage.drone.wait_heard()
+    stage.drone.wait_connected()
     missing = [each for each in one.needs if each not in stage.drone.capabilities]
     if missing:
         raise _LackingError(", ".join(each.value for each in missing))

@@ -220,7 +220,7 @@ class _Trying:
 
     def _call(self) -> None:
         try:
-            self._stage.drone.wait_heard()
+            self._stage.drone.wait_connected()
             self._program(self._stage, self._strike)
             self._caller = "done"
         except VoleryError as error:
@@ -264,7 +264,7 @@ class _Trying:
         if self._fault.deadly:
             stage.sleep(LOST_S)
             program = stage.another_program()
-            program.wait_heard()
+            program.wait_connected()
         try:
             self._ended = program.come_to_rest()
         except VoleryError as error:
@@ -297,7 +297,7 @@ class _Trying:
     def _demand_not_fought(self) -> None:
         """Once the other station's mode was seen in the air, ours never follows while it is armed."""
         start = self._after.modes[0]
-        theirs = next((mode for mode in self._after.modes[1:] if mode in self._stage.driver.comes_down), "")
+        theirs = next((mode for mode in self._after.modes[1:] if mode in self._stage.driver.landing_modes), "")
         if not theirs or not self._after.armed[0]:
             return
         rest = [state.mode for state in self._after.states if state.armed]

@@ -46,25 +46,25 @@ class Commander:
     def __init__(self, kernel: Kernel, driver: Driver, link: Link | None = None, protocol: str = "") -> None:
         self._driver = driver
         self._link, self._protocol = link, protocol
-        self._performer = StepExecutor(kernel, driver)
+        self._executor = StepExecutor(kernel, driver)
         self.seen: Telemetry = driver.telemetry
 
     def waits_until_heard(self) -> None:
         """As anybody who has just switched on."""
-        heard = self._performer.wait(lambda: self.seen.heard >= 0, from_seconds(HEARD_WITHIN_S))
+        heard = self._executor.wait(lambda: self.seen.last_message_ns >= 0, from_seconds(HEARD_WITHIN_S))
         demand(heard, f"on a second link nothing was heard within {HEARD_WITHIN_S:g} s")
 
     def lands_it(self) -> None:
         """Have it land."""
-        self._performer.perform("land", lambda: self._driver.land(300 * S))
+        self._executor.execute("land", lambda: self._driver.land(300 * S))
 
     def sender_to(self, place: Position) -> Callable[[], None]:
         """What has it go to *place*. ``NotPossibleError`` where nobody else can."""
-        return lambda: self._performer.perform("go", lambda: self._driver.goto(place, None, 300 * S))
+        return lambda: self._executor.execute("go", lambda: self._driver.goto(place, None, 300 * S))
 
     def disarms_it(self) -> None:
         """Stop its motors, wherever it is."""
-        self._performer.perform("disarm", lambda: self._driver.disarm(True))
+        self._executor.execute("disarm", lambda: self._driver.disarm(True))
 
     def moves_home(self, place: Position) -> None:
         """Have it return to *place* (AMSL) from now on. ``NotPossibleError`` if nobody can ask for that."""

@@ -134,7 +134,7 @@ def spinning_ends_with_the_node(site: Site) -> None:
         node.spin()
         ended.append(True)
 
-    site.kernel.spawn(spin, "spins", node.place)
+    site.kernel.spawn(spin, "spins", node.context)
     other.sleep(50 * MS)
     demand(not ended, "spin returned before the end")
     node.close()

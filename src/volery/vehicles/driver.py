@@ -1,7 +1,7 @@
-"""What a driver is: facts that it keeps, and for each operation the steps that its autopilot wants.
+"""What a driver is: telemetry that it keeps, and for each operation the steps that its autopilot needs.
 
-A driver answers with data and never waits; ``perform`` runs the steps of every driver for every vehicle. So
-time-outs, refusals, starting over, takeover and fences exist once.
+A driver returns data and never waits; ``executor`` executes the steps of every driver for every vehicle.
+Time-outs, refusals, restarts, takeover and fences therefore exist once, and a driver is testable without a clock.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from volery.vehicles.telemetry import Telemetry, Velocity
 
 
 class Capability(Enum):
-    """What a vehicle may be asked for. A driver states which of these its autopilot can do."""
+    """Operations that a vehicle may support; the value completes the sentence "it can ..."."""
 
     TAKEOFF = "take off"
     GOTO = "go to a position"
@@ -33,7 +33,7 @@ class Capability(Enum):
     RETURN_HOME = "return home"
     LAND = "land"
     HOLD = "hold its place"
-    STICKS = "be flown by sticks"
+    MANUAL_CONTROL = "be flown by manual control"
     STABILIZE = "fly stabilized"
     ALTITUDE_HOLD = "hold its altitude"
     MISSION = "fly an uploaded mission"
@@ -41,7 +41,7 @@ class Capability(Enum):
 
 
 class Repeat(NamedTuple):
-    """Something that is done each ``period``."""
+    """An action that is repeated each ``period``."""
 
     period: Ns
     action: Action
@@ -53,21 +53,25 @@ def _never() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One thing asked of an autopilot, and how one sees that it is done.
+    """One command to an autopilot, and how telemetry shows that it is done.
 
-    ``send`` asks. It and every other function here never blocks, unless the driver has a cycle. ``done``
-    looks at the telemetry; where ``skippable``, a step that is done already is not asked for. ``answer`` is
-    the key of the acknowledgement that counts (``Telemetry.answers``). ``again`` asks once more at this
-    period: until the answer, or, where the autopilot gives none, until it is done.
+    The functions never block, unless the driver has a cycle.
 
-    ``enters`` is the mode that this step commands. ``mode`` is the mode in which it must stay while it goes
-    on, ``leads_to`` modes which the autopilot may choose by itself in the course of it, ``armed`` whether
-    it must stay armed.
-
-    ``lost`` says how somebody else has changed what was asked, where the mode does not tell; empty if nobody
-    has.
-
-    ``keep`` is sent all the while. ``advice`` says what the user can do if it is refused or late.
+    Args:
+        ask: the command in words, completing "the autopilot refused to ...".
+        send: sends the command.
+        done: whether telemetry shows the effect.
+        within: time-out, ns.
+        skippable: do not send if it is done already.
+        answer: key of the acknowledgement that counts (``Telemetry.answers``).
+        again: period at which the command is repeated until the acknowledgement, or until done without one.
+        enters: mode that the step commands.
+        mode: mode in which the vehicle must stay meanwhile.
+        leads_to: modes that the autopilot may enter by itself meanwhile.
+        armed: whether it must stay armed.
+        lost: returns how another station has changed the target, where the mode does not show it; else empty.
+        keep: repeated until the step ends.
+        advice: remedy if the step is refused or late.
     """
 
     ask: str
@@ -87,10 +91,10 @@ class Step:
 
 
 class ManualControl(NamedTuple):
-    """The four sticks: pitch (forward +), roll (right +), yaw (clockwise +) in -1..1, throttle in 0..1.
+    """Positions of the four sticks.
 
-    In altitude hold a throttle of 0.5 keeps the altitude. A rover takes roll for steering and throttle from
-    -1 (back) to 1.
+    Pitch (forward positive), roll (right positive) and yaw (clockwise positive) are in -1..1, throttle in 0..1,
+    where 0.5 keeps the altitude in altitude hold. For a rover roll is the steering and throttle is in -1..1.
     """
 
     pitch: float = 0.0
@@ -100,110 +104,114 @@ class ManualControl(NamedTuple):
 
 
 class Driver(Protocol):
-    """Talks to one autopilot. Each operation answers with the steps to perform, in order.
+    """Commands one autopilot. Each operation returns the steps to execute, in order.
 
-    ``handover`` is the mode in which the autopilot obeys a computer: a pilot hands over by choosing it.
-    ``comes_down`` are the modes in which a drone is on its way to the ground by itself.
-    ``cycle`` is for carriers that are nodes of a graph: one round of the node's own loop, which takes in what
-    has arrived and sleeps for its period. Whoever waits goes round in its own task, which pays for it.
+    Attributes:
+        name: name of the vehicle.
+        telemetry: last reported state.
+        landing_modes: modes in which a drone is landing or returning by itself.
     """
 
     name: str
     telemetry: Telemetry
-    comes_down: frozenset[str]
+    landing_modes: frozenset[str]
 
     @property
-    def handover(self) -> str:
-        """See above."""
+    def offboard_mode(self) -> str:
+        """Mode in which the autopilot obeys a computer; a pilot hands over by selecting it."""
 
     @property
     def capabilities(self) -> frozenset[Capability]:
-        """What this vehicle can be asked for; empty until it has been heard."""
+        """Operations that this vehicle supports; empty before the first message."""
 
     @property
     def cycle(self) -> Action | None:
-        """``None`` where what arrives is taken in by itself."""
+        """One round of the node's own loop, for drivers on a graph; ``None`` if messages arrive by themselves.
 
-    def look(self) -> None:
-        """Take in what has arrived, without waiting."""
+        A round processes received messages and sleeps for the period of the loop. A task that waits runs the
+        rounds itself, so that their execution time is charged to it.
+        """
+
+    def poll(self) -> None:
+        """Process received messages without waiting."""
 
     def ready(self, within: Ns) -> Sequence[Step]:
-        """Until it could arm and go by position."""
+        """Wait until the vehicle could arm and go to a position."""
 
     def arm(self) -> Sequence[Step]:
-        """In the mode it is in."""
+        """Arm in the present mode."""
 
     def disarm(self, force: bool) -> Sequence[Step]:
-        """*force* stops the motors in the air, too."""
+        """Disarm; *force* stops the motors in the air, too."""
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """To *height* metres above home; the whole sequence from the ground and disarmed."""
+        """Take off to *height* metres above home, starting disarmed on the ground."""
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """To *goal* (AMSL, above home or, with ``Capability.TERRAIN``, above ground) at *speed* m/s."""
+        """Go to *goal* (AMSL, above home or, with ``Capability.TERRAIN``, above ground) at *speed* m/s."""
 
     def hold(self) -> Sequence[Step]:
-        """Stop and stay."""
+        """Stop and hold the position."""
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Follow a velocity and degrees per second clockwise; stop after *lasting*, or at any other step."""
+        """Follow a velocity and *yaw_rate* (degrees/s, clockwise) for *lasting* or until another step."""
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn to *degrees* clockwise from north."""
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """A drone lands there, a rover stops there."""
+        """Return home; a drone lands there, a rover stops there."""
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Here, until disarmed."""
+        """Land in place; done when disarmed."""
 
     def stabilize(self) -> Sequence[Step]:
-        """The sticks command attitude and throttle."""
+        """Enter the mode in which manual control commands attitude and throttle."""
 
     def altitude_hold(self) -> Sequence[Step]:
-        """The sticks command attitude and climb rate."""
+        """Enter the mode in which manual control commands attitude and climb rate."""
 
     def manual(self) -> Sequence[Step]:
-        """The sticks command a rover's wheels."""
+        """Enter the mode in which manual control commands the wheels of a rover."""
 
-    def sticks(self, sticks: ManualControl | None) -> None:
-        """Keep sending these until others come; ``None`` lets go of them."""
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Repeat *control* until the next call; ``None`` ends the repetition."""
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
         """Replace the mission on board."""
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
-        """From its first item to its end, arming included."""
+        """Arm, start the uploaded mission; done when its last item has finished."""
 
     def stop(self) -> None:
-        """Let go of sticks and of set-points that are being repeated."""
+        """Stop repeating manual control and set-points."""
 
-    def if_silent(self) -> str:
-        """In one line, from the aircraft's own parameters: what it will do if its commander falls silent.
-
-        Empty until they are known.
-        """
+    def on_link_loss(self) -> str:
+        """Return the reaction to a lost link in one line; empty until the parameters are known."""
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """What is wrong with the way to the autopilot, or why it cannot be flown; ready to be raised."""
+        """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""
 
     def close(self) -> None:
-        """Stop talking and let go of the link."""
+        """Stop all communication and release the link."""
 
 
 Opener = Callable[[Kernel, Any, str, Mapping[str, str]], Driver]
-"""``open_driver(kernel, channel, name, options)``: *channel* is a link, or the node for a driver that rides
-on a graph; *options* are those of the address. Raises ``UsageError`` for options it does not know.
+"""``open_driver(kernel, channel, name, options)``: *channel* is a link, or a node for a driver on a graph;
+*options* are those of the address. Raises ``UsageError`` for unknown options.
 """
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriverFactory:
-    """How a driver is opened: on a link, whose frames *codec* turns into bytes; on a node of a graph; or on
-    either. ``None``: not on that.
+    """How a driver is opened on a link, on a graph, or on either.
 
-    ``namespace`` is where on the graph its topics are if the address does not say; ``{name}`` is the
-    vehicle's. ``graph_names`` says whose names they are.
+    Args:
+        on_link: opener on a link; ``None`` if not supported.
+        codec: codec of the link's frames.
+        on_graph: opener on a node of a graph; ``None`` if not supported.
+        namespace: default namespace of its topics; ``{name}`` is replaced by the vehicle's name.
+        graph_names: whose topic names it uses.
     """
 
     on_link: Opener | None = None

@@ -1,4 +1,4 @@
-"""A drone: blocking operations, each seen on the telemetry before it returns."""
+"""A drone: operations that block until telemetry shows that they are done."""
 
 from __future__ import annotations
 
@@ -6,110 +6,136 @@ from math import isfinite, nan
 
 from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
-from volery.base.position import AboveHome, Position
+from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, from_seconds
 from volery.vehicles.driver import Capability, ManualControl
 from volery.vehicles.executor import RESTARTS
 from volery.vehicles.limits import height_violation
+from volery.vehicles.operation import NO_GOAL, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.telemetry import Velocity
-from volery.vehicles.vehicle import NO_GOAL, STREAM, TO_SAFETY, TRAVEL, TURN, Goal, Vehicle, travel_within
+from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
 
 VELOCITY_LASTS_S = 3.0
 RETURN_CLIMB = 30.0
-"""Metres that a time-out allows an autopilot to climb before it returns; ArduPilot's RTL_ALT is 15."""
+"""Climb before a return, m, that a time-out allows for; ArduPilot's RTL_ALT is 15 m."""
 
 
 class Drone(Vehicle):
-    """A multirotor. See ``Vehicle`` for its state and for what the arguments mean.
+    """A multirotor. See ``Vehicle`` for its state, the constructor's arguments and how operations end.
 
-    The operations of positioning (``takeoff``, ``goto``, ``return_home``) need a position; those of sticks
-    (``manual_control``, ``stabilize``, ``altitude_hold``) and ``land`` do not. One may change between them in
-    flight.
+    ``takeoff``, ``goto`` and ``return_home`` need a position estimate. ``land`` and manual flight
+    (``manual_control``, ``stabilize``, ``altitude_hold``) do not. All may be mixed in one flight.
     """
 
     kind = "drone"
 
     @property
     def flying(self) -> bool:
-        """Off the ground, by the autopilot's own judgement."""
-        return self._look().flying
+        """Whether it is off the ground, as judged by the autopilot."""
+        return self._poll().flying
 
     @property
     def landed(self) -> bool:
-        """On the ground, by the autopilot's own judgement."""
+        """Whether it is on the ground, as judged by the autopilot."""
         return not self.flying
 
-    # -- with a position
+    # -- operations that need a position
 
     def takeoff(self, height: float) -> None:
-        """Wait until it is ready, arm, and climb to *height* metres above home.
+        """Wait until ready, arm, and climb.
 
-        A sequence that is undone before lift-off (somebody changed the mode or disarmed) is started over, at
-        most 3 times.
+        The sequence starts again, at most three times, if it is undone before lift-off because another station
+        changes the mode or disarms.
+
+        Args:
+            height: metres above home.
+
+        Raises:
+            OutOfBounds: limits or fence forbid it; raised before anything is sent.
+            Refused: it flies already, or the autopilot refuses.
         """
         self._require(Capability.TAKEOFF)
         asked = f"take off to {height:g} m"
         if not isfinite(height) or height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
+        telemetry = self._driver.telemetry
         if self.flying:
-            where = f"it flies already, {self._driver.telemetry.above_home:.1f} m above home"
+            where = f"it flies already, {telemetry.above_home:.1f} m above home"
             raise Refused(self.name, asked, f"{where}; goto(position) changes its height")
-        found = height_violation(height, self.limits, self._driver.telemetry.home)
-        if found:
-            raise OutOfBounds(self.name, asked, found)
+        violation = height_violation(height, self.limits, telemetry.home)
+        if violation:
+            raise OutOfBounds(self.name, asked, violation)
         if self.fence is not None:
-            if self._driver.telemetry.home is None:
+            if telemetry.home is None:
                 self.wait_ready()
             ground = self.position
             self._check_path(asked, ground, Position(ground.latitude, ground.longitude, AboveHome(height)))
-        here = self._driver.telemetry.position
-        within = from_seconds(travel_within(0.0, height, None))
+        here = telemetry.position
+        within = travel_timeout(0.0, height)
+
+        def goal() -> Goal:
+            home = telemetry.home
+            if home is None:
+                return NO_GOAL
+            over = here or home
+            return self._goal(Position(over.latitude, over.longitude, AboveHome(height)))
+
         self._operate(
             "takeoff",
             asked,
             lambda: self._driver.takeoff(height, within),
-            manner=TRAVEL,
-            goal=lambda: self._above(here, height),
+            policy=TRAVEL,
+            goal=goal,
             restarts=RESTARTS,
         )
 
     def goto(self, goal: Position, speed: float | None = None) -> None:
-        """Go straight to *goal* and stop there; *speed* in m/s over ground, else the autopilot's own.
+        """Fly straight to *goal* and stop there.
 
-        Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or the straight way,
-        and on the way if it strays all the same.
+        Args:
+            goal: target position, AMSL or above home.
+            speed: speed over ground, m/s; ``None`` means the autopilot's own.
+
+        Raises:
+            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is sent),
+                or were violated on the way.
+            Refused: it is on the ground, or the autopilot refuses.
         """
         self._require(Capability.GOTO)
         asked = f"go to {goal}"
-        self._check_speed(asked, speed)
-        self._in_flight(asked)
-        self._check_altitude(goal)
-        self._check_path(asked, self.position, goal)
-        within = self._within(goal, speed)
+        if speed is not None:
+            self._check_speed(asked, speed)
+        self._check_flying(asked)
+        if not isinstance(goal.altitude, AMSL | AboveHome):
+            self._check_altitude(goal)
+        path = self._check_path(asked, self.position, goal)
+        within = path_timeout(path, speed)
         self._operate(
             "goto",
             asked,
             lambda: self._driver.goto(goal, speed, within),
-            manner=TRAVEL,
+            policy=TRAVEL,
             goal=lambda: self._goal(goal),
         )
 
     def return_home(self) -> None:
-        """Let the autopilot return to home and land there, until it is disarmed.
+        """Let the autopilot return home and land; return when it is disarmed.
 
-        Raises ``OutOfBounds`` if the straight way leads out of the fence or through a no-fly zone, but not
-        if it is out of bounds already. What another task has under way ends with ``Overridden``.
+        The operation of another task is aborted.
+
+        Raises:
+            OutOfBounds: the straight path violates the fence, unless the drone is out of bounds already.
         """
         self._require(Capability.RETURN_HOME)
         home, here = self.home, self.position
-        if not self._strayed_already():
+        if not self._is_out_of_bounds():
             self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
-        within = self._within(home, None) + self._landing_within(RETURN_CLIMB)
+        within = self._timeout_to(home) + self._landing_timeout(RETURN_CLIMB)
         self._operate(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
-            manner=TO_SAFETY,
+            policy=TO_SAFETY,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
@@ -122,12 +148,21 @@ class Drone(Vehicle):
         *,
         lasting: float = VELOCITY_LASTS_S,
     ) -> None:
-        """Fly at this velocity, m/s and degrees per second clockwise. Returns as soon as it is under way.
+        """Fly at a velocity and return as soon as the vehicle follows it.
 
-        It stands for *lasting* seconds or until the next operation, then the drone stops: a program that
-        hangs does not fly away. A loop that controls calls it each time round. Raises ``OutOfBounds`` if it
-        would leave limits or fence in that time; where it strays later it is told to hold, and the next
-        call raises it.
+        The velocity lasts until the next operation or for *lasting* seconds, then the drone stops, so that a
+        program that hangs does not fly away. A control loop calls this in each round. If the drone leaves the
+        bounds after the call, it is commanded to hold and the next call raises ``OutOfBounds``.
+
+        Args:
+            north: velocity to the north, m/s.
+            east: velocity to the east, m/s.
+            up: velocity upwards, m/s.
+            yaw_rate: turn rate, degrees/s, clockwise positive.
+            lasting: duration, s.
+
+        Raises:
+            OutOfBounds: it would leave limits or fence within *lasting* seconds.
         """
         self._require(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
@@ -136,125 +171,145 @@ class Drone(Vehicle):
             raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
         if not (isfinite(lasting) and lasting > 0):
             raise UsageError(f"{self.name}: {asked}, lasting {lasting:g} s; give seconds above 0")
-        self._in_flight(asked)
-        self._check_path(asked, self.position, self._after(velocity, lasting))
+        self._check_flying(asked)
+        self._check_path(asked, self.position, self._position_after(velocity, lasting))
         self._operate(
             "set_velocity",
             asked,
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
-            manner=STREAM,
+            policy=STREAM,
         )
 
     def set_heading(self, degrees: float) -> None:
-        """Turn to *degrees* clockwise from north, in place."""
+        """Turn in place.
+
+        Args:
+            degrees: heading, clockwise from north.
+        """
         self._require(Capability.HEADING)
         asked = f"turn to {degrees:g} degrees"
         if not isfinite(degrees):
             raise UsageError(f"{self.name}: {asked}: not a number")
-        self._in_flight(asked)
-        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), manner=TURN)
+        self._check_flying(asked)
+        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), policy=TURN)
 
     def hold(self) -> None:
-        """Stop and stay where it is, also out of bounds; on the ground it does that anyhow.
+        """Stop and hold the position, also outside the bounds; on the ground nothing is sent.
 
-        What another task has under way ends with ``Overridden``; a drone that somebody else has is left
-        alone.
+        The operation of another task is aborted. Raises ``Overridden`` if another station has control.
         """
         if self.flying:
             super().hold()
 
-    # -- without
+    # -- operations without a position
 
     def land(self, at: Position | None = None) -> None:
-        """Descend here, until it is on the ground and disarmed: also out of bounds and without a position.
+        """Descend in place and return when landed and disarmed; also out of bounds and without a position.
 
-        What another task has under way ends with ``Overridden``; a drone that somebody else has is left
-        alone: ``Overridden``, too. *at* is where it was to touch down, if that is not here: the record
-        measures against it. The autopilot goes straight down either way.
+        The operation of another task is aborted. Raises ``Overridden`` if another station has control.
+
+        Args:
+            at: intended touch-down point, against which the record measures the landing; the descent is
+                vertical in any case.
         """
         self._require(Capability.LAND)
         here = at or self._driver.telemetry.position
-        within = self._landing_within(0.0)
+        within = self._landing_timeout(0.0)
         self._operate(
             "land",
             "land",
             lambda: self._driver.land(within),
-            manner=TO_SAFETY,
+            policy=TO_SAFETY,
             goal=lambda: NO_GOAL if here is None else Goal(here.latitude, here.longitude, nan),
         )
 
     def manual_control(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
-        """Hold the sticks like this until the next call.
+        """Set the manual control (the sticks) until the next call.
 
-        Pitch (forward +), roll (right +), yaw (clockwise +) in -1..1; throttle in 0..1, where 0.5 keeps the
-        altitude in altitude hold. They are sent again and again: else the autopilot would fall back on a
-        transmitter. They take effect in ``stabilize`` and ``altitude_hold``, and are let go by the operations
-        with a position and as soon as somebody else changes the mode.
+        The values are repeated, because an autopilot would otherwise fall back on a transmitter. They take
+        effect in ``stabilize`` and ``altitude_hold``; an operation with a position, or another station that
+        changes the mode, ends the repetition.
 
-        Raises ``UsageError`` naming the stick that is out of range or no number.
+        Args:
+            pitch: -1..1, forward positive.
+            roll: -1..1, right positive.
+            throttle: 0..1; 0.5 keeps the altitude in altitude hold.
+            yaw: -1..1, clockwise positive.
+
+        Raises:
+            UsageError: a value is out of range or not a number.
         """
-        self._require(Capability.STICKS)
-        sticks = ManualControl(pitch, roll, throttle, yaw)
-        for name, value, low in zip(ManualControl._fields, sticks, (-1.0, -1.0, 0.0, -1.0), strict=True):
+        self._require(Capability.MANUAL_CONTROL)
+        control = ManualControl(pitch, roll, throttle, yaw)
+        for name, value, low in zip(ManualControl._fields, control, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from {low:g} to 1")
-        self._move_sticks(sticks)
+        self._set_manual_control(control)
 
     def stabilize(self) -> None:
-        """Fly by sticks: they command attitude and throttle. On the ground it is armed, too.
+        """Enter the mode in which manual control commands attitude and throttle; on the ground also arm.
 
-        Returns when the mode is seen, without a position, too. Raises ``Refused`` unless
-        ``manual_control`` was called within the last second.
+        It needs no position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control`` was
+        called within the last second.
         """
         self._require(Capability.STABILIZE)
-        self._by_hand("stabilize", "fly stabilized", self._driver.stabilize)
+        self._enter_manual_mode("stabilize", "fly stabilized", self._driver.stabilize)
 
     def altitude_hold(self) -> None:
-        """Fly by sticks: they command attitude and climb rate; the throttle's middle keeps the altitude. On
-        the ground it is armed, too.
+        """Enter the mode in which manual control commands attitude and climb rate; on the ground also arm.
 
-        Returns when the mode is seen, without a position, too. Raises ``Refused`` unless
-        ``manual_control`` was called within the last second.
+        A throttle of 0.5 keeps the altitude. It needs no position and returns when the mode is seen. Raises
+        ``Refused`` unless ``manual_control`` was called within the last second.
         """
         self._require(Capability.ALTITUDE_HOLD)
-        self._by_hand("altitude_hold", "hold the altitude", self._driver.altitude_hold)
+        self._enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)
 
-    # -- the end of a program
+    # -- end of a program
 
     def come_to_rest(self) -> str:
-        """Land it if it is armed and nobody else has it; says what was done. For the end of a program.
+        """Land if armed, unless another station has control; return what was done.
 
-        One that its autopilot already brings down is watched until it is down. It waits half a minute for a
-        link that is lost at that moment; ``LinkLost`` if that does not return.
+        A drone that the autopilot is already landing is monitored until it is disarmed. A lost link is given
+        half a minute to return; then ``LinkLost`` is raised.
         """
-        seen = self._look()
-        if seen.heard < 0:
-            return "was never heard"
+        telemetry = self._poll()
+        if telemetry.last_message_ns < 0:
+            return "never sent a message"
         self._wait_for_link()
-        if seen.flying and self._performer.is_ours():
-            self.land()  # the sticks are held until the autopilot lands: it must not fall
+        if telemetry.flying and self._executor.is_ours():
+            self.land()  # manual control is repeated until the autopilot lands; otherwise it would fall
             return "landed"
-        with self._kernel:
+        with self.kernel:
             self._driver.stop()
-        if seen.flying:
-            return self._watch_down()
-        if seen.armed:
+        if telemetry.flying:
+            return self._watch_landing()
+        if telemetry.armed:
             self.disarm()
             return "was disarmed on the ground"
         return "is disarmed"
 
-    def _watch_down(self) -> str:
-        seen, mode = self._driver.telemetry, self._driver.telemetry.mode
-        if mode in self._driver.comes_down:
-            home = seen.home
-            within = self._landing_within(RETURN_CLIMB) + (self._within(home, None) if home else 0)
-            self._performer.wait(lambda: not seen.armed or seen.mode not in self._driver.comes_down, within)
-            if not seen.armed:
-                return f"came down by itself in {mode}"
-        return f"is left to whoever flies it in {seen.mode}"
+    def _watch_landing(self) -> str:
+        telemetry, mode = self._driver.telemetry, self._driver.telemetry.mode
+        landing_modes = self._driver.landing_modes
+        if mode in landing_modes:
+            home = telemetry.home
+            within = self._landing_timeout(RETURN_CLIMB) + (self._timeout_to(home) if home else 0)
+            self._executor.wait(lambda: not telemetry.armed or telemetry.mode not in landing_modes, within)
+            if not telemetry.armed:
+                return f"landed by itself in {mode}"
+        return f"is left to the pilot or station in {telemetry.mode}"
 
-    def _after(self, velocity: Velocity, seconds: float) -> Position:
-        """Where it will be after so many *seconds*. Downwards the ground stops it: that is no offence."""
+    # -- checks and time-outs
+
+    def _check_flying(self, asked: str) -> None:
+        """Raise the bounds error found since the last call, or ``Refused`` on the ground."""
+        if self._bounds_error is not None:
+            self._raise_bounds_error()
+        if not self._driver.telemetry.flying:
+            raise Refused(self.name, asked, "it is on the ground; takeoff(height) first")
+
+    def _position_after(self, velocity: Velocity, seconds: float) -> Position:
+        """Return the position after *seconds* at *velocity*; the ground stops a descent."""
         here = self.position
         frame = LocalFrame(here.latitude, here.longitude, here.altitude.metres)
         moved = velocity.east * seconds, velocity.north * seconds, velocity.up * seconds
@@ -262,15 +317,8 @@ class Drone(Vehicle):
         height = self._driver.telemetry.above_home + velocity.up * seconds
         return Position(latitude, longitude, AboveHome(max(height, self.limits.lowest)))
 
-    def _landing_within(self, climb: float) -> Ns:
+    def _landing_timeout(self, climb: float) -> Ns:
         """ArduPilot lands at 0.5 m/s; from an unknown height, allow for the highest."""
         height = self._driver.telemetry.above_home
         height = max(height, 0.0) if isfinite(height) else self.limits.highest
-        return from_seconds(travel_within(0.0, 2.0 * (height + climb), None))
-
-    def _above(self, here: Position | None, height: float) -> Goal:
-        home = self._driver.telemetry.home
-        if home is None:
-            return NO_GOAL
-        over = here or home
-        return self._goal(Position(over.latitude, over.longitude, AboveHome(height)))
+        return travel_timeout(0.0, 2.0 * (height + climb))

@@ -1,7 +1,8 @@
-"""The one executor of steps: time-outs, refusals, starting over, takeover and silence, for every driver.
+"""The executor of steps, one for all drivers: time-outs, refusals, restarts, takeover and link loss.
 
-It waits on telemetry. MAVLink does not say who changed a mode; so a mode that the autopilot is in without our
-having commanded it belongs to somebody else, and in the air it is never fought.
+A driver states what to send and how telemetry shows that it is done; everything that can go wrong meanwhile is
+handled here, once. MAVLink does not say who changed a mode. A mode that this program did not command is
+therefore taken as the choice of a pilot, another station or a failsafe, and is never overridden in flight.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from volery.base.errors import (
     Overridden,
     Refused,
     VehicleError,
-    VoleryError,
 )
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
@@ -24,140 +24,152 @@ from volery.vehicles.driver import Driver, Step
 from volery.vehicles.telemetry import Telemetry
 
 RESTARTS = 3
-"""How often a sequence that is undone before lift-off is started over."""
-
+"""How often a sequence that is undone before lift-off is started again."""
 REASON_WAIT: Ns = 500 * MS
-"""The autopilot's reason often comes just after its refusal; so long it is waited for."""
-
+"""Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0
-"""A text that is older is quoted with its age."""
-
+"""Texts older than this are quoted with their age."""
 LINK_TIMEOUT: Ns = 5 * S
-"""A link that says nothing for so long is lost: five missed heartbeats."""
-
+"""Time without a message after which the link counts as lost: five missed heartbeats."""
 
 Check = Callable[[str, Ns], VehicleError | None]
-"""Told what is asked and the time with each message of telemetry: the error that ends it, or ``None``."""
+"""``check(operation, now)`` runs at each telemetry message and returns the error that ends the step, or None."""
 
 
-def _no_check(_asked: str, _now: Ns) -> None:
-    """Nothing ends it."""
+def _no_check(_operation: str, _now: Ns) -> None:
+    """Accept everything."""
 
 
 class StepExecutor:
-    """Runs steps for one vehicle. ``commanded`` is the mode that was asked for last; empty when not ours."""
+    """Executes steps for one vehicle and tracks which mode this program commanded.
 
-    def __init__(self, kernel: Kernel, driver: Driver, silence: Ns = LINK_TIMEOUT) -> None:
+    Args:
+        kernel: clock and tasks.
+        driver: the driver of the vehicle.
+        link_timeout: time without a message after which the link counts as lost, ns.
+    """
+
+    def __init__(self, kernel: Kernel, driver: Driver, link_timeout: Ns = LINK_TIMEOUT) -> None:
         self._kernel = kernel
         self._driver = driver
-        self._silence = silence
-        self.commanded = ""
-        self._kept = ""  # the mode that was ours before, until the one commanded last is seen
-        self.turn = 0  # whose it is: what was begun in an earlier one ends
-        self.successor = ""  # what took the vehicle from it
+        self._link_timeout = link_timeout
+        self.commanded = ""  # mode that this program commanded last; empty while another has control
+        self._previous = ""  # mode commanded before, until the one commanded last is seen
+        self._claim = 0  # counts aborts; steps begun under an earlier claim end
+        self._successor = ""  # what aborted the steps in progress
 
-    def perform(
+    def execute(
         self,
         asked: str,
         plan: Callable[[], Sequence[Step]],
         *,
         restarts: int = 0,
-        look: Check = _no_check,
+        check: Check = _no_check,
     ) -> None:
-        """Run the steps of *plan*; while it is undone before lift-off start over, at most *restarts* times.
+        """Execute the steps of *plan* in order.
+
+        Args:
+            asked: the operation, for error messages.
+            plan: returns the steps; called again for each restart.
+            restarts: how often to start again after the sequence was undone before lift-off.
+            check: may end the operation at any telemetry message.
 
         Raises:
-            Refused: the autopilot said no; its own words are quoted.
-            Overridden, Failsafe: somebody else has the vehicle.
-            NotArrived: not seen to be done in time.
-            LinkLost: the autopilot has fallen silent.
-            VehicleError: what *look* returns.
+            Refused: the autopilot refused; its own text is quoted.
+            Overridden: another station, a pilot or another task of this program has control.
+            Failsafe: the autopilot has entered a failsafe.
+            NotArrived: the effect was not seen in time.
+            LinkLost: the link timed out.
+            VehicleError: *check* returned it.
         """
         undone = ""
         for _ in range(restarts + 1):
-            undone = self._sequence(asked, plan(), look)
+            undone = self._execute_once(asked, plan(), check)
             if not undone:
                 return
         times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
-        raise Overridden(self._driver.name, asked, undone + times + self.last_words())
+        raise Overridden(self._driver.name, asked, undone + times + self.last_text())
 
-    def give_way(self, successor: str) -> None:
-        """What is under way in another task ends now: *successor* takes the vehicle."""
-        self.turn += 1
-        self.successor = successor
-        self._driver.telemetry.changed.notify()
-
-    def is_ours(self) -> bool:
-        """It is in the mode that was commanded last, still in the one that was ours before if that was
-        refused, or in the one in which it obeys a computer.
-        """
-        return self._driver.telemetry.mode in {self.commanded, self._kept, self._driver.handover}
-
-    def command(self, mode: str) -> None:
-        """*mode* is being asked for: it is ours from now on."""
-        if mode != self.commanded:
-            self._kept, self.commanded = self.commanded, mode
-
-    def entered(self) -> None:
-        """The mode that was commanded last is seen: what was ours before is no more."""
-        self._kept = ""
-
-    def lose(self) -> None:
-        """Somebody else has it: nothing is sent to it any more, no set-point and no stick either."""
-        self.commanded = self._kept = ""
-        self._driver.stop()
-
-    def check_ours(self, asked: str) -> None:
-        """Raise ``Overridden`` if it flies in a mode that this program did not command."""
-        seen = self._driver.telemetry
-        if not seen.flying or self.is_ours():
-            return
-        self.lose()
-        kind = Failsafe if seen.failsafe else Overridden
-        raise kind(
-            self._driver.name,
-            asked,
-            f"is in {seen.mode} (status {seen.status}), which this program did not command"
-            f"{self.last_words()}; to hand it over, switch the vehicle to {self._driver.handover}",
-        )
-
-    def _sequence(self, asked: str, steps: Sequence[Step], look: Check) -> str:
-        """Why it was undone on the ground; empty if all is done."""
-        turn = self.turn
+    def _execute_once(self, asked: str, steps: Sequence[Step], check: Check) -> str:
+        """Return why the sequence was undone on the ground; empty if all steps are done."""
+        claim = self._claim
+        telemetry = self._driver.telemetry
         for step in steps:
-            if turn != self.turn:
-                raise self.taken_over(asked)
-            undone = _StepRun(self, self._kernel, self._driver, asked, step, look).run()
+            if claim != self._claim:
+                raise self.aborted(asked)
+            if step.skippable and step.done(telemetry):
+                if step.enters:
+                    self.set_commanded(step.enters)  # the vehicle is in that mode already: it is ours now
+                    self._previous = ""
+                continue
+            undone = _StepRun(self, asked, step, check).run()
             if undone:
                 return undone
         return ""
 
-    def taken_over(self, asked: str) -> Overridden:
-        """Another part of the same program has it now."""
-        return Overridden(self._driver.name, asked, f"{self.successor} took its place")
+    # -- control
 
-    def wait(self, holds: Callable[[], bool], within: Ns) -> bool:
-        """Until it *holds* of the telemetry (True), at most for *within* (False)."""
+    def abort_for(self, successor: str) -> None:
+        """Abort the operation in progress; *successor* controls the vehicle from now on."""
+        self._claim += 1
+        self._successor = successor
+        self._driver.telemetry.changed.notify()
+
+    def aborted(self, asked: str) -> Overridden:
+        """Return the error for an operation that another task of this program has aborted."""
+        return Overridden(self._driver.name, asked, f"{self._successor} took its place")
+
+    def is_ours(self) -> bool:
+        """Return whether the vehicle is in a mode of this program.
+
+        These are the mode commanded last, the one before if that command was refused, and the offboard mode.
+        """
+        return self._driver.telemetry.mode in {self.commanded, self._previous, self._driver.offboard_mode}
+
+    def set_commanded(self, mode: str) -> None:
+        """Take *mode* as commanded by this program from now on."""
+        if mode != self.commanded:
+            self._previous, self.commanded = self.commanded, mode
+
+    def release_control(self) -> None:
+        """Stop all repeated messages: another station, a pilot or a failsafe has control."""
+        self.commanded = self._previous = ""
+        self._driver.stop()
+
+    def check_ours(self, asked: str) -> None:
+        """Raise ``Overridden`` or ``Failsafe`` if the vehicle flies in a mode not commanded by this program."""
+        telemetry = self._driver.telemetry
+        if not telemetry.flying or self.is_ours():
+            return
+        self.release_control()
+        kind = Failsafe if telemetry.failsafe else Overridden
+        raise kind(
+            self._driver.name,
+            asked,
+            f"is in {telemetry.mode} (status {telemetry.status}), which this program did not command"
+            f"{self.last_text()}; to hand it over, switch the vehicle to {self._driver.offboard_mode}",
+        )
+
+    # -- telemetry and link
+
+    def wait(self, condition: Callable[[], bool], within: Ns) -> bool:
+        """Wait until *condition* holds; return False if it does not hold after *within* (ns)."""
         cycle = self._driver.cycle
         if cycle is None:
-            return self._driver.telemetry.changed.wait_for(holds, within, ends_activation=True)
+            return self._driver.telemetry.changed.wait_for(condition, within, ends_activation=True)
         until = self._kernel.now() + within
-        while not holds():
+        while not condition():
             if self._kernel.now() >= until:
                 return False
             cycle()
         return True
 
-    def silent(self) -> bool:
-        """It spoke before, but not for so long that the link counts as lost."""
-        return self._kernel.now() - self._driver.telemetry.heard >= self._silence
+    def link_lost(self) -> bool:
+        """Return whether the last message is older than the link time-out."""
+        return self._kernel.now() - self._driver.telemetry.last_message_ns >= self._link_timeout
 
-    def patience(self) -> Ns:
-        """How much longer it may be silent."""
-        return self._driver.telemetry.heard + self._silence - self._kernel.now()
-
-    def last_words(self) -> str:
-        """What the autopilot said last, and how long ago if that is long."""
+    def last_text(self) -> str:
+        """Return the autopilot's last text as the end of an error message, with its age if it is old."""
         texts = self._driver.telemetry.texts
         if not texts:
             return ""
@@ -168,154 +180,143 @@ class StepExecutor:
 
 
 class _StepRun:
-    """One step under way."""
+    """Execution of one step."""
 
-    def __init__(
-        self, owner: StepExecutor, kernel: Kernel, driver: Driver, asked: str, step: Step, look: Check
-    ) -> None:
-        self._owner = owner
-        self._turn = owner.turn
-        self._look = look
-        self._stopped: VehicleError | None = None  # what ends it, seen by *look*
-        self._kernel = kernel
-        self._driver = driver
+    def __init__(self, executor: StepExecutor, asked: str, step: Step, check: Check) -> None:
+        self._executor = executor
+        self._kernel = executor._kernel
+        self._driver = driver = executor._driver
+        self._claim = executor._claim
         self._asked = asked
         self._step = step
-        self._seen: Telemetry = driver.telemetry
-        self._began: Ns = kernel.now()
-        self._mode_before = self._seen.mode
-        self._was_armed = self._seen.armed
-        self._changed = ""  # what somebody else did
+        self._check = check
+        self._telemetry: Telemetry = driver.telemetry
+        self._began: Ns = self._kernel.now()
+        self._mode_before = self._telemetry.mode
+        self._was_armed = self._telemetry.armed
+        self._taken = ""  # how another station, a pilot or a failsafe has changed it
+        self._stopped: VehicleError | None = None  # error returned by *check*
         self._repeated = False
 
     def run(self) -> str:
-        """Why it was undone before lift-off; empty if it is done."""
-        step = self._step
-        skipped = step.skippable and step.done(self._seen)
-        if not skipped:
-            self._check_not_fought()
+        """Return why the step was undone before lift-off; empty if it is done."""
+        step, telemetry = self._step, self._telemetry
+        mode = telemetry.mode
         if step.enters:
-            self._owner.command(step.enters)  # also where it is in that mode already: it is ours now
-        if skipped:
-            self._settle()
-            return ""
-        self._seen.answers.pop(step.answer, None)
-        if self._driver.cycle is None:
+            in_failsafe = telemetry.flying and telemetry.failsafe and mode != step.enters
+            # the offboard mode is never commanded over a failsafe, not even over one that interrupted us
+            if in_failsafe and step.enters == self._driver.offboard_mode:
+                raise self._control_lost(f"is in a failsafe, in {mode}")
+            self._executor.set_commanded(step.enters)
+        telemetry.answers.pop(step.answer, None)
+        cycle = self._driver.cycle
+        if cycle is None:
             self._wait_for_telemetry()
         else:
-            self._go_round(self._driver.cycle)
-        return self._judge()
-
-    def _settle(self) -> None:
-        if self._step.enters:
-            self._owner.entered()
-
-    def _check_not_fought(self) -> None:
-        """Guided is never commanded over a failsafe, not even over one that took the mode we were in."""
-        seen, enters = self._seen, self._step.enters
-        if seen.flying and seen.failsafe and enters == self._driver.handover and seen.mode != enters:
-            raise self._taken(f"is in a failsafe, in {seen.mode}")
+            self._spin(cycle)
+        if self._claim == self._executor._claim and step.done(telemetry):
+            if step.enters:
+                self._executor._previous = ""
+            return ""
+        return self._fail()
 
     # -- waiting
 
     def _wait_for_telemetry(self) -> None:
+        step, changed = self._step, self._telemetry.changed
         handles: list[Handle] = []
         with self._kernel as kernel:
-            self._step.send()
-            if self._step.again is not None:
-                handles.append(_later(kernel, self._step.again, self._ask_again))
-            if self._step.keep is not None:
-                handles.append(_later(kernel, self._step.keep.period, self._step.keep.action))
+            step.send()
+            if step.again is not None:
+                handles.append(_repeat(kernel, step.again, self._send_again))
+            if step.keep is not None:
+                handles.append(_repeat(kernel, step.keep.period, step.keep.action))
             try:
                 while not self._over():
-                    left = self._time_left()
-                    self._seen.changed.wait_for(self._over, left, ends_activation=True)
+                    changed.wait_for(self._over, self._time_left(), ends_activation=True)
             finally:
                 for handle in handles:
                     handle.cancel()
 
-    def _go_round(self, cycle: Action) -> None:
-        """The node's own loop, in the caller's task."""
+    def _spin(self, cycle: Action) -> None:
+        """Run the node's own loop in the caller's task until the step is over."""
         step = self._step
         step.send()
-        asked_at = kept_at = self._kernel.now()
+        sent_at = kept_at = self._kernel.now()
         while not self._over():
             self._time_left()
             cycle()
             now = self._kernel.now()
-            if step.again is not None and now - asked_at >= step.again:
-                asked_at = now
-                self._ask_again()
+            if step.again is not None and now - sent_at >= step.again:
+                sent_at = now
+                self._send_again()
             if step.keep is not None and now - kept_at >= step.keep.period:
                 kept_at = now
                 step.keep.action()
 
-    def _ask_again(self) -> None:
-        if self._step.answer not in self._seen.answers and not self._over():
+    def _send_again(self) -> None:
+        if self._step.answer not in self._telemetry.answers and not self._over():
             self._repeated = bool(self._step.answer)
             self._step.send()
 
     def _over(self) -> bool:
-        """Done, refused, taken by somebody else, or not to be gone on with."""
-        step, seen = self._step, self._seen
-        if self._turn != self._owner.turn:
+        """Return whether the step is done, refused, taken over by another, aborted or stopped by the check."""
+        if self._claim != self._executor._claim or self._step.done(self._telemetry):
             return True
-        if step.done(seen):
+        # the refusal of a repeated command proves nothing: the first may have been obeyed, its answer lost
+        if not self._repeated and self._is_refused():
             return True
-        if self._is_refused() and not self._repeated:
-            return True
-        self._notice_changes()
-        if not self._changed:
-            self._stopped = self._stopped or self._look(self._asked, self._kernel.now())
-        return bool(self._changed) or self._stopped is not None
+        self._detect_takeover()
+        if not self._taken:
+            self._stopped = self._stopped or self._check(self._asked, self._kernel.now())
+        return bool(self._taken) or self._stopped is not None
 
     def _is_refused(self) -> bool:
-        """Of what was asked twice it proves nothing: the first may have been obeyed, and its answer lost."""
-        answer = self._seen.answers.get(self._step.answer)
+        answer = self._telemetry.answers.get(self._step.answer)
         return answer is not None and not answer.accepted
 
-    def _notice_changes(self) -> None:
-        step, seen = self._step, self._seen
-        ours = step.enters or step.mode
-        if seen.mode == ours or seen.mode in step.leads_to:
-            self._mode_before = seen.mode
-        elif ours and seen.mode != self._mode_before and not self._changed:
-            self._changed = f"changed from {self._mode_before} to {seen.mode}"
-        self._changed = self._changed or step.lost()
-        self._was_armed = self._was_armed or seen.armed
-        if step.armed and self._was_armed and not seen.armed and not self._changed:
-            self._changed = f"was disarmed in {seen.mode}"
+    def _detect_takeover(self) -> None:
+        step, telemetry = self._step, self._telemetry
+        expected = step.enters or step.mode
+        if telemetry.mode == expected or telemetry.mode in step.leads_to:
+            self._mode_before = telemetry.mode
+        elif expected and telemetry.mode != self._mode_before and not self._taken:
+            self._taken = f"changed from {self._mode_before} to {telemetry.mode}"
+        self._taken = self._taken or step.lost()
+        self._was_armed = self._was_armed or telemetry.armed
+        if step.armed and self._was_armed and not telemetry.armed and not self._taken:
+            self._taken = f"was disarmed in {telemetry.mode}"
 
     def _time_left(self) -> Ns:
-        """Until the time-out or until the silence is too long; raises when one of them has come."""
-        if self._owner.silent():
-            raise self._lost()
-        left = self._began + self._step.within - self._kernel.now()
+        """Return the time until the step or the link times out; raise if either has timed out."""
+        now = self._kernel.now()
+        patience = self._telemetry.last_message_ns + self._executor._link_timeout - now
+        if patience <= 0:
+            raise self._link_lost()
+        left = self._began + self._step.within - now
         if left <= 0:
-            raise self._refused() if self._is_refused() else self._late()
-        return min(left, self._owner.patience())
+            raise self._refused() if self._is_refused() else self._not_arrived()
+        return min(left, patience)
 
-    # -- the end
+    # -- failures
 
-    def _judge(self) -> str:
-        if self._turn != self._owner.turn:
-            raise self._owner.taken_over(self._asked)
-        if self._step.done(self._seen):
-            self._settle()
-            return ""
-        if self._stopped is not None and not self._changed:
+    def _fail(self) -> str:
+        """Raise the error that ended the step, or return why it was undone on the ground."""
+        if self._claim != self._executor._claim:
+            raise self._executor.aborted(self._asked)
+        if self._stopped is not None and not self._taken:
             raise self._stopped
-        taken = bool(self._changed) and (self._seen.flying or self._seen.failsafe)
-        if taken:
-            self._owner.lose()
-        self._hear_reasons()
-        if not self._changed:
+        in_flight = bool(self._taken) and (self._telemetry.flying or self._telemetry.failsafe)
+        if in_flight:
+            self._executor.release_control()
+        self._wait_for_reasons()
+        if not self._taken:
             raise self._refused()
-        if taken:
-            raise self._taken(self._changed)
-        return self._changed
+        if in_flight:
+            raise self._control_lost(self._taken)
+        return self._taken
 
-    def _hear_reasons(self) -> None:
+    def _wait_for_reasons(self) -> None:
         until = self._kernel.now() + REASON_WAIT
         if self._driver.cycle is None:
             sleep(self._kernel, REASON_WAIT)
@@ -324,45 +325,45 @@ class _StepRun:
             self._driver.cycle()
 
     def _refused(self) -> Refused:
-        texts = self._seen.texts_since(self._began, severity=5)
-        answer = self._seen.answers[self._step.answer]
-        said = "; ".join(dict.fromkeys(texts)) or "gave no reason"
-        what = f"the autopilot refused to {self._step.ask} ({answer.result}): {said}"
+        texts = self._telemetry.texts_since(self._began, severity=5)
+        answer = self._telemetry.answers[self._step.answer]
+        reason = "; ".join(dict.fromkeys(texts)) or "gave no reason"
+        what = f"the autopilot refused to {self._step.ask} ({answer.result}): {reason}"
         return Refused(self._driver.name, self._asked, what + self._advice())
 
-    def _taken(self, what: str) -> Overridden:
-        seen = self._seen
-        kind = Failsafe if seen.failsafe else Overridden
-        said = self._owner.last_words()
-        back = f"; to hand it back, switch the vehicle to {self._driver.handover}"
-        return kind(self._driver.name, self._asked, f"{what} (status {seen.status}){said}{back}")
+    def _control_lost(self, what: str) -> Overridden:
+        telemetry = self._telemetry
+        kind = Failsafe if telemetry.failsafe else Overridden
+        text = self._executor.last_text()
+        back = f"; to hand it back, switch the vehicle to {self._driver.offboard_mode}"
+        return kind(self._driver.name, self._asked, f"{what} (status {telemetry.status}){text}{back}")
 
-    def _late(self) -> NotArrived:
-        texts = self._seen.texts_since(self._began)
+    def _not_arrived(self) -> NotArrived:
+        telemetry, step = self._telemetry, self._step
+        texts = telemetry.texts_since(self._began)
         said = f"; the autopilot said {'; '.join(dict.fromkeys(texts[-3:]))!r}" if texts else ""
-        unanswered = ""
-        if self._step.answer and self._step.answer not in self._seen.answers:
-            unanswered = "; the autopilot never answered"
-        within = to_seconds(self._step.within)
-        what = f"to {self._step.ask} was not seen within {within:g} s; {_whereabouts(self._seen)}"
-        return NotArrived(self._driver.name, self._asked, f"{what}{unanswered}{said}{self._advice()}")
+        unanswered = step.answer and step.answer not in telemetry.answers
+        within = to_seconds(step.within)
+        what = f"to {step.ask} was not seen within {within:g} s; {_state(telemetry)}"
+        what += "; the autopilot never answered" if unanswered else ""
+        return NotArrived(self._driver.name, self._asked, f"{what}{said}{self._advice()}")
 
-    def _lost(self) -> VoleryError:
-        seen = self._seen
-        ago = seen.silence(self._kernel.now())
-        wrong = self._driver.problem()
-        why = f"; {wrong}" if wrong is not None else ""
+    def _link_lost(self) -> LinkLost:
+        telemetry = self._telemetry
+        ago = telemetry.silence(self._kernel.now())
+        problem = self._driver.problem()
+        why = f"; {problem}" if problem is not None else ""
         return LinkLost(
-            f"{seen.name}: {self._asked}: nothing was heard for {ago:.1f} s{why}; "
-            f"last: {_whereabouts(seen)}, at {to_seconds(seen.heard):.1f} s"
+            f"{telemetry.name}: {self._asked}: no message was received for {ago:.1f} s{why}; "
+            f"last: {_state(telemetry)}, at {to_seconds(telemetry.last_message_ns):.1f} s"
         )
 
     def _advice(self) -> str:
         return f"; {self._step.advice}" if self._step.advice else ""
 
 
-def _later(kernel: Kernel, period: Ns, action: Callable[[], None]) -> Handle:
-    """Each *period* from one period on."""
+def _repeat(kernel: Kernel, period: Ns, action: Action) -> Handle:
+    """Call *action* each *period*, for the first time after one period."""
     first = True
 
     def tick() -> None:
@@ -375,7 +376,7 @@ def _later(kernel: Kernel, period: Ns, action: Callable[[], None]) -> Handle:
     return kernel.every(period, tick)
 
 
-def _whereabouts(seen: Telemetry) -> str:
-    armed = "armed" if seen.armed else "disarmed"
-    where = f"at {seen.position}" if seen.position is not None else "position unknown"
-    return f"{where}, mode {seen.mode or 'unknown'}, {armed}"
+def _state(telemetry: Telemetry) -> str:
+    armed = "armed" if telemetry.armed else "disarmed"
+    where = f"at {telemetry.position}" if telemetry.position is not None else "position unknown"
+    return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}"

@@ -137,4 +137,4 @@ class _Round:
                     self._returned[name] = returned
             self._changed.notify()
 
-        return self._kernel.spawn(body, f"{self._asked}: {name}", caller.place, scope)
+        return self._kernel.spawn(body, f"{self._asked}: {name}", caller.context, scope)

@@ -1,11 +1,9 @@
-"""Where a vehicle may go: stated limits about home, and a fence. Here: checked before a command, by straight
-paths. ``bounds`` looks at them while it travels.
+"""Where a vehicle may go: limits about home, a fence, and the checks of both before and during an operation.
 
-Everything is judged in the local frame about home: metres east, north and up of it.
-
-Limits and fence while a vehicle travels: what it has strayed out of, by its own estimate.
-
-What counts is more than a stop may overshoot and an estimate may wander: ``TOLERANCE_M`` metres beyond.
+All checks use the local frame about home: metres east and north of home, and metres above home. ``Bounds``
+computes that frame and the areas of the fence once for one home, because every command and every position
+report is checked. A goal is checked along the straight path before anything is sent; while the vehicle travels,
+``BoundsMonitor`` checks each reported position and the battery.
 """
 
 from __future__ import annotations
@@ -26,15 +24,31 @@ from volery.vehicles.telemetry import Telemetry
 
 Corner = tuple[float, float]
 """Latitude and longitude in degrees."""
+Path = tuple[Vector, Vector]
+"""Start and end of a straight path: metres east and north of home, metres above home."""
+
+TOLERANCE_M = 3.0
+"""A vehicle in flight may exceed a bound by this: the error of a usual GPS receiver, and the overshoot of a
+multirotor when it stops.
+"""
+LOW_BATTERY_FOR: Ns = 3 * S
+"""The battery must be below the reserve for this time, because the voltage sags while the motors draw current."""
+FLOOR = "floor"
+"""Key of the floor's violation. Operations that end on the ground ignore it."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How far and how high, in metres about home; and how much of the battery is kept, 0..1.
+    """Limits about home.
 
-    ``highest`` is the 120 m above ground to which drones may fly without a permit in the EU and much of the
-    world. ``lowest`` leaves 2 m for the error of an estimate: where a goal is lower than home, state it.
-    Below ``battery_reserve`` nothing but the way down or home is begun; 0 is no reserve.
+    Args:
+        farthest: greatest horizontal distance from home, m.
+        highest: greatest height above home, m. The default is the height above ground to which drones may fly
+            without a permit in the EU and in many other countries.
+        lowest: least height above home, m. The default leaves 2 m for the error of the estimate; state a lower
+            value if a goal lies below home.
+        battery_reserve: share of the battery, 0 to below 1, below which only landing, returning and holding
+            are allowed. 0 means no reserve.
     """
 
     farthest: float = 10_000.0
@@ -53,9 +67,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class Zone:
-    """An area over which nothing may fly between ``floor`` and ``ceiling``; without these at any height.
+    """A no-fly zone.
 
-    ``corners`` are at least three (latitude, longitude) in degrees, in order around it.
+    Args:
+        name: name used in error messages.
+        corners: at least three (latitude, longitude) in degrees, in order around the zone.
+        floor: lower boundary; ``None`` means without one.
+        ceiling: upper boundary; ``None`` means without one.
     """
 
     name: str
@@ -70,7 +88,14 @@ class Zone:
 
 @dataclass(frozen=True)
 class Fence:
-    """Stay inside ``polygon`` (if it is given), between floor and ceiling, and out of every no-fly zone."""
+    """A geofence: stay inside ``polygon`` (if given), between floor and ceiling, and outside every no-fly zone.
+
+    Args:
+        polygon: corners as (latitude, longitude) in degrees; empty means no horizontal boundary.
+        floor: lowest altitude, AMSL or above home.
+        ceiling: highest altitude, AMSL or above home.
+        no_fly: zones inside the fence that must not be entered.
+    """
 
     polygon: tuple[Corner, ...] = ()
     floor: Altitude | None = None
@@ -99,19 +124,19 @@ def _check_heights(what: str, low: Altitude | None, high: Altitude | None) -> No
 
 
 class HomeFrame(NamedTuple):
-    """Home, and the local frame about it."""
+    """The local frame about home. ``amsl`` is the altitude of home in metres above mean sea level."""
 
     amsl: float
     frame: LocalFrame
 
     @classmethod
-    def at(cls, position: Position) -> HomeFrame:
-        """*position* has an AMSL altitude."""
-        amsl = position.altitude.metres
-        return cls(amsl, LocalFrame(position.latitude, position.longitude, amsl))
+    def at(cls, home: Position) -> HomeFrame:
+        """Return the frame about *home*, which has an AMSL altitude."""
+        amsl = home.altitude.metres
+        return cls(amsl, LocalFrame(home.latitude, home.longitude, amsl))
 
     def above(self, altitude: Altitude) -> float | None:
-        """Metres above home; ``None`` for kinds that take more than home to convert."""
+        """Return metres above home, or ``None`` for kinds of altitude that home alone cannot convert."""
         if isinstance(altitude, AboveHome):
             return altitude.metres
         if isinstance(altitude, AMSL):
@@ -119,56 +144,162 @@ class HomeFrame(NamedTuple):
         return None
 
     def local(self, position: Position) -> Vector:
-        """East, north of home and metres above home. Up is the stated altitude's, not the tangent plane's.
+        """Return metres east and north of home and metres above home.
 
-        Of an altitude of another kind the metres are taken as they are: the best guess without terrain.
+        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude of
+        another kind (above ground) is taken as above home: the best estimate without a terrain model.
         """
         up = self.above(position.altitude)
         height = position.altitude.metres if up is None else up
         east, north, _ = self.frame.to_enu(position.latitude, position.longitude, self.amsl + height)
         return east, north, height
 
+    def band(self, floor: Altitude | None, ceiling: Altitude | None) -> tuple[float, float]:
+        """Return lower and upper boundary in metres above home; infinite where not stated."""
+        low = None if floor is None else self.above(floor)
+        high = None if ceiling is None else self.above(ceiling)
+        return (-inf if low is None else low, inf if high is None else high)
 
-def path_violation(
-    start: Position, goal: Position, home: Position, limits: Limits, fence: Fence | None
-) -> str:
-    """Why one must not go straight from *start* to *goal*; empty if one may. *start*, *home* are AMSL."""
-    about = HomeFrame.at(home)
-    there = about.local(goal)
-    found = _beyond_limits(goal, there, about, limits)
-    if not found and fence is not None:
-        found = _beyond_fence((about.local(start), there), about, fence)
-    return found
+    def area(self, corners: Sequence[Corner]) -> BaseGeometry:
+        """Return the enclosed area in metres; both halves of an outline that crosses itself."""
+        outline = Polygon([self.local(Position(*corner, AMSL(self.amsl)))[:2] for corner in corners])
+        area = make_valid(outline, method="structure", keep_collapsed=False)
+        prepare(area)
+        return area
 
 
-def home_violation(fence: Fence, home: Position) -> str:
-    """Why nobody could start from *home* (AMSL) within the fence; empty if one can.
+class _ZoneArea(NamedTuple):
+    """A no-fly zone in the local frame. ``inner`` is smaller by the tolerance of a vehicle in flight."""
 
-    The floor does not count: it is for the flight, and crossed on the way up and down.
+    name: str
+    area: BaseGeometry
+    inner: BaseGeometry
+    low: float
+    high: float
+
+
+class Bounds:
+    """Limits and fence about one home, prepared for repeated checks.
+
+    Args:
+        home: home position with an AMSL altitude.
+        limits: limits about home.
+        fence: geofence, or ``None``.
     """
-    about = HomeFrame.at(home)
-    if fence.polygon and not area_of(fence.polygon, about).covers(Point(0.0, 0.0)):
-        return f"home ({home}) is outside the fence's polygon{_swapped(fence.polygon, about)}"
-    if band_of(fence.floor, fence.ceiling, about)[1] <= 0.0:
-        return f"home ({home}) is not below the fence's ceiling of {fence.ceiling}"
-    for zone in fence.no_fly:
-        low, high = band_of(zone.floor, zone.ceiling, about)
-        if low <= 0.0 <= high and area_of(zone.corners, about).contains(Point(0.0, 0.0)):
-            return f"home ({home}) is in the no-fly zone {zone.name!r}"
-    return ""
 
+    def __init__(self, home: Position, limits: Limits, fence: Fence | None) -> None:
+        self.home, self.limits, self.fence = home, limits, fence
+        self._frame = frame = HomeFrame.at(home)
+        stated = fence or Fence()
+        self._stated = stated
+        self._polygon = frame.area(stated.polygon) if stated.polygon else None
+        self._low, self._high = frame.band(stated.floor, stated.ceiling)
+        self._zones = [_zone_area(zone, frame) for zone in stated.no_fly]
+        self.home_violation = self._find_home_violation()
+        """Why no flight can start at home within the fence; empty if one can."""
 
-def _swapped(corners: Sequence[Corner], home: HomeFrame) -> str:
-    """The usual reason: longitude before latitude."""
-    if any(abs(longitude) > 90.0 for _, longitude in corners):
+    # -- home
+
+    def _find_home_violation(self) -> str:
+        """The floor is not checked: it is crossed on the way up and down."""
+        if self._polygon is not None and not self._polygon.covers(Point(0.0, 0.0)):
+            return f"home ({self.home}) is outside the fence's polygon{self._hint_if_swapped()}"
+        if self._high <= 0.0:
+            return f"home ({self.home}) is not below the fence's ceiling of {self._stated.ceiling}"
+        for zone in self._zones:
+            if zone.low <= 0.0 <= zone.high and zone.area.contains(Point(0.0, 0.0)):
+                return f"home ({self.home}) is in the no-fly zone {zone.name!r}"
         return ""
-    turned = tuple((longitude, latitude) for latitude, longitude in corners)
-    inside = area_of(turned, home).covers(Point(0.0, 0.0))
-    return "; corners are (latitude, longitude): are they swapped?" if inside else ""
+
+    def _hint_if_swapped(self) -> str:
+        """Return a hint if the usual mistake explains the violation: longitude before latitude."""
+        corners = self._stated.polygon
+        if any(abs(longitude) > 90.0 for _, longitude in corners):
+            return ""
+        swapped = self._frame.area([(longitude, latitude) for latitude, longitude in corners])
+        inside = swapped.covers(Point(0.0, 0.0))
+        return "; corners are (latitude, longitude): are they swapped?" if inside else ""
+
+    # -- before a command
+
+    def path(self, start: Position, goal: Position) -> Path:
+        """Return the straight path from *start* to *goal* in the local frame about home."""
+        return self._frame.local(start), self._frame.local(goal)
+
+    def path_violation(self, path: Path, goal: Position) -> str:
+        """Return why the vehicle must not go along *path*, which ends at *goal*; empty if it may."""
+        east, north, up = path[1]
+        limits, home = self.limits, self.home
+        distance = hypot(east, north)
+        if distance > limits.farthest:
+            return (
+                f"{goal} is {distance / 1000:.1f} km from home, but the limit is "
+                f"{limits.farthest / 1000:g} km (Limits.farthest)"
+            )
+        if up < limits.lowest:
+            hint = ""
+            if isinstance(goal.altitude, AMSL) and 0.0 <= goal.altitude.metres <= limits.highest:
+                hint = (
+                    f"; did you mean AboveHome({goal.altitude.metres:g})? "
+                    f"Home is {home.altitude.metres:g} m AMSL"
+                )
+            return (
+                f"{goal} is {-up:.1f} m below home, underground as far as is known; the limit is "
+                f"{-limits.lowest:g} m below (Limits.lowest){hint}"
+            )
+        if up > limits.highest:
+            if isinstance(goal.altitude, AboveHome):
+                return height_violation(up, limits, home)
+            return f"{goal} is {up:.1f} m above home, but the limit is {limits.highest:g} m (Limits.highest)"
+        return self._fence_violation(path) if self.fence is not None else ""
+
+    def _fence_violation(self, path: Path) -> str:
+        start, end = path
+        if self._polygon is not None:
+            if not self._polygon.covers(Point(end[:2])):
+                return "the goal is outside the fence"
+            if self._polygon.covers(Point(start[:2])) and not self._polygon.covers(_track(path)):
+                return "the straight path there leaves the fence"
+        if end[2] < self._low:
+            return f"the goal is below the fence's floor of {self._stated.floor}"
+        if end[2] > self._high:
+            return f"the goal is above the fence's ceiling of {self._stated.ceiling}"
+        for zone in self._zones:
+            if _passes_through(path, zone):
+                return f"the straight path there leads through the no-fly zone {zone.name!r}"
+        return ""
+
+    # -- while the vehicle travels
+
+    def violations(self, position: Position) -> Mapping[str, str]:
+        """Return the bounds that *position* (AMSL) violates as {name: message}."""
+        east, north, up = self._frame.local(position)
+        limits, found, distance, point = self.limits, dict[str, str](), hypot(east, north), Point(east, north)
+        if distance > limits.farthest + TOLERANCE_M:
+            found["farthest"] = (
+                f"it is {distance:.0f} m from home, beyond {limits.farthest:g} m (Limits.farthest)"
+            )
+        if up > limits.highest + TOLERANCE_M:
+            found["highest"] = f"it is {up:.1f} m above home, beyond {limits.highest:g} m (Limits.highest)"
+        if up < limits.lowest - TOLERANCE_M:
+            found["lowest"] = f"it is {-up:.1f} m below home, beyond {-limits.lowest:g} m (Limits.lowest)"
+        if self._polygon is not None and not self._polygon.contains(point):
+            outside = float(self._polygon.distance(point))
+            if outside > TOLERANCE_M:
+                found["polygon"] = f"it is {outside:.0f} m outside the fence"
+        if up > self._high + TOLERANCE_M:
+            above = up - self._high
+            found["ceiling"] = f"it is {above:.1f} m above the fence's ceiling of {self._stated.ceiling}"
+        if up < self._low - TOLERANCE_M:
+            found[FLOOR] = f"it is {self._low - up:.1f} m below the fence's floor of {self._stated.floor}"
+        for zone in self._zones:
+            if zone.low <= up <= zone.high and zone.inner.contains(point):
+                found[f"zone {zone.name}"] = f"it is in the no-fly zone {zone.name!r}"
+        return found
 
 
 def height_violation(height: float, limits: Limits, home: Position | None = None) -> str:
-    """Why *height* metres above home is out of bounds; with the hint for one who meant AMSL. Else empty."""
+    """Return why *height* (m above home) is too high, with a hint if AMSL may have been meant; else empty."""
     if height <= limits.highest:
         return ""
     hint = ""
@@ -179,94 +310,37 @@ def height_violation(height: float, limits: Limits, home: Position | None = None
     return f"{height:g} m above home asked, but the limit is {limits.highest:g} m (Limits.highest){hint}"
 
 
-def _beyond_limits(goal: Position, there: Vector, home: HomeFrame, limits: Limits) -> str:
-    far = hypot(there[0], there[1])
-    if far > limits.farthest:
-        return (
-            f"{goal} is {far / 1000:.1f} km from home, but the limit is "
-            f"{limits.farthest / 1000:g} km (Limits.farthest)"
-        )
-    up = there[2]
-    if up < limits.lowest:
-        return (
-            f"{goal} is {-up:.1f} m below home, underground as far as is known; the limit is "
-            f"{-limits.lowest:g} m below (Limits.lowest){_home_hint(goal, home, limits)}"
-        )
-    if isinstance(goal.altitude, AboveHome):
-        return height_violation(
-            up, limits, Position(home.frame.latitude, home.frame.longitude, AMSL(home.amsl))
-        )
-    if up > limits.highest:
-        return f"{goal} is {up:.1f} m above home, but the limit is {limits.highest:g} m (Limits.highest)"
-    return ""
+def _zone_area(zone: Zone, frame: HomeFrame) -> _ZoneArea:
+    """A small zone gets a smaller tolerance, or nothing would be left of it."""
+    area = frame.area(zone.corners)
+    inner = area.buffer(-min(TOLERANCE_M, sqrt(float(area.area)) / 4.0))
+    prepare(inner)
+    return _ZoneArea(zone.name, area, inner, *frame.band(zone.floor, zone.ceiling))
 
 
-def _home_hint(goal: Position, home: HomeFrame, limits: Limits) -> str:
-    if isinstance(goal.altitude, AMSL) and 0.0 <= goal.altitude.metres <= limits.highest:
-        height = goal.altitude.metres
-        return f"; did you mean AboveHome({height:g})? Home is {home.amsl:g} m AMSL"
-    return ""
-
-
-# -- areas, in metres about home
-
-Segment = tuple[Vector, Vector]
-
-
-def _beyond_fence(path: Segment, home: HomeFrame, fence: Fence) -> str:
-    if fence.polygon:
-        area, (start, goal) = area_of(fence.polygon, home), path
-        if not area.covers(Point(goal[:2])):
-            return "the goal is outside the fence"
-        if area.covers(Point(start[:2])) and not area.covers(_track(path)):
-            return "the straight way there leaves the fence"
-    low, high = band_of(fence.floor, fence.ceiling, home)
-    if path[1][2] < low:
-        return f"the goal is below the fence's floor of {fence.floor}"
-    if path[1][2] > high:
-        return f"the goal is above the fence's ceiling of {fence.ceiling}"
-    for zone in fence.no_fly:
-        if _passes(path, zone, home):
-            return f"the straight way there leads through the no-fly zone {zone.name!r}"
-    return ""
-
-
-def band_of(floor: Altitude | None, ceiling: Altitude | None, home: HomeFrame) -> tuple[float, float]:
-    """Metres above home from, to; infinite where not stated."""
-    low = None if floor is None else home.above(floor)
-    high = None if ceiling is None else home.above(ceiling)
-    return (-inf if low is None else low, inf if high is None else high)
-
-
-def area_of(corners: Sequence[Corner], home: HomeFrame) -> BaseGeometry:
-    """What the corners enclose; both halves of an outline that crosses itself."""
-    outline = Polygon([home.local(Position(*corner, AMSL(home.amsl)))[:2] for corner in corners])
-    return make_valid(outline, method="structure", keep_collapsed=False)
-
-
-def _track(path: Segment) -> BaseGeometry:
-    """The path seen from above."""
+def _track(path: Path) -> BaseGeometry:
+    """Return the horizontal projection of the path."""
     start, end = path[0][:2], path[1][:2]
     return Point(start) if start == end else LineString([start, end])
 
 
-def _passes(path: Segment, zone: Zone, home: HomeFrame) -> bool:
-    """The path leads through the zone. Straight out of one in which it starts, it may go."""
-    part = _clipped(path, *band_of(zone.floor, zone.ceiling, home))
+def _passes_through(path: Path, zone: _ZoneArea) -> bool:
+    """Return whether the path enters the zone. A path that starts inside may leave straight."""
+    part = _clipped(path, zone.low, zone.high)
     if part is None:
         return False
-    area, track = area_of(zone.corners, home), _track(part)
-    if not area.intersects(track) or area.touches(track):
+    track = _track(part)
+    if not zone.area.intersects(track) or zone.area.touches(track):
         return False
-    starts_inside = part[0] == path[0] and area.contains(Point(part[0][:2]))
-    if not starts_inside or area.contains(Point(part[1][:2])):
+    starts_inside = part[0] == path[0] and zone.area.contains(Point(part[0][:2]))
+    if not starts_inside or zone.area.contains(Point(part[1][:2])):
         return True
-    stretches = [piece for piece in get_parts(area.intersection(track)) if piece.length > 0.0]
+    stretches = [piece for piece in get_parts(zone.area.intersection(track)) if piece.length > 0.0]
     return len(stretches) > 1
 
 
-def _clipped(path: Segment, low: float, high: float) -> Segment | None:
-    """The part of *path* between two heights; ``None`` if there is none."""
+def _clipped(path: Path, low: float, high: float) -> Path | None:
+    """Return the part of *path* between two heights, or ``None`` if there is none."""
     start, end = path
     rise = end[2] - start[2]
     if abs(rise) < 1e-9:
@@ -278,132 +352,77 @@ def _clipped(path: Segment, low: float, high: float) -> Segment | None:
     return _along(path, first), _along(path, last)
 
 
-def _along(path: Segment, share: float) -> Vector:
+def _along(path: Path, share: float) -> Vector:
     if share in {0.0, 1.0}:
         return path[int(share)]
     (x0, y0, z0), (x1, y1, z1) = path
     return x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0)
 
 
-TOLERANCE_M = 3.0
-"""Metres: the error of a usual GPS receiver, and what a multirotor overshoots when it stops."""
-
-LOW_FOR: Ns = 3 * S
-"""So long it must be below the reserve: a voltage that sags when the motors pull comes back."""
-
-
-class Bounds:
-    """Limits and fence about one *home* (AMSL), made ready for being looked at often."""
-
-    def __init__(self, home: Position, limits: Limits, fence: Fence | None) -> None:
-        self.home = home
-        self._about = about = HomeFrame.at(home)
-        self._limits = limits
-        self._fence = fence = fence or Fence()
-        self._polygon = _prepared(area_of(fence.polygon, about)) if fence.polygon else None
-        self._band = band_of(fence.floor, fence.ceiling, about)
-        self._zones = [
-            (
-                zone.name,
-                _prepared(
-                    area_of(zone.corners, about).buffer(-_zone_tolerance(area_of(zone.corners, about)))
-                ),
-                band_of(zone.floor, zone.ceiling, about),
-            )
-            for zone in fence.no_fly
-        ]
-
-    def left(self, position: Position) -> Mapping[str, str]:
-        """What *position* (AMSL) is out of, by name, and in words. Empty: it is where it may be."""
-        east, north, up = self._about.local(position)
-        found: dict[str, str] = {}
-        self._beyond_limits(found, hypot(east, north), up)
-        self._beyond_fence(found, Point(east, north), up)
-        for name, area, (low, high) in self._zones:
-            if low <= up <= high and area.contains(Point(east, north)):
-                found[f"zone {name}"] = f"it is in the no-fly zone {name!r}"
-        return found
-
-    def _beyond_limits(self, found: dict[str, str], far: float, up: float) -> None:
-        limits = self._limits
-        if far > limits.farthest + TOLERANCE_M:
-            found["farthest"] = f"it is {far:.0f} m from home, beyond {limits.farthest:g} m (Limits.farthest)"
-        if up > limits.highest + TOLERANCE_M:
-            found["highest"] = f"it is {up:.1f} m above home, beyond {limits.highest:g} m (Limits.highest)"
-        if up < limits.lowest - TOLERANCE_M:
-            found["lowest"] = f"it is {-up:.1f} m below home, beyond {-limits.lowest:g} m (Limits.lowest)"
-
-    def _beyond_fence(self, found: dict[str, str], there: Point, up: float) -> None:
-        if self._polygon is not None and not self._polygon.contains(there):
-            off = float(self._polygon.distance(there))
-            if off > TOLERANCE_M:
-                found["polygon"] = f"it is {off:.0f} m outside the fence"
-        low, high = self._band
-        if up > high + TOLERANCE_M:
-            found["ceiling"] = f"it is {up - high:.1f} m above the fence's ceiling of {self._fence.ceiling}"
-        if up < low - TOLERANCE_M:
-            found[FLOOR] = f"it is {low - up:.1f} m below the fence's floor of {self._fence.floor}"
-
-
-FLOOR = "floor"
-"""What an operation that ends on the ground is excused from."""
-
-
-def _prepared(area: BaseGeometry) -> BaseGeometry:
-    prepare(area)
-    return area
-
-
-def _zone_tolerance(area: BaseGeometry) -> float:
-    """A zone is entered well inside it; a small one nearer to its edge."""
-    return min(TOLERANCE_M, sqrt(float(area.area)) / 4.0)
-
-
 class BoundsMonitor:
-    """One operation's eye on bounds and battery. What was wrong when it began is excused until it has been
-    right once: so a vehicle that is outside may come back in.
+    """Checks bounds and battery during one operation.
+
+    A bound that is violated at the start is ignored until it has been met once, so that a vehicle outside its
+    bounds can come back.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+        bounds: bounds about home, or ``None`` without a home.
+        reserve: battery reserve, 0..1.
+        ignored: names of bounds that are never checked.
     """
 
     def __init__(
-        self, seen: Telemetry, bounds: Bounds | None, reserve: float, excused: frozenset[str] = frozenset()
+        self,
+        telemetry: Telemetry,
+        bounds: Bounds | None,
+        reserve: float,
+        ignored: frozenset[str] = frozenset(),
     ) -> None:
-        self._seen = seen
+        self._telemetry = telemetry
         self._bounds = bounds
         self._reserve = reserve
-        self._always = excused
-        self._looked_at: Position | None = None
+        self._ignored = ignored
+        self._checked: Position | None = None
         self._low_since: Ns | None = None
-        here = seen.position
-        at_first = bounds.left(here) if bounds is not None and here is not None else {}
-        self._excused = set(at_first)
+        here = telemetry.position
+        self._violated_at_start = (
+            set(bounds.violations(here)) if bounds is not None and here is not None else set()
+        )
 
-    def look(self, asked: str, now: Ns) -> VehicleError | None:
-        """What ends the operation; ``None`` if nothing does."""
-        return self._strayed(asked) or self._exhausted(asked, now)
+    def check(self, operation: str, now: Ns) -> VehicleError | None:
+        """Return the error that must end the operation, or ``None``.
 
-    def _strayed(self, asked: str) -> OutOfBounds | None:
-        here = self._seen.position
-        if self._bounds is None or here is None or here is self._looked_at:
+        Args:
+            operation: what the vehicle is doing, for the error message.
+            now: the present time, ns.
+        """
+        return self._check_bounds(operation) or self._check_battery(operation, now)
+
+    def _check_bounds(self, operation: str) -> OutOfBounds | None:
+        here = self._telemetry.position
+        if self._bounds is None or here is None or here is self._checked:
             return None
-        self._looked_at = here
-        left = self._bounds.left(here)
-        self._excused.intersection_update(left)
-        wrong = [text for key, text in left.items() if key not in self._excused and key not in self._always]
-        return OutOfBounds(self._seen.name, asked, " and ".join(wrong)) if wrong else None
+        self._checked = here
+        violations = self._bounds.violations(here)
+        self._violated_at_start.intersection_update(violations)
+        ignored = self._violated_at_start | self._ignored
+        found = [text for name, text in violations.items() if name not in ignored]
+        return OutOfBounds(self._telemetry.name, operation, " and ".join(found)) if found else None
 
-    def _exhausted(self, asked: str, now: Ns) -> LowBattery | None:
-        remaining = self._seen.battery.remaining
+    def _check_battery(self, operation: str, now: Ns) -> LowBattery | None:
+        remaining = self._telemetry.battery.remaining
         if not isfinite(remaining) or remaining >= self._reserve:
             self._low_since = None
             return None
         if self._low_since is None:
             self._low_since = now
-        if now - self._low_since < LOW_FOR:
+        if now - self._low_since < LOW_BATTERY_FOR:
             return None
-        return low_battery(self._seen.name, asked, remaining, self._reserve)
+        return low_battery(self._telemetry.name, operation, remaining, self._reserve)
 
 
-def low_battery(vehicle: str, asked: str, remaining: float, reserve: float) -> LowBattery:
-    """The error, with what is still allowed."""
+def low_battery(vehicle: str, operation: str, remaining: float, reserve: float) -> LowBattery:
+    """Return the error for a battery below its reserve; it names the operations that are still allowed."""
     what = f"the battery is at {remaining:.0%}, below the reserve of {reserve:.0%} (Limits.battery_reserve)"
-    return LowBattery(vehicle, asked, f"{what}; return_home(), land() and hold() are still possible")
+    return LowBattery(vehicle, operation, f"{what}; return_home(), land() and hold() are still possible")

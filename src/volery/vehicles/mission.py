@@ -1,9 +1,9 @@
-"""A mission that is flown by the autopilot itself: items in order, uploaded before it starts."""
+"""Missions that the autopilot flies by itself: items in order, uploaded before the start."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 
 from volery.base.position import Position
 
@@ -17,8 +17,12 @@ class TakeOff:
 
 @dataclass(frozen=True)
 class Waypoint:
-    """Fly to ``position``, stay ``stay_s`` seconds; heading in degrees clockwise from north, or NaN for
-    any.
+    """Fly to a position and stay there.
+
+    Args:
+        position: where to fly.
+        stay_s: time to stay, s.
+        heading: heading in degrees clockwise from north; NaN means any.
     """
 
     position: Position
@@ -28,14 +32,14 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class ChangeSpeed:
-    """From here on ``speed`` m/s over ground."""
+    """Fly at ``speed`` m/s over ground from this item on."""
 
     speed: float
 
 
 @dataclass(frozen=True)
 class Land:
-    """Land here, or where ``position`` says."""
+    """Land at ``position``, or in place if there is none."""
 
     position: Position | None = None
 
@@ -46,3 +50,14 @@ class ReturnHome:
 
 
 MissionItem = TakeOff | Waypoint | ChangeSpeed | Land | ReturnHome
+
+
+def item_problem(item: MissionItem) -> str:
+    """Return which number of *item* is out of range, and the remedy; empty if all are valid."""
+    if isinstance(item, ChangeSpeed) and not (isfinite(item.speed) and item.speed > 0):
+        return f"a speed of {item.speed:g} m/s; give one above 0"
+    if isinstance(item, TakeOff) and not (isfinite(item.height) and item.height > 0):
+        return f"a height of {item.height:g} m; give one above 0"
+    if isinstance(item, Waypoint) and not (isfinite(item.stay_s) and item.stay_s >= 0):
+        return f"a stay of {item.stay_s:g} s; give 0 or more"
+    return ""

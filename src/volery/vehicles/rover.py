@@ -1,4 +1,4 @@
-"""A rover: blocking operations, each seen on the telemetry before it returns."""
+"""A rover: operations that block until telemetry shows that they are done."""
 
 from __future__ import annotations
 
@@ -7,96 +7,113 @@ from math import nan
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
 from volery.vehicles.driver import Capability, ManualControl
-from volery.vehicles.vehicle import TO_SAFETY, TRAVEL, Goal, Vehicle
+from volery.vehicles.operation import TO_SAFETY, TRAVEL, Goal
+from volery.vehicles.vehicle import Vehicle
 
 
 class Rover(Vehicle):
-    """A ground vehicle. See ``Vehicle`` for its state and for what the arguments mean."""
+    """A ground vehicle. See ``Vehicle`` for its state, the constructor's arguments and how operations end."""
 
     kind = "rover"
 
     @property
     def driving(self) -> bool:
-        """It moves, by the autopilot's estimate faster than 0.1 m/s."""
+        """Whether it moves faster than 0.1 m/s, as estimated by the autopilot."""
         north, east, _ = self.velocity
         return north * north + east * east > 0.01
 
     def drive(self, goal: Position | tuple[float, float], speed: float | None = None) -> None:
-        """Wait until it is ready, arm if need be, drive straight to *goal* and stop there.
+        """Wait until ready, arm if disarmed, drive straight to *goal* and stop there.
 
-        *goal* may be a latitude and a longitude; an altitude is not looked at. *speed* in m/s, else the
-        autopilot's own. Raises ``OutOfBounds`` before anything moves if limits or fence forbid the goal or
-        the straight way.
+        Args:
+            goal: target as a position or as (latitude, longitude) in degrees; an altitude is ignored.
+            speed: speed, m/s; ``None`` means the autopilot's own.
+
+        Raises:
+            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is sent),
+                or were violated on the way.
         """
         self._require(Capability.GOTO)
         latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
         there = Position(latitude, longitude, AboveHome(0.0))
         asked = f"drive to {latitude:.7f}, {longitude:.7f}"
-        self._check_speed(asked, speed)
+        if speed is not None:
+            self._check_speed(asked, speed)
         if self._driver.telemetry.position is None:
             self.wait_ready()
         here = self.position
         level = Position(here.latitude, here.longitude, self.home.altitude)
         self._check_path(asked, level, there)
-        within = self._within(there, speed or 1.0)
+        within = self._timeout_to(there, speed or 1.0)
         self._operate(
             "drive",
             asked,
             lambda: self._driver.goto(there, speed, within),
-            manner=TRAVEL,
+            policy=TRAVEL,
             goal=lambda: Goal(latitude, longitude, nan),
         )
 
     def return_home(self) -> None:
-        """Let the autopilot return to home and stop there. See ``Drone.return_home``."""
+        """Let the autopilot return home and stop there.
+
+        The operation of another task is aborted.
+
+        Raises:
+            OutOfBounds: the straight path violates the fence, unless the rover is out of bounds already.
+        """
         self._require(Capability.RETURN_HOME)
         home, here = self.home, self.position
         level = Position(here.latitude, here.longitude, home.altitude)
-        if not self._strayed_already():
+        if not self._is_out_of_bounds():
             self._check_path("return home", level, home)
-        within = self._within(home, 1.0)
+        within = self._timeout_to(home, 1.0)
         self._operate(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
-            manner=TO_SAFETY,
+            policy=TO_SAFETY,
             goal=lambda: Goal(home.latitude, home.longitude, nan),
         )
 
     def manual(self) -> None:
-        """Drive by ``manual_control``; it is armed if need be. Returns when the mode is seen.
+        """Enter the mode that is driven by ``manual_control``, arm if disarmed, and return when it is seen.
 
         Raises ``Refused`` unless ``manual_control`` was called within the last second.
         """
-        self._require(Capability.STICKS)
-        self._by_hand("manual", "drive by hand", self._driver.manual)
+        self._require(Capability.MANUAL_CONTROL)
+        self._enter_manual_mode("manual", "drive by hand", self._driver.manual)
 
     def manual_control(self, steering: float, throttle: float) -> None:
-        """Hold the controls so until the next call: steering (right +) and throttle (back -) in -1..1.
+        """Set the manual control until the next call.
 
-        Raises ``UsageError`` naming the control that is out of range or no number.
+        Args:
+            steering: -1..1, right positive.
+            throttle: -1..1, forward positive.
+
+        Raises:
+            UsageError: a value is out of range or not a number.
         """
-        self._require(Capability.STICKS)
+        self._require(Capability.MANUAL_CONTROL)
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")
-        self._move_sticks(ManualControl(roll=steering, throttle=throttle))
+        self._set_manual_control(ManualControl(roll=steering, throttle=throttle))
 
     def come_to_rest(self) -> str:
-        """Stop and disarm it if nobody else has it; says what was done. For the end of a program.
+        """Stop and disarm, unless another station has control; return what was done.
 
-        It waits half a minute for a link that is lost at that moment; ``LinkLost`` if that does not return.
+        A lost link is given half a minute to return; then ``LinkLost`` is raised.
         """
-        seen = self._look()
-        if seen.heard < 0:
-            return "was never heard"
+        telemetry = self._poll()
+        if telemetry.last_message_ns < 0:
+            return "never sent a message"
         self._wait_for_link()
-        with self._kernel:
+        with self.kernel:
             self._driver.stop()
-        if not seen.armed:
+        if not telemetry.armed:
             return "is disarmed"
-        if not self._performer.is_ours():
-            return f"is left to whoever drives it in {seen.mode}"
+        if not self._executor.is_ours():
+            return f"is left to the pilot or station in {telemetry.mode}"
         self.hold()
         self.disarm()
         return "stopped and was disarmed"

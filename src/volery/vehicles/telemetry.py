@@ -1,4 +1,4 @@
-"""What the autopilot said last. A driver writes it; everybody above reads it."""
+"""The last state that an autopilot has reported. A driver writes it; everything above the driver reads it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.kernel.waiting import Signal
 
 
 class Velocity(NamedTuple):
-    """Metres per second over ground."""
+    """Velocity over ground, m/s."""
 
     north: float
     east: float
@@ -21,7 +21,7 @@ class Velocity(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """``remaining`` 0..1; NaN where the autopilot does not measure."""
+    """State of the battery: remaining share 0..1, V and A; NaN for values that are not measured."""
 
     remaining: float
     volts: float
@@ -29,7 +29,7 @@ class Battery(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """Degrees: roll right +, pitch nose up +, heading clockwise from north."""
+    """Attitude in degrees: roll right positive, pitch nose up positive, heading clockwise from north."""
 
     roll: float
     pitch: float
@@ -37,7 +37,7 @@ class Attitude(NamedTuple):
 
 
 class StatusText(NamedTuple):
-    """A text of the autopilot. ``severity`` as in syslog."""
+    """A text of the autopilot; ``severity`` as in syslog (RFC 5424)."""
 
     at: Ns
     severity: int
@@ -45,7 +45,7 @@ class StatusText(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """An acknowledgement. ``result`` in the protocol's own word."""
+    """An acknowledgement; ``result`` in the protocol's own term."""
 
     at: Ns
     accepted: bool
@@ -56,21 +56,31 @@ KEPT_TEXTS = 50
 
 
 class Telemetry:
-    """Facts about one vehicle, in this project's units, each as it was last heard.
+    """The last reported state of one vehicle, in this project's units.
 
-    ``changed`` is notified after each message. ``heard`` is when the autopilot itself last spoke, -1 for
-    never. ``position`` has an AMSL altitude, as has ``target``: where it said last that it goes. ``failsafe``
-    says that the autopilot itself is in one. ``flying`` is off the ground by the autopilot's own judgement.
-    ``ready`` means that it could arm now and fly by position, ``armable`` that it could arm in the mode it is
-    in.
+    Attributes:
+        changed: notified after each message.
+        last_message_ns: time of the last message of the autopilot itself; -1 before the first.
+        kind: "drone", "rover", or the autopilot's own term for another kind.
+        system: system id, where the protocol has one.
+        failsafe: the autopilot is in a failsafe.
+        flying: off the ground, as judged by the autopilot.
+        armable: it could arm in the present mode.
+        ready: it could arm now and go to a position.
+        position: position estimate with an AMSL altitude.
+        target: where the autopilot reports that it goes; AMSL altitude.
+        above_home: height above home, m.
+        mission_item: the mission item in progress.
+        mission_reached: the mission item reached last.
+        answers: last acknowledgement by key.
     """
 
     def __init__(self, kernel: Kernel, name: str) -> None:
         self.name = name
-        self.heard: Ns = -1
-        self.kind = ""  # "drone", "rover", or the autopilot's own word for anything else
+        self.last_message_ns: Ns = -1
+        self.kind = ""
         self.autopilot = ""
-        self.system = 0  # its id, where the protocol has one
+        self.system = 0
         self.mode = ""
         self.status = ""
         self.armed = False
@@ -87,17 +97,17 @@ class Telemetry:
         self.battery = Battery(nan, nan, nan)
         self.fix = ""
         self.satellites = 0
-        self.mission_item = -1  # the item it flies to
-        self.mission_reached = -1  # the item it reached last
+        self.mission_item = -1
+        self.mission_reached = -1
         self.mission_ended = False
         self.texts: deque[StatusText] = deque(maxlen=KEPT_TEXTS)
         self.answers: dict[str, Answer] = {}
         self.changed = Signal(kernel, f"telemetry of {name}")
 
     def texts_since(self, when: Ns, severity: int = 6) -> list[str]:
-        """Texts said at or after *when*, that are at least as severe as *severity*, oldest first."""
-        return [said.text for said in self.texts if said.at >= when and said.severity <= severity]
+        """Return texts received at or after *when*, at least as severe as *severity*, oldest first."""
+        return [text.text for text in self.texts if text.at >= when and text.severity <= severity]
 
     def silence(self, now: Ns) -> float:
-        """Seconds since the autopilot was last heard; infinite if it never was."""
-        return inf if self.heard < 0 else (now - self.heard) / S
+        """Return seconds since the last message; infinite before the first."""
+        return inf if self.last_message_ns < 0 else (now - self.last_message_ns) / S

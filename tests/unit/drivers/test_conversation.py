@@ -46,10 +46,10 @@ def test_parameters_are_asked_for_until_they_come(bench: Make) -> None:
     at = bench()
     driver = at.vehicle._driver
     at.kernel.run(3 * S)
-    assert driver.if_silent() == ""
+    assert driver.on_link_loss() == ""
     at.autopilot.parameters = {"FS_GCS_ENABLE": 0.0, "GUID_TIMEOUT": 3.0, "SYSID_MYGCS": 255.0}
     at.kernel.run(15 * S)
-    assert driver.if_silent() == (
+    assert driver.on_link_loss() == (
         "it does not miss its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there; "
         "a velocity ends after 3 s"
     )
@@ -102,7 +102,7 @@ def test_a_px4_is_named(bench: Make) -> None:
 
     at.kernel.every(S, beat)
     with pytest.raises(LinkGarbled, match="a PX4 speaks here, not an ArduPilot"):
-        at.fly(lambda drone: drone.wait_heard(within=5))
+        at.fly(lambda drone: drone.wait_connected(within=5))
 
 
 def test_options_are_checked() -> None:

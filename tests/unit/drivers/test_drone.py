@@ -220,7 +220,7 @@ def test_a_pilot_who_takes_over_in_the_air_is_not_fought(bench: Make) -> None:
             drone.goto(NEAR)
         with pytest.raises(Overridden):
             drone.land()
-        assert drone.come_to_rest() == "is left to whoever flies it in LOITER"
+        assert drone.come_to_rest() == "is left to the pilot or station in LOITER"
         assert not [f for f in at.autopilot.heard[before:] if f.name not in {"HEARTBEAT"}]
 
     at.fly(mission)
@@ -307,7 +307,7 @@ def test_a_link_that_falls_silent_in_flight(bench: Make) -> None:
         at.after(3, lambda: setattr(at.autopilot, "mute", True))
         drone.goto(NEAR)
 
-    with pytest.raises(LinkLost, match=r"nothing was heard for 5\.\d s.*last: at -35.*mode GUIDED, armed"):
+    with pytest.raises(LinkLost, match=r"no message was received for 5\.\d s.*last: at -35.*mode GUIDED, armed"):
         at.fly(mission)
     assert [state.state for state in at.told(LinkState)] == ["silent"]
 

@@ -78,7 +78,7 @@ def test_a_driver_who_takes_over_is_not_fought(bench: Make) -> None:
             rover.drive(NEAR)
         with pytest.raises(Overridden, match="is in MANUAL"):
             rover.drive(NEAR)
-        assert rover.come_to_rest() == "is left to whoever drives it in MANUAL"
+        assert rover.come_to_rest() == "is left to the pilot or station in MANUAL"
 
     at.fly(mission)
 

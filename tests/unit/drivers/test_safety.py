@@ -135,7 +135,7 @@ def test_a_velocity_that_leads_out_is_stopped_and_the_next_call_says_so(bench: M
         drift(at, 120.0)
         sleep(at.kernel, 12 * S)
         assert at.told(Operation)[-1].operation == "hold"
-        with pytest.raises(OutOfBounds, match="20 m outside the fence; it was told to hold"):
+        with pytest.raises(OutOfBounds, match="20 m outside the fence; it was commanded to hold"):
             drone.set_velocity(north=-1.0)
         drone.goto(north(10))
 
@@ -152,7 +152,7 @@ def test_sticks_do_not_lead_out_either(bench: Make) -> None:
         drift(at, 120.0)
         sleep(at.kernel, 12 * S)
         assert at.craft.mode == "GUIDED"
-        with pytest.raises(OutOfBounds, match="it was told to hold"):
+        with pytest.raises(OutOfBounds, match="it was commanded to hold"):
             drone.manual_control(0.5, 0, 0.5, 0)
         drone.manual_control(-0.5, 0, 0.5, 0)
         drone.altitude_hold()  # by hand it may come back
@@ -257,7 +257,7 @@ def test_below_the_reserve_on_the_way_it_is_held(bench: Make) -> None:
 def test_a_reserve_without_a_battery_monitor_cannot_be_kept(bench: Make) -> None:
     at = bench(limits=Limits(battery_reserve=0.2))
     battery(at, -1)
-    with pytest.raises(CapabilityError, match="does not say how full the battery is"):
+    with pytest.raises(CapabilityError, match="does not report how full the battery is"):
         at.fly(lambda drone: drone.takeoff(10))
     assert not at.craft.armed
 
@@ -361,7 +361,7 @@ def test_no_flying_by_hand_without_fresh_sticks(bench: Make, name: str) -> None:
             getattr(drone, name)()
         drone.manual_control(0, 0, 0.5, 0)
         drone.hold()
-        with pytest.raises(Refused, match="no stick sample is newer than 1 s"):
+        with pytest.raises(Refused, match="no manual control is newer than 1 s"):
             getattr(drone, name)()  # hold() let go of them
         drone.manual_control(0, 0, 0.5, 0)
         getattr(drone, name)()
@@ -373,7 +373,7 @@ def test_a_rover_needs_fresh_controls_and_is_armed(bench: Make) -> None:
     at = bench(Rover)
 
     def mission(rover: Any) -> None:
-        with pytest.raises(Refused, match="no stick sample is newer than 1 s"):
+        with pytest.raises(Refused, match="no manual control is newer than 1 s"):
             rover.manual()
         rover.manual_control(0.1, 0.2)
         rover.manual()
@@ -449,13 +449,13 @@ def test_numbers_that_are_none(bench: Make, call: Callable[[Any], None], says: s
 def test_what_it_does_if_left_alone_is_told_once_it_is_known(bench: Make) -> None:
     at = bench()
     lines = ["", "", "it lands"]
-    at.vehicle._driver.if_silent = lambda: lines.pop(0) if len(lines) > 1 else lines[0]
+    at.vehicle._driver.on_link_loss = lambda: lines.pop(0) if len(lines) > 1 else lines[0]
 
     def mission(drone: Any) -> None:
-        drone.wait_heard()
+        drone.wait_connected()
         assert not at.told(Text)
         sleep(at.kernel, 5 * S)
-        assert drone.if_silent == "it lands"
+        assert drone.on_link_loss == "it lands"
 
     at.fly(mission)
     assert [one.text for one in at.told(Text)] == ["if this program falls silent: it lands"]

@@ -175,7 +175,7 @@ def test_a_pilot_takes_over_and_hands_back(mavros: bool) -> None:
 def test_a_failsafe_of_the_autopilot_is_not_fought() -> None:
     """With the failsafe of the ground station switched on, a link that is cut for 8 s ends the call."""
     field = Field(faults=WireFaults(cuts=((20 * S, 28 * S),)), parameters={"FS_GCS_ENABLE": 1.0})
-    field.vehicle._performer._silence = 20 * S
+    field.vehicle._executor._link_timeout = 20 * S
 
     def mission(drone: Any) -> None:
         drone.takeoff(10)
@@ -184,7 +184,7 @@ def test_a_failsafe_of_the_autopilot_is_not_fought() -> None:
         assert "GCS Failsafe" in str(caught.value) or isinstance(caught.value, Failsafe)
         with pytest.raises(Overridden):
             drone.goto(at(0, 20))
-        assert drone.come_to_rest() == "came down by itself in RTL"
+        assert drone.come_to_rest() == "landed by itself in RTL"
 
     field.fly(mission)
 
@@ -198,7 +198,7 @@ def test_a_link_that_drops_in_flight_and_returns() -> None:
 
 def test_a_vehicle_node_that_hears_its_autopilot_no_more() -> None:
     field = Field(mavros=True, faults=WireFaults(cuts=((15 * S, HOUR),)))
-    with pytest.raises(LinkLost, match="nothing was heard for 5"):
+    with pytest.raises(LinkLost, match="no message was received for 5"):
         field.fly(square)
 
 
@@ -208,7 +208,7 @@ def test_a_vehicle_node_that_is_not_there() -> None:
 
     def nobody(drone: Any) -> None:
         driver = open_mavros(field.kernel, graph.node("control"), "craft_2", {})
-        Drone(field.kernel, "craft_2", driver).wait_heard(3.0)
+        Drone(field.kernel, "craft_2", driver).wait_connected(3.0)
 
     with pytest.raises(LinkSilent, match="no vehicle node publishes /craft_2/state"):
         field.fly(nobody)

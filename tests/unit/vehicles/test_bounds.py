@@ -12,7 +12,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.vehicles import Battery, Fence, Limits, Zone
-from volery.vehicles.limits import FLOOR, Bounds, BoundsMonitor, home_violation
+from volery.vehicles.limits import FLOOR, Bounds, BoundsMonitor
 from volery.vehicles.telemetry import Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
@@ -50,12 +50,12 @@ FENCED = Fence(square(50.0), AboveHome(5.0), AboveHome(40.0), (Zone("mast", squa
     ],
 )
 def test_what_it_is_out_of(where: Position, keys: list[str]) -> None:
-    assert list(Bounds(HOME, Limits(farthest=200.0), FENCED).left(where)) == keys
+    assert list(Bounds(HOME, Limits(farthest=200.0), FENCED).violations(where)) == keys
 
 
 def test_a_small_zone_is_not_overlooked() -> None:
     fence = Fence(no_fly=(Zone("post", square(1.0)),))
-    assert list(Bounds(HOME, Limits(), fence).left(place(0, 0))) == ["zone post"]
+    assert list(Bounds(HOME, Limits(), fence).violations(place(0, 0))) == ["zone post"]
 
 
 def telemetry(where: Position, remaining: float = 1.0) -> Telemetry:
@@ -69,9 +69,9 @@ def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
     watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0)
     for north in (70, 60, 10):
         seen.position = place(0, north)
-        assert watch.look("go", 0) is None
+        assert watch.check("go", 0) is None
     seen.position = place(0, 60)
-    error = watch.look("go", 0)
+    error = watch.check("go", 0)
     assert isinstance(error, OutOfBounds)
     assert "10 m outside the fence" in str(error)
 
@@ -82,29 +82,29 @@ def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
         watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
         for up in (0.5, 20.0):
             seen.position = place(0, 0, up)
-            assert watch.look("up", 0) is None
+            assert watch.check("up", 0) is None
         seen.position = place(0, 0, 1.0)
-        assert (watch.look("down", 0) is not None) is expected
+        assert (watch.check("down", 0) is not None) is expected
 
 
 def test_a_battery_that_sags_for_a_moment_is_not_empty() -> None:
     seen = telemetry(place(0, 0), 0.19)
     watch = BoundsMonitor(seen, None, 0.2)
-    assert watch.look("go", 0) is None
-    assert watch.look("go", 2 * S) is None
+    assert watch.check("go", 0) is None
+    assert watch.check("go", 2 * S) is None
     seen.battery = Battery(0.21, 12.0, 10.0)
-    assert watch.look("go", 3 * S) is None
+    assert watch.check("go", 3 * S) is None
     seen.battery = Battery(0.18, 12.0, 10.0)
-    assert watch.look("go", 4 * S) is None
-    error = watch.look("go", 7 * S)
+    assert watch.check("go", 4 * S) is None
+    error = watch.check("go", 7 * S)
     assert isinstance(error, LowBattery)
     assert "at 18%, below the reserve of 20%" in str(error)
 
 
 def test_a_battery_that_is_not_measured_ends_nothing() -> None:
     watch = BoundsMonitor(telemetry(place(0, 0), float("nan")), None, 0.2)
-    assert watch.look("go", 0) is None
-    assert watch.look("go", 10 * S) is None
+    assert watch.check("go", 0) is None
+    assert watch.check("go", 10 * S) is None
 
 
 @pytest.mark.parametrize(
@@ -118,14 +118,14 @@ def test_a_battery_that_is_not_measured_ends_nothing() -> None:
     ],
 )
 def test_a_fence_that_excludes_home(fence: Fence, says: str) -> None:
-    found = home_violation(fence, HOME)
+    found = Bounds(HOME, Limits(), fence).home_violation
     assert (says in found) if says else found == ""
 
 
 def test_swapped_corners_are_recognised() -> None:
     home = Position(46.0, 7.0, AMSL(900.0))
     turned = ((6.9, 45.9), (7.1, 45.9), (7.1, 46.1), (6.9, 46.1))
-    assert "are they swapped?" in home_violation(Fence(turned), home)
+    assert "are they swapped?" in Bounds(home, Limits(), Fence(turned)).home_violation
 
 
 @pytest.mark.parametrize(

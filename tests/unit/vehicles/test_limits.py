@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.vehicles.limits import Fence, HomeFrame, Limits, Zone, height_violation, path_violation
+from volery.vehicles.limits import Bounds, Fence, HomeFrame, Limits, Zone, height_violation
 
 HOME = Position(46.0828, -103.8990, AMSL(900.0))
 FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
@@ -26,7 +26,8 @@ SQUARE = corners((-50, 20), (50, 20), (50, 120), (-50, 120))
 
 
 def check(start: Position, goal: Position, fence: Fence | None = None, limits: Limits | None = None) -> str:
-    return path_violation(start, goal, HOME, limits or Limits(), fence)
+    bounds = Bounds(HOME, limits or Limits(), fence)
+    return bounds.path_violation(bounds.path(start, goal), goal)
 
 
 def test_within_everything() -> None:

@@ -248,4 +248,4 @@ class CommandHandler:
     def _let_go(self) -> None:
         if self._sticks_at is not None:
             self._sticks_at = None
-            self._driver.sticks(None)
+            self._driver.manual_control(None)

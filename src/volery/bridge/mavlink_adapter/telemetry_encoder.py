@@ -110,7 +110,7 @@ class TelemetryEncoder:
     # -- what they are made of
 
     def _heard(self, known: bool = True) -> object:
-        return self._seen.heard if known and self._seen.heard >= 0 else None
+        return self._seen.last_message_ns if known and self._seen.last_message_ns >= 0 else None
 
     def _placed(self) -> Position | None:
         seen = self._seen
@@ -136,7 +136,7 @@ class TelemetryEncoder:
 
     def _heartbeat(self) -> Fields:
         seen, firmware = self._seen, self.firmware
-        guided = GUIDED_ENABLED if seen.mode == self._driver.handover else 0
+        guided = GUIDED_ENABLED if seen.mode == self._driver.offboard_mode else 0
         return {
             "type": firmware.kind,
             "autopilot": firmware.autopilot,

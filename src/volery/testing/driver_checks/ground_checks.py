@@ -52,7 +52,7 @@ def _asking(stage: Stage) -> dict[Capability, Callable[[], None]]:
         Capability.HEADING: lambda: drone.set_heading(90),
         Capability.STABILIZE: drone.stabilize,
         Capability.ALTITUDE_HOLD: drone.altitude_hold,
-        Capability.STICKS: lambda: drone.manual_control(0, 0, 0.5, 0),
+        Capability.MANUAL_CONTROL: lambda: drone.manual_control(0, 0, 0.5, 0),
         Capability.MISSION: lambda: drone.upload_mission([]),
     }
 
@@ -185,8 +185,8 @@ def altitudes_that_it_cannot_fly(stage: Stage) -> str:
 @check(kind="")
 def what_if_silent(stage: Stage) -> str:
     """Connected, it says in one line what the aircraft will do if its commander falls silent."""
-    stage.until(stage.driver.if_silent, SAYS_WITHIN_S, "it never says")
-    words = stage.driver.if_silent()
+    stage.until(stage.driver.on_link_loss, SAYS_WITHIN_S, "it never says")
+    words = stage.driver.on_link_loss()
     demand("\n" not in words, f"more than one line: {words!r}")
     return words
 

@@ -55,7 +55,7 @@ def link_lost(stage: Stage) -> str:
     after = to_seconds(stage.kernel.now() - cut)
     demand(after < NOTICED_S, f"it was noticed after {after:.1f} s")
     seen = stage.drone.telemetry
-    stage.until(lambda: stage.kernel.now() - seen.heard < 1e9, 20.0, "it was not heard again")
+    stage.until(lambda: stage.kernel.now() - seen.last_message_ns < 1e9, 20.0, "it was not heard again")
     stage.sleep(2)
     words = str(stage.drone.come_to_rest())
     if stage.drone.armed:
@@ -87,9 +87,9 @@ def commander_silence(stage: Stage) -> str:
     """
     stage.drone.takeoff(10)
     here = stage.drone.position
-    words = stage.driver.if_silent()
+    words = stage.driver.on_link_loss()
     witness = stage.another_program()
-    witness.wait_heard()
+    witness.wait_connected()
     stage.drone.close()
     stage.sleep(20)
     north, east, _ = stage.offset(here, witness.position)

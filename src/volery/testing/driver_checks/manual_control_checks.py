@@ -9,8 +9,8 @@ from volery.testing.checks import check, demand, raising
 from volery.testing.stage import Stage
 from volery.vehicles import Capability
 
-STICKS = (Capability.STICKS, Capability.ALTITUDE_HOLD)
-STABILIZED = (Capability.STICKS, Capability.STABILIZE)
+STICKS = (Capability.MANUAL_CONTROL, Capability.ALTITUDE_HOLD)
+STABILIZED = (Capability.MANUAL_CONTROL, Capability.STABILIZE)
 UP = (Capability.TAKEOFF,)
 BETWEEN_S = 0.1
 

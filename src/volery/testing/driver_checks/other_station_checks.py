@@ -124,7 +124,7 @@ def disarmed_before_lift_off(stage: Stage) -> str:
 def another_vehicle_on_the_air(stage: Stage) -> None:
     """A second vehicle is heard and hears on the same link: only the one that is meant arms and flies."""
     neighbour = stage.neighbour
-    neighbour.wait_heard()
+    neighbour.wait_connected()
     stage.drone.takeoff(10)
     demand(not neighbour.armed, "the neighbour was armed, too")
     north, east, _ = stage.offset(stage.drone.home, stage.drone.position)
@@ -138,7 +138,7 @@ def wrong_system_id(stage: Stage) -> str:
     stranger = stage.of_system(77)
     try:
         with raising(LinkSilent, LinkGarbled, naming=stage.name) as caught:
-            stranger.wait_heard(5.0)
+            stranger.wait_connected(5.0)
     finally:
         stranger.close()
     return caught.text.removeprefix(f"{stage.name}: ")

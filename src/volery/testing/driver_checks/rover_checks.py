@@ -34,7 +34,7 @@ def drive_home(stage: Stage) -> None:
     demand(hypot(north, east) < NEAR_M + 1.0, f"it stopped {hypot(north, east):.1f} m from home")
 
 
-@check(kind="rover", needs=(Capability.STICKS,), flies=True)
+@check(kind="rover", needs=(Capability.MANUAL_CONTROL,), flies=True)
 def drive_by_hand(stage: Stage) -> None:
     """By manual(), armed, the throttle drives; a control out of range is refused."""
     stage.drone.wait_ready()

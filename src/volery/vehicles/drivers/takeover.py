@@ -37,7 +37,7 @@ class Takeover:
         return self._watch is not None
 
     @property
-    def handover(self) -> str:
+    def offboard_mode(self) -> str:
         """To which mode somebody must switch to hand it over; words that are no mode while it stands."""
         return f"another mode and then to {self._mode}" if self.stands else self._mode
 
@@ -115,8 +115,8 @@ class TargetMonitor:
             self._other_since = None
             return ""
         if self._other_since is None:
-            self._other_since = self._seen.heard
-        if self._seen.heard - self._other_since < OTHER_TARGET_FOR:
+            self._other_since = self._seen.last_message_ns
+        if self._seen.last_message_ns - self._other_since < OTHER_TARGET_FOR:
             return ""
         self._eviction.begin()
         return f"was sent elsewhere by another, to {target}"

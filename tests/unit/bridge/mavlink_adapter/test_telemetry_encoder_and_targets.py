@@ -36,7 +36,7 @@ class Bird:
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
         self.telemetry = Telemetry(self.kernel, "bird")
-        self.handover = "GUIDED"
+        self.offboard_mode = "GUIDED"
         self.telling = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
 
     def hear(self, at: int = 5 * S, **facts: Any) -> None:

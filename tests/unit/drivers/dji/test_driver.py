@@ -57,7 +57,7 @@ def test_it_is_heard_once_it_has_said_which_aircraft_it_is(bench: Make) -> None:
     made = bench()
 
     def body() -> None:
-        made.drone.wait_heard()
+        made.drone.wait_connected()
         seen = made.drone.telemetry
         assert (seen.kind, seen.autopilot, seen.mode) == ("drone", "DJI A3", "P_GPS")
         assert made.node.names() == ["query_drone_version"]
@@ -76,7 +76,7 @@ def test_nobody_there_is_told_with_the_topic_that_is_missing(bench: Make) -> Non
 
     def body() -> None:
         with pytest.raises(LinkSilent, match="no DJI node publishes /elsewhere/dji_sdk/flight_status"):
-            Drone(made.kernel, "d", driver).wait_heard(within=2.0)
+            Drone(made.kernel, "d", driver).wait_connected(within=2.0)
         driver.close()
 
     made.run(body)
@@ -396,7 +396,7 @@ def test_a_silent_link_is_lost_and_comes_back(bench: Make) -> None:
         made.node.obey(4)
         made.wait(0.1)
         made.later(1.0, lambda: setattr(made.node, "mute", True))
-        with pytest.raises(LinkLost, match="nothing was heard"):
+        with pytest.raises(LinkLost, match="no message was received"):
             made.drone.goto(at(20.0, 0.0, 5.0))
         made.node.mute = False
         made.wait(0.5)
@@ -411,7 +411,7 @@ def test_anomalies_are_texts(bench: Make) -> None:
     made = bench()
 
     def body() -> None:
-        made.drone.wait_heard()
+        made.drone.wait_connected()
         made.node.say("flight_anomaly", data=128 | 2048)
         made.wait(0.1)
         made.node.say("flight_anomaly", data=128)
@@ -436,7 +436,7 @@ def test_an_m100_is_read_by_its_own_numbers(bench: Make) -> None:
     made.node.on_task = take_off
 
     def body() -> None:
-        made.drone.wait_heard()
+        made.drone.wait_connected()
         assert (made.drone.armed, made.drone.flying) == (False, False)  # 1 is ON_GROUND, motors off
         follows(made)
         made.drone.takeoff(5.0)

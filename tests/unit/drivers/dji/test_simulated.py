@@ -44,7 +44,7 @@ class Flown:
         """Carry it out; what it raises comes out here."""
 
         def flow() -> None:
-            self.drone.wait_heard()
+            self.drone.wait_connected()
             mission(self.drone)
 
         try:
@@ -219,7 +219,7 @@ def test_two_in_one_world_do_not_hear_each_other() -> None:
 
     def flow(vehicle: Vehicle, height: float) -> None:
         assert isinstance(vehicle, Drone)
-        vehicle.wait_heard()
+        vehicle.wait_connected()
         vehicle.takeoff(height)
         ended.append(vehicle.name)
 

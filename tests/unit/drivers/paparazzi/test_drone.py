@@ -352,7 +352,7 @@ def test_a_silent_aircraft_is_a_lost_link(bench: Make) -> None:
         at.autopilot.deaf = True
         drone.goto(NEAR)
 
-    with pytest.raises(LinkLost, match="nothing was heard for"):
+    with pytest.raises(LinkLost, match="no message was received for"):
         at.fly(mission)
 
 
@@ -395,14 +395,14 @@ def test_an_aircraft_with_its_own_numbers(bench: Make, tmp_path: Path) -> None:
 def test_another_aircraft_than_the_one_meant(bench: Make) -> None:
     at = bench(options={"system": "12"})
     with pytest.raises(Exception, match="aircraft 7 speaks here, not 12"):
-        at.fly(lambda drone: drone.wait_heard())
+        at.fly(lambda drone: drone.wait_connected())
 
 
 def test_nobody_there(bench: Make) -> None:
     at = bench()
     at.autopilot.mute = True
     with pytest.raises(LinkSilent, match="no Paparazzi aircraft was heard"):
-        at.fly(lambda drone: drone.wait_heard())
+        at.fly(lambda drone: drone.wait_connected())
 
 
 def test_another_kind_of_aircraft(bench: Make) -> None:
@@ -413,7 +413,7 @@ def test_another_kind_of_aircraft(bench: Make) -> None:
         lambda: at.autopilot.link.send(at.autopilot.heard[0]._replace(name="PPRZ_MODE", fields={}, system=7)),
     )
     with pytest.raises(CapabilityError, match="is a plane, not a drone"):
-        at.fly(lambda drone: drone.wait_heard())
+        at.fly(lambda drone: drone.wait_connected())
 
 
 # -- what it can
@@ -438,7 +438,7 @@ def test_what_it_cannot_is_said_before_anything_moves(bench: Make) -> None:
 def test_what_it_does_if_its_commander_falls_silent(bench: Make) -> None:
     at = bench()
     at.fly(lambda drone: drone.wait_ready())
-    line = at.vehicle.if_silent
+    line = at.vehicle.on_link_loss
     assert "a velocity goes on without end" in line
     assert "further than 150 m from home it turns back" in line
 

@@ -103,7 +103,7 @@ def test_sticks_go_on_although_the_component_does_something_else(peer: Any) -> N
 def test_no_bridge(peer: Any) -> None:
     at = OnGraph(peer, bridged=False)
     with pytest.raises(LinkSilent, match="nobody publishes /bee/pprzros/to_ros; start pprzros"):
-        at.fly(lambda drone: drone.wait_heard())
+        at.fly(lambda drone: drone.wait_connected())
 
 
 def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
@@ -118,7 +118,7 @@ def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
 
     at.kernel.spawn(babble, "babbler", ExecutionContext("babbler"))
     with pytest.raises(LinkSilent, match="is not understood: pprzlink has no message 'NO_SUCH_MESSAGE'"):
-        at.fly(lambda drone: drone.wait_heard())
+        at.fly(lambda drone: drone.wait_connected())
 
 
 def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
@@ -136,11 +136,11 @@ def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
             group.spin_once(0)
 
     at.kernel.spawn(bridge, "bridge", ExecutionContext("bridge"))
-    at.fly(lambda drone: drone.wait_heard(), namespace="/")
+    at.fly(lambda drone: drone.wait_connected(), namespace="/")
     assert heard[0].msg_name == "PING"
 
 
 def test_options_that_make_no_sense(peer: Any) -> None:
     at = OnGraph(peer)
     with pytest.raises(UsageError, match="the paparazzi driver has no option 'uplink'"):
-        at.fly(lambda drone: drone.wait_heard(), uplink="4243")
+        at.fly(lambda drone: drone.wait_connected(), uplink="4243")

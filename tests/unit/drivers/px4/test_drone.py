@@ -134,7 +134,7 @@ def test_what_px4_lacks_is_refused_before_anything_moves(bench: Make) -> None:
 
     def mission(drone: Any) -> None:
         assert not drone.capabilities
-        drone.wait_heard()
+        drone.wait_connected()
         assert {Capability.TAKEOFF, Capability.MISSION, Capability.STABILIZE} <= drone.capabilities
         drone.goto(Position(LATITUDE, LONGITUDE, AboveGround(10.0)))
 
@@ -185,7 +185,7 @@ def test_an_unknown_warning_is_shown_as_its_number(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> list[str]:
-        drone.wait_heard()
+        drone.wait_connected()
         at.autopilot.event("something_new", 3)
         at.autopilot.event("something_unimportant", 6)
         at.autopilot.event("commander_rc_lost", 4)
@@ -213,7 +213,7 @@ def test_on_the_ground_a_mode_is_believed_only_when_it_is_seen(bench: Make) -> N
     at.autopilot.enter = lambda mode: None  # accepted, and nothing happens
 
     with pytest.raises(NotArrived, match="change to STABILIZED was not seen"):
-        at.fly(lambda drone: (drone.wait_heard(), drone.manual_control(0, 0, 0, 0), drone.stabilize()))
+        at.fly(lambda drone: (drone.wait_connected(), drone.manual_control(0, 0, 0, 0), drone.stabilize()))
 
 
 # -- OFFBOARD
@@ -300,7 +300,7 @@ def test_a_pilot_who_held_an_offboard_flight_keeps_it_until_another_mode_was_cho
             with pytest.raises(Overridden) as caught:
                 drone.goto(NEAR)
             said.append(str(caught.value))
-        assert drone.come_to_rest() == "is left to whoever flies it in AUTO.LOITER"
+        assert drone.come_to_rest() == "is left to the pilot or station in AUTO.LOITER"
         at.autopilot.enter("POSCTL")
         sleep(at.kernel, 2 * S)
         at.autopilot.enter(HOLD)
@@ -377,7 +377,7 @@ def test_stabilized_flight_without_a_position(bench: Make) -> None:
     at.craft.flags = 167
 
     def mission(drone: Any) -> None:
-        drone.wait_heard()
+        drone.wait_connected()
         drone.manual_control(0, 0, 0, 0)
         drone.stabilize()
         at.craft.landed_state, at.craft.up = 2, 5.0
@@ -483,7 +483,7 @@ def test_an_ardupilot_is_named(bench: Make) -> None:
     at = bench()
     at.autopilot.firmware = 3
     with pytest.raises(LinkGarbled, match="an ArduPilot speaks here, not a PX4"):
-        at.fly(lambda drone: drone.wait_heard(within=5))
+        at.fly(lambda drone: drone.wait_connected(within=5))
 
 
 def test_firmware_that_is_too_old_is_named(bench: Make) -> None:
@@ -511,10 +511,10 @@ def test_what_it_will_do_if_its_commander_falls_silent(bench: Make) -> None:
         "COM_DL_LOSS_T": 10.0,
     }
     at.kernel.run(2 * S)
-    assert driver.if_silent() == ""
+    assert driver.on_link_loss() == ""
     at.autopilot.parameters["NAV_DLL_ACT"] = 0.0
     at.kernel.run(10 * S)
-    assert driver.if_silent() == (
+    assert driver.on_link_loss() == (
         "it does not miss its commander (NAV_DLL_ACT=0): it goes to its last target and stays there; "
         "a velocity ends after 1 s in POSCTL, where it sinks unless somebody has the sticks; "
         "0.5 s after the last sticks it returns home"

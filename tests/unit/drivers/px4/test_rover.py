@@ -28,7 +28,7 @@ def test_driving_arms_and_goes_there(bench: Make) -> None:
 
 def test_it_cannot_take_off(bench: Make) -> None:
     at = bench(Rover)
-    at.fly(lambda rover: rover.wait_heard())
+    at.fly(lambda rover: rover.wait_connected())
     assert Capability.TAKEOFF not in at.vehicle.capabilities
     wrong = bench(Drone)
     wrong.autopilot.kind = 10

@@ -271,7 +271,7 @@ def test_a_bad_wire() -> None:
 def test_what_it_will_do_if_its_commander_falls_silent() -> None:
     field = Field(parameters={"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 4.0})
     field.kernel.run(5 * S)
-    assert field.vehicle.if_silent == (
+    assert field.vehicle.on_link_loss == (
         "10 s after the last heartbeat it returns home; a velocity ends after 1 s in AUTO.LAND; "
         "0.5 s after the last sticks it returns home"
     )

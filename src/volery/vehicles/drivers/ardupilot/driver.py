@@ -75,14 +75,14 @@ class ArduPilot(MavlinkDriver):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     obeys = GUIDED
-    comes_down = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
+    landing_modes = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
 
     def __init__(self, kernel: Kernel, name: str, commands: ArduPilotBackend) -> None:
         super().__init__(kernel, name, commands)
         self._commands = commands
         self._setpoints = ArduPilotSetpoints(kernel, commands)
 
-    def if_silent(self) -> str:
+    def on_link_loss(self) -> str:
         """From its failsafe for ground stations."""
         parameters = self._commands.parameters
         return on_link_loss(self.telemetry.kind, parameters) if parameters is not None else ""
@@ -182,7 +182,7 @@ class ArduPilot(MavlinkDriver):
             self._setpoints.hold(ManualControl(throttle=0.0))
         return self._change("MANUAL")
 
-    def sticks(self, sticks: ManualControl | None) -> None:
+    def manual_control(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         self._setpoints.take(sticks)
 

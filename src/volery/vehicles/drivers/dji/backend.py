@@ -63,7 +63,7 @@ class DjiBackend:
         self._sent_at: Ns = -QUIET
         self._silent = False
         self._closed = False
-        self._place: ExecutionContext = replace(node.place, deadline=None, on_release=None, meter=None)
+        self._place: ExecutionContext = replace(node.context, deadline=None, on_release=None, meter=None)
         self._scope = kernel.root.child(f"{name} (DJI)")
         self._spinner = node.group()
         inbox = node.group(self._take)
@@ -140,7 +140,7 @@ class DjiBackend:
         self._due.notify()
 
     def _notice_silence(self) -> None:
-        heard, now = self.telemetry.heard, self._kernel.now()
+        heard, now = self.telemetry.last_message_ns, self._kernel.now()
         if heard >= 0 and now - heard > SILENT_AFTER and not self._silent:
             self._silent = True
             self._record_link("silent", "the aircraft is not heard")
@@ -226,7 +226,7 @@ class DjiBackend:
         """What is wrong on the way, as far as it shows."""
         if self._wrong:
             return LinkSilent(self._wrong)
-        if self.telemetry.heard >= 0:
+        if self.telemetry.last_message_ns >= 0:
             return None
         below = self.names.namespace
         if self.hearing.node_seen:

@@ -105,7 +105,7 @@ class DjiDecoder:
             self._motors = False  # when it begins to say so; it goes on for a while, whatever is started then
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
-            self._seen.heard = self._kernel.now()
+            self._seen.last_message_ns = self._kernel.now()
 
     def _display_mode(self, message: Any) -> None:
         now, shown = self._kernel.now(), message.data
@@ -200,7 +200,7 @@ class DjiDecoder:
     def judge(self) -> None:
         """After the messages that came at one time."""
         seen = self._seen
-        if seen.heard < 0:
+        if seen.last_message_ns < 0:
             return
         if self._taken and self._taken != "RC" and self._kernel.now() - self._taken_at > TAKEN_OVER_FOR:
             self._taken = ""

@@ -58,7 +58,7 @@ _NONE: frozenset[Capability] = frozenset()
 class Dji:
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
-    comes_down = LANDING_MODES
+    landing_modes = LANDING_MODES
     cycle: Action | None = None
 
     def __init__(self, kernel: Kernel, name: str, carrier: DjiBackend) -> None:
@@ -72,7 +72,7 @@ class Dji:
         self._mission = MissionRunner(self._pieces, self._tasks)
 
     @property
-    def handover(self) -> str:
+    def offboard_mode(self) -> str:
         """It hovers and takes commands: by position, or without one in ATTITUDE. In ``NAVI_SDK_CTRL``, which
         no pilot can choose, it obeys a computer already: another node of ours has had it.
         """
@@ -86,14 +86,14 @@ class Dji:
         """All but terrain; none until it has been heard."""
         return CAPABILITIES if self.telemetry.kind else _NONE
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """What arrives is taken in by itself."""
 
     def problem(self) -> LinkError | CapabilityError | None:
         """What is wrong with the way to the aircraft."""
         return self._carrier.problem()
 
-    def if_silent(self) -> str:
+    def on_link_loss(self) -> str:
         """Assumed: the public definitions do not say, and no parameter of the aircraft can be read."""
         return (
             "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low or the pilot "
@@ -210,7 +210,7 @@ class Dji:
         """There are no DJI rovers."""
         raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
 
-    def sticks(self, sticks: ManualControl | None) -> None:
+    def manual_control(self, sticks: ManualControl | None) -> None:
         """They are sent while it is flown by them."""
         if sticks is None:
             if self._stream.by_hand:

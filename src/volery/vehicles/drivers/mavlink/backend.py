@@ -79,7 +79,7 @@ class Backend(Protocol):
     def parameters(self) -> Mapping[str, float] | None:
         """By name; one that the firmware does not have is missing."""
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """See ``Driver``."""
 
     def set_mode(self, mode: str) -> None:

@@ -251,7 +251,7 @@ class MavlinkClient:
 
     # -- hearing
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """What arrives is taken in by itself."""
 
     @property
@@ -266,7 +266,7 @@ class MavlinkClient:
         if self._silent:
             self._silent = False
             self._kernel.record(LinkState(now, self.telemetry.name, "back", "the autopilot is heard again"))
-        first = self.telemetry.heard < 0
+        first = self.telemetry.last_message_ns < 0
         known = self._hearing.hear(frame.name, frame.fields)
         self._streams.heard(frame.name, now)
         if first:
@@ -278,7 +278,7 @@ class MavlinkClient:
 
     def _is_ours(self, frame: Frame) -> bool:
         """Of our autopilot; the first heartbeat of this firmware tells which system that is."""
-        if self.telemetry.heard >= 0:
+        if self.telemetry.last_message_ns >= 0:
             return frame.system == self._system and frame.component == self._component
         if frame.name != "HEARTBEAT" or frame.fields["autopilot"] == _NO_AUTOPILOT:
             return False
@@ -362,7 +362,7 @@ class MavlinkClient:
             system_status=constant("MAV_STATE_ACTIVE"),
             mavlink_version=3,
         )
-        heard, now = self.telemetry.heard, self._kernel.now()
+        heard, now = self.telemetry.last_message_ns, self._kernel.now()
         if heard < 0:
             return
         self._streams.look(now)
@@ -381,7 +381,7 @@ class MavlinkClient:
             return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
         if self._unfit:
             return CapabilityError(self._unfit)
-        if self.telemetry.heard >= 0:
+        if self.telemetry.last_message_ns >= 0:
             return None
         if self._stranger:
             return LinkGarbled(f"{self._stranger} speaks here, not {self.firmware.called}")

@@ -86,7 +86,7 @@ class TelemetryDecoder(ABC):
 
     def hear(self, name: str, fields: Fields) -> bool:
         """Take note of a message of our autopilot. One that puts it off the globe is left unheard."""
-        self._seen.heard = self._kernel.now()
+        self._seen.last_message_ns = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False

@@ -72,7 +72,7 @@ ROVER_CAPABILITIES = frozenset(
         Capability.SPEED,
         Capability.RETURN_HOME,
         Capability.HOLD,
-        Capability.STICKS,
+        Capability.MANUAL_CONTROL,
         Capability.MISSION,
     }
 )
@@ -107,18 +107,18 @@ class MavlinkDriver:
         return _CAPABILITIES.get(self.telemetry.kind, _NONE)
 
     @property
-    def handover(self) -> str:
+    def offboard_mode(self) -> str:
         """The mode in which it obeys; words that are no mode while somebody else has it there."""
-        return self._eviction.handover
+        return self._eviction.offboard_mode
 
     @property
     def cycle(self) -> Action | None:
         """The carrier's."""
         return self._carrier.cycle
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Take in what has arrived."""
-        self._carrier.look()
+        self._carrier.poll()
 
     def problem(self) -> LinkError | CapabilityError | None:
         """What is wrong with the way to the autopilot, or with what is there."""

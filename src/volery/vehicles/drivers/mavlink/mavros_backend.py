@@ -84,7 +84,7 @@ class MavrosDecoder:
         }
 
     def _heard(self) -> None:
-        self._seen.heard = self._kernel.now()
+        self._seen.last_message_ns = self._kernel.now()
         self._seen.changed.notify()
 
     def _state(self, message: Any) -> None:
@@ -213,7 +213,7 @@ class MavrosBackend:
         return self._go_round
 
     def _go_round(self) -> None:
-        self.look()
+        self.poll()
         self._rate.sleep()
 
     @property
@@ -221,7 +221,7 @@ class MavrosBackend:
         """Not read over a graph."""
         return None
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """One ``spinOnce``: it is paid once, and runs the callbacks of all that has arrived."""
         self._spinner.spin_once(0)
         while self._arrived:
@@ -232,7 +232,7 @@ class MavrosBackend:
         """What is wrong on the way, as far as it shows."""
         if self._wrong:
             return LinkSilent(self._wrong)
-        if self.telemetry.heard >= 0:
+        if self.telemetry.last_message_ns >= 0:
             return None
         if self._hearing.node_seen:
             return LinkSilent(f"the vehicle node at {self._namespace} hears no autopilot")

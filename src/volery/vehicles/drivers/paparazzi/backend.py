@@ -109,7 +109,7 @@ class PaparazziBackend:
     def _tick(self) -> None:
         """Each second: say that we are there, ask for settings not checked yet, notice silence."""
         self._send("PING")
-        heard, now = self.telemetry.heard, self._kernel.now()
+        heard, now = self.telemetry.last_message_ns, self._kernel.now()
         if heard < 0:
             return
         for name in sorted(self._unchecked):
@@ -190,7 +190,7 @@ class PaparazziBackend:
             yaw=setpoint.yaw,
         )
 
-    def sticks(self, sticks: ManualControl) -> None:
+    def manual_control(self, sticks: ManualControl) -> None:
         """As a transmitter whose mode switch is in the third position; pitch is nose up."""
         self._send(
             "RC_4CH",
@@ -213,7 +213,7 @@ class PaparazziBackend:
             heard = getattr(self._link, "statistics", None)
             garbled = isinstance(heard, ReceiveStatistics) and heard.octets > 0 and not heard.frames
             return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
-        if self.telemetry.heard >= 0:
+        if self.telemetry.last_message_ns >= 0:
             return None
         if self._stranger:
             return LinkSilent(f"aircraft {self._stranger} speaks here, not {self._wanted}")
@@ -255,4 +255,4 @@ class PaparazziSetpoints(setpoint_repeater.SetpointRepeater):
 
     def send(self, sticks: ManualControl) -> None:
         """As a transmitter's."""
-        self._uplink.sticks(sticks)
+        self._uplink.manual_control(sticks)

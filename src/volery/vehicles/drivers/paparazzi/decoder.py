@@ -105,7 +105,7 @@ class PaparazziDecoder:
         if name in KINDS and not seen.kind:
             seen.kind, seen.autopilot = KINDS[name], "Paparazzi"
         if seen.kind:
-            seen.heard = self._kernel.now()
+            seen.last_message_ns = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False

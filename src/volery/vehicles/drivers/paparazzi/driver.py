@@ -59,7 +59,7 @@ CAPABILITIES = frozenset(
         Capability.RETURN_HOME,
         Capability.LAND,
         Capability.HOLD,
-        Capability.STICKS,
+        Capability.MANUAL_CONTROL,
         Capability.STABILIZE,
         Capability.ALTITUDE_HOLD,
     }
@@ -74,7 +74,7 @@ class Paparazzi:
     Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*.
     """
 
-    comes_down = frozenset({FAILSAFE})
+    landing_modes = frozenset({FAILSAFE})
     cycle: Action | None = None
 
     def __init__(self, kernel: Kernel, uplink: PaparazziBackend, blocks: Blocks) -> None:
@@ -87,19 +87,19 @@ class Paparazzi:
         self._eviction = Takeover(kernel, uplink.telemetry, GUIDED)
 
     @property
-    def handover(self) -> str:
+    def offboard_mode(self) -> str:
         """GUIDED; words that are no mode while somebody else has it there."""
-        return self._eviction.handover
+        return self._eviction.offboard_mode
 
     @property
     def capabilities(self) -> frozenset[Capability]:
         """Those of a rotorcraft; none until it has been heard."""
         return CAPABILITIES if self.telemetry.kind == DRONE_KIND else _NONE
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """What arrives is taken in by itself."""
 
-    def if_silent(self) -> str:
+    def on_link_loss(self) -> str:
         """From its flight plan, as far as that says it."""
         return on_link_loss(self._uplink.aircraft) if self.telemetry.kind == DRONE_KIND else ""
 
@@ -212,7 +212,7 @@ class Paparazzi:
         """Rovers only."""
         raise CapabilityError(f"{self.name}: a rotorcraft has no wheels to steer by hand")
 
-    def sticks(self, sticks: ManualControl | None) -> None:
+    def manual_control(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         self._setpoints.take(sticks)
 

@@ -41,7 +41,7 @@ class PprzrosLink:
         self._publisher = node.advertise(f"{stem}/{FROM_ROS}", TYPE)
         self._spinner = node.group()
         node.subscribe(f"{stem}/{TO_ROS}", TYPE, self._hear, group=node.group(self._take))
-        place = replace(node.place, deadline=None, on_release=None, meter=None)
+        place = replace(node.context, deadline=None, on_release=None, meter=None)
         kernel.spawn(self._run, f"pprzros link of {node.name}", place, kernel.root.child(self.name))
 
     # -- as a link

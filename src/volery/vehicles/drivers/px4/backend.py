@@ -96,7 +96,7 @@ class PX4Backend(Backend, Protocol):
     def setpoint(self, setpoint: Setpoint) -> None:
         """One of the stream without which there is no OFFBOARD."""
 
-    def sticks(self, sticks: ManualControl) -> None:
+    def manual_control(self, sticks: ManualControl) -> None:
         """One of the stream without which there are no sticks."""
 
     def rewind(self) -> None:
@@ -171,7 +171,7 @@ class PX4Mavlink(MavlinkClient):
             yaw_rate=radians(setpoint.yaw_rate),
         )
 
-    def sticks(self, sticks: ManualControl) -> None:
+    def manual_control(self, sticks: ManualControl) -> None:
         """By MANUAL_CONTROL."""
         axes = stick_axes(sticks, self.telemetry.kind)
         self._send("MANUAL_CONTROL", target=self._system or 0, **axes)
@@ -217,7 +217,7 @@ class PX4Mavros(MavrosBackend):
             yaw = heading_to_yaw(radians(setpoint.heading))
             self._publish_velocity(setpoint.velocity, VELOCITY_AND_YAW, yaw=yaw)
 
-    def sticks(self, sticks: ManualControl) -> None:
+    def manual_control(self, sticks: ManualControl) -> None:
         """``manual_control/send``."""
         axes = {name: float(value) for name, value in stick_axes(sticks, self.telemetry.kind).items()}
         self._manual.publish(new("mavros_msgs/msg/ManualControl", **axes))

@@ -105,7 +105,7 @@ class PX4(MavlinkDriver):
     """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
 
     obeys = HOLD
-    comes_down = frozenset({modes.LAND, modes.RTL, "AUTO.PRECLAND"})
+    landing_modes = frozenset({modes.LAND, modes.RTL, "AUTO.PRECLAND"})
 
     def __init__(self, kernel: Kernel, name: str, commands: PX4Backend) -> None:
         super().__init__(kernel, name, commands)
@@ -118,12 +118,12 @@ class PX4(MavlinkDriver):
         self._stream = Repeat(SETPOINT_PERIOD, self._offboard.repeat)
 
     @property
-    def handover(self) -> str:
+    def offboard_mode(self) -> str:
         """AUTO.LOITER; words that are no mode while AUTO.LOITER is a pilot's."""
         self._offboard.look()
-        return self._eviction.handover
+        return self._eviction.offboard_mode
 
-    def if_silent(self) -> str:
+    def on_link_loss(self) -> str:
         """From its failsafes for the ground station, for OFFBOARD and for sticks."""
         parameters = self._commands.parameters
         return on_link_loss(parameters) if parameters is not None else ""
@@ -327,7 +327,7 @@ class PX4(MavlinkDriver):
         self._sticks.hold_any()
         return self._change(modes.MANUAL)
 
-    def sticks(self, sticks: ManualControl | None) -> None:
+    def manual_control(self, sticks: ManualControl | None) -> None:
         """Keep sending them, as long as the mode is ours."""
         if sticks is None:
             self._sticks.centre()

@@ -123,7 +123,7 @@ class OffboardStream:
         elif self._seen.mode != OFFBOARD:
             self._end()
             return
-        if now - self._seen.heard > DEAF_AFTER:
+        if now - self._seen.last_message_ns > DEAF_AFTER:
             self._in_doubt = now
         if self._entered and self._commands.beat <= self._in_doubt:
             return
@@ -223,4 +223,4 @@ class ManualControlStream:
         if flying and by_sticks and mode not in {self._asked_mode, self._mode_before}:
             self.stop()  # somebody else flies it now, by their own sticks
             return
-        self._commands.sticks(self.held if by_sticks or not flying else self._centre)
+        self._commands.manual_control(self.held if by_sticks or not flying else self._centre)
