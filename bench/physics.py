@@ -66,11 +66,11 @@ def free_world(bodies: int) -> tuple[Clock, World]:
     clock = Clock()
     world = World(clock, [Multirotor(at=(10.0 * index, 0.0, 0.0)) for index in range(bodies)], frame=HERE)
     for index in range(bodies):
-        world.drive(index, U_THROTTLE, 0.62, 0.62, 0.62, 0.62)
-        world.look(index)
+        world.set_input(index, U_THROTTLE, 0.62, 0.62, 0.62, 0.62)
+        world.advance_to_now(index)
     clock.now = S
     for index in range(bodies):
-        world.look(index)
+        world.advance_to_now(index)
     return clock, world
 
 
@@ -83,7 +83,7 @@ def our_steps(bodies: int, simulated: int, per_call: int) -> float:
         for _ in range(calls):
             clock.now += per_call * STEP
             for index in range(bodies):
-                world.look(index)
+                world.advance_to_now(index)
 
     return calls * per_call * bodies / seconds_for(work)
 

@@ -50,7 +50,7 @@ def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
     for step in range(steps):
         if step % 1500 == 0:
             throttle = (0.45, 0.5, 0.4, 0.55, 0.48)[step // 1500]
-            world.drive(0, U_THROTTLE, *(throttle,) * 4)
+            world.set_input(0, U_THROTTLE, *(throttle,) * 4)
         clock.now += STEP
         before, truth = truth, world.truth(0)
         if now is None:  # the first interval still has the inputs of the start
@@ -76,7 +76,7 @@ def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
 def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
     spec = Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.5))
     world = World(clock, [spec], frame=frame)
-    world.drive(0, U_THROTTLE, 1.0, 1.0, 1.0, 1.0)
+    world.set_input(0, U_THROTTLE, 1.0, 1.0, 1.0, 1.0)
     clock.wait(1)
     first = world.truth(0)
     clock.wait(20)
@@ -88,7 +88,7 @@ def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
 
 def test_driving_costs_more_than_standing(clock, frame):
     world = World(clock, [Rover(sensors="perfect"), Rover(sensors="perfect")], frame=frame)
-    world.drive(0, U_THROTTLE, 0.0, 0.2)
+    world.set_input(0, U_THROTTLE, 0.0, 0.2)
     clock.wait(30)
     driving, standing = world.truth(0), world.truth(1)
     assert standing.energy_j == pytest.approx(30.0 * 5.0, rel=1e-9)
@@ -111,7 +111,7 @@ def test_a_cell_breaks_down_once_it_is_empty():
 
 def test_an_empty_battery_stops_the_rotors(clock, frame):
     world = World(clock, [Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.02))], frame=frame)
-    world.drive(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
+    world.set_input(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
     clock.wait(3)
     assert world.truth(0).position[2] > 2.0
     clock.wait(30)

@@ -81,9 +81,9 @@ def test_terminal_velocity_balances_weight_and_drag(clock, frame, ideal_battery)
 
 def test_motor_lag_is_first_order(clock, frame, dragless):
     world = World(clock, [dragless], frame=frame)
-    world.drive(0, U_THROTTLE, 0.5, 0.5, 0.5, 0.5)
+    world.set_input(0, U_THROTTLE, 0.5, 0.5, 0.5, 0.5)
     clock.now = STEP
-    world.look(0)
+    world.advance_to_now(0)
     clock.wait(0.1)
     expected = 0.5 * dragless.top_speed * (1.0 - math.exp(-0.1 / dragless.rotor_lag))
     assert world.truth(0).rotors[0] == pytest.approx(expected, rel=1e-5)
@@ -111,7 +111,7 @@ def test_a_rover_speeds_up_with_its_lag_and_drives_a_circle_of_its_wheelbase(clo
 def test_a_skid_steered_rover_turns_on_the_spot(clock, frame, ideal_battery):
     spec = Rover(sensors="perfect", battery=ideal_battery, skid=True)
     world = World(clock, [spec], frame=frame)
-    world.drive(0, U_THROTTLE, 0.5, 0.0)
+    world.set_input(0, U_THROTTLE, 0.5, 0.0)
     clock.wait(3)
     truth = world.truth(0)
     assert truth.rates[2] == pytest.approx(math.radians(spec.turn_top_deg) * 0.5, rel=1e-6)

@@ -28,7 +28,7 @@ def sampled(clock, frame):
         for _ in range(180):
             clock.wait(1)
             for body in range(BODIES):
-                world.look(body)
+                world.advance_to_now(body)
             samples.append(world.arrays.rows.copy())
         return np.array(samples)
 

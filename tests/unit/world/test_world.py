@@ -33,16 +33,16 @@ def fly(clock, frame, looks, seed=3, wind=None):
     for millisecond in range(1000):
         clock.now = millisecond * MS
         if millisecond % 100 == 7:
-            world.drive(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
-            world.drive(1, U_THROTTLE, 0.1, 0.3)
+            world.set_input(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
+            world.set_input(1, U_THROTTLE, 0.1, 0.3)
         for _ in range(looks.count((millisecond, 0))):
-            world.look(0)
+            world.advance_to_now(0)
         for body in (1, 2):
             if (millisecond, body) in looks:
-                world.look(body)
+                world.advance_to_now(body)
     clock.now = 1000 * MS
     for body in range(3):
-        world.look(body)
+        world.advance_to_now(body)
     return world.arrays.rows.tobytes()
 
 
@@ -61,8 +61,8 @@ def test_another_seed_gives_other_noise_and_the_same_seed_the_same(clock, frame)
 def test_an_input_acts_from_the_next_grid_step_on(clock, frame):
     world = World(clock, [Multirotor()], frame=frame)
     clock.now = 10 * STEP
-    world.look(0)
-    world.drive(0, U_THROTTLE, 0.5, 0.5, 0.5, 0.5)
+    world.advance_to_now(0)
+    world.set_input(0, U_THROTTLE, 0.5, 0.5, 0.5, 0.5)
     clock.now = 11 * STEP + STEP - 1
     assert world.truth(0).rotors[0] == 0.0
     clock.now = 12 * STEP
@@ -82,20 +82,20 @@ def test_bodies_that_nobody_looks_at_are_not_computed(clock, frame):
     world = World(clock, SPECS, frame=frame)
     for _ in range(20):
         clock.wait(0.1)
-        world.look(0)
+        world.advance_to_now(0)
     assert world.arrays.reached.tolist() == [1000, 0, 0]
-    world.look(2)
+    world.advance_to_now(2)
     assert world.arrays.reached.tolist() == [1000, 0, 1000]
 
 
 def test_bodies_in_view_advance_together_in_one_call(clock, frame):
     world = World(clock, SPECS, frame=frame)
     for body in range(3):
-        world.look(body)
+        world.advance_to_now(body)
     before = world.advances
     clock.wait(0.1)
     for body in range(3):
-        world.look(body)
+        world.advance_to_now(body)
     assert world.advances == before + 1
 
 
@@ -129,7 +129,7 @@ def test_terrain_is_bilinear_between_its_posts_and_level_beyond(clock, frame):
     assert terrain.height(-50.0, 0.0) == pytest.approx(0.0, abs=1e-3)
     assert terrain.height(50.0, 50.0) == pytest.approx(30.0, abs=1e-3)
     world = World(clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, terrain=terrain)
-    world.drive(0, U_THROTTLE, 0.0, 0.1)
+    world.set_input(0, U_THROTTLE, 0.0, 0.1)
     clock.wait(4)
     east, _, up = world.truth(0).position
     assert up == pytest.approx(10.0 + min(east, 10.0), abs=1e-3)
@@ -149,7 +149,7 @@ def test_gusts_have_their_deviation_and_their_correlation_time(clock, frame):
     for _ in range(1500):
         clock.wait(0.2)
         for body in range(10):
-            world.look(body)
+            world.advance_to_now(body)
         samples.append(world.arrays.rows[:, S_GUST : S_GUST + 3].copy())
     gusts = np.array(samples)
     assert gusts[..., :2].std() == pytest.approx(1.5, rel=0.08)
@@ -162,8 +162,8 @@ def test_gusts_have_their_deviation_and_their_correlation_time(clock, frame):
 def test_two_bodies_feel_gusts_of_their_own(clock, frame):
     world = World(clock, [Multirotor(), Multirotor()], frame=frame, wind=Wind(east=6.0, gust=1.5))
     clock.wait(5)
-    world.look(0)
-    world.look(1)
+    world.advance_to_now(0)
+    world.advance_to_now(1)
     assert world.arrays.rows[0, S_GUST] != world.arrays.rows[1, S_GUST]
 
 
@@ -171,7 +171,7 @@ def test_the_wind_can_change(clock, frame):
     world = World(clock, [Multirotor()], frame=frame)
     world.set_wind(Wind(east=3.0))
     clock.now = STEP
-    world.look(0)
+    world.advance_to_now(0)
     assert world.arrays.rows[0, U_WIND] == 3.0
 
 

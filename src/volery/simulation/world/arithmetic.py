@@ -1,13 +1,12 @@
-"""Elementary functions for compiled code, from additions, products, quotients and square roots alone.
+"""Elementary functions and noise for compiled code, the same to the last bit on every processor.
 
-The C library chooses its sine by the processor it finds, and the last bit may differ. These do not: every
-operation here is correctly rounded by IEEE 754 and no compiler flag allows fusing or reordering them, so the
-same inputs give the same bytes on every processor. All are accurate to about two units in the last place.
+The C library chooses its sine by the processor, and the last bit may differ. The functions here use
+additions, products, quotients and square roots alone, which IEEE 754 rounds correctly, and no compiler flag
+permits fusing or reordering them. They are accurate to about two units in the last place.
 
-Noise as a function: draw number *k* of stream *s* of a body depends on (key, s, k) and on nothing else.
-
-A generator that is drawn from has a state, and then who draws, and how often, changes what comes next. Here
-the counter itself is hashed (SplitMix64's finaliser, Steele, Lea and Flood, OOPSLA 2014, applied twice).
+Noise is a function of (key, stream, counter): a generator with a state would make each draw depend on who
+drew before. The counter is hashed by SplitMix64's finaliser (Steele, Lea and Flood, OOPSLA 2014), applied
+twice.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _LN2_LOW = 1.9082149292705877e-10
 
 @njit(cache=True)
 def _sine_near_zero(x: float) -> float:
-    """Taylor's series to x**17 on [-pi/4, pi/4]; the remainder is below 2e-19."""
+    """Evaluate Taylor's series to x**17 on [-pi/4, pi/4]; the remainder is below 2e-19."""
     s = x * x
     p = -1.0 / 1307674368000.0 + s * (1.0 / 355687428096000.0)
     p = 1.0 / 6227020800.0 + s * p
@@ -41,7 +40,7 @@ def _sine_near_zero(x: float) -> float:
 
 @njit(cache=True)
 def _cosine_near_zero(x: float) -> float:
-    """Taylor's series to x**16 on [-pi/4, pi/4]; the remainder is below 3e-18."""
+    """Evaluate Taylor's series to x**16 on [-pi/4, pi/4]; the remainder is below 3e-18."""
     s = x * x
     p = -1.0 / 87178291200.0 + s * (1.0 / 20922789888000.0)
     p = 1.0 / 479001600.0 + s * p
@@ -54,7 +53,7 @@ def _cosine_near_zero(x: float) -> float:
 
 @njit(cache=True)
 def sine_cosine(x: float) -> tuple[float, float]:
-    """``(sin x, cos x)`` for |x| below a million radians."""
+    """Return (sin x, cos x) for |x| below a million radians."""
     turns = x * (1.0 / HALF_PI)
     quarter = int(turns + 0.5) if turns >= 0.0 else -int(0.5 - turns)
     reduced = (x - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_LOW
@@ -72,7 +71,10 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def _arc_tangent(x: float) -> float:
-    """For 0 <= x <= 1: the angle is halved twice, then the series to t**19 (remainder below 2e-17)."""
+    """Return the arc tangent for 0 <= x <= 1.
+
+    The angle is halved twice, then the series to t**19 is evaluated (remainder below 2e-17).
+    """
     half = x / (1.0 + sqrt(1.0 + x * x))
     t = half / (1.0 + sqrt(1.0 + half * half))
     s = t * t
@@ -85,7 +87,7 @@ def _arc_tangent(x: float) -> float:
 
 @njit(cache=True)
 def arc_tangent2(y: float, x: float) -> float:
-    """The angle of the point (x, y) in (-pi, pi]; zero at the origin."""
+    """Return the angle of the point (x, y) in (-pi, pi] [rad]; zero at the origin."""
     across = abs(x)
     up = abs(y)
     if across == 0.0 and up == 0.0:
@@ -98,7 +100,7 @@ def arc_tangent2(y: float, x: float) -> float:
 
 @njit(cache=True)
 def exponential(x: float) -> float:
-    """e**x for |x| < 700, by reduction to |r| <= ln2/2 and Taylor's series to r**13."""
+    """Return e**x for |x| < 700, by reduction to |r| <= ln2/2 and Taylor's series to r**13."""
     scaled = x * 1.4426950408889634
     k = int(scaled + 0.5) if scaled >= 0.0 else -int(0.5 - scaled)
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -110,7 +112,10 @@ def exponential(x: float) -> float:
 
 @njit(cache=True)
 def logarithm(x: float) -> float:
-    """Natural logarithm of x > 0: x = m 2**k with m in [sqrt(1/2), sqrt(2)), ln m = 2 artanh((m-1)/(m+1))."""
+    """Return the natural logarithm of x > 0.
+
+    x = m 2**k with m in [sqrt(1/2), sqrt(2)), and ln m = 2 artanh((m-1)/(m+1)).
+    """
     m, k = frexp(x)
     if m < 0.7071067811865476:
         m = m * 2.0
@@ -125,7 +130,7 @@ def logarithm(x: float) -> float:
 
 @njit(cache=True)
 def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi), for angles within a few thousand turns."""
+    """Return the same angle in [-pi, pi), for angles within a few thousand turns [rad]."""
     turns = angle * (0.5 / PI)
     whole = int(turns + 0.5) if turns >= 0.0 else -int(0.5 - turns)
     return angle - whole * (2.0 * PI)
@@ -133,7 +138,7 @@ def wrap_angle(angle: float) -> float:
 
 @njit(cache=True)
 def clip(value: float, low: float, high: float) -> float:
-    """*value* held within [low, high]."""
+    """Return *value* limited to [low, high]."""
     return min(max(value, low), high)
 
 
@@ -157,15 +162,21 @@ def _mix(word: np.uint64) -> np.uint64:
 
 @njit(cache=True)
 def random_word(key: np.uint64, stream: int, k: int) -> np.uint64:
-    """64 uniform bits for uint64 *key*, integer *stream* and integer counter *k*."""
+    """Return 64 uniform bits for uint64 *key*, integer *stream* and integer counter *k*."""
     return _mix(_mix(key + np.uint64(stream) * _STREAM) + np.uint64(k) * _STEP)
 
 
 @njit(cache=True)
 def gaussian(key: np.uint64, stream: int, k: int) -> float:
-    """Zero mean, unit variance: the sum of eight 16-bit uniforms (Irwin and Hall).
+    """Return draw *k* of a stream, of zero mean and unit variance: the sum of eight 16-bit uniforms.
 
-    Bounded at 4.9 sigma, excess kurtosis -0.15; no logarithm, no root: cheap, and the same everywhere.
+    The distribution (Irwin and Hall) is bounded at 4.9 sigma, its excess kurtosis is -0.15. It needs no
+    logarithm and no root.
+
+    Args:
+        key: Key of the body or the sensor (uint64).
+        stream: Number of the stream.
+        k: Counter, usually the grid step.
     """
     a = random_word(key, stream, k)
     b = _mix(a + _STEP)

@@ -1,11 +1,9 @@
-"""How compiled code is cached, and why changing a law never leaves an old one in force.
+"""One grid step of one body, and the compiled step of a world without autopilots.
 
-numba stamps a cached function with its own source file only: a function that calls one of another file would
-be kept although the other changed. So nothing here that calls across files is cached, except the few entry
-points that compile everything below them at once; those hold a digest of all sources as a constant, which
-numba makes part of the cache's key.
-
-One grid step of one body of either kind: law, ground, wind, sensors. Composed steps are made of it.
+How compiled code is cached: numba stamps a cached function with its own source file only, so a function that
+calls one of another file would be kept although the other changed. Therefore functions that call across files
+are not cached, except the entry points that compile everything below them at once; those hold a digest of all
+sources as a constant, which numba makes part of the cache's key.
 """
 
 from __future__ import annotations
@@ -75,21 +73,21 @@ from volery.simulation.world.state_layout import (
 
 
 def digest_of(files: Iterable[Path]) -> str:
-    """A digest of the files' contents, in the order of their names."""
+    """Return a digest of the files' contents, independent of their order."""
     digest = hashlib.sha256()
-    for file in sorted(files, key=lambda file: file.name):
+    for file in sorted(files):
         digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
 def world_sources() -> list[Path]:
-    """The source files of this room."""
+    """Return the source files of this package."""
     return list(Path(__file__).parent.glob("*.py"))
 
 
 _STILL_SPEED = 0.02  # [m/s]
 _STILL_RATE = 0.05  # [rad/s]
-_LIGHT = 0.7  # of its weight: a body whose rotors lift less than this stays where it landed
+_LIGHT = 0.7  # fraction of the weight: with less thrust a landed body stays where it is
 
 
 @njit(cache=False)
@@ -102,7 +100,7 @@ def _slope(row: Array, flying: bool, resting: bool) -> None:
 
 @njit(cache=False)
 def _integrate(row: Array, flying: bool) -> None:
-    """The classical fourth-order Runge-Kutta step (Kutta 1901) of the integrated columns."""
+    """Advance the integrated columns by the classical fourth-order Runge-Kutta step (Kutta 1901)."""
     resting = row[S_RESTING] > 0.5
     for i in range(INTEGRATED):
         row[W_STATE + i] = row[i]
@@ -145,8 +143,8 @@ def _touches(row: Array) -> bool:
 
 
 @njit(cache=False)
-def _settle_flyer(row: Array) -> None:
-    """Contact, rest and power at the end of a multirotor's step."""
+def _settle_multirotor(row: Array) -> None:
+    """Update contact and rest at the end of a multirotor's step."""
     touching = _touches(row)
     if touching and row[S_ON_GROUND] == 0.0:
         row[S_CONTACT_SPEED] = max(0.0, -row[W_LAST_VELOCITY + 2])
@@ -169,7 +167,7 @@ def _settle_flyer(row: Array) -> None:
 
 @njit(cache=False)
 def _settle_rover(row: Array, height_before: float) -> None:
-    """Height, velocity and rest at the end of a rover's step."""
+    """Update height, velocity and rest at the end of a rover's step."""
     climb = (row[S_GROUND] - height_before) / STEP_S
     row[S_ON_GROUND] = 1.0
     resting = row[W_THROTTLE + 1] == 0.0 and row[W_THROTTLE] == 0.0 and abs(row[S_SPEED]) < 0.01
@@ -181,8 +179,8 @@ def _settle_rover(row: Array, height_before: float) -> None:
 
 
 @njit(cache=False)
-def _felt(row: Array) -> None:
-    """The step's mean specific force in body axes, and the way gone."""
+def _measure_motion(row: Array) -> None:
+    """Compute the step's mean specific force in body axes, and add to the distance travelled."""
     ae = (row[S_VELOCITY] - row[W_LAST_VELOCITY]) / STEP_S
     an = (row[S_VELOCITY + 1] - row[W_LAST_VELOCITY + 1]) / STEP_S
     au = (row[S_VELOCITY + 2] - row[W_LAST_VELOCITY + 2]) / STEP_S + row[P_GRAVITY]
@@ -198,7 +196,7 @@ def _felt(row: Array) -> None:
 
 @njit(cache=False)
 def _power(row: Array, flying: bool) -> None:
-    power = electrical_power(row, 0) if flying else electrical_rover(row)
+    power = electrical_power(row, 0) if flying else _rover_power(row)
     volts, amps = volts_amps(row, 0, power)
     row[S_VOLTS] = volts
     row[S_AMPS] = amps
@@ -206,8 +204,8 @@ def _power(row: Array, flying: bool) -> None:
 
 
 @njit(cache=False)
-def electrical_rover(row: Array) -> float:
-    """Watts drawn at a rover's battery."""
+def _rover_power(row: Array) -> float:
+    """Return the power [W] that a rover draws from its battery."""
     drive = drive_power(row, row[S_SPEED], row[W_SLOPE + S_SPEED])
     power: float = drive + row[P_IDLE_POWER] + row[U_PAYLOAD]
     return power
@@ -215,7 +213,13 @@ def electrical_rover(row: Array) -> float:
 
 @njit(cache=False)
 def step_body(bodies: Bodies, body: int, row: Array) -> None:
-    """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples."""
+    """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples.
+
+    Args:
+        bodies: All arrays.
+        body: Index of the body.
+        row: The body's row.
+    """
     key = bodies.keys[body]
     flying = row[P_KIND] == MULTIROTOR
     for axis in range(3):
@@ -229,11 +233,11 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         if row[S_RESTING] == 0.0:
             _normalise(row)
         rotation_matrix(row, S_ATTITUDE, W_ROTATION)
-        _settle_flyer(row)
+        _settle_multirotor(row)
     else:
         _settle_rover(row, height_before)
         rotation_matrix(row, S_ATTITUDE, W_ROTATION)
-    _felt(row)
+    _measure_motion(row)
     _power(row, flying)
     k = bodies.reached[body] + 1
     bodies.reached[body] = k
@@ -244,7 +248,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
 
 @njit(cache=False)
 def start_body(bodies: Bodies, body: int, row: Array) -> None:
-    """What the instruments show at the first grid step, before anything moved."""
+    """Take the samples of the first grid step, before any motion."""
     rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     for axis in range(3):
         row[S_SPECIFIC_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
@@ -256,7 +260,7 @@ def start_body(bodies: Bodies, body: int, row: Array) -> None:
 def _compose(sources: str) -> Advance:
     @njit(cache=True)
     def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
-        if not sources:  # never so: its being named here makes the digest part of the cache's key
+        if not sources:  # never true: naming the digest makes it part of the cache's key
             return
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
@@ -272,4 +276,4 @@ def _compose(sources: str) -> Advance:
 
 
 advance_bodies = _compose(digest_of(world_sources()))
-"""Advance each body to its goal step with the motor commands in its inputs: no autopilot at all."""
+"""Advance each body to its goal step with the motor commands in its inputs, without an autopilot."""

@@ -1,33 +1,33 @@
-"""The battery: an open-circuit voltage that falls with the charge drawn, behind a constant resistance.
+"""Equations of motion and power of multirotors and rovers, and the battery.
 
-* Law: V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R) (Thevenin's circuit without
-  its RC branch; Tremblay and Dessaint, World Electric Vehicle Journal 3 (2009), name it the static part).
+Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World Electric Vehicle Journal 3
+(2009), call it the static part).
+
+* V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R).
 * OCV(s): piecewise linear through the usual rest voltages of a lithium-polymer cell at 25 degrees C, s =
-  fraction left.
-* Valid: 0 to 40 degrees C, currents up to about 20 C. Sag recovers at once; ageing and self-discharge are
-  left out.
+  fraction left. Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a
+  load; ageing and self-discharge are not modelled.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
 
-The law of a multirotor: a rigid body under four rotors, drag, gravity and the ground.
+Multirotor: a rigid body under four rotors, drag, gravity and the ground.
 
 * Rigid body: m v' = m g + R F, q' = q (0, w) / 2, I w' = M - w x I w (Newton and Euler), I diagonal.
-* Rotor: w' = (u w_top V / V_full - w) / T, thrust k_T w^2, reaction torque k_Q w^2 with
-  k_Q = k_T^1.5 / (FM sqrt(2 rho A)): momentum theory's induced power at the figure of merit FM
-  (Leishman, Principles of Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3, electrical power that over the
-  efficiency of motor and controller. Valid: hover and slow flight; inflow of climb or fast flight is left
-  out, so are flapping, ground effect and the rotors' gyroscopic torque.
-* Drag: F = -(c_1 + c_2 |v|) v, v relative to the air; valid to about 20 m/s. Spinning is damped by -c_w w.
-* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down it
-  lies on four points as far above the centre.
+* Rotor: w' = (u w_top V / V_full - w) / T, thrust k_T w^2, reaction torque k_Q w^2 with k_Q = k_T^1.5 / (FM
+  sqrt(2 rho A)): momentum theory's induced power at the figure of merit FM (Leishman, Principles of
+  Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3; electrical power is that over the efficiency of motor
+  and controller. Valid in hover and slow flight; inflow of climb or fast flight, flapping, ground effect and
+  the rotors' gyroscopic torque are not modelled.
+* Drag: F = -(c_1 + c_2 |v|) v, v relative to the air; valid to about 20 m/s. Rotation is damped by -c_w w.
+* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down the
+  body lies on four points as far above the centre.
 
-The law of a rover: a bicycle on the ground.
+Rover: a kinematic bicycle on the ground (Rajamani, Vehicle Dynamics and Control, 2.2).
 
-* Speed: v' = (u v_top - v) / T_v, at most the tyres' grip a_max; steering angle d' = (s d_top - d) / T_d;
-  heading' = v tan(d) / L, held to the grip by limiting the turn rate to a_max / v (Rajamani, Vehicle
-  Dynamics and Control, 2.2: the kinematic bicycle). A skid-steered one turns at s r_top with the lag T_d, at
+* Speed: v' = (u v_top - v) / T_v, limited to the tyres' grip a_max; steering angle d' = (s d_top - d) / T_d;
+  heading' = v tan(d) / L, limited to a_max / v. A skid-steered rover turns at s r_top with the lag T_d, at
   any speed.
-* Power: rolling resistance, drag and acceleration against the drive's efficiency; braking returns nothing.
-* Valid: firm ground, slopes below about 15 degrees, no slip angle; the body follows the ground, level in
+* Power: rolling resistance, drag and acceleration over the drive's efficiency; braking recovers nothing.
+* Valid on firm ground, on slopes below about 15 degrees, without slip; the body follows the ground, level in
   attitude.
 """
 
@@ -98,7 +98,10 @@ CELL_FULL_VOLTS = 4.2
 
 @njit(cache=False)
 def cell_voltage(left: float) -> float:
-    """Open-circuit volts of one cell with the fraction *left* of its charge; past 0 it breaks down."""
+    """Return the open-circuit voltage of one cell [V] with the fraction *left* of its charge.
+
+    Below zero the cell breaks down.
+    """
     if left >= 0.9:
         return 4.06 + (min(left, 1.0) - 0.9) * 1.4
     if left >= 0.5:
@@ -114,7 +117,13 @@ def cell_voltage(left: float) -> float:
 
 @njit(cache=False)
 def battery_current(open_volts: float, resistance: float, power: float) -> float:
-    """Amperes at which the terminals give *power* watts."""
+    """Return the current [A] at which the terminals give a power.
+
+    Args:
+        open_volts: Open-circuit voltage of the battery [V].
+        resistance: Resistance of the battery [ohm].
+        power: Power at the terminals [W].
+    """
     room = open_volts * open_volts - 4.0 * resistance * power
     if room <= 0.0:
         return 0.5 * open_volts / resistance
@@ -126,7 +135,7 @@ _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
 @njit(cache=False)
 def electrical_power(row: Array, at: int) -> float:
-    """Watts drawn at the battery by rotors, autopilot and payload, in the state from column *at*."""
+    """Return the power [W] that rotors, autopilot and payload draw, in the state from column *at*."""
     cubes = 0.0
     for i in range(4):
         speed = row[at + S_ROTORS + i]
@@ -138,7 +147,7 @@ def electrical_power(row: Array, at: int) -> float:
 
 @njit(cache=False)
 def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
-    """Terminal volts and amperes at a power, in the state from column *at*."""
+    """Return voltage [V] and current [A] at the terminals at a power [W], in the state from column *at*."""
     left = 1.0 - row[at + S_CHARGE] / row[P_CAPACITY]
     open_volts = cell_voltage(left) * row[P_CELLS]
     amps = battery_current(open_volts, row[P_RESISTANCE], power)
@@ -147,7 +156,7 @@ def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
 
 @njit(cache=False)
 def rotation_matrix(row: Array, at: int, to: int) -> None:
-    """The quaternion from column *at* as a matrix, from column *to*: body axes to the axes of the world."""
+    """Write the matrix of the quaternion in column *at* to column *to*: body axes to world axes."""
     w, x, y, z = row[at], row[at + 1], row[at + 2], row[at + 3]
     row[to] = 1.0 - 2.0 * (y * y + z * z)
     row[to + 1] = 2.0 * (x * y - w * z)
@@ -162,7 +171,7 @@ def rotation_matrix(row: Array, at: int, to: int) -> None:
 
 @njit(cache=False)
 def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector in body axes as east, north, up."""
+    """Rotate a vector from body axes to east, north, up."""
     return (
         row[W_ROTATION] * x + row[W_ROTATION + 1] * y + row[W_ROTATION + 2] * z,
         row[W_ROTATION + 3] * x + row[W_ROTATION + 4] * y + row[W_ROTATION + 5] * z,
@@ -172,7 +181,7 @@ def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, f
 
 @njit(cache=False)
 def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, float, float]:
-    """A vector east, north, up in body axes."""
+    """Rotate a vector from east, north, up to body axes."""
     return (
         row[W_ROTATION] * east + row[W_ROTATION + 3] * north + row[W_ROTATION + 6] * up,
         row[W_ROTATION + 1] * east + row[W_ROTATION + 4] * north + row[W_ROTATION + 7] * up,
@@ -181,8 +190,8 @@ def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, f
 
 
 @njit(cache=False)
-def _tread(row: Array, x: float, y: float, z: float) -> None:
-    """Add to force and torque what the ground does to a foot at x, y, z in body axes."""
+def _add_foot_contact(row: Array, x: float, y: float, z: float) -> None:
+    """Add the force and torque of the ground on a foot at x, y, z in body axes [m]."""
     _, _, height = _to_world(row, x, y, z)
     depth = row[W_GROUND] - row[W_STATE + S_POSITION + 2] - height
     if depth <= 0.0:
@@ -204,18 +213,18 @@ def _tread(row: Array, x: float, y: float, z: float) -> None:
 
 
 @njit(cache=False)
-def _stand(row: Array) -> None:
-    """Add what the ground does to the four feet, or to as many points above when upside down."""
+def _add_ground_contact(row: Array) -> None:
+    """Add the force and torque of the ground on the four feet, or on four points above if upside down."""
     depth = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
     for foot in range(4):
         x = row[P_FEET] if foot < 2 else -row[P_FEET]
         y = row[P_FEET + 1] if foot % 2 == 0 else -row[P_FEET + 1]
-        _tread(row, x, y, depth)
+        _add_foot_contact(row, x, y, depth)
 
 
 @njit(cache=False)
-def _spin_up(row: Array) -> None:
-    """Rotor speeds, charge and energy: what changes even in a body at rest."""
+def _rotor_and_battery_slope(row: Array) -> None:
+    """Compute the slopes of rotor speeds, charge and energy: these change also at rest."""
     power = electrical_power(row, W_STATE)
     volts, amps = volts_amps(row, W_STATE, power)
     top = row[P_MAX_ROTOR_SPEED] * volts / row[P_FULL_VOLTS]
@@ -228,8 +237,8 @@ def _spin_up(row: Array) -> None:
 
 
 @njit(cache=False)
-def _loads(row: Array) -> None:
-    """Rotor and air loads: force east, north, up without gravity; torque forward, left, up."""
+def _add_rotor_and_air_loads(row: Array) -> None:
+    """Compute force (east, north, up, without gravity) and torque (forward, left, up) of rotors and air."""
     lift = 0.0
     for axis in range(3):
         row[W_TORQUE + axis] = 0.0
@@ -252,8 +261,8 @@ def _loads(row: Array) -> None:
 
 
 @njit(cache=False)
-def _turn(row: Array) -> None:
-    """Rates of change of the attitude quaternion and of the body rates, by Euler's equations."""
+def _attitude_slope(row: Array) -> None:
+    """Compute the slopes of attitude quaternion and body rates, by Euler's equations."""
     p, q, r = row[W_STATE + S_RATES], row[W_STATE + S_RATES + 1], row[W_STATE + S_RATES + 2]
     w, x = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 1]
     y, z = row[W_STATE + S_ATTITUDE + 2], row[W_STATE + S_ATTITUDE + 3]
@@ -269,27 +278,32 @@ def _turn(row: Array) -> None:
 
 @njit(cache=False)
 def multirotor_slope(row: Array, resting: bool) -> None:
-    """The state's rate of change. A resting body keeps its place; its rotors may spin."""
-    _spin_up(row)
+    """Compute the slope of a multirotor's state.
+
+    Args:
+        row: State row; the state is read from W_STATE and the slope is written to W_SLOPE.
+        resting: The body stands on the ground and keeps its position; its rotors may turn.
+    """
+    _rotor_and_battery_slope(row)
     if resting:
         for i in range(S_ROTORS):
             row[W_SLOPE + i] = 0.0
         return
     rotation_matrix(row, W_STATE + S_ATTITUDE, W_ROTATION)
-    _loads(row)
+    _add_rotor_and_air_loads(row)
     reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
     if row[W_STATE + S_POSITION + 2] - row[W_GROUND] < reach:
-        _stand(row)
+        _add_ground_contact(row)
     for axis in range(3):
         row[W_SLOPE + S_POSITION + axis] = row[W_STATE + S_VELOCITY + axis]
         row[W_SLOPE + S_VELOCITY + axis] = row[W_FORCE + axis] / row[P_MASS]
     row[W_SLOPE + S_VELOCITY + 2] -= row[P_GRAVITY]
-    _turn(row)
+    _attitude_slope(row)
 
 
 @njit(cache=False)
 def total_thrust(row: Array) -> float:
-    """The rotors' thrust together [N]."""
+    """Return the thrust of all rotors [N]."""
     squares = 0.0
     for i in range(4):
         squares += row[S_ROTORS + i] * row[S_ROTORS + i]
@@ -304,7 +318,13 @@ _STANDING = 0.001  # [m/s] below which rolling resistance has no sign
 
 @njit(cache=False)
 def drive_power(row: Array, speed: float, acceleration: float) -> float:
-    """Watts at the battery for the wheels at a speed [m/s] and an acceleration [m/s^2]."""
+    """Return the power [W] that the wheels draw from the battery.
+
+    Args:
+        row: State row.
+        speed: Forward speed [m/s].
+        acceleration: Forward acceleration [m/s^2].
+    """
     pace = abs(speed)
     if pace < _STANDING:
         return 0.0
@@ -318,7 +338,13 @@ def drive_power(row: Array, speed: float, acceleration: float) -> float:
 
 @njit(cache=False)
 def turn_rate(row: Array, speed: float, steer: float) -> float:
-    """Heading's rate of change [rad/s, anticlockwise] at a speed and a steering angle (skid: a turn rate)."""
+    """Return the rate of change of the heading [rad/s, anticlockwise].
+
+    Args:
+        row: State row.
+        speed: Forward speed [m/s].
+        steer: Steering angle [rad]; skid-steered: turn rate [rad/s].
+    """
     if row[P_SKID_STEERED] > 0.5:
         rate = steer
     else:
@@ -331,7 +357,7 @@ def turn_rate(row: Array, speed: float, steer: float) -> float:
 
 @njit(cache=False)
 def rover_slope(row: Array, resting: bool) -> None:
-    """The state's rate of change; commands are steering (left positive) and throttle."""
+    """Compute the slope of a rover's state; the commands are steering (left positive) and throttle."""
     for i in range(INTEGRATED):
         row[W_SLOPE + i] = 0.0
     speed = row[W_STATE + S_SPEED]
@@ -357,7 +383,7 @@ def rover_slope(row: Array, resting: bool) -> None:
 
 @njit(cache=False)
 def follow_ground(row: Array, ground: float, climb: float) -> None:
-    """What the wheels dictate after a step: height, velocity and turn rate."""
+    """Write height, velocity and turn rate of a rover after a step: its wheels follow the ground."""
     speed = row[S_SPEED]
     w, z = row[S_ATTITUDE], row[S_ATTITUDE + 3]
     norm = sqrt(w * w + z * z)

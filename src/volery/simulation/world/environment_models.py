@@ -1,23 +1,17 @@
-"""The standard atmosphere's lowest layer (ISO 2533): pressure and height, up to 11 km.
+"""Models of the surroundings: standard atmosphere, magnetic field, terrain and wind.
 
-The earth's magnetic field at a place: what a compass there points along.
-
-* Law: the main field's scalar potential in spherical harmonics, Schmidt's semi-normalised, to degree 4.
-* Coefficients: International Geomagnetic Reference Field, 13th generation, epoch 2020 (Alken et al., Earth,
-  Planets and Space 73 (2021), table 2), in nanotesla.
-* Valid: mid latitudes at the ground, to some 3 degrees and 5 % of the full model to degree 13; geographic
-  latitude is taken for geocentric. Fit for a compass whose autopilot uses the same law, not for surveying.
-
-The ground: heights over a square grid, bilinear between the posts, level beyond the edge.
-
-Wind: a mean and gusts.
-
-* Law: each component of a gust is first-order Gauss-Markov noise, the shape of Dryden's longitudinal spectrum
-  (MIL-F-8785C): g' = -g/T + s sqrt(2/T) n, T = L / V. Its exact discrete form holds over one gust period.
-* Simplified: Dryden's lateral and vertical spectra are second order; here they are as the longitudinal one,
-  with the vertical deviation halved. T is a constant of the scene (the wind's own speed stands for the
-  airspeed).
-* Valid: below about 100 m over open ground; no shear, no wakes. Bodies feel gusts of their own, uncorrelated.
+* Atmosphere: the lowest layer of ISO 2533, up to 11 km.
+* Magnetic field: the main field's scalar potential in Schmidt semi-normalised spherical harmonics to degree
+  4, with the coefficients of the International Geomagnetic Reference Field, 13th generation, epoch 2020
+  (Alken et al., Earth, Planets and Space 73 (2021), table 2). Valid at mid latitudes at the ground, to some 3
+  degrees and 5 % of the full model; geographic latitude is taken for geocentric. Sufficient for a
+  magnetometer whose autopilot uses the same model, not for surveying.
+* Terrain: heights over a square grid, bilinear between the posts, level beyond the edge.
+* Wind: a mean and gusts. Each component of a gust is first-order Gauss-Markov noise, the shape of Dryden's
+  longitudinal spectrum (MIL-F-8785C): g' = -g/T + s sqrt(2/T) n, T = L / V, in its exact discrete form.
+  Dryden's lateral and vertical spectra are of second order; here all are as the longitudinal one, with the
+  vertical deviation halved, and V is the mean wind's speed. Valid below about 100 m over open ground; no
+  shear, no wakes; gusts at different bodies are uncorrelated.
 """
 
 from __future__ import annotations
@@ -42,14 +36,14 @@ _EXPONENT = 5.255877  # g M / (R L)
 
 @njit(cache=True)
 def pressure_at(amsl: float) -> float:
-    """Pascal at a height in metres above mean sea level: p0 (1 - L h / T0)^(g M / R L)."""
+    """Return the pressure [Pa] at a height above mean sea level [m]: p0 (1 - L h / T0)^(g M / R L)."""
     warmth = 1.0 - _LAPSE * amsl / _SEA_LEVEL_K
     return _SEA_LEVEL_PA * exponential(_EXPONENT * logarithm(warmth))
 
 
 @njit(cache=True)
 def altitude_at(pressure: float) -> float:
-    """Metres above mean sea level at a pressure in pascal: the inverse of ``pressure_at``."""
+    """Return the height above mean sea level [m] at a pressure [Pa]: the inverse of ``pressure_at``."""
     return _SEA_LEVEL_K / _LAPSE * (1.0 - exponential(logarithm(pressure / _SEA_LEVEL_PA) / _EXPONENT))
 
 
@@ -74,9 +68,13 @@ _GAUSS = 1e-5  # of a nanotesla
 
 
 def _legendre(s: float, c: float) -> dict[tuple[int, int], tuple[float, float]]:
-    """Schmidt's functions of the colatitude whose sine and cosine are given, with their derivatives.
+    """Return Schmidt's functions of the colatitude and their derivatives, by (degree, order).
 
-    By the usual recursions (Winch et al., Geophysical Journal International 160 (2005), section 2).
+    By the recursions of Winch et al., Geophysical Journal International 160 (2005), section 2.
+
+    Args:
+        s: Sine of the colatitude.
+        c: Cosine of the colatitude.
     """
     table = {(0, 0): (1.0, 0.0), (1, 0): (c, -s), (1, 1): (s, c)}
     for n in range(2, _DEGREE + 1):
@@ -96,7 +94,7 @@ def _legendre(s: float, c: float) -> dict[tuple[int, int], tuple[float, float]]:
 
 
 def magnetic_field(frame: LocalFrame) -> Vector:
-    """The field at the frame's origin: north, east, down in gauss."""
+    """Return the magnetic field at the frame's origin: north, east, down [gauss]."""
     north = east = down = 0.0
     cosine, sine = sine_cosine(radians(frame.latitude))  # of the colatitude
     sine = max(sine, 1e-9)  # at a pole east has no direction
@@ -116,13 +114,17 @@ _HALF_CURVATURE = 0.5 / 6_371_008.8  # of the earth's mean radius (IUGG) [1/m]
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights in metres above the level of the world's origin (AMSL less the frame's).
+    """Heights of the ground above the level of the world's origin (AMSL less the frame's).
 
-    The ground follows the globe: seen from the plane that touches it at the origin it falls by d^2 / 2 R (8 m
-    in 10 km), so that ground at one level has one altitude AMSL.
+    The ground follows the globe: relative to the plane that touches the globe at the origin it is lower by
+    d^2 / 2 R (8 m in 10 km), so that level ground has one altitude AMSL.
 
-    ``heights[row][column]`` is the height at north ``south_edge + row * spacing`` and east ``west_edge +
-    column * spacing``. One post alone is level ground everywhere.
+    Args:
+        heights: Heights [m] by row and column: ``heights[row][column]`` stands at north ``south_edge + row *
+            spacing`` and east ``west_edge + column * spacing``. A single post is level ground everywhere.
+        west_edge: East coordinate of the first column [m].
+        south_edge: North coordinate of the first row [m].
+        spacing: Distance between posts [m].
     """
 
     heights: Sequence[Sequence[float]] = ((0.0,),)
@@ -138,12 +140,17 @@ class Terrain:
             raise UsageError(f"terrain: a spacing of {self.spacing} m between posts; give more than 0")
 
     def height(self, east: float, north: float) -> float:
-        """Metres up of the ground at a point: its ``up`` in the world's frame."""
+        """Return the height of the ground at a point [m up in the world's frame].
+
+        Args:
+            east: East of the world's origin [m].
+            north: North of the world's origin [m].
+        """
         heights, grid = self.arrays()
         return float(ground_height(heights, grid, east, north))
 
     def arrays(self) -> tuple[Array, Array]:
-        """The posts and (west edge, south edge, spacing), as compiled code takes them."""
+        """Return the posts and (west edge, south edge, spacing) as arrays for compiled code."""
         return (
             np.array(self.heights, dtype=np.float64),
             np.array((self.west_edge, self.south_edge, self.spacing), dtype=np.float64),
@@ -152,7 +159,7 @@ class Terrain:
 
 @njit(cache=True)
 def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
-    """Bilinear interpolation between the four posts around a point."""
+    """Interpolate bilinearly between the four posts around a point."""
     rows, columns = heights.shape
     x = min(max((east - grid[0]) / grid[2], 0.0), columns - 1.0)
     y = min(max((north - grid[1]) / grid[2], 0.0), rows - 1.0)
@@ -170,7 +177,7 @@ def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
 
 @njit(cache=True)
 def ground_height(heights: Array, grid: Array, east: float, north: float) -> float:
-    """Metres up of the ground, over the plane that touches the globe at the world's origin."""
+    """Return the height of the ground over the plane that touches the globe at the world's origin [m]."""
     drop = (east * east + north * north) * _HALF_CURVATURE
     if heights.size == 1:
         level: float = heights[0, 0] - drop
@@ -184,8 +191,12 @@ _STREAM = 100
 
 @dataclass(frozen=True)
 class Wind:
-    """Where the air goes: metres a second east, north and up; gusts' standard deviation and length scale in
-    metres.
+    """Mean velocity of the air, and gusts.
+
+    Args:
+        east: Mean velocity towards the east [m/s]; likewise ``north`` and ``up``.
+        gust: Standard deviation of the horizontal components of gusts [m/s].
+        gust_length: Length scale of gusts [m].
     """
 
     east: float = 0.0
@@ -207,7 +218,7 @@ class Wind:
 
 @njit(cache=False)
 def advance_gust(row: Array, key: np.uint64, k: int) -> None:
-    """Advance one body's gust by one gust period (call when k is a multiple of GUST_EVERY)."""
+    """Advance one body's gust by one gust period; to be called when k is a multiple of GUST_EVERY."""
     deviation = row[U_GUST]
     if deviation == 0.0:
         return

@@ -68,6 +68,8 @@ from volery.simulation.world.state_layout import (
     STEP_S,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
+    U_GPS_DRIFT,
+    U_GPS_DRIFT_START,
     U_MAG_BLOCKED,
     W_ROTATION,
     WHITE_SIGMA,
@@ -493,6 +495,11 @@ def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
         row[M_GPS + axis] = sign * row[S_POSITION + source] + error
         noise = speed * gaussian(key, _GPS_VELOCITY_STREAM + axis, k)
         row[M_GPS_VELOCITY + axis] = sign * row[S_VELOCITY + source] + noise
+    for axis in range(2):
+        drift = row[U_GPS_DRIFT + axis]
+        if drift != 0.0:
+            row[M_GPS + axis] += drift * (k - row[U_GPS_DRIFT_START]) * STEP_S
+            row[M_GPS_VELOCITY + axis] += drift
     row[M_GPS_FIX] = row[P_GPS_FIX]
     row[M_GPS_COUNT] += 1.0
 

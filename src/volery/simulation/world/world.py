@@ -1,8 +1,8 @@
-"""The world: all bodies on one grid of time, advanced when somebody looks.
+"""The world: all bodies on one grid of time, advanced when one of them is read.
 
-State k holds over [k STEP, (k+1) STEP); an input given in that interval acts from k+1 on; a look advances to
-now // STEP. So looking is free and changes nothing, nobody owns the tick, and whoever holds the clock (a
-virtual kernel, the wall, firmware in lock step) moves the world by moving ``now``.
+State k holds over [k STEP, (k+1) STEP). An input given in that interval acts from k+1 on. Reading a body
+advances it to step now // STEP. Reading changes no result, so no task owns the grid, and whatever holds the
+clock (a virtual kernel, the wall clock, firmware in lock step) moves the world by moving the time.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame, Quaternion, Vector
 from volery.base.seeds import key
 from volery.base.time import MS, Ns
 from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_state
 from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.environment_models import Terrain, Wind
+from volery.simulation.world.sensors import Measurement, MountedSensor, SensorInput, added_sensor
 from volery.simulation.world.state_layout import (
     P_CAPACITY,
     S_AMPS,
@@ -30,11 +31,13 @@ from volery.simulation.world.state_layout import (
     S_DISTANCE,
     S_ENERGY,
     S_GROUND,
+    S_GUST,
     S_ON_GROUND,
     S_PAYLOAD_ENERGY,
     S_POSITION,
     S_RATES,
     S_ROTORS,
+    S_SPECIFIC_FORCE,
     S_VELOCITY,
     S_VOLTS,
     STATE,
@@ -49,19 +52,33 @@ from volery.simulation.world.state_layout import (
 )
 
 STEP: Ns = 2 * MS
-"""The grid: 500 Hz."""
+"""Grid step: 500 Hz."""
 
-_WATCHED = 500
-"""A body looked at within this many steps is advanced along with the others, in one compiled call."""
+_ACTIVE_STEPS = 500
+"""A body that was read within this many steps is advanced together with the others, in one compiled call."""
 
 
 class Truth(NamedTuple):
-    """What is really so: ENU about the world's origin, body axes forward, left, up; SI units.
+    """True state of a body.
 
-    ``charge_as`` ampere-seconds and ``energy_j`` drawn so far (``payload_j`` of it by on-board computers),
-    ``battery_left`` a fraction, ``contact_speed`` downward at the last touch-down, ``contacts`` how many
-    there were, ``rotors`` rad/s (rover: steering angle rad, wheel speed m/s, 0, 0), ``ground`` height of the
-    ground below.
+    Args:
+        time: Time of the grid step [ns].
+        position: East, north, up about the world's origin [m].
+        velocity: East, north, up [m/s].
+        attitude: Quaternion (w, x, y, z) from body (forward, left, up) to east, north, up.
+        rates: Body rates about forward, left, up [rad/s].
+        rotors: Rotor speeds [rad/s]; rover: steering angle [rad], wheel speed [m/s], 0, 0.
+        battery_left: Fraction of the charge left, 0..1.
+        charge_as: Charge drawn so far [A s].
+        energy_j: Energy drawn so far [J].
+        payload_j: Part of it that the on-board computers used [J].
+        volts: Voltage at the battery's terminals [V].
+        amps: Current drawn [A].
+        on_ground: Whether the body touches the ground.
+        contact_speed: Downward speed at the last touch-down [m/s].
+        contacts: Number of touch-downs.
+        ground: Height of the ground straight below, up [m].
+        distance: Length of the path so far [m].
     """
 
     time: Ns
@@ -83,24 +100,24 @@ class Truth(NamedTuple):
     distance: float
 
 
-class _Dated(NamedTuple):
+class _PendingInput(NamedTuple):
     step: int
     column: int
     values: tuple[float, ...]
 
 
-def _furnish(
-    specs: Sequence[BodySpec], seed: int, frame: LocalFrame, air: Wind, ground: Terrain, own: int
+def _initial_arrays(
+    specs: Sequence[BodySpec], seed: int, frame: LocalFrame, wind: Wind, terrain: Terrain, columns: int
 ) -> Bodies:
-    """The arrays of a world at its first moment; *own* is how many columns its composer adds."""
-    heights, grid = ground.arrays()
-    rows: Array = np.zeros((len(specs), WORLD + own))
+    """Return the arrays of a world at step 0, with *columns* more columns than the world's own."""
+    heights, grid = terrain.arrays()
+    rows: Array = np.zeros((len(specs), WORLD + columns))
     for row, spec in zip(rows, specs, strict=True):
-        fill_parameters(row, spec, frame, air)
-        fill_state(row, spec, ground)
+        fill_parameters(row, spec, frame, wind)
+        fill_state(row, spec, terrain)
         row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
-        row[U_WIND : U_WIND + 3] = air.east, air.north, air.up
-        row[U_GUST] = air.gust
+        row[U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
+        row[U_GUST] = wind.gust
     keys = [key(seed, f"world/body/{index}") for index in range(len(specs))]
     return Bodies(
         rows=rows,
@@ -112,10 +129,20 @@ def _furnish(
 
 
 class World:
-    """All bodies of a run. Rows of its arrays are in the order of *bodies*.
+    """All bodies of a run; the rows of its arrays are in their order.
 
-    *advance* is the compiled step; ``advance_bodies`` flies nothing and takes motor commands as inputs.
-    *columns* is how many a composer adds to each row.
+    Args:
+        now: Returns the time [ns].
+        bodies: The bodies, at least one.
+        advance: The compiled step; ``advance_bodies`` has no autopilot and takes motor commands as inputs.
+        seed: Seed of all noise.
+        frame: Local frame whose origin is the world's.
+        wind: Wind; ``None``: still air.
+        terrain: Terrain; ``None``: level ground.
+        columns: Number of columns that *advance* adds to each row.
+
+    Raises:
+        UsageError: There are no bodies, or a sensor does not exist.
     """
 
     def __init__(
@@ -137,42 +164,50 @@ class World:
         count = len(self.specs)
         if not count:
             raise UsageError("a world without bodies; give at least one")
-        self.arrays = _furnish(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
-        self._dated: list[deque[_Dated]] = [deque() for _ in self.specs]
-        self._looked = [-_WATCHED] * count
+        self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
+        self._pending: list[deque[_PendingInput]] = [deque() for _ in self.specs]
+        self._last_read = [-_ACTIVE_STEPS] * count
         self._goals = np.zeros(count, dtype=np.int64)
+        self._mounted = {
+            body: {name: MountedSensor(added_sensor(name), seed, body) for name in spec.added_sensors}
+            for body, spec in enumerate(self.specs)
+            if spec.added_sensors
+        }
         self._advance(self.arrays, self._goals)
+        self._sample_mounted()
         self.advances = 0
+        """Number of calls of the compiled step."""
 
-    def look(self, body: int) -> int:
-        """Bring *body* to the present and return its grid step; its rows may then be read, not kept."""
+    def advance_to_now(self, body: int) -> int:
+        """Advance *body* to the present and return its grid step; its row may then be read, not kept."""
         step = self._now() // STEP
-        self._looked[body] = step
+        self._last_read[body] = step
         if self.arrays.reached[body] < step:
             self._catch_up(step)
         return step
 
-    def drive(self, body: int, column: int, *values: float) -> None:
-        """Set inputs of *body* from *column* on; dated to the next grid step."""
-        self._dated[body].append(_Dated(self._now() // STEP + 1, column, values))
+    def set_input(self, body: int, column: int, *values: float) -> None:
+        """Set inputs of *body*, from *column* of its row on, with effect from the next grid step."""
+        self._pending[body].append(_PendingInput(self._now() // STEP + 1, column, values))
 
     def payload_power(self, body: int, watts: float) -> None:
-        """Electrical power of the computers that *body* carries, from the next grid step on [W]."""
+        """Set the electrical power of the computers on *body* [W], from the next grid step on."""
         if watts < 0.0:
             raise UsageError(f"a payload of {watts} W; give 0 or more")
-        self.drive(body, U_PAYLOAD, watts)
+        self.set_input(body, U_PAYLOAD, watts)
 
     def set_wind(self, wind: Wind) -> None:
-        """Another mean wind and gust strength for all, from the next grid step on (the gusts' time constant
-        stays).
+        """Set mean wind and gust strength for all bodies, from the next grid step on.
+
+        The correlation time of gusts stays that of the first wind.
         """
         for body in range(len(self.specs)):
-            self.drive(body, U_WIND, wind.east, wind.north, wind.up)
-            self.drive(body, U_GUST, wind.gust)
+            self.set_input(body, U_WIND, wind.east, wind.north, wind.up)
+            self.set_input(body, U_GUST, wind.gust)
 
     def truth(self, body: int) -> Truth:
-        """The true state of *body* now."""
-        step = self.look(body)
+        """Return the true state of *body* now."""
+        step = self.advance_to_now(body)
         row = self.arrays.rows[body, :STATE].tolist()
         capacity = float(self.arrays.rows[body, P_CAPACITY])
         return Truth(
@@ -195,26 +230,71 @@ class World:
             distance=row[S_DISTANCE],
         )
 
+    def measurement(self, body: int, sensor: str) -> Measurement:
+        """Return the last sample of an added sensor of *body*.
+
+        Args:
+            body: Index of the body.
+            sensor: Name of the sensor, one of the spec's ``added_sensors``.
+
+        Raises:
+            UsageError: The body has no such sensor.
+        """
+        mounted = self._mounted.get(body, {})
+        if sensor not in mounted:
+            there = f"it has {choices(mounted)}" if mounted else "it has no added sensors"
+            raise UsageError(f"body {body} has no sensor {sensor!r}; {there}")
+        self.advance_to_now(body)
+        return mounted[sensor].last
+
     def _catch_up(self, step: int) -> None:
-        """Bring every watched body to *step*, stopping where an input falls due."""
-        watched = [body for body, looked in enumerate(self._looked) if step - looked < _WATCHED]
+        """Advance every active body to *step*, with stops where an input or a sample of it is due."""
+        active = [body for body, read in enumerate(self._last_read) if step - read < _ACTIVE_STEPS]
         while True:
-            due = False
-            for body in watched:
-                self._apply(body)
-                dated = self._dated[body]
-                waits = bool(dated) and dated[0].step <= step
-                self._goals[body] = dated[0].step if waits else step
-                due = due or waits
+            stopped = False
+            for body in active:
+                self._apply_inputs(body)
+                pending = self._pending[body]
+                goal = step
+                if pending and pending[0].step <= step:
+                    goal, stopped = pending[0].step, True
+                if body in self._mounted:
+                    sample = min(sensor.next_step for sensor in self._mounted[body].values())
+                    if sample < goal:
+                        goal, stopped = sample, True
+                self._goals[body] = goal
             self._advance(self.arrays, self._goals)
             self.advances += 1
-            if not due:
+            self._sample_mounted()
+            if not stopped:
                 return
 
-    def _apply(self, body: int) -> None:
-        """Put into force the inputs that are dated to where *body* stands."""
-        dated = self._dated[body]
+    def _apply_inputs(self, body: int) -> None:
+        """Apply the inputs that are due at the step that *body* has reached."""
+        pending = self._pending[body]
         reached = int(self.arrays.reached[body])
-        while dated and dated[0].step <= reached:
-            _, column, values = dated.popleft()
+        while pending and pending[0].step <= reached:
+            _, column, values = pending.popleft()
             self.arrays.rows[body, column : column + len(values)] = values
+
+    def _sample_mounted(self) -> None:
+        """Take the samples of added sensors that are due at the steps reached."""
+        for body, mounted in self._mounted.items():
+            reached = int(self.arrays.reached[body])
+            for sensor in mounted.values():
+                if sensor.next_step == reached:
+                    sensor.sample(self._sensor_input(body, reached))
+
+    def _sensor_input(self, body: int, step: int) -> SensorInput:
+        row = self.arrays.rows[body].tolist()
+        wind, gust = row[U_WIND : U_WIND + 3], row[S_GUST : S_GUST + 3]
+        return SensorInput(
+            time=step * STEP,
+            position=tuple(row[S_POSITION : S_POSITION + 3]),
+            velocity=tuple(row[S_VELOCITY : S_VELOCITY + 3]),
+            attitude=tuple(row[S_ATTITUDE : S_ATTITUDE + 4]),
+            rates=tuple(row[S_RATES : S_RATES + 3]),
+            specific_force=tuple(row[S_SPECIFIC_FORCE : S_SPECIFIC_FORCE + 3]),
+            air_velocity=(wind[0] + gust[0], wind[1] + gust[1], wind[2] + gust[2]),
+            ground=row[S_GROUND],
+        )

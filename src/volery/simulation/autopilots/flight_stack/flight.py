@@ -46,6 +46,7 @@ from volery.simulation.world.sensors import Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     M_GYRO,
     MULTIROTOR,
+    P_CELLS,
     P_KIND,
     S_AMPS,
     S_CHARGE,
@@ -53,6 +54,7 @@ from volery.simulation.world.state_layout import (
     SAMPLES_END,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
+    U_GPS_DRIFT,
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
     W_THROTTLE,
@@ -192,7 +194,7 @@ class Flight:
 
     def look(self) -> Estimate:
         """What the autopilot knows now; the same object until the next grid step."""
-        step = self._world.look(self._body)
+        step = self._world.advance_to_now(self._body)
         time = step * STEP
         seen = self._seen
         if seen is not None and seen.time == time:
@@ -214,7 +216,7 @@ class Flight:
         row = setpoint.row()
         if not isfinite(sum(row)):
             raise UsageError(f"a set-point must be of finite numbers: {setpoint}")
-        self._world.drive(self._body, C_CONTROL, *row)
+        self._world.set_input(self._body, C_CONTROL, *row)
 
     def truth(self) -> Truth:
         """The true state, for judges and recorders; an autopilot must not ask."""
@@ -222,11 +224,11 @@ class Flight:
 
     def set_origin(self) -> None:
         """Use satellites from now on; the origin is where the receiver says the vehicle is then."""
-        self._world.drive(self._body, C_AIDED, 1.0)
+        self._world.set_input(self._body, C_AIDED, 1.0)
 
     def forget_origin(self) -> None:
         """Stop using satellites, as after a restart of the autopilot."""
-        self._world.drive(self._body, C_AIDED, 0.0)
+        self._world.set_input(self._body, C_AIDED, 0.0)
 
     def payload_power(self, watts: float) -> None:
         """Drain of the on-board computers from the next grid step on [W]."""
@@ -234,27 +236,40 @@ class Flight:
 
     def block_gps(self, blocked: bool = True) -> None:
         """Fault: the receiver sees no satellites (or sees them again)."""
-        self._world.drive(self._body, U_GPS_BLOCKED, float(blocked))
+        self._world.set_input(self._body, U_GPS_BLOCKED, float(blocked))
+
+    def drift_gps(self, north: float, east: float) -> None:
+        """Fault: let the position that the receiver reports drift from now on.
+
+        Args:
+            north: Speed of the drift to the north [m/s]; 0 for both ends the drift and its offset.
+            east: Speed of the drift to the east [m/s].
+        """
+        self._world.set_input(self._body, U_GPS_DRIFT, north, east, float(self._world.advance_to_now(self._body)))
+
+    def short_cells(self, cells: int) -> None:
+        """Fault: `cells` of the battery give no voltage (0: all do again). One cell always stays alive."""
+        self._world.set_input(self._body, P_CELLS, float(max(1, self.spec.battery.cells - cells)))
 
     def block_barometer(self, blocked: bool = True) -> None:
         """Fault: the barometer is stuck."""
-        self._world.drive(self._body, U_BARO_BLOCKED, float(blocked))
+        self._world.set_input(self._body, U_BARO_BLOCKED, float(blocked))
 
     def block_compass(self, blocked: bool = True) -> None:
         """Fault: the magnetometer is stuck."""
-        self._world.drive(self._body, U_MAG_BLOCKED, float(blocked))
+        self._world.set_input(self._body, U_MAG_BLOCKED, float(blocked))
 
     def drain_battery(self, left: float) -> None:
         """Fault: from the next grid step on only the fraction *left* of the charge is in it."""
         if not 0.0 <= left <= 1.0:
             raise UsageError(f"a battery with {left} left: 0 to 1")
-        self._world.drive(self._body, S_CHARGE, self.capacity_as * (1.0 - left))
+        self._world.set_input(self._body, S_CHARGE, self.capacity_as * (1.0 - left))
 
     def weaken_motor(self, motor: int, health: float) -> None:
         """Fault: *motor* (0 to 3) gives only the fraction *health* of its thrust."""
         if not 0 <= motor <= 3 or not 0.0 <= health <= 1.0:
             raise UsageError(f"motor {motor} at {health}: motors are 0 to 3, health 0 to 1")
-        self._world.drive(self._body, U_MOTOR_HEALTH + motor, health)
+        self._world.set_input(self._body, U_MOTOR_HEALTH + motor, health)
 
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
         """Degrees and metres AMSL to north, east, down about the estimator's present origin."""
