@@ -36,7 +36,7 @@ from volery.links.mavlink_codec import MAVLINK
 from volery.links.udp_link import UdpLink
 from volery.links.wire_faults import FaultyLink
 from volery.run.assembly.simulated_fleet import fleet_of
-from volery.run.assembly.simulated_vehicles import link_to, parse_simulated
+from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.testing.fuzzing import FuzzTarget
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
@@ -54,7 +54,7 @@ def telemetry(seconds: int, rate: int) -> Chunks:
     """What arrives of a simulated ArduPilot; *rate* of what a ground station asks for, 0 for nothing more."""
     kernel = VirtualKernel()
     wanted = parse_simulated(parse("sim:ardupilot?start=warm&wire=bytes"), "craft")
-    link = link_to(kernel, fleet_of(kernel, [wanted], 1), wanted, 1)
+    link = fleet_of(kernel, [wanted], 1).link_for(wanted)
     assert isinstance(link, FaultyLink)
     chunks: Chunks = []
     arrived = link.arrived

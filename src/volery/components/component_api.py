@@ -40,7 +40,7 @@ def caller(what: str) -> tuple[Kernel, Task]:
 
 def component_of(task: Task) -> Instance | None:
     """The component whose code *task* executes now; ``None`` for a mission or a script."""
-    place = task.place
+    place = task.context
     return place.instance if isinstance(place, ComponentContext) else None
 
 
@@ -89,7 +89,7 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
     """Record that something the application follows entered a state: ``note("parcel", "p-1", "ordered")``."""
     kernel, task = caller("volery.note()")
     with kernel:
-        kernel.record(Milestone(kernel.now(), task.place.component, kind, subject, state, detail))
+        kernel.record(Milestone(kernel.now(), task.context.component, kind, subject, state, detail))
 
 
 def log(text: str, severity: str = "info") -> None:
@@ -98,4 +98,4 @@ def log(text: str, severity: str = "info") -> None:
         raise UsageError(f"volery.log(severity={severity!r}): choose {', '.join(SEVERITIES)}")
     kernel, task = caller("volery.log()")
     with kernel:
-        kernel.record(Text(kernel.now(), task.place.component, SEVERITIES[severity], str(text)))
+        kernel.record(Text(kernel.now(), task.context.component, SEVERITIES[severity], str(text)))

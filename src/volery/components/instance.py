@@ -13,7 +13,7 @@ from traceback import walk_tb
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
-from volery.cost.pricing import FREE, Cost, Pricing
+from volery.cost import FREE, Cost, Pricing
 from volery.kernel.api import Kernel
 from volery.kernel.task import ComputeResource, ExecutionContext, Scope, Task
 from volery.kernel.waiting import Lock, Signal, executing_in
@@ -88,7 +88,7 @@ class Instance:
         self._uncharged: Ns = 0
         self._lock = Lock(kernel, f"{name} (busy)")
         self._made = Signal(kernel, f"{name} (being constructed)")
-        self.place = ComponentContext(
+        self.context = ComponentContext(
             name,
             seat.processor,
             seat.priority,
@@ -176,7 +176,7 @@ class Instance:
         thing = self._ready()
         with self._lock:
             try:
-                with executing_in(self.kernel, self.place):
+                with executing_in(self.kernel, self.context):
                     self._charge(task, f"operation:{operation}", cost)
                     yield thing
             finally:

@@ -23,7 +23,7 @@ from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError
 from volery.components.instance import COMPONENT_MARK
-from volery.cost.instrumentation import StepCounter
+from volery.cost import StepCounter
 
 _PREFIX = "volery.user"
 USER_MODULE_PREFIX = f"{_PREFIX}."

@@ -93,7 +93,7 @@ class Port:
         self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> Any:
         callee = self._callee
-        far = task.place.processor is not callee.place.processor
+        far = task.context.processor is not callee.context.processor
         if far:
             args, kwargs = self._copied((args, kwargs), f"the arguments of {callee.name}.{operation}")
         self._move(self._there, (args, kwargs))

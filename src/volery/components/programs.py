@@ -230,7 +230,7 @@ def start(
             sleep(instance.kernel, instance.seat.starts_at - instance.kernel.now())
             instance.guard(lambda: program.run(instance.object), RUN)
 
-    return instance.kernel.spawn(body, instance.name, instance.place, scope)
+    return instance.kernel.spawn(body, instance.name, instance.context, scope)
 
 
 def _construct(instance: Instance, program: Program, given: Mapping[str, Any]) -> bool:

@@ -1,8 +1,7 @@
-"""Time, flows of control and the resources that computing takes.
+"""Time, tasks, processors and networks.
 
-``api`` is the contract, kept by ``virtual`` and ``wall``; ``processor`` and ``network`` are resources in
-contention; ``timer``, ``interrupt``, ``pacing`` and ``watchdog`` are parts of the two clocks. Two doors:
-``api``, ``task`` and ``waiting`` are for everybody; ``virtual``, ``wall``, ``processor`` and ``network`` are
-opened by ``run`` alone. The kernel serves amounts of time; it must not know what they are for or what sets
-their price.
+``api`` is the interface that the clocks ``virtual`` and ``wall`` implement; ``processor`` and ``network`` are
+contended resources; ``interrupts`` handles Ctrl-C and tasks that freeze virtual time. Any package may import
+``api``, ``task`` and ``waiting``; only ``run`` makes kernels, processors and networks. The kernel serves
+amounts of time and does not know what they are for or how they were priced.
 """

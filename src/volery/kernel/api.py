@@ -1,11 +1,9 @@
-"""What every room above may ask of time: once on greenlets, once on threads.
+"""The interface of a kernel: time and tasks. `virtual` implements it on greenlets, `wall` on threads.
 
-*House code* (actions of ``call_at``, ``every`` and ``post``) never blocks. *User code* (the body of a task)
-blocks wherever it likes. ``with kernel:`` marks an interaction point: user code enters the house. There
-virtual time first serves what the task owes its processor, and the wall clock takes the one monitor that
-guards all house data.
-
-What repeats, on either clock.
+Framework callbacks (actions of ``call_at``, ``every`` and ``post``) never block. Component code (the body of
+a task) may block anywhere. ``with kernel:`` marks an interaction point, where component code enters the
+framework: the virtual clock first spends the task's pending execution time on its processor, the wall clock
+takes the one monitor that guards all data of the framework.
 """
 
 from __future__ import annotations
@@ -13,97 +11,97 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.trace.events import Record
 
-if TYPE_CHECKING:
-    from volery.base.time import Ns
-
-    pass
-
 Action = Callable[[], None]
 
 
 class Handle(Protocol):
-    """Something that will happen."""
+    """An action that has been scheduled."""
 
     def cancel(self) -> None:
-        """It will not happen (any more)."""
+        """Do not execute the action (any more)."""
 
 
 class Kernel(Protocol):
-    """Time and flows of control."""
+    """Time and tasks."""
 
     root: Scope
     record: Record
     guard: AbstractContextManager[object]
-    """Holds house data together without being an interaction point: for what must not fail or block, such as
-    a release in ``finally``. Virtual time needs none, the wall clock takes its monitor."""
+    """Guards data of the framework without being an interaction point, for code that must not fail or block,
+    such as a release in ``finally``. On the wall clock it is the monitor; in virtual time it is never
+    contended."""
 
     def now(self) -> Ns:
-        """Nanoseconds since the start of the run."""
+        """Return the time since the start of the run, ns."""
 
     def call_at(self, when: Ns, action: Action) -> Handle:
-        """Run house code at *when*, not before now. Actions of one instant run in the order of the calls."""
+        """Execute a framework callback at `when`, ns, or now if that is past; in call order."""
 
     def every(self, period: Ns, action: Action) -> Handle:
-        """Run house code now and then each *period*."""
+        """Execute a framework callback now and then every `period` ns."""
 
     def post(self, action: Action) -> None:
-        """Run house code as soon as possible. The only call that a foreign thread may make."""
+        """Execute a framework callback as soon as possible. The only method for foreign threads."""
 
-    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
-        """Start a flow of control. An exception that leaves *body* is a fault of the house."""
+    def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
+        """Start a task. An exception that leaves `body` is an error of the framework and ends the run."""
 
     def adopt(self, name: str) -> AbstractContextManager[Task]:
-        """Make the flow that calls this (a script, a REPL) a task for as long as the context lasts.
+        """Make the calling flow (a script, a REPL) a task while the context manager lasts.
 
-        While it blocks, virtual time runs; while it does not, virtual time stands still.
+        Virtual time runs while that task blocks and stands still while it does not.
         """
 
     def current(self) -> Task | None:
-        """The task that runs now; ``None`` in house code."""
+        """Return the running task; None in a framework callback."""
 
     def __enter__(self) -> Self:
-        """An interaction point: see above. Raises ``Cancelled`` if the task's scope has ended."""
+        """Begin an interaction point. Raises ``Cancelled`` if the task's scope has been cancelled."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Leave the house."""
+        """End the interaction point."""
 
-    def pay(self, amount: Ns) -> None:
-        """Block the current task until its processor has served *amount*, before what follows is visible."""
+    def consume(self, amount: Ns) -> bool:
+        """Block the current task until its processor has served `amount` ns; False if there is no task."""
 
     def sleep_until(self, when: Ns) -> None:
-        """Pay, then block the current task until *when*."""
+        """Spend the pending execution time, then block the current task until `when`, ns."""
 
     def park(self, deadline: Ns | None, waiting_for: str) -> bool:
-        """Block the current task until it is woken (True) or *deadline* has passed (False).
+        """Block the current task until it is woken (True) or `deadline`, ns, has passed (False).
 
-        *waiting_for* names what, for the message of a deadlock. Whoever looks whether it has to wait looks
-        and parks within one ``with kernel:``, lest it be woken in between.
+        A caller that checks a condition before it parks does both within one ``with kernel:``, so that it
+        cannot be woken in between.
+
+        Args:
+            deadline: Time, ns; None waits without limit.
+            waiting_for: What the task waits for, for the message of a deadlock.
         """
 
     def wake(self, task: Task) -> None:
-        """End the wait that *task* is in."""
+        """End the wait that `task` is in."""
 
     def cancel(self, scope: Scope, why: str) -> None:
-        """Deliver ``Cancelled`` to every task of *scope* at its next interaction point."""
+        """Deliver ``Cancelled`` to every task of `scope` at its next interaction point."""
 
     def run(self, until: Ns) -> None:
-        """Let things happen up to and including *until*, or until the root scope is cancelled."""
+        """Let time pass up to and including `until`, ns, or until the root scope is cancelled."""
 
     def close(self, why: str = "end of run") -> list[str]:
-        """Unwind every task; returns the names of those that would not go."""
+        """Cancel and unwind every task; return the names of those that did not end."""
 
 
 class PeriodicAction:
-    """House code now and each *period* from now, counted from the start, so that it never drifts."""
+    """A framework callback now and every `period` ns, counted from the start, so that it does not drift."""
 
     def __init__(self, kernel: Kernel, period: Ns, action: Action) -> None:
         if period <= 0:

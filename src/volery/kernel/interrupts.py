@@ -1,13 +1,9 @@
-"""What reaches the house from outside of virtual time: Ctrl-C, and the watchdog's accusations.
+"""Interrupts of virtual time from outside: Ctrl-C, and the watchdog for tasks that freeze it.
 
-While the house runs in the main thread it owns SIGINT, and takes it where nothing of its own is half done.
-Ctrl-C is posted to the hub, which raises it between two events; if user code is running it is also raised
-there at once, so that an endless loop ends. A second Ctrl-C before the first was delivered is raised on the
-spot. A handler that somebody else has installed is called instead.
-
-Names code that freezes virtual time: a task that runs on the host, and virtual time does not move.
-
-It samples now and then from a thread of its own and costs nothing in between.
+While a kernel runs in the main thread it owns SIGINT. Ctrl-C is posted to the hub, which raises it between
+two events; if component code is running, it is also raised there at once, so that an endless loop ends. A
+second Ctrl-C before the first was delivered is raised immediately. A handler that the user's program has
+installed is called instead. The watchdog uses the same signal, since it also ends blocking system calls.
 """
 
 from __future__ import annotations
@@ -31,43 +27,46 @@ if TYPE_CHECKING:
     from volery.kernel.task import Task
 
 LONGEST_WAIT_S = 0.25
-"""The main thread waits for nothing longer than this at a stretch: Python runs handlers between bytecodes,
-and a signal that arrives just before the thread falls asleep does not wake it."""
+"""Longest single wait of the main thread: Python runs signal handlers between bytecodes, and a signal that
+arrives just before the thread blocks does not wake it."""
 
-_HOUSE = f"{Path(__file__).parents[1]}{os.sep}"
-_EXAMPLES = f"{_HOUSE}examples{os.sep}"
+SAMPLES_PER_PATIENCE = 4
+"""Samples that the watchdog takes within the time that it allows."""
+
+_FRAMEWORK = f"{Path(__file__).parents[1]}{os.sep}"
+_EXAMPLES = f"{_FRAMEWORK}examples{os.sep}"
 _LIBRARIES = (
     "<frozen",
     *{sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")},
 )
 
 
-def _is_house(frame: FrameType) -> bool:
+def _is_framework(frame: FrameType) -> bool:
     file = frame.f_code.co_filename
-    return file.startswith(_HOUSE) and not file.startswith(_EXAMPLES)
+    return file.startswith(_FRAMEWORK) and not file.startswith(_EXAMPLES)
 
 
-def _outwards(frame: FrameType | None) -> Iterator[FrameType]:
-    """*frame* and its callers, libraries left out."""
+def _callers(frame: FrameType | None) -> Iterator[FrameType]:
+    """Yield `frame` and its callers without those of libraries."""
     while frame is not None:
-        if _is_house(frame) or not frame.f_code.co_filename.startswith(_LIBRARIES):
+        if _is_framework(frame) or not frame.f_code.co_filename.startswith(_LIBRARIES):
             yield frame
         frame = frame.f_back
 
 
 def is_component_code(frame: FrameType | None) -> bool:
-    """Whether it is user code that is at work, and not the house on its behalf."""
-    return not _is_house(next(_outwards(frame), frame)) if frame is not None else False
+    """Return whether component code executes, directly or in a library, and not the framework."""
+    return not _is_framework(next(_callers(frame), frame)) if frame is not None else False
 
 
 def component_line(frame: FrameType | None) -> str:
-    """``file:line`` of the innermost line of user code; of a house that is all alone, its own."""
-    found = next((each for each in _outwards(frame) if not _is_house(each)), frame)
+    """Return ``file:line`` of the innermost line of component code, else of the framework."""
+    found = next((each for each in _callers(frame) if not _is_framework(each)), frame)
     return f"{found.f_code.co_filename}:{found.f_lineno}" if found is not None else "an unknown line"
 
 
 class StallReport(NamedTuple):
-    """It was this task, at this virtual time, that would not let go."""
+    """A task that has not blocked, and the virtual time at which it has not."""
 
     task: Task
     now: Ns
@@ -75,18 +74,18 @@ class StallReport(NamedTuple):
 
 
 class Interrupts:
-    """Owns SIGINT within its context, if that is entered in the main thread."""
+    """Owner of SIGINT while it is entered, if it is entered in the main thread."""
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
         self._before: Any = None
-        self._lock = threading.Lock()  # an accusation is made while the handler is in place, or not at all
-        self._accusation: StallReport | None = None
+        self._lock = threading.Lock()  # a stall is reported while the handler is installed, or not at all
+        self._stall: StallReport | None = None
         self._pending = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGINT, self._taken)
+            self._before = signal.signal(signal.SIGINT, self._handle)
         return self
 
     def __exit__(
@@ -97,46 +96,46 @@ class Interrupts:
                 signal.signal(signal.SIGINT, self._before)
                 self._before = None
         if isinstance(error, KeyboardInterrupt):
-            self._pending = False  # raised in user code before it was delivered
+            self._pending = False  # raised in component code before it was delivered
         self._deliver()
 
-    def accuse(self, task: Task, now: Ns, what: str) -> None:
-        """Raise a ``ComponentError`` in *task* if it is still at work at *now*. From any thread."""
+    def report_stall(self, task: Task, now: Ns, what: str) -> None:
+        """Raise a ``ComponentError`` in `task` if it still executes at time `now`; from any thread."""
         main = threading.main_thread().ident
         with self._lock:
             if self._before is not None and main is not None:
-                self._accusation = StallReport(task, now, what)
-                signal.pthread_kill(main, signal.SIGINT)  # ends blocking calls too, such as time.sleep
+                self._stall = StallReport(task, now, what)
+                signal.pthread_kill(main, signal.SIGINT)  # also ends blocking calls, such as time.sleep
 
-    def _taken(self, number: int, frame: FrameType | None) -> None:
-        accusation, self._accusation = self._accusation, None
-        if accusation is not None:
-            self._confront(accusation, frame)
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        stall, self._stall = self._stall, None
+        if stall is not None:
+            self._raise_stall(stall, frame)
         elif self._before is signal.default_int_handler:
             self._interrupt(frame)
         elif callable(self._before):
             self._before(number, frame)
 
-    def _confront(self, accusation: StallReport, frame: FrameType | None) -> None:
-        task, now, what = accusation
+    def _raise_stall(self, stall: StallReport, frame: FrameType | None) -> None:
+        task, now, what = stall
         if self._kernel.current() is not task or self._kernel.now() != now:
             return
         error = ComponentError(
-            task.place.component, f"virtual time is frozen: {what}, in {component_line(frame)}"
+            task.context.component, f"virtual time is frozen: {what}, in {component_line(frame)}"
         )
         if is_component_code(frame):
             raise error
-        task.summons = task.summons or error
+        task.pending_cancellation = task.pending_cancellation or error
 
     def _interrupt(self, frame: FrameType | None) -> None:
         if self._pending:
             raise KeyboardInterrupt
         task = self._kernel.current()
-        in_user_code = task is not None and is_component_code(frame)
-        if not (in_user_code and task is not None and task.adopted):
+        in_component = task is not None and is_component_code(frame)
+        if not (in_component and task is not None and task.adopted):
             self._pending = True
             self._kernel.post(self._deliver)
-        if in_user_code:
+        if in_component:
             raise KeyboardInterrupt
 
     def _deliver(self) -> None:
@@ -145,14 +144,10 @@ class Interrupts:
             raise KeyboardInterrupt
 
 
-SAMPLES = 4
-"""How often it looks within the time that it allows."""
-
-
 class Watchdog:
-    """Has a task accused that runs for *patience_s* seconds on the wall at one and the same virtual time.
+    """Thread that reports a task which executes for `patience_s` of wall time at one virtual time.
 
-    The flow of a script is exempt: virtual time stands still while that runs.
+    The flow of a script is exempt, since virtual time stands still while a script executes.
     """
 
     def __init__(self, kernel: Kernel, interrupts: Interrupts, patience_s: float) -> None:
@@ -162,7 +157,7 @@ class Watchdog:
         self._stopped = threading.Event()
         self._thread: threading.Thread | None = None
         self._seen: tuple[Task | None, Ns] = (None, 0)
-        self._since = 0.0  # on the wall: when it was first seen so
+        self._since = 0.0  # monotonic time at which `_seen` was first seen, s
 
     def start(self) -> None:
         """Watch until ``stop``."""
@@ -171,18 +166,18 @@ class Watchdog:
             self._thread.start()
 
     def stop(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._stopped.set()
 
     def _watch(self) -> None:
-        while not self._stopped.wait(self._patience_s / SAMPLES):
-            self.look(monotonic())
+        while not self._stopped.wait(self._patience_s / SAMPLES_PER_PATIENCE):
+            self.check(monotonic())
 
-    def look(self, moment: float) -> None:
-        """Compare what runs at this *moment*, seconds on the wall, with what ran when it last looked."""
+    def check(self, moment: float) -> None:
+        """Compare what runs at `moment`, monotonic seconds, with the previous sample."""
         task, now = self._kernel.current(), self._kernel.now()
         if task is None or task.adopted or self._seen != (task, now):
             self._seen, self._since = (task, now), moment
         elif moment - self._since >= self._patience_s:
-            self._interrupts.accuse(task, now, f"it has not let go for {self._patience_s:g} s")
+            self._interrupts.report_stall(task, now, f"it has not let go for {self._patience_s:g} s")
             self._since = moment

@@ -1,11 +1,11 @@
-"""A network joins processors: one sender at a time, then latency; what is sent may be lost.
+"""Networks between processors: one sender at a time, then latency; a transmission may be lost.
 
-The law, for *size* bytes:
+The law, for `size` bytes:
 
-* serialisation time = size * 8 / bandwidth, rounded up to a nanosecond; who wants to send meanwhile waits;
+* serialisation time = size * 8 / bandwidth, rounded up to a nanosecond; other senders wait meanwhile;
 * arrival = end of serialisation + latency;
-* each sending is lost with probability *loss*: one draw from the network's own stream per sending, in turn;
-* what must arrive is sent again 2 * latency + serialisation time after the start of a sending that was lost.
+* each transmission is lost with probability `loss`: one draw each from the network's own stream, in order;
+* a reliable transfer is sent again 2 * latency + serialisation time after the start of a lost transmission.
 """
 
 from __future__ import annotations
@@ -27,17 +27,31 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, slots=True)
 class Transfer:
-    """Something that must arrive."""
+    """A reliable transfer in progress."""
 
     size: int
     deliver: Action
-    queue: deque[Transfer]  # of those that must arrive in order
+    queue: deque[Transfer]  # transfers that must arrive in order
     next: Handle | None = None
     arrived: bool = False
 
 
 class Network:
-    """Serves both clocks. Sizes are in bytes on the wire, headers included."""
+    """A shared medium, for both clocks.
+
+    Args:
+        kernel: Clock that it takes time of.
+        name: Name in messages.
+        bandwidth_bit_s: Bits per second, above 0.
+        latency: Time between the end of serialisation and arrival, ns.
+        loss: Probability that a transmission is lost, 0 to 1.
+        stream: Random numbers for the losses.
+
+    Sizes are in bytes on the medium, headers included.
+
+    Raises:
+        UsageError: an argument is out of range.
+    """
 
     def __init__(
         self, kernel: Kernel, name: str, *, bandwidth_bit_s: int, latency: Ns, loss: float, stream: Random
@@ -49,21 +63,27 @@ class Network:
             )
         self._kernel, self.name = kernel, name
         self._bandwidth, self._latency, self._loss, self._stream = bandwidth_bit_s, latency, loss, stream
+        self._usual = latency, loss
         self._free: Ns = 0  # when the medium is free
         self._queues: dict[str, deque[Transfer]] = {}
 
+    def degrade(self, *, loss: float = 0.0, delay: Ns = 0) -> None:
+        """Set at least this `loss` and `delay` ns more latency than stated at the start; 0 restores it."""
+        usual_latency, usual_loss = self._usual
+        self._latency, self._loss = usual_latency + delay, max(usual_loss, loss)
+
     def serialisation(self, size: int) -> Ns:
-        """How long the medium is taken by *size* bytes."""
+        """Return the time that `size` bytes occupy the medium, ns."""
         return -(-size * 8 * S // self._bandwidth)
 
     def _transmit(self, size: int) -> tuple[Ns, Ns, bool]:
-        """Take the medium in turn: when it starts to send, when that arrives, and whether it is lost."""
+        """Occupy the medium in turn; return when sending starts, when it arrives, and whether it is lost."""
         start = max(self._free, self._kernel.now())
         self._free = start + self.serialisation(size)
         return start, self._free + self._latency, self._stream.random() < self._loss
 
     def send(self, size: int, deliver: Action, lost: Action | None = None) -> None:
-        """Best effort: *deliver* is called when it arrives, else *lost* when it would have. Never blocks."""
+        """Send best-effort: call `deliver` at the arrival, or `lost` at that time. Never blocks."""
         _, arrival, is_lost = self._transmit(size)
         if not is_lost:
             self._kernel.call_at(arrival, deliver)
@@ -71,15 +91,15 @@ class Network:
             self._kernel.call_at(arrival, lost)
 
     def send_reliable(self, size: int, deliver: Action, stream: str = "") -> None:
-        """Sent again until it arrives. What bears one *stream* name is delivered in the order of sending."""
+        """Send until it arrives, then call `deliver`. Transfers of one `stream` are delivered in order."""
         queue = self._queues.setdefault(stream, deque()) if stream else deque()
         self._begin(Transfer(size, deliver, queue))
 
     def carry(self, size: int, deadline: Ns | None = None) -> None:
-        """Block the current task until *size* bytes have arrived, sent again as often as that takes.
+        """Block the current task until `size` bytes have arrived, repeated as often as necessary.
 
         Raises:
-            LinkLost: they have not by *deadline*.
+            LinkLost: they have not arrived by `deadline`, ns.
         """
         with self._kernel as kernel:
             task = current_task(kernel)

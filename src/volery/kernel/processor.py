@@ -1,14 +1,15 @@
-"""Cores as contended resources: they serve amounts of target time, whatever for and whoever set the price.
+"""Processors: cores as contended resources that serve amounts of target time.
 
 Schedulers:
 
-* ``fixed-priority``: the most urgent jobs run, at once; among equals the first (SCHED_FIFO of POSIX).
-* ``round-robin``: priorities do not count; whoever has run for a *quantum* goes to the back if others wait.
-* ``fifo``: priorities do not count; first come, first served, to the end.
+* ``fixed-priority``: the most urgent jobs run, preemptively; equal ones in order of arrival (POSIX
+SCHED_FIFO).
+* ``round-robin``: without priorities; a job that has run for a `quantum` goes to the end if others wait.
+* ``fifo``: without priorities; first come, first served, without preemption.
 
-A job keeps its core while it runs and takes the free core of lowest number when it starts or goes on. Putting
-a job on a core that served somebody else last takes *context_switch* of that core first, which the job's
-slices contain.
+A job keeps its core while it runs, and takes the free core of lowest number when it starts or continues.
+Placing a job on a core that served another owner last takes `context_switch` of that core first, which the
+slices of the job contain. Prices are the caller's: a processor does not know what an amount of time is for.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
 from volery.kernel.task import ExecutionContext, Task
-from volery.kernel.virtual import FOREVER, VirtualKernel
+from volery.kernel.virtual import FOREVER, NEVER, VirtualKernel
 from volery.trace.events import Preemption, Slice
 
 if TYPE_CHECKING:
@@ -32,14 +33,14 @@ if TYPE_CHECKING:
 NO_CORE = -1
 
 QUANTUM: Ns = 10 * MS
-"""The usual time slice of round-robin."""
+"""Default time slice of round-robin."""
 
 
 @dataclass(eq=False, slots=True)
 class Job:
-    """An amount of computing that wants a core."""
+    """An amount of computing that needs a core."""
 
-    owner: Task | ExecutionContext  # a place: computing in the background, nobody waits for it
+    owner: Task | ExecutionContext  # a context: computing in the background, for which no task waits
     name: str
     component: str
     priority: int
@@ -71,7 +72,19 @@ SCHEDULERS: dict[str, Callable[[Job], Order]] = {
 
 
 class Processor:
-    """A ``Server`` with *cores* equal cores under one *scheduler*."""
+    """A ``ComputeResource`` of equal cores under one scheduler.
+
+    Args:
+        kernel: Virtual clock that it takes time of.
+        name: Name in the trace.
+        cores: Number of cores, at least 1.
+        scheduler: A key of ``SCHEDULERS``.
+        quantum: Time slice of round-robin, ns.
+        context_switch: Time that a change of owner takes on a core, ns.
+
+    Raises:
+        UsageError: an argument is out of range.
+    """
 
     def __init__(
         self,
@@ -95,79 +108,95 @@ class Processor:
         self._order = SCHEDULERS[scheduler]
         self._quantum = quantum if scheduler == "round-robin" else FOREVER
         self._context_switch = context_switch
-        self._jobs: list[Job] = []  # the first ``cores`` of them run
+        self._jobs: list[Job] = []  # in order; the first `cores` of them run
         self._free = list(range(cores))
-        self._last: list[Task | ExecutionContext | None] = [None] * cores  # whom a core served last
+        self._last: list[Task | ExecutionContext | None] = [None] * cores  # last owner of each core
         self._background: dict[ExecutionContext, Job] = {}
         self._arrivals = 0
         self._busy: Ns = 0
+        self._halted = False
 
     def busy_ns(self, now: Ns) -> Ns:
-        """Time that cores have been busy until *now*, summed over the cores."""
+        """Return the busy time until `now`, summed over the cores, ns."""
         return self._busy + sum(now - job.started for job in self._jobs if job.core != NO_CORE)
 
-    # -- what is asked of it
+    # -- requests
 
     def serve(self, task: Task, amount: Ns) -> None:
-        """Block *task* until *amount* has been executed for it, at the priority that it has now."""
-        if amount <= 0 or (not self._jobs and self._serve_alone(task, amount)):
+        """Block `task` until `amount` ns have been executed for it, at the priority that it has now."""
+        if amount <= 0:
             return
-        job = self._arrive(Job(task, task.name, task.place.component, task.priority, 0, amount))
+        component = task.contexts[-1].component
+        if not self._jobs and not self._halted:  # no job competes, and perhaps no event is due before the end
+            total = amount if self._last[0] is task else amount + self._context_switch
+            start = self._kernel.skip(total)
+            if start != NEVER:
+                self._last[0] = task
+                self._busy += total
+                self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
+                return
+        job = Job(task, task.name, component, task.priority, 0, amount)
+        self._admit(job)
         try:
             while not job.done:
                 self._kernel.park(None, self.name)
         finally:
             if not job.done:
-                self._leave(job)
+                self._abandon(job)
 
-    def _serve_alone(self, task: Task, amount: Ns) -> bool:
-        """The short way: nobody else computes, and nothing happens anywhere until the end."""
-        start = self._kernel.now()
-        total = amount if self._last[0] is task else amount + self._context_switch
-        if not self._kernel.leap(start + total):
-            return False
-        self._last[0] = task
-        self._busy += total
-        self._kernel.record(Slice(start, start + total, self.name, 0, task.name, task.place.component))
-        return True
-
-    def load(self, place: ExecutionContext, amount: Ns) -> None:
-        """Execute *amount* in the background of *place*: one thread, at the priority of the place."""
+    def load(self, context: ExecutionContext, amount: Ns) -> None:
+        """Execute `amount` ns in the background of `context`: one thread, at the priority of the context."""
         if amount <= 0:
             return
-        job = self._background.get(place)
+        job = self._background.get(context)
         if job is None:
-            name = f"{place.component} (background)"
-            job = Job(place, name, place.component, place.priority or 0, 0, amount)
-            self._background[place] = job
-            self._arrive(job)
+            name = f"{context.component} (background)"
+            job = Job(context, name, context.component, context.priority or 0, 0, amount)
+            self._background[context] = job
+            self._admit(job)
         else:
             job.remaining += amount
             if job.core != NO_CORE:
                 self._set_timer(job)
 
-    # -- who runs
+    def halt(self) -> None:
+        """Stop executing: no job progresses until `resume`."""
+        self._halted = True
+        for job in list(self._jobs):
+            if job.core != NO_CORE:
+                self._stop(job)
+                if job.remaining == 0:  # it would have ended at this instant
+                    self._complete(job)
 
-    def _arrive(self, job: Job) -> Job:
+    def resume(self) -> None:
+        """Execute again, from where `halt` stopped."""
+        self._halted = False
+        self._dispatch()
+
+    # -- scheduling
+
+    def _admit(self, job: Job) -> None:
         self._arrivals += 1
         job.arrival = self._arrivals
         insort(self._jobs, job, key=self._order)
-        self._make_way(job.name)
+        if len(self._jobs) > self.cores:
+            self._preempt(job.name)
         self._dispatch()
-        return job
 
-    def _make_way(self, urgent: str) -> None:
-        """Who has a core and no right to it any more stops for *urgent*, who has just come."""
+    def _preempt(self, urgent: str) -> None:
+        """Stop the jobs that have a core but are no longer among the first; job `urgent` has arrived."""
         for job in self._jobs[self.cores :]:
             if job.core != NO_CORE:
                 core = job.core
                 self._stop(job)
-                if job.remaining == 0:  # it would have ended at this very instant
+                if job.remaining == 0:  # it would have ended at this instant
                     self._complete(job)
                 else:
                     self._kernel.record(Preemption(self._kernel.now(), self.name, core, job.name, urgent))
 
     def _dispatch(self) -> None:
+        if self._halted:
+            return
         for job in self._jobs[: self.cores]:
             if job.core == NO_CORE:
                 self._start(job)
@@ -189,7 +218,7 @@ class Processor:
         if ends <= job.turn_ends:
             job.timer = self._kernel.call_at(ends, partial(self._finish, job))
         else:
-            job.timer = self._kernel.call_at(job.turn_ends, partial(self._turn, job))
+            job.timer = self._kernel.call_at(job.turn_ends, partial(self._end_turn, job))
 
     def _stop(self, job: Job) -> None:
         now = self._kernel.now()
@@ -202,14 +231,14 @@ class Processor:
         self._free.append(job.core)
         job.core = NO_CORE
 
-    def _turn(self, job: Job) -> None:
-        if len(self._jobs) <= self.cores:  # nobody waits
+    def _end_turn(self, job: Job) -> None:
+        if len(self._jobs) <= self.cores:  # no other job waits
             job.turn_ends += self._quantum
             self._set_timer(job)
         else:
             self._stop(job)
             self._jobs.remove(job)
-            self._arrive(job)
+            self._admit(job)
 
     def _finish(self, job: Job) -> None:
         self._stop(job)
@@ -224,8 +253,8 @@ class Processor:
         else:
             del self._background[job.owner]
 
-    def _leave(self, job: Job) -> None:
-        """Its task is ended: the rest of it is not executed."""
+    def _abandon(self, job: Job) -> None:
+        """Drop a job whose task has been cancelled: the rest is not executed."""
         if job.core != NO_CORE:
             self._stop(job)
         self._jobs.remove(job)

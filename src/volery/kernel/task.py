@@ -1,4 +1,8 @@
-"""A task is a flow of control; a place is where its computing is spent; a scope is who may end it."""
+"""Tasks, the contexts they execute in, and the scopes that cancel them.
+
+Both clocks use these classes. A task carries the execution time that it still has to spend (``pending_ns``);
+only the virtual clock has processors to spend it on.
+"""
 
 from __future__ import annotations
 
@@ -10,33 +14,36 @@ from volery.base.time import Ns
 from volery.trace.events import NONE, Activation
 
 MAX_SWALLOWED_CANCELLATIONS = 10
-"""How often a task may swallow its end before it is left where it is and never runs again."""
+"""A task that has caught more cancellations than this without ending is left blocked and never runs again."""
 
 
 class Cancelled(BaseException):
-    """Ends a task at its next interaction point. No ``Exception``, lest user code catch it by accident."""
+    """Ends a task at its next interaction point. Not an ``Exception``, which components may catch."""
 
 
 class ComputeResource(Protocol):
-    """A processor, as a task sees it."""
+    """A processor as tasks use it."""
 
     name: str
 
     def serve(self, task: Task, amount: Ns) -> None:
-        """Block *task* until *amount* of target time has been executed for it, in contention with others."""
+        """Block `task` until `amount` ns of target time have been executed for it, under contention."""
 
-    def load(self, place: ExecutionContext, amount: Ns) -> None:
-        """Execute *amount* beside whatever the caller does: background threads of a process. Never blocks."""
+    def load(self, context: ExecutionContext, amount: Ns) -> None:
+        """Execute `amount` ns in the background threads of a process. Never blocks the caller."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExecutionContext:
-    """Where computing is spent: whose it is, on which processor, how urgent, and how it is metered.
+    """Where execution time is spent: for which component, on which processor, at what priority.
 
-    ``processor`` is ``None`` where computing takes no simulated time. ``priority`` ``None`` means the
-    caller's (a passive component). ``deadline`` is relative to the release of an activation. ``meter`` gives
-    the execution time on the target since it was last asked; it is pulled at every interaction point.
-    ``on_release`` is told each release of an activation before the task goes on, and may charge it.
+    Attributes:
+        component: Name of the component instance that is charged.
+        processor: Processor that executes it; None where computing takes no simulated time.
+        priority: Scheduling priority, higher is more urgent; None inherits the caller's (passive component).
+        deadline: Relative to the release of an activation, ns; None for none.
+        meter: Returns the execution time on the target since its last call, ns; read at interaction points.
+        on_release: Called with the task at each release of an activation; it may charge the activation.
     """
 
     component: str
@@ -48,90 +55,95 @@ class ExecutionContext:
 
 
 class Task:
-    """One flow of control. The kernel that spawned it owns ``flow`` and the fields below it.
+    """One flow of control. ``flow`` and the attributes after it belong to the kernel that spawned the task.
 
-    An *activation* runs from a release (its start, a timer, a message, the return of a sleep) to the next
-    blocking wait of the user's. Waits inside the house (for a processor, a network, a lock) do not end it.
+    An activation lasts from a release (start, timer, message, end of a sleep) to the next blocking wait of
+    the component's code. Waits inside the framework (for a processor, a network, a lock) do not end it.
     """
 
-    def __init__(self, name: str, place: ExecutionContext, scope: Scope) -> None:
+    def __init__(self, name: str, context: ExecutionContext, scope: Scope) -> None:
         self.name = name
-        self.places = [place]
+        self.contexts = [context]
         self.scope = scope
-        self.debt: Ns = 0
-        self.released: Ns | None = None  # of the activation that is under way
+        self.pending_ns: Ns = 0
+        self.released: Ns | None = None  # release time of the activation in progress
         self.done = False
-        self.adopted = False  # the flow of a script: the kernel has not made it and cannot end it
+        self.adopted = False  # the flow of a script: the kernel did not start it and cannot end it
         self.flow: Any = None
         self.waiting_for = ""
         self.woken = False
-        self.ticket = 0  # of its next resumption; what was scheduled under another ticket is void
-        self.refusals = 0  # how often it has swallowed its end
-        self.summons: BaseException | None = Cancelled(scope.cancelled) if scope.cancelled else None
+        self.ticket = 0  # of the next resumption; heap entries with another ticket are void
+        self.swallowed = 0  # cancellations that it has caught without ending
+        self.pending_cancellation: BaseException | None = (
+            Cancelled(scope.cancelled) if scope.cancelled else None
+        )
         scope.tasks.append(self)
 
-    def answer(self) -> None:
-        """Raise what it is summoned for. Returns only if it has swallowed its end too often."""
-        error, self.summons = self.summons, None
+    def deliver_cancellation(self) -> None:
+        """Raise the pending cancellation. Returns only for a task that has swallowed too many of them."""
+        error, self.pending_cancellation = self.pending_cancellation, None
         if self.scope.cancelled:
-            self.summons = Cancelled(self.scope.cancelled)  # an end is delivered again and again
+            self.pending_cancellation = Cancelled(self.scope.cancelled)  # delivered again until the task ends
         if isinstance(error, Cancelled):
-            self.refusals += 1
-            if self.refusals > MAX_SWALLOWED_CANCELLATIONS and not self.adopted:
+            self.swallowed += 1
+            if self.swallowed > MAX_SWALLOWED_CANCELLATIONS and not self.adopted:
                 return
         if error is not None:
             raise error
 
     def release(self, due: Ns) -> None:
-        """An activation begins; it was due at *due*, which is in the past for a task that is late."""
+        """Begin an activation that was due at `due`, ns; in the past for a task that is late."""
         self.released = due
-        hook = self.places[0].on_release
+        hook = self.contexts[0].on_release
         if hook is not None:
             hook(self)
 
     def finish(self, now: Ns) -> Activation | None:
-        """The activation that is under way ends; ``None`` if there is none, as in the flow of a script."""
-        if self.released is None:
+        """End the activation in progress; return None if there is none, as in the flow of a script."""
+        released = self.released
+        if released is None:
             return None
-        home = self.places[0]
-        deadline = NONE if home.deadline is None else self.released + home.deadline
-        activation = Activation(self.released, now, home.component, deadline)
         self.released = None
-        return activation
+        own = self.contexts[0]
+        deadline = NONE if own.deadline is None else released + own.deadline
+        return Activation(released, now, own.component, deadline)
 
     @property
-    def place(self) -> ExecutionContext:
-        """Where it computes now: its own place, or that of the component it is visiting through a port."""
-        return self.places[-1]
+    def context(self) -> ExecutionContext:
+        """Context it executes in: its own, or that of the component that it is calling through a port."""
+        return self.contexts[-1]
 
     @property
     def priority(self) -> int:
-        """Of the innermost place that states one."""
-        return next((place.priority for place in reversed(self.places) if place.priority is not None), 0)
+        """Priority of the innermost context that states one."""
+        for context in reversed(self.contexts):
+            if context.priority is not None:
+                return context.priority
+        return 0
 
     def charge(self, amount: Ns) -> None:
-        """Owe *amount* of target time, to be served at the next interaction point."""
-        self.debt += amount
+        """Add `amount` ns of execution time, which is spent at the next interaction point."""
+        self.pending_ns += amount
 
-    def take_debt(self) -> Ns:
-        """What is owed, the meter's reading included; zero from now on."""
-        amount, self.debt = self.debt, 0
-        meter = self.places[-1].meter
+    def take_pending(self) -> Ns:
+        """Return the pending execution time, the meter's reading included, and reset it to zero."""
+        amount, self.pending_ns = self.pending_ns, 0
+        meter = self.contexts[-1].meter
         return amount + meter() if meter else amount
 
 
 @dataclass(eq=False)
 class Scope:
-    """A tree of tasks that are ended together."""
+    """A tree of tasks that are cancelled together."""
 
     name: str
     parent: Scope | None = None
     tasks: list[Task] = field(default_factory=list)
     children: list[Scope] = field(default_factory=list)
-    cancelled: str = ""  # why; empty while it lives
+    cancelled: str = ""  # the reason; empty while the scope lives
 
     def child(self, name: str) -> Scope:
-        """A scope that ends when this one does, or earlier. Those that have ended before are forgotten."""
+        """Return a new scope that ends with this one or earlier; forget children that have ended."""
         self.children = [one for one in self.children if not (one.cancelled and one.is_empty)]
         scope = Scope(name, self, cancelled=self.cancelled)
         self.children.append(scope)
@@ -139,19 +151,19 @@ class Scope:
 
     @property
     def is_empty(self) -> bool:
-        """No task is left in it or below."""
+        """Whether no task is left in this scope or below."""
         return next(self.all_tasks(), None) is None
 
     def all_tasks(self) -> Iterator[Task]:
-        """Every task in this scope and below."""
+        """Yield every task in this scope and below."""
         yield from self.tasks
         for child in self.children:
             yield from child.all_tasks()
 
     def mark(self, why: str) -> None:
-        """Remember, here and below, that it has ended. Waking the tasks is the kernel's part."""
+        """Mark this scope, its children and their tasks as cancelled. The kernel wakes the tasks."""
         self.cancelled = self.cancelled or why
         for task in self.tasks:
-            task.summons = Cancelled(self.cancelled)
+            task.pending_cancellation = Cancelled(self.cancelled)
         for child in self.children:
             child.mark(why)

@@ -1,17 +1,18 @@
-"""Virtual time: a task is a greenlet, and what is to happen lies in one heap ordered by (time, ticket).
+"""Virtual time: a task is a greenlet, and future events lie in one heap ordered by (time, ticket).
 
-The *hub* is a greenlet of its own that takes from the heap: house code runs there, and from there tasks are
-started. A task that blocks hands over directly to a task that is next (``_yield``), and does not even do that
-where nobody would notice (``leap``). A ticket is drawn for every entry; an entry is void once its target
-bears another.
-
-Keeps virtual time from running ahead of the clock on the wall.
+The hub is a greenlet of its own that takes events from the heap: framework callbacks execute there, and tasks
+are started from there. A task that blocks switches directly to the next task where the next event is one
+(``_switch``), and does not switch at all where no event precedes the end of its wait (``skip``). Every entry
+of the heap has a ticket; an entry is void once its target has another one. Threads that pass a baton were
+measured to be fifty times slower than greenlets, and generators would make every blocking call of a component
+visible in its code.
 """
 
 from __future__ import annotations
 
+import threading
 from collections import deque
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from heapq import heappop, heappush, heapreplace
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -32,32 +33,33 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from types import TracebackType
 
-    from volery.base.time import Ns
     from volery.kernel.api import Action
+
+FOREVER: Ns = 2**63 - 1
+NEVER: Ns = -1
+VOID = 0
 
 
 class Pacer:
-    """Lets *pace* seconds pass in one second on the wall, at most: time that was lost is not made good."""
+    """Limits virtual time to `pace` seconds per second of wall time. Time that was lost is not caught up."""
 
     def __init__(self, pace: float) -> None:
         if pace <= 0.0:
             raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
         self._pace = pace
-        self._anchor: tuple[int, Ns] | None = None  # a moment on the wall and in virtual time
-        self._bell: SimpleQueue[None] = (
-            SimpleQueue()
-        )  # unlike an Event's, its ring is safe in a signal handler
+        self._anchor: tuple[int, Ns] | None = None  # one instant in wall time and in virtual time
+        self._bell: SimpleQueue[None] = SimpleQueue()  # unlike an Event, safe to use in a signal handler
 
     def rest(self) -> None:
-        """Virtual time stands still until the next ``wait``."""
+        """Stop virtual time until the next ``wait``."""
         self._anchor = None
 
     def ring(self) -> None:
-        """End the wait that is under way, or else the next; from any thread."""
+        """End the wait in progress, or else the next one; from any thread."""
         self._bell.put(None)
 
     def wait(self, now: Ns, when: Ns) -> Ns | None:
-        """``None`` if *when* has come; else what time it is after a wait, which may have been cut short."""
+        """Wait for `when`, ns; return None if it has come, else the time after a wait, perhaps short."""
         if self._anchor is None:
             self._anchor = (monotonic_ns(), now)
         wall, virtual = self._anchor
@@ -70,13 +72,8 @@ class Pacer:
         return max(now, min(virtual + passed, when))
 
 
-FOREVER: Ns = 2**63 - 1
-NEVER: Ns = -1
-VOID = 0
-
-
 class Entry:
-    """House code in the heap."""
+    """A framework callback in the heap."""
 
     __slots__ = ("action", "ticket")
 
@@ -84,22 +81,23 @@ class Entry:
         self.action, self.ticket = action, ticket
 
     def cancel(self) -> None:
-        """Make it void."""
+        """Make the entry void."""
         self.ticket = VOID
 
 
-def _nothing() -> None:
-    """What happens at the end of time."""
+def _end_of_time() -> None:
+    """Do nothing; the action of the entry that is never reached."""
 
 
 class VirtualKernel:
-    """Time that passes as fast as there is nothing to do; with a *pace*, at most that many seconds a second.
+    """Kernel whose time passes as fast as its events are processed, in the thread that first runs it.
 
-    A kernel with a pace also serves other threads: it waits for what they ``post`` when nothing else is left
-    to happen. With *watchdog_s*, a task that runs that long on the wall while virtual time stands gets a
-    ``ComponentError`` that names its component and line; this needs the main thread.
-
-    A kernel belongs to the thread that first runs it.
+    Args:
+        record: Receives the events of the run.
+        pace: Greatest number of virtual seconds per second of wall time. A kernel with a pace also waits
+            for ``post`` of other threads when no event is left.
+        watchdog_s: Wall time, s, after which a task that does not block gets a ``ComponentError`` naming its
+            component and line; needs the main thread.
     """
 
     def __init__(
@@ -107,53 +105,53 @@ class VirtualKernel:
     ) -> None:
         self.record = record
         self.root = Scope("run")
-        self.guard: AbstractContextManager[object] = nullcontext()
+        self.guard: AbstractContextManager[object] = threading.RLock()  # cheaper than nullcontext()
         self._now: Ns = 0
         self._until: Ns = 0
-        self._horizon: Ns = NEVER  # up to here tasks may hand over without the hub
-        self._heap: list[tuple[Ns, int, Any]] = [(FOREVER + 1, VOID, Entry(_nothing, VOID))]  # never empty
+        self._horizon: Ns = NEVER  # until then tasks may switch without the hub
+        self._heap: list[tuple[Ns, int, Any]] = [(FOREVER + 1, VOID, Entry(_end_of_time, VOID))]
         self._tickets = count(1)
         self._current: Task | None = None
         self._adopted: Task | None = None
         self._inbox: deque[Action] = deque()
         self._pacer = None if pace is None else Pacer(pace)
         self._hub: Any = None
-        self._owner: Any = None  # the flow that is told how the hub ended
+        self._owner: Any = None  # the flow that the hub returns to
         self._interrupts = Interrupts(self)
         self._watchdog = None if watchdog_s is None else Watchdog(self, self._interrupts, watchdog_s)
 
-    # -- what is asked without blocking
+    # -- without blocking
 
     def now(self) -> Ns:
-        """Nanoseconds since the start of the run."""
+        """Return the time since the start of the run, ns."""
         return self._now
 
     def current(self) -> Task | None:
-        """The task that runs now; ``None`` in house code."""
+        """Return the running task; None in a framework callback."""
         return self._current
 
     def call_at(self, when: Ns, action: Action) -> Entry:
-        """Run house code at *when*, or now if that is past."""
+        """Execute a framework callback at `when`, ns, or now if that is past."""
         ticket = next(self._tickets)
         entry = Entry(action, ticket)
         heappush(self._heap, (when if when > self._now else self._now, ticket, entry))
         return entry
 
     def every(self, period: Ns, action: Action) -> PeriodicAction:
-        """Run house code now and then each *period*."""
+        """Execute a framework callback now and then every `period` ns."""
         return PeriodicAction(self, period, action)
 
     def post(self, action: Action) -> None:
-        """Run house code as soon as possible; from any thread, and from signal handlers."""
+        """Execute a framework callback as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
         self._horizon = NEVER
         if self._pacer is not None:
             self._pacer.ring()
 
-    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
-        """Start a flow of control; it begins at this instant, after what is already due."""
-        task = Task(name, place, scope or self.root)
-        task.woken = True  # nothing to wake before it has begun
+    def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
+        """Start a task at this instant, after what is already due."""
+        task = Task(name, context, scope or self.root)
+        task.woken = True  # it cannot be woken before it has begun
 
         def begin() -> None:
             if not task.done:
@@ -165,10 +163,10 @@ class VirtualKernel:
 
     def _live(self, task: Task, body: Action) -> None:
         try:
-            if task.summons is None:
+            if task.pending_cancellation is None:
                 task.release(self._now)
                 body()
-                with self:  # the last computing is paid as well
+                with self:  # spends the execution time of the last activation
                     activation = task.finish(self._now)
                     if activation is not None:
                         self.record(activation)
@@ -186,14 +184,10 @@ class VirtualKernel:
 
     def __enter__(self) -> Self:
         task = self._current
-        if task is not None:
-            if task.summons is not None:
-                self._answer(task)
-            amount = task.take_debt()
-            if amount:
-                processor = task.places[-1].processor
-                if processor is not None:
-                    processor.serve(task, amount)
+        if task is not None and (
+            task.pending_ns or task.pending_cancellation is not None or task.contexts[-1].meter is not None
+        ):
+            self._interact(task)
         return self
 
     def __exit__(
@@ -201,26 +195,39 @@ class VirtualKernel:
     ) -> None:
         pass
 
-    def _answer(self, task: Task) -> None:
-        task.answer()
-        while True:  # it swallows its end: this interaction point never returns
+    def _interact(self, task: Task) -> None:
+        """Deliver a pending cancellation, else block until the pending execution time has been served."""
+        if task.pending_cancellation is not None:
+            self._cancel_task(task)
+        amount = task.take_pending()
+        processor = task.contexts[-1].processor
+        if amount and processor is not None:
+            processor.serve(task, amount)
+
+    def _cancel_task(self, task: Task) -> None:
+        task.deliver_cancellation()
+        while True:  # it has swallowed too many cancellations: this interaction point never returns
             task.ticket = VOID
-            self._hub_runs()
+            self._switch_to_hub()
 
-    def pay(self, amount: Ns) -> None:
-        """Block the current task until its processor has served *amount*."""
-        task = self._current
-        if task is not None:
-            task.debt += amount
-            self.__enter__()
-
-    def sleep_until(self, when: Ns) -> None:
-        """Pay, then block the current task until *when*. The hot path: leap, park and yield, written out."""
+    def consume(self, amount: Ns) -> bool:
+        """Block the current task until its processor has served `amount` ns; False if there is no task."""
         task = self._current
         if task is None:
-            raise _house_blocks("a time")
-        if task.debt or task.summons is not None or task.places[-1].meter is not None:
-            self.__enter__()
+            return False
+        task.pending_ns += amount
+        self._interact(task)
+        return True
+
+    def sleep_until(self, when: Ns) -> None:
+        """Spend the pending execution time, then block the current task until `when`, ns.
+
+        The most frequent call of a simulation: ``skip``, ``park`` and ``_switch`` are written out here.
+        """
+        task = self._current
+        if task is None:
+            raise UsageError("a framework callback must not block, but waits for a time")
+        self.__enter__()
         if when <= self._now:
             return
         due, due_ticket, target = self._heap[0]
@@ -237,62 +244,63 @@ class VirtualKernel:
             target.flow.switch()
         else:
             heappush(self._heap, (when, ticket, task))
-            self._hub_runs()
-        if task.summons is not None:
-            self._answer(task)
+            self._switch_to_hub()
+        if task.pending_cancellation is not None:
+            self._cancel_task(task)
 
-    def leap(self, to: Ns) -> bool:
-        """Advance to *to* without blocking anybody, if nothing else is to happen until then."""
-        if to > self._horizon or self._heap[0][0] <= to:
-            return False
-        self._now = to
-        return True
+    def skip(self, amount: Ns) -> Ns:
+        """Let `amount` ns pass if no event is due meanwhile; return when they began, else ``NEVER``."""
+        start = self._now
+        end = start + amount
+        if end > self._horizon or self._heap[0][0] <= end:
+            return NEVER
+        self._now = end
+        return start
 
     def park(self, deadline: Ns | None = None, waiting_for: str = "") -> bool:
-        """Block the current task until it is woken (True) or *deadline* has passed (False)."""
+        """Block the current task until it is woken (True) or `deadline`, ns, has passed (False)."""
         task = self._current
         if task is None:
-            raise _house_blocks(waiting_for)
-        if task.summons is not None:
-            self._answer(task)
+            raise UsageError(f"a framework callback must not block, but waits for {waiting_for}")
+        if task.pending_cancellation is not None:
+            self._cancel_task(task)
         task.woken = False
         task.waiting_for = waiting_for
         task.ticket = next(self._tickets)
         if deadline is not None:
             heappush(self._heap, (max(deadline, self._now), task.ticket, task))
-        self._yield(task)
-        if task.summons is not None:
-            self._answer(task)
+        self._switch()
+        if task.pending_cancellation is not None:
+            self._cancel_task(task)
         return task.woken
 
     def wake(self, task: Task) -> None:
-        """End the wait that *task* is in."""
+        """End the wait that `task` is in."""
         if not task.woken and not task.done and task is not self._current:
             task.woken = True
             task.ticket = next(self._tickets)
             heappush(self._heap, (self._now, task.ticket, task))
 
     def cancel(self, scope: Scope, why: str) -> None:
-        """Deliver ``Cancelled`` to every task of *scope* at its next interaction point."""
+        """Deliver ``Cancelled`` to every task of `scope` at its next interaction point."""
         scope.mark(why)
         for task in scope.all_tasks():
             self.wake(task)
 
-    # -- handing over
+    # -- context switches
 
-    def _yield(self, task: Task) -> None:
-        """To whoever is next: directly if that is a task, through the hub if it is house code."""
+    def _switch(self) -> None:
+        """Switch to the next event: directly if that is a task, else through the hub."""
         due, ticket, target = self._heap[0]
         if due <= self._horizon and target.ticket == ticket and type(target) is Task:
             heappop(self._heap)
             self._now = due
-            if target is not task:
-                self._current = target
-                target.flow.switch()
+            self._current = target
+            target.flow.switch()
         else:
-            self._hub_runs()
+            self._switch_to_hub()
 
-    def _hub_runs(self) -> None:
+    def _switch_to_hub(self) -> None:
         if self._hub is None:
             self._hub = greenlet(self._serve)
         self._hub.switch()
@@ -306,21 +314,21 @@ class VirtualKernel:
     # -- the hub
 
     def run(self, until: Ns) -> None:
-        """Let things happen up to and including *until*, or until the root scope is cancelled.
+        """Let time pass up to and including `until`, ns, or until the root scope is cancelled.
 
-        If nothing at all is left to happen it returns at once, at the time of the last event. Whatever
-        escapes from house code or from the body of a task is raised here, Ctrl-C included; ``run`` may be
-        called again after that.
+        If no event is left at all, return at once, at the time of the last event. Any exception of a
+        framework callback or of a task's body is raised here, Ctrl-C included; ``run`` may be called again
+        after it.
 
         Raises:
-            Deadlock: nothing is left to happen while tasks still wait.
+            Deadlock: no event is left while tasks still wait.
         """
         if self._current is not None or (self._hub is not None and self._hub is getcurrent()):
             raise UsageError("run() from inside the run: time passes while a task blocks")
         self._until = min(until, FOREVER)
         self._owner = getcurrent()
         with self._watched():
-            self._hub_runs()
+            self._switch_to_hub()
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
@@ -366,7 +374,7 @@ class VirtualKernel:
                     self._now = now
                     continue
             if due > self._until:
-                self._come_to_rest()
+                self._end_loop()
                 return
             _, ticket, target = heappop(heap)
             if target.ticket == ticket:
@@ -376,7 +384,8 @@ class VirtualKernel:
                 else:
                     target.action()
 
-    def _come_to_rest(self) -> None:
+    def _end_loop(self) -> None:
+        """Advance to the end of ``run``, or raise ``Deadlock`` if no event is left while tasks wait."""
         heap = self._heap
         while heap[0][2].ticket != heap[0][1]:
             heappop(heap)
@@ -391,9 +400,9 @@ class VirtualKernel:
 
     @contextmanager
     def adopt(self, name: str) -> Iterator[Task]:
-        """Make the calling flow a task. Virtual time runs while it blocks, else it stands still.
+        """Make the calling flow a task. Virtual time runs while the task blocks, else it stands still.
 
-        The end of its scope ends the context quietly, as it ends any task.
+        The cancellation of its scope ends the context silently, as it ends any task.
         """
         if self._current is not None:
             raise UsageError(f"adopt({name!r}): this flow is the task {self._current.name!r} already")
@@ -415,9 +424,9 @@ class VirtualKernel:
     # -- the end
 
     def close(self, why: str = "end of run") -> list[str]:
-        """Unwind every task; returns the names of those that would not go.
+        """Cancel and unwind every task; return the names of those that did not end.
 
-        What escapes from one of them meanwhile is raised when all are unwound.
+        An exception of a task that is unwound is raised when all have been unwound.
         """
         if self._current is not None:
             raise UsageError("close() from inside a task: leave it first")
@@ -425,14 +434,14 @@ class VirtualKernel:
         if self._watchdog is not None:
             self._watchdog.stop()
         hub, self._hub = self._hub, getcurrent()
-        faults = [self._unwind(task) for task in list(self.root.all_tasks())]
+        errors = [self._unwind(task) for task in list(self.root.all_tasks())]
         if hub is not None:
             hub.parent = self._hub
             hub.throw()
         self._hub = self._current = None
-        for fault in faults:
-            if fault is not None:
-                raise fault
+        for error in errors:
+            if error is not None:
+                raise error
         return [task.name for task in self.root.all_tasks()]
 
     def _unwind(self, task: Task) -> BaseException | None:
@@ -440,12 +449,8 @@ class VirtualKernel:
             if task.flow is None:
                 self._bury(task)
             else:
-                task.flow.parent = self._hub  # where it ends
+                task.flow.parent = self._hub  # the flow that it ends in
                 self._resume(task)
-        except BaseException as fault:
-            return fault
+        except BaseException as error:
+            return error
         return None
-
-
-def _house_blocks(waiting_for: str) -> UsageError:
-    return UsageError(f"house code must not block, but waits for {waiting_for}")

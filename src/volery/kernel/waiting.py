@@ -1,7 +1,7 @@
-"""Everything that waits, once for both clocks: built on ``park`` and ``wake`` only.
+"""Everything that waits, for both clocks: built on ``park`` and ``wake`` only.
 
-The user's own waits end an activation when they block: ``sleep``, ``Rate.sleep``, ``Event.wait``,
-``Queue.get``, and ``Signal.wait_for`` where asked. Waits inside the house, such as a ``Lock``'s, do not.
+Waits of component code end an activation when they block: ``sleep``, ``Rate.sleep``, ``Event.wait``,
+``Queue.get`` and ``Signal.wait_for`` on request. Waits inside the framework, such as a ``Lock``'s, do not.
 """
 
 from __future__ import annotations
@@ -21,39 +21,45 @@ T = TypeVar("T")
 Predicate = Callable[[], object]
 
 MAX_PERIODS_LATE = 2
-"""A ``Rate`` that is later than this gives up catching up, as rospy's does."""
+"""A ``Rate`` that is later than this does not catch up but counts anew, as rospy's does."""
 
 
 def current_task(kernel: Kernel) -> Task:
-    """The task that runs now; a ``UsageError`` in house code, which must not wait."""
+    """Return the running task; raise ``UsageError`` in a framework callback, which must not wait."""
     task = kernel.current()
     if task is None:
         raise UsageError("only a task can wait: call this from a component, or from a script within adopt()")
     return task
 
 
-def end_activation(kernel: Kernel) -> None:
-    """Record the end of the current task's activation. Call it within ``with kernel``, where it is paid."""
-    activation = current_task(kernel).finish(kernel.now())
+def end_activation(kernel: Kernel, task: Task | None = None) -> None:
+    """Record the end of the activation of `task` (the current one); call it within ``with kernel``."""
+    activation = (task or current_task(kernel)).finish(kernel.now())
     if activation is not None:
         kernel.record(activation)
 
 
 def sleep(kernel: Kernel, duration: Ns) -> None:
-    """Block the current task for *duration*, counted from when its computing so far has been served."""
+    """Block the current task for `duration` ns, counted from when its computing so far has been served."""
     with kernel:
+        sleep_within(kernel, duration)
+
+
+def sleep_within(kernel: Kernel, duration: Ns) -> None:
+    """``sleep`` for a caller that is within ``with kernel`` already."""
+    if duration > 0:
+        task = current_task(kernel)
         due = kernel.now() + duration
-        if duration > 0:
-            end_activation(kernel)
-            kernel.sleep_until(due)
-            current_task(kernel).release(due)
+        end_activation(kernel, task)
+        kernel.sleep_until(due)
+        task.release(due)
 
 
 class Rate:
-    """Sleeps to the next multiple of *period*, counted from its making.
+    """Sleeps until the next multiple of `period` ns, counted from its creation.
 
-    A loop that is late catches up: ``sleep`` returns at once, the next activation was released when it was
-    due. One that is more than two periods late starts counting anew from now, as rospy's Rate does.
+    A late loop catches up: ``sleep`` returns at once, and the next activation was released when it was due.
+    One that is more than two periods late counts anew from now, as rospy's Rate does.
     """
 
     def __init__(self, kernel: Kernel, period: Ns) -> None:
@@ -66,40 +72,41 @@ class Rate:
     def sleep(self) -> None:
         """End the activation; block the current task until the next one is due."""
         with self._kernel as kernel:
-            end_activation(kernel)
+            task = current_task(kernel)
+            end_activation(kernel, task)
             now = kernel.now()
             due = self._last + self.period
             if now - due > MAX_PERIODS_LATE * self.period:
                 due = now
             self._last = due
             kernel.sleep_until(due)
-            current_task(kernel).release(due)
+            task.release(due)
 
 
 class Signal:
-    """``wait_for`` a predicate, which is looked at again each time somebody says ``notify``."""
+    """A condition variable: tasks wait for predicates, which each ``notify`` evaluates again."""
 
     def __init__(self, kernel: Kernel, name: str) -> None:
         self._kernel, self.name = kernel, name
         self._waiters: list[tuple[Task, Predicate]] = []
 
     def notify(self) -> None:
-        """What predicates look at has changed. Never blocks; not an interaction point."""
+        """Wake the tasks whose predicates hold. Never blocks; not an interaction point."""
         with self._kernel.guard:
             for task, predicate in self._waiters:
                 if _may_hold(predicate):
-                    self._kernel.wake(task)  # a task that would only look again is not woken
+                    self._kernel.wake(task)
 
     def wait_for(
         self, predicate: Predicate, within: Ns | None = None, *, ends_activation: bool = False
     ) -> bool:
-        """Block the current task until *predicate* holds (True), at most for *within* (False)."""
+        """Block the current task until `predicate` holds (True), at most for `within` ns (False)."""
         with self._kernel as kernel:
             if predicate():
                 return True
             task = current_task(kernel)
             if ends_activation:
-                end_activation(kernel)
+                end_activation(kernel, task)
             held = self._wait(task, predicate, None if within is None else kernel.now() + within)
             if ends_activation:
                 task.release(kernel.now())
@@ -122,7 +129,7 @@ class Signal:
 def _may_hold(predicate: Predicate) -> bool:
     try:
         return bool(predicate())
-    except Exception:  # the fault of whoever waits: woken, it looks itself and gets it
+    except Exception:  # an error of the waiting task: woken, it evaluates the predicate itself and raises it
         return True
 
 
@@ -135,28 +142,28 @@ class Event:
         self._set = False
 
     def is_set(self) -> bool:
-        """Whether it is raised."""
+        """Return whether the flag is set."""
         with self._kernel:
             return self._set
 
     def set(self) -> None:
-        """Raise it: everybody who waits goes on."""
+        """Set the flag and wake every waiting task."""
         with self._kernel:
             self._set = True
             self._changed.notify()
 
     def clear(self) -> None:
-        """Lower it."""
+        """Reset the flag."""
         with self._kernel:
             self._set = False
 
     def wait(self, within: Ns | None = None) -> bool:
-        """Block the current task until it is raised (True), at most for *within* (False)."""
+        """Block the current task until the flag is set (True), at most for `within` ns (False)."""
         return self._changed.wait_for(lambda: self._set, within, ends_activation=True)
 
 
 class Queue(Generic[T]):
-    """First in, first out. With a *depth*, the oldest item makes room for a new one, as ROS has it."""
+    """A FIFO queue. With a `depth`, a new item replaces the oldest one of a full queue, as in ROS."""
 
     def __init__(self, kernel: Kernel, name: str, depth: int | None = None) -> None:
         if depth is not None and depth <= 0:
@@ -169,7 +176,7 @@ class Queue(Generic[T]):
         return len(self._items)
 
     def put(self, item: T) -> bool:
-        """Append *item*; False if the oldest one had to go. Blocks only to pay what the task owes."""
+        """Append `item`; return False if the oldest one was dropped. An interaction point; never waits."""
         with self._kernel:
             fits = len(self._items) != self._items.maxlen
             self._items.append(item)
@@ -181,7 +188,7 @@ class Queue(Generic[T]):
     @overload
     def get(self, within: Ns | None) -> T | None: ...
     def get(self, within: Ns | None = None) -> T | None:
-        """Block the current task until there is an item and take it; ``None`` if there is none *within*."""
+        """Block the current task until there is an item and take it; None if there is none `within` ns."""
         with self._kernel:
             if self._filled.wait_for(lambda: self._items, within, ends_activation=True):
                 return self._items.popleft()
@@ -189,10 +196,10 @@ class Queue(Generic[T]):
 
 
 class Lock:
-    """One task at a time, as often as that task likes. ``with lock:`` blocks until it is free.
+    """A reentrant mutual exclusion between tasks. ``with lock:`` blocks until it is free.
 
-    The next owner is the most urgent of those who wait, and among equals the first (a futex's order under
-    real-time scheduling). Priority is not inherited by the owner.
+    The next owner is the waiting task of highest priority, among equals the first (the order of a futex under
+    real-time scheduling). The owner does not inherit priority.
     """
 
     def __init__(self, kernel: Kernel, name: str) -> None:
@@ -218,7 +225,7 @@ class Lock:
                 self._kernel.park(None, self.name)
         except BaseException:
             if self.owner is task:
-                self._hand_over()
+                self._pass_on()
             else:
                 self._waiters.remove(task)
             raise
@@ -226,14 +233,14 @@ class Lock:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Release it. Never blocks and is no interaction point, so that a task that is ended can do it."""
+        """Release it. Never blocks and is not an interaction point, so that a cancelled task can do it."""
         with self._kernel.guard:
             self._depth -= 1
             if self._depth == 0:
-                self._hand_over()
+                self._pass_on()
 
-    def _hand_over(self) -> None:
-        # ``max`` takes the first of the greatest
+    def _pass_on(self) -> None:
+        # ``max`` returns the first of equals
         self.owner = max(self._waiters, key=lambda task: task.priority, default=None)
         if self.owner is not None:
             self._waiters.remove(self.owner)
@@ -241,14 +248,14 @@ class Lock:
 
 
 @contextmanager
-def executing_in(kernel: Kernel, place: ExecutionContext) -> Iterator[None]:
-    """The current task computes at *place*: it pays before it goes there, and before it leaves.
+def executing_in(kernel: Kernel, context: ExecutionContext) -> Iterator[None]:
+    """Let the current task compute in `context`: pending execution time is spent before it enters and leaves.
 
-    That holds for an error that leaves, too; a task that is ended owes nothing.
+    That also holds for an exception that leaves the block; a cancelled task spends nothing.
     """
     with kernel:
         task = current_task(kernel)
-        task.places.append(place)
+        task.contexts.append(context)
     try:
         try:
             yield
@@ -259,5 +266,5 @@ def executing_in(kernel: Kernel, place: ExecutionContext) -> Iterator[None]:
         with kernel:
             pass
     finally:
-        task.take_debt()
-        task.places.pop()
+        task.take_pending()
+        task.contexts.pop()

@@ -1,9 +1,8 @@
-"""The clock on the wall: a task is a thread, the house is one monitor, one hub runs all house code.
+"""Wall-clock time: a task is a thread, one monitor guards the framework, one hub executes its callbacks.
 
 ``run`` is the hub in the thread that calls it; ``start`` gives the hub a thread of its own, so that a script
-can be a task (``adopt``). Computing takes the time that it takes: what a task owes is forgotten.
-
-Time that somebody else keeps: it stands still until it is told to go on (``/clock`` of real ROS).
+can be a task (``adopt``). Computing takes the time that it takes: pending execution time is dropped. The time
+of a ``FollowingKernel`` is set from outside, by ``/clock`` of a real ROS graph.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ GRACE_S = 2.0
 
 
 class Entry:
-    """House code in the heap."""
+    """A framework callback in the heap."""
 
     __slots__ = ("action",)
 
@@ -45,20 +44,20 @@ class Entry:
         self.action: Action | None = action
 
     def cancel(self) -> None:
-        """It will not happen (any more)."""
+        """Do not execute the action (any more)."""
         self.action = None
 
 
 @dataclass(eq=False, slots=True)
 class Flow:
-    """What the kernel knows of a task's thread."""
+    """The thread of a task."""
 
     woken: threading.Condition
-    thread: threading.Thread | None = None  # None: it was there before
+    thread: threading.Thread | None = None  # None for the flow of a script
 
 
 class WallKernel:
-    """Time that passes by itself, *speed* times as fast as on the wall."""
+    """Kernel whose time passes by itself, `speed` times as fast as wall time."""
 
     def __init__(self, record: Record = ignore, speed: float = 1.0) -> None:
         if speed <= 0.0:
@@ -69,11 +68,11 @@ class WallKernel:
         self.guard: AbstractContextManager[object] = self._monitor
         self._speed = speed
         self._began: int | None = None
-        self._gone = threading.Condition(self._monitor)  # a task has ended, or never will
+        self._gone = threading.Condition(self._monitor)  # a task has ended or will never end
         self._heap: list[tuple[Ns, int, Entry]] = []
         self._tickets = count(1)
         self._inbox: deque[Action] = deque()
-        self._bell: SimpleQueue[None] = SimpleQueue()  # wakes the hub; may be rung from a signal handler
+        self._bell: SimpleQueue[None] = SimpleQueue()  # wakes the hub; safe to use in a signal handler
         self._local = threading.local()
         self._adopted: Task | None = None
         self._fault: BaseException | None = None
@@ -81,21 +80,21 @@ class WallKernel:
         self._stopping = False
         self._interrupts = Interrupts(self)
 
-    # -- what is asked without blocking
+    # -- without blocking
 
     def now(self) -> Ns:
-        """Nanoseconds since the start of the run; 0 before it."""
+        """Return the time since the start of the run, ns; 0 before it."""
         if self._began is None:
             return 0
         return int((monotonic_ns() - self._began) * self._speed)
 
     def current(self) -> Task | None:
-        """The task that runs now; ``None`` in house code."""
+        """Return the running task; None in a framework callback."""
         task: Task | None = getattr(self._local, "task", None)
         return task
 
     def call_at(self, when: Ns, action: Action) -> Entry:
-        """Run house code at *when*, or as soon as possible if that is past."""
+        """Execute a framework callback at `when`, ns, or as soon as possible if that is past."""
         entry = Entry(action)
         with self._monitor:
             heappush(self._heap, (when, next(self._tickets), entry))
@@ -104,18 +103,18 @@ class WallKernel:
         return entry
 
     def every(self, period: Ns, action: Action) -> PeriodicAction:
-        """Run house code now and then each *period*."""
+        """Execute a framework callback now and then every `period` ns."""
         return PeriodicAction(self, period, action)
 
     def post(self, action: Action) -> None:
-        """Run house code as soon as possible; from any thread, and from signal handlers."""
+        """Execute a framework callback as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
         self._bell.put(None)
 
-    def spawn(self, body: Action, name: str, place: ExecutionContext, scope: Scope | None = None) -> Task:
-        """Start a flow of control; before the run has begun it waits for that."""
+    def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
+        """Start a task; before the run has begun, the task waits for that."""
         with self._monitor:
-            task = Task(name, place, scope or self.root)
+            task = Task(name, context, scope or self.root)
             thread = threading.Thread(
                 target=self._live, args=(task, body, self.now()), name=name, daemon=True
             )
@@ -149,10 +148,10 @@ class WallKernel:
             self._gone.notify_all()
 
     def _fail(self, error: BaseException) -> None:
-        """Remember what run(), or the script that is adopted, is to be told."""
+        """Keep an exception for ``run``, or deliver it to the script that is adopted."""
         with self._monitor:
             if self._adopted is not None:
-                self._adopted.summons = self._adopted.summons or error
+                self._adopted.pending_cancellation = self._adopted.pending_cancellation or error
                 self.wake(self._adopted)
             else:
                 self._fault = self._fault or error
@@ -169,10 +168,10 @@ class WallKernel:
         self._monitor.acquire()
         task = self.current()
         if task is not None:
-            task.take_debt()
-            if task.summons is not None:
+            task.take_pending()
+            if task.pending_cancellation is not None:
                 try:
-                    self._answer(task)
+                    self._cancel_task(task)
                 finally:
                     self._monitor.release()
         return self
@@ -182,33 +181,33 @@ class WallKernel:
     ) -> None:
         self._monitor.release()
 
-    def pay(self, amount: Ns) -> None:
-        """An interaction point; the computing itself has taken its time already."""
+    def consume(self, amount: Ns) -> bool:
+        """Return whether there is a current task; the computing itself has taken its time already."""
         with self:
-            pass
+            return self.current() is not None
 
     def sleep_until(self, when: Ns) -> None:
-        """Block the current task until *when*."""
+        """Block the current task until `when`, ns."""
         with self:
             if when > self.now():
                 self.park(when, "time")
 
     def park(self, deadline: Ns | None = None, waiting_for: str = "") -> bool:
-        """Block the current task until it is woken (True) or *deadline* has passed (False)."""
+        """Block the current task until it is woken (True) or `deadline`, ns, has passed (False)."""
         task = self.current()
         if task is None:
-            raise UsageError(f"house code must not block, but waits for {waiting_for}")
+            raise UsageError(f"a framework callback must not block, but waits for {waiting_for}")
         with self:
             task.woken = False
             task.waiting_for = waiting_for
             while not task.woken and (deadline is None or self.now() < deadline):
                 task.flow.woken.wait(self._patience(task, deadline))
-            if task.summons is not None:
-                self._answer(task)
+            if task.pending_cancellation is not None:
+                self._cancel_task(task)
             return task.woken
 
     def _patience(self, task: Task, deadline: Ns | None) -> float | None:
-        """How long *task* may wait at a stretch, in seconds on the wall."""
+        """Return how long `task` may wait without a break, s of wall time; None for no limit."""
         if deadline is None:
             return LONGEST_WAIT_S if task.adopted else None
         left = self._wall_seconds(deadline)
@@ -218,50 +217,50 @@ class WallKernel:
         return min(to_seconds(until - self.now()) / self._speed, threading.TIMEOUT_MAX)
 
     def wake(self, task: Task) -> None:
-        """End the wait that *task* is in."""
+        """End the wait that `task` is in."""
         with self._monitor:
             task.woken = True
             task.flow.woken.notify()
 
     def cancel(self, scope: Scope, why: str) -> None:
-        """Deliver ``Cancelled`` to every task of *scope* at its next interaction point."""
+        """Deliver ``Cancelled`` to every task of `scope` at its next interaction point."""
         with self._monitor:
             scope.mark(why)
             for task in scope.all_tasks():
                 self.wake(task)
             self._bell.put(None)
 
-    def _answer(self, task: Task) -> None:
-        task.answer()
+    def _cancel_task(self, task: Task) -> None:
+        task.deliver_cancellation()
         self._gone.notify_all()
-        while True:  # it swallows its end: this interaction point never returns
+        while True:  # it has swallowed too many cancellations: this interaction point never returns
             task.flow.woken.wait()
 
     # -- the hub
 
     def run(self, until: Ns) -> None:
-        """Let things happen up to *until*, or until the root scope is cancelled or nothing is left to do.
+        """Execute events up to `until`, ns, until the root scope is cancelled, or until nothing is left.
 
-        Whatever escapes from house code or from the body of a task is raised here, Ctrl-C included; ``run``
-        may be called again after that.
+        Any exception of a framework callback or of a task's body is raised here, Ctrl-C included; ``run`` may
+        be called again after it.
         """
         if self.current() is not None:
             raise UsageError("run() from inside a task: time runs by itself")
         self._stop()
         self._begin()
         with self._interrupts:
-            while self._goes_on(until):
+            while self._step(until):
                 pass
 
-    def _goes_on(self, until: Ns) -> bool:
-        """Do one thing that is due, or wait for it; False if there will be none."""
+    def _step(self, until: Ns) -> bool:
+        """Execute one due event, or wait for one; return False if there will be none."""
         with self._monitor:
             self._raise_fault()
             if self.root.cancelled:
                 return False
             if self._do_next(until):
                 return True
-            if self.now() >= until or self._is_over():
+            if self.now() >= until or not (self._heap or any(self.root.all_tasks())):
                 return False
             due = min(until, self._heap[0][0]) if self._heap else until
         self._wait(due)
@@ -281,9 +280,6 @@ class WallKernel:
             action()
         return True
 
-    def _is_over(self) -> bool:
-        return not self._heap and not any(self.root.all_tasks())
-
     def _wait(self, due: Ns) -> None:
         with suppress(Empty):
             self._bell.get(timeout=max(0.0, min(self._wall_seconds(due), LONGEST_WAIT_S)))
@@ -299,7 +295,7 @@ class WallKernel:
     # -- a hub of its own, for scripts
 
     def start(self) -> None:
-        """Let things happen in a thread of the kernel's own, until ``run`` or ``close``."""
+        """Execute events in a thread of the kernel's own, until ``run`` or ``close``."""
         if self._hub is None:
             self._begin()
             self._stopping = False
@@ -329,7 +325,7 @@ class WallKernel:
     def adopt(self, name: str) -> Iterator[Task]:
         """Make the calling flow a task; the hub gets a thread of its own.
 
-        The end of its scope ends the context quietly, as it ends any task.
+        The cancellation of its scope ends the context silently, as it ends any task.
         """
         current = self.current()
         if current is not None:
@@ -351,12 +347,12 @@ class WallKernel:
     # -- the end
 
     def _is_unwound(self) -> bool:
-        return all(task.refusals > MAX_SWALLOWED_CANCELLATIONS for task in self.root.all_tasks())
+        return all(task.swallowed > MAX_SWALLOWED_CANCELLATIONS for task in self.root.all_tasks())
 
     def close(self, why: str = "end of run", grace_s: float = GRACE_S) -> list[str]:
-        """Unwind every task; returns the names of those that would not go within *grace_s* in all.
+        """Cancel and unwind every task; return the names of those that did not end within `grace_s` s in all.
 
-        What escapes from one of them meanwhile is raised when all are unwound.
+        An exception of a task that is unwound is raised when all have been unwound.
         """
         if self.current() is not None:
             raise UsageError("close() from inside a task: leave it first")
@@ -372,9 +368,9 @@ class WallKernel:
 
 
 class FollowingKernel(WallKernel):
-    """A kernel on threads whose time goes on by ``advance`` alone.
+    """Kernel on threads whose time passes by ``advance`` only.
 
-    What waits for a time waits until it has been told of it, however long that takes on the wall.
+    A wait until a given time lasts until that time has been announced, however long that takes in wall time.
     """
 
     def __init__(self, record: Record = ignore) -> None:
@@ -382,15 +378,15 @@ class FollowingKernel(WallKernel):
         self._now: Ns = 0
 
     def now(self) -> Ns:
-        """The sum of all advances."""
+        """Return the sum of all advances, ns."""
         return self._now
 
     def advance(self, by: Ns) -> None:
-        """Let time pass; from any thread. What has become due happens."""
+        """Let `by` ns pass, from any thread, and execute what has become due."""
         with self._monitor:
             self._now += max(0, by)
             for task in self.root.all_tasks():
-                task.flow.woken.notify()  # it looks itself whether its time has come
+                task.flow.woken.notify()  # it checks itself whether its deadline has passed
             self._bell.put(None)
 
     def _wall_seconds(self, until: Ns) -> float:

@@ -107,7 +107,7 @@ class _Flight:
         kernel.record = self._recording.stream
         if options.tell is not None:
             self._recording.stream.tap(LostLinkReporter(options.tell))
-        self._states = self._opened.airfield or ObservedVehicles(kernel, self._opened.vehicles)
+        self._states = self._opened.fleet or ObservedVehicles(kernel, self._opened.vehicles)
         self._states.sample()
         if options.show is not None:
             self._recording.stream.tap(ProgressReporter(kernel, 0, self._states.progress, options.show))

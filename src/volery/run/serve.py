@@ -34,12 +34,12 @@ class VehicleServer:
         self, wanted: SimulatedVehicle, address: Address | None, *, speed: float = 1.0, seed: int = 1
     ) -> None:
         self.kernel = VirtualKernel(pace=speed)
-        self.airfield: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
+        self.fleet: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
-        self._autopilot = self.airfield.autopilots[name]
-        codec = self.airfield.codec(name)
+        self._autopilot = self.fleet.autopilots[name]
+        codec = self.fleet.codec(name)
         self.protocol = codec.name
-        usual = self.airfield.family(name).default_links
+        usual = self.fleet.family(name).default_links
         stations = [(parse_listen(text), use) for text, use in usual] if address is None else [(address, "")]
         self.addresses = [one for one, _ in stations]
         self.links: list[CodedLink] = []
@@ -75,14 +75,14 @@ class VehicleNodeServer:
         self, wanted: SimulatedVehicle, graph: str, namespace: str = "", *, speed: float = 1.0, seed: int = 1
     ) -> None:
         self.kernel = VirtualKernel(pace=speed)
-        self.airfield: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
+        self.fleet: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
-        if self.airfield.family(name).codec is not None:
+        if self.fleet.family(name).codec is not None:
             raise UsageError(f"{name}: a simulated {wanted.vehicle.autopilot} is no node; it speaks on links")
         usual = graph_access(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
         self.namespace = namespace or usual
         self.graph = open_graph(self.kernel, graph)
-        self.airfield.autopilots[name].join(self.graph, self.namespace, ExecutionContext(name))
+        self.fleet.autopilots[name].join(self.graph, self.namespace, ExecutionContext(name))
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """See ``Server.run``."""

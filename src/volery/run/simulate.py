@@ -17,7 +17,7 @@ from volery.requirements.verdicts import Observers
 from volery.run.assembly.components import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
-from volery.run.assembly.faults import inject
+from volery.run.assembly.faults import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import DistributedRun, GraphSettings, HostPlatform, unallocated, without_computers
@@ -133,7 +133,12 @@ class _Simulation:
         setup = self._setup(platform)
         surroundings = system.environment
         self._airfield = SimulatedFleet(
-            kernel, system.vehicles, surroundings.origin, surroundings.wind, options.seed
+            kernel,
+            system.vehicles,
+            surroundings.origin,
+            surroundings.wind,
+            options.seed,
+            through_bytes=with_faulty_links(surroundings),
         )
         self._built = self._build(platform)
         self._recording = Recording(setup, options.out, attachments_of(system))
@@ -151,7 +156,15 @@ class _Simulation:
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._airfield)
         self._airfield.sample()
-        inject(kernel, self._airfield, surroundings.faults)
+        affected = Affected(
+            kernel,
+            self._airfield,
+            FleetLinks(self._airfield),
+            surroundings.wind,
+            platform.processors,
+            platform.networks,
+        )
+        inject(surroundings.faults, affected)
 
     def _look_at_goal(self) -> None:
         if self._goal.all_hold(self._kernel.now()):

@@ -70,11 +70,6 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
     )
 
 
-def node_name(vehicle: str) -> str:
-    """The component name of the node that serves a vehicle on the graph."""
-    return f"{vehicle}/mavros"
-
-
 def _component(instance: Instance) -> ComponentSetup:
     activity = instance.activity
     return ComponentSetup(
@@ -184,29 +179,3 @@ def _lines(ways: Ways) -> Iterable[Line]:
 
 def _area(prism: Prism, kind: str) -> Area:
     return Area(prism.name, tuple(prism.corners), kind)
-
-
-# -- a flight without a model
-
-
-def setup_of_flight(
-    path: Path | None, urls: Sequence[str], opened: OpenedVehicles, seed: int
-) -> tuple[RunSetup, list[Attachment]]:
-    """The setup of ``fly``: vehicles, and no computers. Attached: the map, and the mission's text if it is a
-    file.
-    """
-    autopilots = [parse(url).driver for url in urls]
-    vehicles = tuple(
-        VehicleSetup(vehicle.name, autopilot, "multirotor" if isinstance(vehicle, Drone) else "rover")
-        for vehicle, autopilot in zip(opened.vehicles, autopilots, strict=True)
-    )
-    fidelity = "code" if opened.airfield else "hardware"
-    setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
-    attachments = []
-    if opened.airfield is not None:
-        origin = opened.airfield.frame
-        scenery = Scenery(Origin(origin.latitude, origin.longitude, origin.amsl))
-        attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", scenery_to_json(scenery)))
-    if path is not None:
-        attachments.append(Attachment(path.name, "text/x-python", path.read_bytes()))
-    return setup, attachments

@@ -17,7 +17,7 @@ from volery.links.link import Frame, Link, Receiver
 from volery.links.wire_faults import FaultyLink, WireFaults
 from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.simulated_fleet import SimulatedFleet
-from volery.run.assembly.simulated_vehicles import SimulatedVehicle, link_to
+from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import (
     GIVE_UP_AFTER,
     SIMULATED_LINK_OPTIONS,
@@ -122,16 +122,16 @@ class ByLink(Access):
     """Over links; what *sharing* says and hears is on the first program's link, too."""
 
     def __init__(
-        self, kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
+        self, kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
     ) -> None:
-        self._kernel, self._airfield = kernel, airfield
+        self._kernel, self._airfield = kernel, fleet
         self._vehicle = wanted.vehicle.name
         self._factory = drivers.load(wanted.vehicle.autopilot)
         self.protocol = self._factory.codec.name
-        self.link = link_to(kernel, airfield, wanted, seed)
+        self.link = fleet.link_for(wanted)
         self._tap = self.hand = ControlledLink(self.link)
         if sharing:
-            self._tap.share(airfield.link(sharing))
+            self._tap.share(fleet.link(sharing))
 
     def first(self) -> Driver:
         """Through the hand."""
@@ -190,7 +190,7 @@ class ByGraph(Access):
     protocol = "a graph"
 
     def __init__(
-        self, kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
+        self, kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
     ) -> None:
         self._kernel = kernel
         self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
@@ -201,7 +201,7 @@ class ByGraph(Access):
         for vehicle in filter(None, (self._vehicle, sharing)):
             serve_on_graph(
                 self._graph,
-                airfield,
+                fleet,
                 vehicle,
                 graph_access(self._autopilot, vehicle),
                 ExecutionContext(vehicle),
@@ -230,9 +230,9 @@ class ByGraph(Access):
 
 
 def access_to(
-    kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
+    kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
 ) -> Access:
     """The way to a vehicle that its autopilot and driver have in common: links first."""
-    if reached_over_links(airfield, wanted):
-        return ByLink(kernel, airfield, wanted, seed, sharing)
-    return ByGraph(kernel, airfield, wanted, seed, sharing)
+    if reached_over_links(fleet, wanted):
+        return ByLink(kernel, fleet, wanted, seed, sharing)
+    return ByGraph(kernel, fleet, wanted, seed, sharing)

@@ -204,7 +204,7 @@ class _Trying:
         return Trial(*self._names, self._caller, self._said, tuple(self._after.modes), self._ended, broken)
 
     def _look(self) -> None:
-        state = self._stage.airfield.autopilots[self._name].state()
+        state = self._stage.fleet.autopilots[self._name].state()
         self._seen.note(state)
         if self._struck:
             self._after.note(state)
@@ -297,7 +297,9 @@ class _Trying:
     def _demand_not_fought(self) -> None:
         """Once the other station's mode was seen in the air, ours never follows while it is armed."""
         start = self._after.modes[0]
-        theirs = next((mode for mode in self._after.modes[1:] if mode in self._stage.driver.landing_modes), "")
+        theirs = next(
+            (mode for mode in self._after.modes[1:] if mode in self._stage.driver.landing_modes), ""
+        )
         if not theirs or not self._after.armed[0]:
             return
         rest = [state.mode for state in self._after.states if state.armed]

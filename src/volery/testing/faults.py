@@ -69,7 +69,5 @@ FAULTS: Mapping[str, Fault] = {
     "killed": Fault("the program is killed", _dies, deadly=True),
     "battery-low": Fault("8 % are left in the battery", lambda stage: stage.flight.drain_battery(0.08)),
     "gps-lost": Fault("no satellites are seen any more", lambda stage: stage.flight.block_gps()),
-    "wind": Fault(
-        "wind of 12 m/s from the west, with gusts", lambda stage: stage.airfield.world.set_wind(GALE)
-    ),
+    "wind": Fault("wind of 12 m/s from the west, with gusts", lambda stage: stage.fleet.world.set_wind(GALE)),
 }

@@ -74,10 +74,10 @@ class SimulatedStage(Stage):
         options = {**address.options, "start": "cold" if cold else "warm"}
         self._wanted = parse_simulated(replace(address, options=options), address.driver, KINDS[kind])
         all_wanted = [self._wanted, _beside(self._wanted)] if neighbour else [self._wanted]
-        self.airfield = fleet_of(self.kernel, all_wanted, seed)
+        self.fleet = fleet_of(self.kernel, all_wanted, seed)
         self._kind = kind
         self._neighbour = all_wanted[1].vehicle.name if neighbour else ""
-        self._access = access_to(self.kernel, self.airfield, self._wanted, seed, self._neighbour)
+        self._access = access_to(self.kernel, self.fleet, self._wanted, seed, self._neighbour)
         self.link = self._access.link
         self.driver = self._access.first()
         self.drone = self._kind(self.kernel, self.name_of_vehicle, self.driver)
@@ -119,7 +119,7 @@ class SimulatedStage(Stage):
     def _commander(self) -> Commander:
         if self.link is None:
             driver, _ = self._access.another(self.name_of_vehicle)
-            return SafetyPilot(self.kernel, driver, self.airfield.autopilots[self.name_of_vehicle])
+            return SafetyPilot(self.kernel, driver, self.fleet.autopilots[self.name_of_vehicle])
         driver, link = self._access.another(self.name_of_vehicle)
         return Commander(self.kernel, driver, link, self._access.protocol)
 
@@ -141,7 +141,7 @@ class SimulatedStage(Stage):
     @property
     def flight(self) -> Flight:
         """The body and its sensors."""
-        return self.airfield.flights[self.name_of_vehicle]
+        return self.fleet.flights[self.name_of_vehicle]
 
     @property
     def neighbour(self) -> Any:

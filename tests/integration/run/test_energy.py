@@ -36,8 +36,8 @@ def flown(delivery):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation, "Airfield", Kept)
         run = simulate(delivery, Options(fidelity="code", seed=7), scenario="pocket")
-    (airfield,) = fleets
-    return run.record, {name: flight.truth() for name, flight in airfield.flights.items()}
+    (fleet,) = fleets
+    return run.record, {name: flight.truth() for name, flight in fleet.flights.items()}
 
 
 @pytest.mark.parametrize(("vehicle", "processor"), FED.items())

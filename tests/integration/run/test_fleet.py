@@ -119,8 +119,8 @@ def test_drones_and_rovers_in_one_fleet() -> None:
 def test_each_has_a_system_id_of_its_own() -> None:
     stated = {"a": "sim:ardupilot", "b": "sim:ardupilot?system=1", "c": "sim:ardupilot"}
     wanted = [parse_simulated(parse(url), name) for name, url in stated.items()]
-    airfield = fleet_of(VirtualKernel(), wanted, 1)
-    assert [one.vehicle.system for one in airfield.autopilots.values()] == [2, 1, 3]
+    fleet = fleet_of(VirtualKernel(), wanted, 1)
+    assert [one.vehicle.system for one in fleet.autopilots.values()] == [2, 1, 3]
 
 
 @pytest.mark.parametrize(

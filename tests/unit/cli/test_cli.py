@@ -17,10 +17,10 @@ from volery.base.errors import (
     Refused,
     UsageError,
 )
-from volery.cli.console import Output
 from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
 from volery.cli.commands.demo import example
 from volery.cli.commands.doctor import PARTS, Part, doctor, module, program
+from volery.cli.console import Output
 from volery.cli.main import app
 from volery.cli.outcome import next_folder
 

@@ -307,7 +307,9 @@ def test_a_link_that_falls_silent_in_flight(bench: Make) -> None:
         at.after(3, lambda: setattr(at.autopilot, "mute", True))
         drone.goto(NEAR)
 
-    with pytest.raises(LinkLost, match=r"no message was received for 5\.\d s.*last: at -35.*mode GUIDED, armed"):
+    with pytest.raises(
+        LinkLost, match=r"no message was received for 5\.\d s.*last: at -35.*mode GUIDED, armed"
+    ):
         at.fly(mission)
     assert [state.state for state in at.told(LinkState)] == ["silent"]
 

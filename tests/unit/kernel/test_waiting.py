@@ -474,7 +474,7 @@ def test_a_task_that_is_ended_at_a_place_owes_nothing(virtual: VirtualKernel, co
     virtual.spawn(body, "caller", ExecutionContext("caller", core), scope)
     virtual.run(S)
     assert core.busy_ns(virtual.now()) == 0
-    assert len(tasks[0].places) == 1
+    assert len(tasks[0].contexts) == 1
     assert tasks[0].pending_ns == 0
 
 

@@ -143,7 +143,7 @@ class _Streams:
 
     def mine(self) -> real_random.Random:
         task = self._kernel.current()
-        component = task.place.component if task is not None else ""
+        component = task.context.component if task is not None else ""
         if component not in self._streams:
             self._streams[component] = stream(self._seed, f"component {component}")
         return self._streams[component]
@@ -188,7 +188,7 @@ def builtins_module(kernel: Kernel) -> ModuleType:
         with kernel:
             task = kernel.current()
             if task is not None and text.strip():
-                kernel.record(Text(kernel.now(), task.place.component, INFO, text.rstrip()))
+                kernel.record(Text(kernel.now(), task.context.component, INFO, text.rstrip()))
 
     module = ModuleType("builtins", real_builtins.__doc__)
     module.__dict__.update(vars(real_builtins), print=say)

@@ -61,7 +61,7 @@ class Thread(KernelBound):
             if instance is None:
                 raise UsageError("threading.Thread: only components start threads")
             body = self._body(lambda: instance.guard(self.run, f"thread {self.name}"))
-            self._task = kernel.spawn(body, f"{instance.name}/{self.name}", instance.place, instance.scope)
+            self._task = kernel.spawn(body, f"{instance.name}/{self.name}", instance.context, instance.scope)
 
     def _body(self, run: Callable[[], object]) -> Callable[[], None]:
         def body() -> None:

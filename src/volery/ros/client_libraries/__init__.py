@@ -1,5 +1,6 @@
-"""Faces: the embedded graph in the shape of a client library, so that a user's file runs unmodified.
+"""Client libraries over the graph (rospy, rclpy, roscpp, tf2, message_filters) for unmodified user files.
 
-Knows the graph, messages and the kernel's waiting. It must not know models, costs or vehicles, nor load
-files: it gives module objects, and whoever loads a file puts them in the place of the real ones.
+The package knows the graph, messages and the kernel's waiting. It must not know models, costs or vehicles,
+and it loads no files: it returns module objects, which the loader of a file installs in place of the real
+ones.
 """

@@ -1,4 +1,4 @@
-"""All that a file written for ROS may import in a run: faces of client libraries, and what goes with them."""
+"""All modules that a file written for ROS may import in a run."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from volery.ros.client_libraries import message_filters, rclpy, rospy, tf2
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end
 from volery.ros.graph import Node, RosGraph
 
-_ABSENT = {
+_UNAVAILABLE = {
     "actionlib": "make topics and services of it, or use rclpy.action",
     "dynamic_reconfigure": "ask rospy.get_param each time, as a parameter may be set while it runs",
     "dynamic_reconfigure.client": "use rospy.set_param",
     "dynamic_reconfigure.server": "ask rospy.get_param each time, as a parameter may be set while it runs",
 }
-"""Libraries beside the client libraries that are not there, and what to do instead."""
+"""Libraries that are not available, and their replacement."""
 
 
 def importable_modules(
@@ -25,21 +25,19 @@ def importable_modules(
     nodes: Mapping[str, Node] | None = None,
     at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
-    """The modules by name; *launched*, *nodes* and *at_end* as in ``faces.rospy.modules``."""
+    """Return the modules by name. For the arguments see ``rospy.modules``."""
     given = launched, nodes, at_end
     found = {**rospy.modules(graph, *given), **rclpy.modules(graph, *given)}
-    transforms = tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"])
-    filters = message_filters.modules(found["rospy"], found["rclpy.time"])
     return {
         **found,
-        **transforms,
-        **filters,
-        **{name: _absent(name, instead) for name, instead in _ABSENT.items()},
+        **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
+        **message_filters.modules(found["rospy"], found["rclpy.time"]),
+        **{name: _unavailable_module(name, instead) for name, instead in _UNAVAILABLE.items()},
     }
 
 
-def _absent(name: str, instead: str) -> ModuleType:
-    """A module that says, as soon as something of it is asked for, that it is not there."""
+def _unavailable_module(name: str, instead: str) -> ModuleType:
+    """Return a module that raises ``ImportError`` on the first use of its content."""
     module = ModuleType(name)
     module.__path__ = []
 

@@ -1,4 +1,4 @@
-"""What every Python client library shares: launch settings, module objects, ``/rosout``."""
+"""What every Python client library shares: launch settings, module objects and ``/rosout``."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from volery.kernel.waiting import current_task
 from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
 from volery.ros.messages import message_class
 
+# -- components and their launch settings
+
 
 class Launch(NamedTuple):
-    """A node's namespace, its remappings and its private parameters."""
+    """Namespace, remappings and private parameters of a node, as in a launch file."""
 
     namespace: str = "/"
     remaps: Mapping[str, str] = {}
@@ -25,18 +27,22 @@ class Launch(NamedTuple):
 
 
 AtEnd = Callable[[ExecutionContext, Callable[[], object]], None]
-"""Has something done at a place when the run ends, by which components have been cancelled already."""
+"""Registers a function that is run in a context at the end of the run, when components have been cancelled."""
 
 
-def ignore_end(place: ExecutionContext, last: Callable[[], object]) -> None:
-    """Where runs end without a word."""
+def ignore_end(context: ExecutionContext, last: Callable[[], object]) -> None:
+    """Register nothing: an ``AtEnd`` for runs that end without notice."""
 
 
 @dataclass(eq=False)
 class LaunchedComponents:
-    """All components of one run behind one face: their graph, and what stands for each before it has begun.
+    """The components of one run that use one client library.
 
-    *launched* says what a launch file would, by component; *nodes* are those that they are given.
+    Args:
+        graph: The graph of the run.
+        launched: Launch settings by component.
+        nodes: Existing nodes by component; a component without one creates its own.
+        at_end: Registers functions for the end of the run.
     """
 
     graph: RosGraph
@@ -49,20 +55,28 @@ class LaunchedComponents:
 
     @property
     def component(self) -> str:
-        """The one that the current task computes for."""
-        return current_task(self.kernel).place.component
+        """Component of the current task."""
+        return current_task(self.kernel).context.component
 
     def launch_of(self, component: str) -> Launch | None:
-        """What is said of it; ``None`` where nothing is."""
+        """Return the launch settings of *component*, or None."""
         return None if self.launched is None else self.launched.get(component)
 
     def node_of(self, component: str) -> Node | None:
-        """The one that it is given; ``None`` where it makes its own."""
+        """Return the existing node of *component*, or None."""
         return None if self.nodes is None else self.nodes.get(component)
 
 
+# -- module objects
+
+
 def library_module(name: str, names: Mapping[str, Any]) -> ModuleType:
-    """The module *name* with these *names* in it; ``AttributeError`` for another one lists the valid ones."""
+    """Return a module object whose ``AttributeError`` lists the available names.
+
+    Args:
+        name: Dotted name of the module.
+        names: Content of the module.
+    """
     module = ModuleType(name, f"{name.partition('.')[0]} on the embedded graph.")
     module.__path__ = []
     vars(module).update(names)
@@ -79,11 +93,13 @@ def library_module(name: str, names: Mapping[str, Any]) -> ModuleType:
     return module
 
 
+# -- /rosout
+
 ROSOUT = "/rosout"
 
 
 class Caller(NamedTuple):
-    """Where a line was logged: the file's name, the function and the line."""
+    """Source location of a log call: file name, function and line."""
 
     file: str
     function: str
@@ -91,17 +107,17 @@ class Caller(NamedTuple):
 
 
 def caller(depth: int) -> Caller:
-    """Of the call that is *depth* calls above whoever asks."""
+    """Return the source location *depth* calls above the calling function."""
     frame = sys._getframe(depth + 1)
     return Caller(Path(frame.f_code.co_filename).name, frame.f_code.co_name, frame.f_lineno)
 
 
 class Rosout:
-    """Publishes a node's lines of the log as messages of one type.
+    """Publishes the log lines of a node as messages of one type.
 
-    On the embedded graph it joins the topic only when somebody listens there, so that logging costs nothing
-    and shows nowhere else. Where the topic carries another library's type, or the type is not installed, the
-    lines are in the log alone.
+    On the embedded graph the node joins the topic only if the topic has a subscriber, so that logging costs
+    nothing otherwise. Where the topic carries the type of another client library, or the type is not
+    installed, log lines are recorded but not published.
     """
 
     def __init__(self, graph: RosGraph, node: Node, message_type: str, qos: QoS) -> None:
@@ -109,9 +125,11 @@ class Rosout:
         self._publisher: Publisher | None = None
         self._closed = False
 
-    def tell(self, fill: Callable[[Any], None]) -> None:
-        """Publish a message that *fill* completes, if somebody listens. An interaction point if so."""
-        if self._closed or self._node.closed or not self._wanted():
+    def publish(self, fill: Callable[[Any], None]) -> None:
+        """Publish a message that *fill* completes, if there is a subscriber. Then an interaction point."""
+        if self._closed or self._node.closed:
+            return
+        if isinstance(self._graph, EmbeddedGraph) and not self._graph.heard(ROSOUT):
             return
         try:
             if self._publisher is None:
@@ -121,6 +139,3 @@ class Rosout:
             self._publisher.publish(message)
         except UsageError:
             self._closed = True
-
-    def _wanted(self) -> bool:
-        return not isinstance(self._graph, EmbeddedGraph) or self._graph.heard(ROSOUT)

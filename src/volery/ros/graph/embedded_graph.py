@@ -127,7 +127,7 @@ class EmbeddedGraph:
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: ExecutionContext | None = None,
+        context: ExecutionContext | None = None,
     ) -> EmbeddedNode:
         """Join the graph as *name*; priced as ``init`` and ``node_handle``.
 
@@ -138,12 +138,12 @@ class EmbeddedGraph:
         with self.kernel:
             if anonymous:
                 name = self._numbered(name, namespace)
-            made = EmbeddedNode(self._context, name, namespace, remaps or {}, place or self._here(name))
+            made = EmbeddedNode(self._context, name, namespace, remaps or {}, context or self._here(name))
             other = self._nodes.get(made.name)
             if other is not None:
                 raise UsageError(
-                    f"a node named {made.name} is there already (of component {other.place.component}); "
-                    f"give this one of component {made.place.component} another name or namespace"
+                    f"a node named {made.name} is there already (of component {other.context.component}); "
+                    f"give this one of component {made.context.component} another name or namespace"
                 )
             self._nodes[made.name] = made
             made.on_close = lambda: self._forget(made)
@@ -152,7 +152,7 @@ class EmbeddedGraph:
 
     def _here(self, name: str) -> ExecutionContext:
         task = self.kernel.current()
-        return task.place if task is not None else ExecutionContext(name)
+        return task.context if task is not None else ExecutionContext(name)
 
     def _numbered(self, name: str, namespace: str) -> str:
         number = 1

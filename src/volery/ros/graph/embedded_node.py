@@ -52,7 +52,7 @@ class LocalNode:
         self.on_close: Callable[[], None] | None = None
 
     @property
-    def place(self) -> ExecutionContext:
+    def context(self) -> ExecutionContext:
         """Where its computing is spent."""
         return self._member.place
 

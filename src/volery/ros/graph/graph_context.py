@@ -188,7 +188,7 @@ class NodeContext:
         if kernel.current() is None:
             background += caller
         elif caller:
-            kernel.pay(caller)
+            kernel.consume(caller)
         if background and self.place.processor is not None:
             self.place.processor.load(self.place, background)
 

@@ -239,7 +239,7 @@ class Node(Protocol):
     namespace: str
 
     @property
-    def place(self) -> ExecutionContext:
+    def context(self) -> ExecutionContext:
         """Where its computing is spent."""
 
     @property
@@ -350,7 +350,7 @@ class RosGraph(Protocol):
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: ExecutionContext | None = None,
+        context: ExecutionContext | None = None,
     ) -> Node:
         """Join the graph as *name*. *anonymous* adds something to the name that makes it unique.
 

@@ -135,7 +135,7 @@ class TransportGraph:
         *,
         remaps: Mapping[str, str] | None = None,
         anonymous: bool = False,
-        place: ExecutionContext | None = None,
+        context: ExecutionContext | None = None,
     ) -> TransportNode:
         """Join the graph as *name*.
 
@@ -146,7 +146,7 @@ class TransportGraph:
             self._numbers += 1
             name = f"{name}_{time_ns() // 1000}_{self._numbers}"
         task = self.kernel.current()
-        here = place or (task.place if task is not None else ExecutionContext(name))
+        here = context or (task.context if task is not None else ExecutionContext(name))
         made = TransportNode(self._context, name, namespace, remaps or {}, here)
         if made.name in self._nodes:
             raise UsageError(

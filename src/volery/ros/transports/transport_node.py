@@ -292,7 +292,7 @@ class TransportMember(NodeContext):
 
     def pay(self, call: str, x: float = 0.0) -> None:
         """Only an interaction point."""
-        self.context.kernel.pay(0)
+        self.context.kernel.consume(0)
 
     def check_open(self) -> None:
         """``UsageError`` if the node has left the graph, with the reason if it was thrown out."""

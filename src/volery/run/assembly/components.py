@@ -154,7 +154,7 @@ class Builder:
         system: System,
         kernel: Kernel,
         platform: Platform,
-        airfield: SimulatedFleet | None,
+        fleet: SimulatedFleet | None,
         ending: Ending,
         *,
         part: ProcessPart | None = None,
@@ -162,11 +162,11 @@ class Builder:
         self._system = system
         self._kernel = kernel
         self._platform = platform
-        self._airfield = airfield
+        self._airfield = fleet
         self._ending = ending
         self._fence = fence_of(system.environment)
         self._part = part
-        self._truth = airfield.truth if airfield else part.truth if part else None
+        self._truth = fleet.truth if fleet else part.truth if part else None
         self._models = part.instances if part else system.instances
         self._graph: RosGraph = (
             part.graph if part else EmbeddedGraph(kernel, platform.price, platform.between)
@@ -327,10 +327,10 @@ class Builder:
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
 
-    def _serve(self, airfield: SimulatedFleet, name: str, processor: str | None) -> None:
+    def _serve(self, fleet: SimulatedFleet, name: str, processor: str | None) -> None:
         """In the root scope: it must outlive the components, for the way down."""
         place = ExecutionContext(node_name(name), self._platform.processors[processor] if processor else None)
-        serve_on_graph(self._graph, airfield, name, graph_access(self._autopilot(name), name), place)
+        serve_on_graph(self._graph, fleet, name, graph_access(self._autopilot(name), name), place)
 
 
 def _kind(connection: Connection) -> TargetKind | None:

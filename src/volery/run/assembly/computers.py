@@ -170,7 +170,6 @@ class Platform:
             stream=stream(seed, f"network/{model.name}"),
         )
 
-
     # -- what components are given
 
     def seat(self, instance: Instance) -> Allocation:
@@ -279,17 +278,17 @@ FEED_PERIOD: Ns = 500 * MS
 class PowerFeed:
     """Feeds the computers of one platform from the batteries of one airfield."""
 
-    def __init__(self, kernel: Kernel, platform: Platform, airfield: SimulatedFleet) -> None:
+    def __init__(self, kernel: Kernel, platform: Platform, fleet: SimulatedFleet) -> None:
         self._kernel = kernel
         self._platform = platform
-        self._airfield = airfield
+        self._airfield = fleet
         self._fed = platform.powered_by()
         self._busy: dict[str, Ns] = {name: 0 for names in self._fed.values() for name in names}
         self._then: Ns = kernel.now()
         for name in self._busy:
             self._check(name)
         for vehicle, names in self._fed.items():
-            airfield.flights[vehicle].payload_power(sum(platform.watts(name, 0.0) for name in names))
+            fleet.flights[vehicle].payload_power(sum(platform.watts(name, 0.0) for name in names))
         if self._fed:
             kernel.every(FEED_PERIOD, self._feed)
 

@@ -69,7 +69,6 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
     return None if known is None or known.core_model is None else known.core_law()
 
 
-
 def compiler_options(include: Sequence[Path], flags: Sequence[str]) -> list[str]:
     """What the compiler of counted and traced code is told."""
     return ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path))), *flags]

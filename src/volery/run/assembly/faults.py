@@ -1,41 +1,230 @@
-"""Faults that a scenario injects: something of a vehicle breaks at a stated time, for good or for a while."""
+"""The effects of faults on a simulated run. The kinds of faults are declared in ``volery.model.faults``.
+
+Every effect is one function that makes a fault happen or ends it. Scenarios of a model and fault trials use
+the same functions; they differ in how the link to an autopilot is reached (``LinkControl``).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import cos, radians, sin
+from typing import Any, Protocol
 
-from volery.kernel.api import Kernel
-from volery.model.faults import Fault
-from volery.run.assembly.simulated_fleet import SimulatedFleet
-from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.base.errors import ModelError
+from volery.base.time import Ns
+from volery.kernel.api import Handle, Kernel
+from volery.kernel.network import Network
+from volery.kernel.processor import Processor
+from volery.kernel.task import ExecutionContext
+from volery.links.wire_faults import WireFaults
+from volery.model.environment import Environment, Wind
+from volery.model.faults import (
+    BarometerStuck,
+    BatteryCellDead,
+    BatteryLow,
+    CompassStuck,
+    ComputerSlowed,
+    ComputerStopped,
+    Fault,
+    GpsDrift,
+    GpsLost,
+    LinkCut,
+    LinkDegraded,
+    MotorDead,
+    NetworkCut,
+    NetworkDegraded,
+    VehicleFault,
+    WindChange,
+)
+from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
+from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
 from volery.trace.events import Text
-
-Break = Callable[[Flight, bool], None]
-"""Breaks something of a vehicle (True), or mends it (False)."""
 
 WARNING = 4
 
-KINDS: Mapping[str, Break] = {
-    "gps-lost": lambda flight, broken: flight.block_gps(broken),
-    "barometer-stuck": lambda flight, broken: flight.block_barometer(broken),
-    "compass-stuck": lambda flight, broken: flight.block_compass(broken),
-    "motor-dead": lambda flight, broken: flight.weaken_motor(0, 0.0 if broken else 1.0),
-}
-"""By the name that a model uses."""
+ALWAYS: tuple[tuple[Ns, Ns], ...] = ((0, 1 << 62),)
+NO_WIRE_FAULTS = WireFaults()
 
 
-def inject(kernel: Kernel, airfield: SimulatedFleet, faults: Iterable[Fault]) -> None:
-    """Let every fault happen at its time, and end when it ends; both are told to the trace."""
+class LinkControl(Protocol):
+    """Control of the links to autopilots."""
+
+    def cut(self, vehicle: str, active: bool) -> None:
+        """Let nothing pass on the link of *vehicle*, in either direction; or let it pass again."""
+
+    def set_faults(self, vehicle: str, faults: WireFaults) -> None:
+        """Apply *faults* to whatever passes on the link of *vehicle* from now on."""
+
+
+@dataclass
+class FleetLinks:
+    """Control of the links that a fleet has made for a model."""
+
+    fleet: SimulatedFleet
+    _faults: dict[str, WireFaults] = field(default_factory=dict)
+
+    def cut(self, vehicle: str, active: bool) -> None:
+        """See ``LinkControl``."""
+        faults = self._faults.get(vehicle, NO_WIRE_FAULTS)
+        self.set_faults(vehicle, replace(faults, cuts=ALWAYS if active else ()))
+
+    def set_faults(self, vehicle: str, faults: WireFaults) -> None:
+        """See ``LinkControl``."""
+        self._faults[vehicle] = faults
+        for link in self.fleet.faulty_links(vehicle):
+            link.set_faults(faults)
+
+
+@dataclass
+class Affected:
+    """The parts of a run that faults act on. ``wind`` is the one that returns when a fault of it is over."""
+
+    kernel: Kernel
+    fleet: SimulatedFleet
+    links: LinkControl
+    wind: Wind = field(default_factory=Wind)
+    processors: Mapping[str, Processor] = field(default_factory=dict)
+    networks: Mapping[str, Network] = field(default_factory=dict)
+    loads: dict[str, list[Handle]] = field(default_factory=dict)
+
+
+def with_faulty_links(environment: Environment) -> frozenset[str]:
+    """Return the vehicles whose links must go through bytes, because a fault damages them.
+
+    Raises:
+        ModelError: a vehicle has no link that a fault could damage.
+    """
+    found = set()
+    autopilots = {vehicle.name: vehicle.autopilot for vehicle in environment.vehicles}
+    for fault in environment.faults:
+        if isinstance(fault, LinkCut | LinkDegraded):
+            if autopilots[fault.vehicle] == "dji":
+                what = f"a simulated dji has no link; {fault.vehicle} is reached over a graph"
+                raise ModelError(what, f"environment.faults.{fault.name}.vehicle", fault.where)
+            found.add(fault.vehicle)
+    return frozenset(found)
+
+
+def inject(faults: Iterable[Fault], affected: Affected) -> None:
+    """Schedule every fault and its end, both of which are recorded in the trace."""
+    kernel = affected.kernel
     for fault in faults:
-        kernel.call_at(fault.at_ns, _act(kernel, airfield, fault, broken=True))
+        kernel.call_at(fault.at_ns, partial(_happen, fault, affected, True))
         if fault.duration_ns is not None:
-            kernel.call_at(fault.at_ns + fault.duration_ns, _act(kernel, airfield, fault, broken=False))
+            kernel.call_at(fault.at_ns + fault.duration_ns, partial(_happen, fault, affected, False))
 
 
-def _act(kernel: Kernel, airfield: SimulatedFleet, fault: Fault, *, broken: bool) -> Callable[[], None]:
-    def act() -> None:
-        words = f"fault {fault.name}: {fault.kind}" if broken else f"fault {fault.name} is over"
-        kernel.record(Text(kernel.now(), fault.subject, WARNING, words))
-        KINDS[fault.kind](airfield.flights[fault.subject], broken)
+def _happen(fault: Fault, affected: Affected, active: bool) -> None:
+    kernel = affected.kernel
+    text = f"fault {fault.name}: {fault.kind}" if active else f"fault {fault.name} is over"
+    kernel.record(Text(kernel.now(), fault.subject, WARNING, text))
+    apply_fault(fault, affected, active)
 
-    return act
+
+def apply_fault(fault: Fault, affected: Affected, active: bool = True) -> None:
+    """Make *fault* happen now, or end it."""
+    EFFECTS[type(fault)](fault, affected, active)
+
+
+# -- the effects
+
+
+def _flight_effect(act: Callable[[Any, Any, bool], None]) -> Callable[[Any, Affected, bool], None]:
+    """Return the effect of a fault that acts on the flight of its vehicle."""
+
+    def effect(fault: VehicleFault, affected: Affected, active: bool) -> None:
+        act(affected.fleet.flights[fault.vehicle], fault, active)
+
+    return effect
+
+
+def _drift(flight: Any, fault: GpsDrift, active: bool) -> None:
+    speed, direction = (fault.speed_m_s if active else 0.0), radians(fault.direction_deg)
+    flight.drift_gps(speed * cos(direction), speed * sin(direction))
+
+
+def _drain(flight: Any, fault: BatteryLow, active: bool) -> None:
+    if active:
+        flight.drain_battery(fault.charge)
+
+
+def _cut_link(fault: LinkCut, affected: Affected, active: bool) -> None:
+    affected.links.cut(fault.vehicle, active)
+
+
+def _degrade_link(fault: LinkDegraded, affected: Affected, active: bool) -> None:
+    faults = WireFaults(
+        drop=fault.loss,
+        flip=fault.corrupt,
+        truncate=fault.truncate,
+        duplicate=fault.duplicate,
+        reorder=fault.reorder,
+        jitter=fault.delay_ns,
+    )
+    affected.links.set_faults(fault.vehicle, faults if active else NO_WIRE_FAULTS)
+
+
+def _cut_network(fault: NetworkCut, affected: Affected, active: bool) -> None:
+    affected.networks[fault.network].degrade(loss=1.0 if active else 0.0)
+
+
+def _degrade_network(fault: NetworkDegraded, affected: Affected, active: bool) -> None:
+    network = affected.networks[fault.network]
+    network.degrade(loss=fault.loss if active else 0.0, delay=fault.delay_ns if active else 0)
+
+
+def _stop_computer(fault: ComputerStopped, affected: Affected, active: bool) -> None:
+    processor = affected.processors[fault.processor]
+    if active:
+        processor.halt()
+    else:
+        processor.resume()
+
+
+def _slow_computer(fault: ComputerSlowed, affected: Affected, active: bool) -> None:
+    """Add background load: on each core the same share of every period."""
+    for handle in affected.loads.pop(fault.name, ()):
+        handle.cancel()
+    if active:
+        processor, piece = affected.processors[fault.processor], round(fault.load * LOAD_PERIOD)
+        affected.loads[fault.name] = [
+            affected.kernel.every(
+                LOAD_PERIOD,
+                partial(
+                    processor.load,
+                    ExecutionContext(load_name(processor.name), processor, LOAD_PRIORITY),
+                    piece,
+                ),
+            )
+            for _ in range(processor.cores)
+        ]
+
+
+def _change_wind(fault: WindChange, affected: Affected, active: bool) -> None:
+    wind = Wind(fault.speed_m_s, fault.direction_deg, fault.gusts_m_s) if active else affected.wind
+    affected.fleet.world.set_wind(wind_of(wind))
+
+
+EFFECTS: Mapping[type[Fault], Callable[[Any, Affected, bool], None]] = {
+    MotorDead: _flight_effect(
+        lambda flight, fault, active: flight.weaken_motor(fault.motor - 1, fault.thrust if active else 1.0)
+    ),
+    BatteryLow: _flight_effect(_drain),
+    BatteryCellDead: _flight_effect(
+        lambda flight, fault, active: flight.short_cells(fault.cells if active else 0)
+    ),
+    GpsLost: _flight_effect(lambda flight, fault, active: flight.block_gps(active)),
+    GpsDrift: _flight_effect(_drift),
+    BarometerStuck: _flight_effect(lambda flight, fault, active: flight.block_barometer(active)),
+    CompassStuck: _flight_effect(lambda flight, fault, active: flight.block_compass(active)),
+    LinkCut: _cut_link,
+    LinkDegraded: _degrade_link,
+    NetworkCut: _cut_network,
+    NetworkDegraded: _degrade_network,
+    ComputerStopped: _stop_computer,
+    ComputerSlowed: _slow_computer,
+    WindChange: _change_wind,
+}
+"""The effect of each kind of fault that a model can state."""

@@ -1,18 +1,24 @@
-"""The vehicles of a run: their bodies in one world, and for each the simulated autopilot that flies it."""
+"""The simulated vehicles of a run: their bodies in one world, and a simulated autopilot for each.
+
+This module imports the simulation, and with it numba. Code that also runs on board of a real vehicle imports
+it inside functions, or for type checking only.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from math import cos, pi, radians, sin
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
+from volery.base.seeds import stream
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Codec, Link
+from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
 from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
@@ -30,9 +36,10 @@ CELL_NOMINAL_VOLTS = 3.7
 
 
 class SimulatedFleet:
-    """Simulated vehicles, by name, in the order of the model.
+    """Simulated vehicles in one world, by name, in the order of the model.
 
-    Their system ids count from 1, except for those that *systems* states.
+    System ids count from 1, except for the vehicles in *systems*. The links of the vehicles in
+    *through_bytes* can be given faults: see ``faulty_links``.
     """
 
     def __init__(
@@ -44,8 +51,11 @@ class SimulatedFleet:
         seed: int,
         *,
         systems: Mapping[str, int] | None = None,
+        through_bytes: Collection[str] = (),
     ) -> None:
         self._kernel = kernel
+        self._seed = seed
+        self._faulty: dict[str, list[FaultyLink]] = {vehicle: [] for vehicle in through_bytes}
         self.frame = frame
         specs = [body_of(vehicle) for vehicle in vehicles]
         self._world: World | None = None
@@ -71,44 +81,77 @@ class SimulatedFleet:
 
     @property
     def world(self) -> World:
-        """Where the bodies are. Raises ``UsageError`` if there are none."""
+        """World of the bodies. Raises ``UsageError`` if the run has no vehicle."""
         if self._world is None:
-            raise UsageError("there is no vehicle in this run, and so no world")
+            raise UsageError("this run has no vehicle and therefore no world")
         return self._world
 
     def family(self, vehicle: str) -> FirmwareFamily:
-        """The firmware that flies it."""
+        """Return the firmware of a vehicle."""
         return self._families[vehicle]
 
     def codec(self, vehicle: str) -> Codec:
-        """What its autopilot's links speak. Raises ``UsageError`` if it is reached over a graph only."""
+        """Return the codec of a vehicle's links.
+
+        Raises:
+            UsageError: The autopilot has no links, because it is a node of a ROS graph.
+        """
         family = self._families[vehicle]
         if family.codec is None:
-            raise UsageError(f"{vehicle}: a simulated {family.name} has no links; it is reached over a graph")
+            raise UsageError(
+                f"{vehicle}: a simulated {family.name} has no links; it is reached over a ROS graph"
+            )
         return family.codec
 
     def link(self, vehicle: str) -> Link:
-        """A new link to the autopilot of *vehicle*, as over a serial line beside it."""
-        ours, theirs = in_process_pair(self._kernel, LINK_DELAY, vehicle, self.codec(vehicle))
+        """Return a new link to the autopilot of *vehicle*, as over a serial line on board."""
+        codec = self.codec(vehicle)
+        ours: Link
+        theirs: Link
+        if vehicle in self._faulty:
+            random = stream(self._seed, f"wire/{vehicle}")
+            faulty, theirs = faulty_pair(
+                self._kernel, vehicle, WireFaults(), random, delay=LINK_DELAY, codec=codec
+            )
+            self._faulty[vehicle].append(faulty)
+            ours = faulty
+        else:
+            ours, theirs = in_process_pair(self._kernel, LINK_DELAY, vehicle, codec)
         self.autopilots[vehicle].connect(theirs)
         return ours
 
+    def link_for(self, wanted: SimulatedVehicle) -> Link:
+        """Return a new link to the autopilot of *wanted*, with the faults that its address states."""
+        name = wanted.vehicle.name
+        if wanted.faults is None:
+            return self.link(name)
+        random = stream(self._seed, f"wire/{name}")
+        ours, theirs = faulty_pair(
+            self._kernel, name, wanted.faults, random, delay=LINK_DELAY, codec=self.codec(name)
+        )
+        self.autopilots[name].connect(theirs)
+        return ours
+
+    def faulty_links(self, vehicle: str) -> Sequence[FaultyLink]:
+        """Return the links to the autopilot of *vehicle* that can be given faults."""
+        return self._faulty.get(vehicle, ())
+
     def truth(self, vehicle: str) -> Callable[[], Position]:
-        """Where *vehicle* really is: for judges, never for its commander."""
+        """Return a function for the true position of *vehicle*: to judge an operation, never to command it."""
         flight = self.flights[vehicle]
 
-        def look() -> Position:
+        def position() -> Position:
             latitude, longitude, amsl = self.frame.from_enu(flight.truth().position)
             return Position(latitude, longitude, AMSL(amsl))
 
-        return look
+        return position
 
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
-        """Record the state of every vehicle now and then each *period*."""
+        """Record the state of every vehicle periodically, from now on."""
         self._kernel.every(period, self.record_states)
 
     def progress(self) -> tuple[VehicleProgress, ...]:
-        """What they do now."""
+        """Return the present state of each vehicle."""
         return tuple(self._progress(name) for name in self.flights)
 
     def _progress(self, name: str) -> VehicleProgress:
@@ -116,22 +159,22 @@ class SimulatedFleet:
         return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)
 
     def record_states(self) -> None:
-        """Record the state of every vehicle now."""
+        """Record the present state of every vehicle."""
         for autopilot in self.autopilots.values():
             self._kernel.record(autopilot.state())
 
 
 def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
-    """Distinct system ids. Raises ``UsageError`` if two are stated to be the same."""
+    """Return distinct system ids. Raises ``UsageError`` if two stated ids are equal."""
     taken = list(stated.values())
     if len(set(taken)) < len(taken):
-        raise UsageError(f"system ids {sorted(taken)}: each vehicle needs one of its own")
+        raise UsageError(f"system ids {sorted(taken)}: each vehicle needs its own")
     free = (number for number in range(1, 256) if number not in taken)
     return {name: stated[name] if name in stated else next(free) for name in names}
 
 
 def wind_of(model: WindModel) -> Wind:
-    """The model says where it blows from, clockwise from north; the world wants the way it blows."""
+    """Return the wind of the world: the model states the direction it comes from, clockwise from north."""
     towards = radians(model.direction_deg) + pi
     return Wind(
         east=model.speed_m_s * sin(towards), north=model.speed_m_s * cos(towards), gust=model.gusts_m_s
@@ -139,7 +182,7 @@ def wind_of(model: WindModel) -> Wind:
 
 
 def body_of(vehicle: VehicleModel) -> BodySpec:
-    """The body of a vehicle, standing where the model puts it."""
+    """Return the body of a vehicle at its place in the model."""
     kind = Multirotor if vehicle.kind == "multirotor" else Rover
     usual = kind().battery
     return kind(
@@ -156,7 +199,7 @@ def _battery(model: BatteryModel, usual: Battery) -> Battery:
 
 
 def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> SimulatedFleet:
-    """A world with these vehicles in it: its origin and its wind are the first one's."""
+    """Return a fleet of these vehicles. The origin and the wind of its world are those of the first."""
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}

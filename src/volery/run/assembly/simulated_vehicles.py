@@ -1,4 +1,7 @@
-"""Vehicles that ``sim:`` addresses describe."""
+"""Simulated vehicles as ``sim:`` addresses describe them.
+
+This module describes them only and imports nothing of the simulation; see ``simulated_fleet`` for that.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,8 @@ from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, faulty_pair, par
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
 from volery.vehicles.address import Address
 
-if TYPE_CHECKING:
-    from volery.run.assembly.simulated_fleet import SimulatedFleet
-
 HOME = Position(46.0825, -103.8995, AMSL(900))
-"""Where simulated vehicles stand unless an address or a mission says otherwise."""
+"""Home of simulated vehicles unless an address or a mission states another."""
 
 OPTIONS = (
     "heading",
@@ -35,20 +35,25 @@ OPTIONS = (
     "wire",
     *FAULT_OPTIONS,
 )
-"""What may follow ``sim:AUTOPILOT?``."""
+"""Options of ``sim:AUTOPILOT?``."""
 
-CARRIERS = ("values", "bytes")
+WIRE_MODES = ("values", "bytes")
 
 LINK_DELAY: Ns = 2 * MS
-"""One way between an autopilot and the computer beside it, over a serial line."""
+"""One-way delay between an autopilot and a computer on board, over a serial line."""
 
 
 @dataclass(frozen=True)
 class SimulatedVehicle:
-    """What a ``sim:`` address describes: a vehicle in a world of its own, and the wire to it.
+    """Description of one simulated vehicle, its surroundings and its link.
 
-    ``faults`` is ``None`` where frames travel as values. ``names`` are those of its node, where its autopilot
-    is reached over a graph and has more than one set of them.
+    Attributes:
+        vehicle: The vehicle as a model describes it.
+        frame: Local frame with its origin at home.
+        wind: Wind of the world.
+        faults: Faults of the link, or None if frames travel as values and not as bytes.
+        system: System id, or None for the next free one.
+        names: Namespace of its ROS node, if the autopilot has one and offers several.
     """
 
     vehicle: Vehicle
@@ -60,7 +65,7 @@ class SimulatedVehicle:
 
     @property
     def home(self) -> Position:
-        """Where it stands."""
+        """Home position."""
         at = self.vehicle.at
         return Position(at.latitude, at.longitude, AMSL(at.amsl_m))
 
@@ -68,11 +73,11 @@ class SimulatedVehicle:
 def parse_simulated(
     address: Address, name: str, kind: str = "multirotor", home: Position = HOME
 ) -> SimulatedVehicle:
-    """Read a ``sim:`` address; *kind* and *home* hold unless it says otherwise.
+    """Parse a ``sim:`` address.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
     ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the
-    autopilot, ``names`` of its node on a graph, ``wire=values|bytes`` and, through bytes, the faults of
+    autopilot, ``names`` of its ROS node, ``wire=values|bytes`` and, with bytes, the faults of
     ``volery.links.wire_faults``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
@@ -105,7 +110,7 @@ def _parameters(address: Address) -> dict[str, float]:
         except ValueError:
             colon = ""
         if not colon or not name:
-            raise UsageError(f"{address}: parameters={part!r} should be NAME:VALUE, joined by commas")
+            raise UsageError(f"{address}: parameters={part!r} should be NAME:VALUE, separated by commas")
     return found
 
 
@@ -126,23 +131,11 @@ def _one_of(address: Address, option: str, valid: tuple[str, ...], default: str)
 
 
 def _faults(address: Address) -> WireFaults | None:
-    carrier = _one_of(address, "wire", CARRIERS, "values")
+    carrier = _one_of(address, "wire", WIRE_MODES, "values")
     wanted = {name: value for name, value in address.options.items() if name in FAULT_OPTIONS}
     if carrier == "values":
         if wanted:
-            raise UsageError(f"{address}: {choices(wanted)} happens to bytes; add wire=bytes")
+            raise UsageError(f"{address}: {choices(wanted)} needs a link through bytes; add wire=bytes")
         return None
     return parse_wire_faults(wanted)
 
-
-def link_to(kernel: Kernel, airfield: SimulatedFleet, wanted: SimulatedVehicle, seed: int) -> Link:
-    """A link to its autopilot, as the address wants it."""
-    name = wanted.vehicle.name
-    if wanted.faults is None:
-        return airfield.link(name)
-    random = stream(seed, f"wire/{name}")
-    ours, theirs = faulty_pair(
-        kernel, name, wanted.faults, random, delay=LINK_DELAY, codec=airfield.codec(name)
-    )
-    airfield.autopilots[name].connect(theirs)
-    return ours

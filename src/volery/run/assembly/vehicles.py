@@ -46,13 +46,13 @@ def _nothing() -> None:
 
 @dataclass(frozen=True)
 class OpenedVehicles:
-    """A kernel and the vehicles that were opened on it; ``airfield`` is ``None`` for vehicles that are out
+    """A kernel and the vehicles that were opened on it; ``fleet`` is ``None`` for vehicles that are out
     there.
     """
 
     kernel: VirtualKernel | WallKernel
     vehicles: tuple[Vehicle, ...]
-    airfield: SimulatedFleet | None = None
+    fleet: SimulatedFleet | None = None
     leave: Action = _nothing
     """Leave the graphs that lead to them; once they are closed."""
 
@@ -95,9 +95,9 @@ def _open_simulated(
     for one in wanted:
         _check_home(one, stated.fence)
     kernel = VirtualKernel(pace=stated.pace)
-    airfield = fleet_of(kernel, wanted, stated.seed)
-    vehicles = [_simulated_vehicle(kernel, airfield, one, kinds[one.vehicle.name], stated) for one in wanted]
-    return OpenedVehicles(kernel, tuple(vehicles), airfield)
+    fleet = fleet_of(kernel, wanted, stated.seed)
+    vehicles = [_simulated_vehicle(kernel, fleet, one, kinds[one.vehicle.name], stated) for one in wanted]
+    return OpenedVehicles(kernel, tuple(vehicles), fleet)
 
 
 def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:
@@ -109,14 +109,14 @@ def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:
 
 def _simulated_vehicle(
     kernel: Kernel,
-    airfield: SimulatedFleet,
+    fleet: SimulatedFleet,
     wanted: SimulatedVehicle,
     kind: type[Vehicle],
     stated: VehicleSettings,
 ) -> Vehicle:
-    driver = open_simulated_driver(kernel, airfield, wanted, stated.seed)
+    driver = open_simulated_driver(kernel, fleet, wanted, stated.seed)
     name = wanted.vehicle.name
-    return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=airfield.truth(name))
+    return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=fleet.truth(name))
 
 
 # -- out there

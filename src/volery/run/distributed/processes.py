@@ -169,15 +169,15 @@ class DistributedRun:
         self._truth: Callable[[str], Truth]
         self.graph = open_graph(kernel, order.graph, start_master=True, epoch=0)
 
-    def build(self, platform: Platform, airfield: SimulatedFleet) -> BuiltComponents:
+    def build(self, platform: Platform, fleet: SimulatedFleet) -> BuiltComponents:
         """The components of the environment. Raises what is wrong with them, or with the graph."""
         kernel, system = self._kernel, self._system
         self._node = node = self.graph.node(plan.NODE)
-        self._truth = airfield.truth
+        self._truth = fleet.truth
         self._values = ValueCodec(self._beside)
         self._here = tuple(one for one in system.instances if one.is_environment)
         part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._values))
-        builder = Builder(system, kernel, platform, airfield, self._ending, part=part)
+        builder = Builder(system, kernel, platform, fleet, self._ending, part=part)
         self._built = builder.build("times", self._order.seed)
         return self._built
 

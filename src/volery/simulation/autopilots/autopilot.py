@@ -55,8 +55,10 @@ class Autopilot:
         chosen = _of_kind(firmware, "multirotor" if flight.flying else "rover")
         self.firmware = chosen
         self.name = name or f"{chosen.name}_{system}"
-        self.vehicle = Vehicle(kernel, flight, chosen, system=system, name=self.name, overrides=parameters)
-        self.face: ProtocolEndpoint = chosen.face(self.vehicle)
+        self.vehicle = Vehicle(
+            kernel, flight, chosen.rules, system=system, name=self.name, overrides=parameters
+        )
+        self.face: ProtocolEndpoint = chosen.endpoint(self.vehicle)
         self.vehicle.outlet = self.face
         self.on_reboot: Action = _nothing
         """Called when a station restarts the autopilot: whoever serves its links may close them."""
@@ -66,7 +68,7 @@ class Autopilot:
         self._booted = warm
         self.vehicle.restart = self._restart
         if warm:
-            self._boot(chosen.warm_age)
+            self._boot(chosen.rules.startup.warm_age)
 
     # -- life
 
@@ -134,17 +136,19 @@ class Autopilot:
         self._ticks = 0
         if age:
             self._flight.set_origin()
-            firmware.on_warm(vehicle)
-            self._at(age + WARM_UP, lambda: firmware.on_warm_position(vehicle))
+            firmware.boot.on_warm(vehicle)
+            self._at(age + WARM_UP, lambda: firmware.boot.on_warm_position(vehicle))
         else:
-            for event in firmware.boot_events:
+            for event in firmware.boot.events:
                 self._at(event.after, partial(event.act, vehicle))
         self.face.start()
-        self._clocks.append(self._kernel.every(firmware.tick, self._tick))
-        phase = (firmware.each_second_from - age) % S
+        self._clocks.append(self._kernel.every(firmware.periodic.tick, self._tick))
+        phase = (firmware.periodic.each_second_from - age) % S
         self._at(
             age + phase,
-            lambda: self._clocks.append(self._kernel.every(S, lambda: firmware.each_second(vehicle))),
+            lambda: self._clocks.append(
+                self._kernel.every(S, lambda: firmware.periodic.each_second(vehicle))
+            ),
         )
 
     def _at(self, uptime: Ns, action: Action) -> None:
@@ -156,21 +160,21 @@ class Autopilot:
         if vehicle.armed:
             vehicle.watch_ground()
             vehicle.act()
-        firmware.on_step(vehicle)
-        if self._ticks % firmware.watch_every == 0:
+        firmware.periodic.on_step(vehicle)
+        if self._ticks % firmware.periodic.failsafe_ticks == 0:
             self._watch()
 
     def _watch(self) -> None:
         """Look whether a failsafe begins or ends."""
         vehicle = self.vehicle
-        for watch in self.firmware.watches:
-            tripped, was = watch.tripped(vehicle), watch.name in vehicle.failsafes
+        for failsafe in self.firmware.failsafes:
+            tripped, was = failsafe.tripped(vehicle), failsafe.name in vehicle.failsafes
             if tripped and not was:
-                vehicle.failsafes.add(watch.name)
-                watch.begins(vehicle)
+                vehicle.failsafes.add(failsafe.name)
+                failsafe.begins(vehicle)
             elif was and not tripped:
-                vehicle.failsafes.discard(watch.name)
-                watch.ends(vehicle)
+                vehicle.failsafes.discard(failsafe.name)
+                failsafe.ends(vehicle)
 
     # -- for recorders
 

@@ -6,12 +6,37 @@ knows neither.
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
+from volery.kernel.api import Action
 from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.ros.graph import RosGraph
-from volery.simulation.autopilots.vehicle_state import VehicleOutput
+
+
+class VehicleOutput(Protocol):
+    """Through which a vehicle speaks to whoever listens."""
+
+    def say(self, severity: int, text: str) -> None:
+        """Words for people; severity as in syslog."""
+
+    def parameter(self, name: str) -> None:
+        """A parameter has another value."""
+
+    def mode_changed(self) -> None:
+        """It flies another mode."""
+
+    def home_changed(self) -> None:
+        """Home is elsewhere."""
+
+    def announce(self, message: str) -> None:
+        """Send that message of the firmware's protocol now, to everyone."""
+
+    def tell(self, message: str, fields: dict[str, Any]) -> None:
+        """Send an event with these fields, to everyone."""
+
+    def after_answer(self, action: Action) -> None:
+        """Do it once the frame that is being handled has been answered; at once if none is."""
 
 
 class ProtocolEndpoint(VehicleOutput, Protocol):

@@ -8,21 +8,19 @@ protocol; what differs between firmwares it asks its dialect.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import hypot
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
-from volery.base.time import Ns, from_seconds
+from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
-from volery.simulation.autopilots.autopilot_parameters import Parameters
+from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
+from volery.simulation.autopilots.endpoint import VehicleOutput
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import NEVER, RcChannels
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
-
-if TYPE_CHECKING:
-    from volery.simulation.autopilots.firmware import Firmware
 
 
 class Manoeuvre:
@@ -109,29 +107,69 @@ class Mode:
     """May be armed by a ground station with the throttle stick up."""
 
 
-class VehicleOutput(Protocol):
-    """Through which a vehicle speaks to whoever listens."""
+def do_nothing(_vehicle: Vehicle) -> None:
+    """Do nothing: the default of a firmware's actions."""
 
-    def say(self, severity: int, text: str) -> None:
-        """Words for people; severity as in syslog."""
 
-    def parameter(self, name: str) -> None:
-        """A parameter has another value."""
+class StartupTimes(NamedTuple):
+    """Uptimes [ns] from which parts of the autopilot work."""
 
-    def mode_changed(self) -> None:
-        """It flies another mode."""
+    ready_after: Ns
+    """Telemetry streams run, and status texts follow the acknowledgement that they belong to."""
+    origin_after: Ns
+    """The estimator has an origin and the vehicle a home position."""
+    position_after: Ns
+    """Modes that need a position may fly."""
+    local_position_after: Ns
+    """The local position is sent."""
+    warm_age: Ns = 60 * S
+    """Uptime of a vehicle that starts warm."""
 
-    def home_changed(self) -> None:
-        """Home is elsewhere."""
 
-    def announce(self, message: str) -> None:
-        """Send that message of the firmware's protocol now, to everyone."""
+class ArmingTimes(NamedTuple):
+    """Times [ns] from arming until a vehicle that flies leaves the ground; all 0 for a rover."""
 
-    def tell(self, message: str, fields: dict[str, Any]) -> None:
-        """Send an event with these fields, to everyone."""
+    motors_rest: Ns = 0
+    """After arming the motors stay off for that time."""
+    spool_up: Ns = 0
+    """Time from idle to full speed."""
+    takeoff_slew: Ns = 0
+    """Additional ramp of a slow start."""
+    abandoned_after: Ns = 0
+    """A vehicle that still stands on the ground and no longer wants to fly counts as landed after that time."""
 
-    def after_answer(self, action: Action) -> None:
-        """Do it once the frame that is being handled has been answered; at once if none is."""
+
+class ParameterTable(NamedTuple):
+    """The parameters of a firmware and what follows from them."""
+
+    defaults: Callable[[], tuple[Parameter, ...]]
+    tuning: Callable[[Parameters], Tuning]
+    """Derive the limits and gains of the manoeuvres from parameter values."""
+    of_vehicle: Callable[[int, Flight], Mapping[str, float]]
+    """Return the values that follow from the system id and the body."""
+    supported: Mapping[str, str]
+    """The parameters that change the behaviour, and what each changes. All others are only stored."""
+
+
+class RcDefaults(NamedTuple):
+    """The simulated transmitter: its pulse widths [us] by channel, and where its throttle stick rests."""
+
+    transmitter: Sequence[int]
+    throttle_centred: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleRules:
+    """What a vehicle uses of its firmware."""
+
+    modes: Mapping[int, Mode]
+    boot_mode: Mode
+    startup: StartupTimes
+    arming: ArmingTimes = field(default_factory=ArmingTimes)
+    parameters: ParameterTable
+    rc: RcDefaults
+    firmware_state: Callable[[Vehicle], object] = do_nothing
+    """Create the state that only this firmware keeps about a vehicle: ``Vehicle.firmware_state``."""
 
 
 class Home(NamedTuple):
@@ -150,7 +188,7 @@ class Vehicle:
         self,
         kernel: Kernel,
         flight: Flight,
-        firmware: Firmware,
+        rules: VehicleRules,
         *,
         system: int,
         name: str,
@@ -158,22 +196,22 @@ class Vehicle:
     ) -> None:
         self.kernel = kernel
         self.flight = flight
-        self.firmware = firmware
+        self.rules = rules
         self.system = system
         self.name = name
         self.outlet: VehicleOutput
         self.restart: Action
         """Switch the autopilot off and on again."""
         self.parameters = Parameters(
-            firmware.parameters(), {**firmware.own_parameters(system, flight), **(overrides or {})}
+            rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
         )
-        self.tuning = firmware.tuning(self.parameters)
-        self.sticks = RcChannels(firmware.transmitter)
+        self.tuning = rules.parameters.tuning(self.parameters)
+        self.sticks = RcChannels(rules.rc.transmitter)
         self.plan = OnboardMission()
-        self.memory: Any = firmware.memory(self)
+        self.firmware_state: Any = rules.firmware_state(self)
         """What only its firmware knows of."""
         self.boot_at: Ns = kernel.now()
-        self.mode: Mode = firmware.boot_mode
+        self.mode: Mode = rules.boot_mode
         self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
         self._reset()
 
@@ -221,6 +259,11 @@ class Vehicle:
         """Nanoseconds since boot."""
         return self.kernel.now() - self.boot_at
 
+    @property
+    def flies(self) -> bool:
+        """Whether the vehicle leaves the ground (multirotor), so that standing on the ground is a state."""
+        return self.flight.flying
+
     def boot(self, age: Ns) -> None:
         """Start anew, as if switched on *age* ago.
 
@@ -229,7 +272,7 @@ class Vehicle:
         self.boot_at = self.kernel.now() - age
         self._reset()
         self.sticks.release()
-        self.mode = self.firmware.boot_mode
+        self.mode = self.rules.boot_mode
         self.manoeuvre = self.mode.manoeuvre(self)
 
     @property
@@ -240,7 +283,7 @@ class Vehicle:
     @property
     def has_position(self) -> bool:
         """Whether modes that need a position may fly."""
-        return self.uptime() >= self.firmware.position_after and self.estimate.position_ok
+        return self.uptime() >= self.rules.startup.position_after and self.estimate.position_ok
 
     def set_home(self, latitude: float, longitude: float, amsl: float) -> None:
         """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
@@ -278,7 +321,7 @@ class Vehicle:
         changed = self.parameters.set(name, value)
         if changed is None:
             return False
-        self.tuning = self.firmware.tuning(self.parameters)
+        self.tuning = self.rules.parameters.tuning(self.parameters)
         self.outlet.parameter(name)
         return True
 
@@ -334,9 +377,9 @@ class Vehicle:
         """Let the manoeuvre decide what the motors do; called at every tick and when the sticks moved."""
         if not self.armed:
             self.drive(OFF)
-        elif self.firmware.stands and self.landed:
+        elif self.flies and self.landed:
             self._stand()
-        elif self.firmware.stands and not self._lifted and not self.manoeuvre.wants_to_fly():
+        elif self.flies and not self._lifted and not self.manoeuvre.wants_to_fly():
             self.drive(IDLE)  # the wish to fly went before it had left the ground
         else:
             self.manoeuvre.step()
@@ -345,8 +388,8 @@ class Vehicle:
         """On the ground: motors rest, idle, and come up in the firmware's own time when the manoeuvre wants
         to fly.
         """
-        now, firmware = self.kernel.now(), self.firmware
-        if now - self.armed_at < firmware.motors_rest:
+        now, times = self.kernel.now(), self.rules.arming
+        if now - self.armed_at < times.motors_rest:
             self.drive(OFF)
             return
         self.manoeuvre.on_ground()
@@ -360,8 +403,8 @@ class Vehicle:
             self._wanted_at = now
         ready = self._wanted_at
         if self.manoeuvre.slow_start:
-            idling = self.armed_at + firmware.motors_rest + firmware.spool_time
-            ready = max(ready, idling) + firmware.takeoff_slew
+            idling = self.armed_at + times.motors_rest + times.spool_up
+            ready = max(ready, idling) + times.takeoff_slew
         if now < ready:
             self.drive(IDLE)
             return
@@ -371,14 +414,14 @@ class Vehicle:
 
     def watch_ground(self) -> None:
         """Notice that it has left the ground, come down, or given up the wish to fly."""
-        if not self.armed or self.landed or not self.firmware.stands:
+        if not self.armed or self.landed or not self.flies:
             return
         now = self.kernel.now()
         on_ground = self.estimate.landed
         self._lifted = self._lifted or not on_ground
         if not on_ground or self.manoeuvre.wants_to_fly():
             self._resigned_at = now
-        if on_ground and (self._lifted or now - self._resigned_at >= self.firmware.resigns_after):
+        if on_ground and (self._lifted or now - self._resigned_at >= self.rules.arming.abandoned_after):
             self.landed = True
             self.landed_at = self.idle_since = now
             self._wanted_at = NEVER
@@ -388,5 +431,5 @@ class Vehicle:
         return from_seconds(self.parameters[name])
 
 
-Rule = Callable[[Vehicle], None]
-"""Something that the stack does to a vehicle."""
+VehicleAction = Callable[[Vehicle], None]
+"""An action of a firmware on its vehicle."""

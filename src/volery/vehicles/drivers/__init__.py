@@ -1,1 +1,1 @@
-"""Drivers: how to talk to each autopilot. They know neither world nor autopilots."""
+"""Drivers: one package for each autopilot. They depend neither on the simulated world nor on simulated autopilots."""

@@ -1,4 +1,4 @@
-"""Whatever flies behind a vehicle node with MAVROS's names: an ArduPilot unless the address says another."""
+"""Driver of an autopilot behind MAVROS topic names: ArduPilot, unless the address names another."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ AUTOPILOTS: Mapping[str, Opener] = {"ardupilot": ardupilot.open_mavros, "px4": p
 
 
 def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Driver:
-    """A vehicle behind a vehicle node, commanded by *node*.
+    """Open a vehicle behind MAVROS names.
 
-    Options: ``autopilot`` (``ardupilot`` or ``px4``), ``namespace`` of the vehicle node (else ``/`` and
-    *name*), ``geoid``: ``egm96``, which is also what holds without it, or metres above the ellipsoid.
+    Args:
+        kernel: clock and tasks.
+        node: the node that commands the vehicle.
+        name: name of the vehicle.
+        options: ``autopilot`` (``ardupilot`` or ``px4``); ``namespace`` of the topics, by default ``/`` and
+            *name*; ``geoid``: ``egm96`` (default) or its height above the ellipsoid in metres.
     """
     rest = dict(options)
     autopilot = rest.pop("autopilot", "ardupilot")
@@ -29,4 +33,3 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
 
 
 MAVROS = DriverFactory(on_graph=open_driver)
-"""On a graph only."""

@@ -1,8 +1,7 @@
-"""A velocity that is repeated for as long as it is to last: one message may be lost, and some autopilots
-forget it, others never do.
+"""Repetition of velocities and manual control.
 
-What has to be said again and again: sticks, since an autopilot misses its transmitter; velocities, since
-one may be lost on the way, and some autopilots forget the last while others never do.
+An autopilot treats missing manual control as the loss of its transmitter; a single velocity may be lost on the
+way, and some autopilots forget the last one while others follow it without end.
 """
 
 from __future__ import annotations
@@ -10,136 +9,123 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from volery.base.time import Ns
-from volery.kernel.api import Action, Handle, Kernel
+from volery.kernel.api import Handle, Kernel
 from volery.vehicles.driver import ManualControl, Repeat, Step
 from volery.vehicles.drivers.steps import STOPPED_WITHIN, at_rest
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 
-class VelocityRepeater:
-    """Each *period*, as long as the vehicle is in *mode*: in another one it is somebody else's."""
-
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, mode: str, period: Ns) -> None:
-        self._kernel = kernel
-        self._seen = telemetry
-        self._mode = mode
-        self._period = period
-        self._handle: Handle | None = None
-
-    def begin(self, say: Action, stop: Action, lasting: Ns) -> None:
-        """*say* it from now on for so long; then *stop*, once."""
-        self.end()
-        until = self._kernel.now() + lasting
-
-        def repeat() -> None:
-            if self._seen.mode != self._mode:
-                self.end()
-            elif self._kernel.now() < until:
-                say()
-            else:
-                self.end()
-                stop()
-
-        self._handle = self._kernel.every(self._period, repeat)
-
-    def end(self) -> None:
-        """It is not repeated any more."""
-        if self._handle is not None:
-            self._handle.cancel()
-            self._handle = None
-
-
 class SetpointRepeater(ABC):
-    """Repeats one velocity for as long as it is to last, in *mode*, and sticks for as long as the mode is
-    ours.
+    """Repeats one velocity while the vehicle is in *mode*, and manual control while the mode is ours.
+
+    Args:
+        kernel: clock.
+        telemetry: telemetry of the vehicle.
+        mode: mode in which the vehicle follows velocities; in another one another station has control.
+        velocity_period: period of velocities, ns.
+        control_period: period of manual control, ns.
     """
 
     def __init__(
-        self, kernel: Kernel, telemetry: Telemetry, mode: str, *, velocity_period: Ns, sticks_period: Ns
+        self, kernel: Kernel, telemetry: Telemetry, mode: str, *, velocity_period: Ns, control_period: Ns
     ) -> None:
         self.held: ManualControl | None = None
         self._kernel = kernel
-        self._seen = telemetry
+        self._telemetry = telemetry
         self._mode = mode
-        self._velocity_period, self._sticks_period = velocity_period, sticks_period
-        self._following = VelocityRepeater(kernel, telemetry, mode, velocity_period)
-        self._refresh: Handle | None = None
+        self._velocity_period, self._control_period = velocity_period, control_period
+        self._velocity_handle: Handle | None = None
+        self._control_handle: Handle | None = None
 
-    # -- said by each autopilot's own
-
-    @abstractmethod
-    def stand_still(self) -> None:
-        """A velocity of zero, once."""
+    # -- what differs between autopilots
 
     @abstractmethod
-    def move(self, velocity: Velocity, yaw_rate: float) -> None:
-        """A velocity [m/s] and a turn rate [degrees/s], once."""
+    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Send a velocity (m/s) and a turn rate (degrees/s, clockwise) once."""
 
     @abstractmethod
-    def send(self, sticks: ManualControl) -> None:
-        """Sticks, once."""
+    def send_stop(self) -> None:
+        """Send a velocity of zero once."""
 
     @abstractmethod
-    def asked_for(self, mode: str) -> bool:
-        """Whether *mode* is one that was commanded."""
+    def send_control(self, control: ManualControl) -> None:
+        """Send manual control once."""
+
+    @abstractmethod
+    def is_commanded(self, mode: str) -> bool:
+        """Return whether this program commanded *mode*."""
 
     # -- velocity
 
     def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        """From now on for so long; then stop."""
-        self._following.begin(lambda: self.move(velocity, yaw_rate), self.stand_still, lasting)
+        """Repeat a velocity for *lasting*, then stop."""
+        self.end_velocity()
+        until = self._kernel.now() + lasting
 
-    def unfollow(self) -> None:
-        """No velocity is repeated any more."""
-        self._following.end()
+        def repeat() -> None:
+            if self._telemetry.mode != self._mode:
+                self.end_velocity()
+            elif self._kernel.now() < until:
+                self.send_velocity(velocity, yaw_rate)
+            else:
+                self.end_velocity()
+                self.send_stop()
 
-    def braking(self) -> Step:
-        """No velocity, until it stands."""
+        self._velocity_handle = self._kernel.every(self._velocity_period, repeat)
+
+    def end_velocity(self) -> None:
+        """Stop repeating a velocity."""
+        if self._velocity_handle is not None:
+            self._velocity_handle.cancel()
+            self._velocity_handle = None
+
+    def braking_step(self) -> Step:
+        """Return a step that sends a velocity of zero until the vehicle is at rest."""
         return Step(
             ask="stop",
-            send=self.stand_still,
+            send=self.send_stop,
             done=at_rest,
             within=STOPPED_WITHIN,
-            keep=Repeat(self._velocity_period, self.stand_still),
+            keep=Repeat(self._velocity_period, self.send_stop),
             mode=self._mode,
             armed=True,
         )
 
-    # -- sticks
+    # -- manual control
 
-    def take(self, sticks: ManualControl | None) -> None:
-        """Keep sending these; ``None`` lets go of them."""
-        if sticks is None:
+    def set_control(self, control: ManualControl | None) -> None:
+        """Repeat *control*; ``None`` ends the repetition."""
+        if control is None:
             self.release()
         else:
-            self.hold(sticks)
+            self.hold(control)
 
-    def hold(self, sticks: ManualControl) -> None:
-        """Keep sending these."""
-        self.held = sticks
-        if self._refresh is None:
-            self._refresh = self._kernel.every(self._sticks_period, self._send_sticks)
+    def hold(self, control: ManualControl) -> None:
+        """Repeat *control*."""
+        self.held = control
+        if self._control_handle is None:
+            self._control_handle = self._kernel.every(self._control_period, self._repeat_control)
 
     def hold_any(self) -> None:
-        """Sticks that were never set are in the middle in the air, and idle on the ground."""
+        """Repeat neutral control if none was ever set: centred in the air, idle throttle on the ground."""
         if self.held is None:
-            self.hold(ManualControl() if self._seen.flying else ManualControl(throttle=0.0))
+            self.hold(ManualControl() if self._telemetry.flying else ManualControl(throttle=0.0))
 
     def release(self) -> None:
-        """Let go of the sticks."""
-        if self._refresh is not None:
-            self._refresh.cancel()
-            self._refresh = None
+        """Stop repeating manual control."""
+        if self._control_handle is not None:
+            self._control_handle.cancel()
+            self._control_handle = None
         self.held = None
 
-    def _send_sticks(self) -> None:
-        seen = self._seen
-        if seen.flying and seen.mode != self._mode and not self.asked_for(seen.mode):
-            self.release()  # somebody else flies it now, by their own sticks
+    def _repeat_control(self) -> None:
+        telemetry = self._telemetry
+        if telemetry.flying and telemetry.mode != self._mode and not self.is_commanded(telemetry.mode):
+            self.release()  # another station or a pilot flies it now
         elif self.held is not None:
-            self.send(self.held)
+            self.send_control(self.held)
 
     def end(self) -> None:
-        """No set-point and no stick is repeated any more."""
-        self.unfollow()
+        """Stop all repetition."""
+        self.end_velocity()
         self.release()

@@ -1,6 +1,9 @@
-"""Steps, and limits of theirs, that are the same for every autopilot.
+"""Steps that all drivers share, and the conditions that end them: arrival, rest, and takeover by another.
 
-When a vehicle counts as having arrived: near its goal, and nearly standing.
+An autopilot that goes to a position reports where it goes: ArduPilot and PX4 in POSITION_TARGET_GLOBAL_INT,
+where a new target shows within a second and to a centimetre, as recorded; a Paparazzi in the carrot of its
+ROTORCRAFT_FP. So once our target has been reported, a different one was set by another station. The mode does
+not show it, because it stays the same.
 """
 
 from __future__ import annotations
@@ -10,10 +13,14 @@ from math import hypot, inf, isnan
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
-from volery.base.position import AboveHome, Position
-from volery.base.time import MINUTE, Ns, S
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.time import MINUTE, MS, Ns, S
+from volery.kernel.api import Action, Handle, Kernel
 from volery.vehicles.driver import ManualControl, Repeat, Step
 from volery.vehicles.telemetry import Telemetry
+
+DRONE_KIND, ROVER_KIND = "drone", "rover"
+"""Values of ``Telemetry.kind``."""
 
 ANSWERED_WITHIN: Ns = 5 * S
 ARMED_WITHIN: Ns = 10 * S
@@ -23,18 +30,31 @@ TURNED_WITHIN: Ns = 30 * S
 TURNED_DEG = 3.0
 IDLE_THROTTLE = 0.1
 
+NEAR_M, NEAR_UP_M = 0.6, 0.3
+"""Horizontal and vertical distance from its goal at which a drone has arrived."""
+AT_REST_M_S = 0.5
+ROVER_NEAR_M = 2.5
+"""Rovers stop within their waypoint radius: 2 m in ArduRover (WP_RADIUS) and PX4 (NAV_ACC_RAD)."""
+ROVER_AT_REST_M_S = 0.3
+
+SAME_TARGET_M = 0.5
+"""Targets nearer to each other than this are the same."""
+OTHER_TARGET_FOR: Ns = S
+"""Time for which another target must be reported: an unreliable link may deliver an old message late."""
+CHECK_PERIOD: Ns = 100 * MS
+
 
 def send_nothing() -> None:
-    """Some steps only wait."""
+    """Send nothing: the step only waits."""
 
 
-def immediate_step(ask: str, action: Callable[[], None], enters: str = "") -> Step:
-    """Something that is done as soon as it is sent."""
+def immediate_step(ask: str, action: Action, enters: str = "") -> Step:
+    """Return a step that is done as soon as *action* has run."""
     return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN, enters=enters)
 
 
 def ready_step(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
-    """Until it could arm and go by position."""
+    """Return a step that waits until the vehicle could arm and go to a position."""
     return Step(
         ask="be ready to arm and to go by position",
         send=send_nothing,
@@ -47,7 +67,7 @@ def ready_step(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
 
 
 def disarmed_step(ask: str, mode: str, within: Ns, leads_to: tuple[str, ...] = ()) -> Step:
-    """In *mode* it comes down by itself and stops its motors."""
+    """Return a step that waits for the end of a landing in *mode*, when the motors stop."""
     return Step(
         ask=ask,
         send=send_nothing,
@@ -58,8 +78,21 @@ def disarmed_step(ask: str, mode: str, within: Ns, leads_to: tuple[str, ...] = (
     )
 
 
+def check_throttle(telemetry: Telemetry, held: ManualControl | None, least: float = IDLE_THROTTLE) -> None:
+    """Raise ``UsageError`` if a drone in the air would fall because the throttle is below *least*."""
+    throttle = held.throttle if held is not None else 0.0
+    if telemetry.flying and throttle < least:
+        raise UsageError(
+            f"{telemetry.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle and it "
+            f"would fall; manual_control() with a throttle about 0.5 first"
+        )
+
+
+# -- conditions of arrival
+
+
 def heading_reached(degrees: float) -> Callable[[Telemetry], bool]:
-    """It looks *degrees* clockwise from north."""
+    """Return a condition: the heading is *degrees* clockwise from north."""
 
     def turned(seen: Telemetry) -> bool:
         off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
@@ -68,71 +101,157 @@ def heading_reached(degrees: float) -> Callable[[Telemetry], bool]:
     return turned
 
 
-def check_throttle(seen: Telemetry, held: ManualControl | None, least: float = IDLE_THROTTLE) -> None:
-    """Raise ``UsageError`` if it is to be flown by an idle throttle in the air: it would fall."""
-    throttle = held.throttle if held is not None else 0.0
-    if seen.flying and throttle < least:
-        raise UsageError(
-            f"{seen.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle and it "
-            f"would fall; manual_control() with a throttle about 0.5 first"
-        )
+def climbed_to(height: float) -> Callable[[Telemetry], bool]:
+    """Return a condition: in the air at *height* metres above home, and no longer climbing."""
 
+    def climbed(seen: Telemetry) -> bool:
+        near = abs(seen.above_home - height) <= NEAR_UP_M
+        return seen.flying and near and abs(seen.velocity.up) <= AT_REST_M_S
 
-DRONE_KIND, ROVER_KIND = "drone", "rover"
-"""What ``Telemetry.kind`` says."""
-
-NEAR_M, NEAR_UP_M = 0.6, 0.3
-"""A drone, horizontally and vertically."""
-STANDING_M_S = 0.5
-ROVER_NEAR_M = 2.5
-"""Rovers stop within their waypoint radius of a goal: 2 m in ArduRover (WP_RADIUS) and PX4 (NAV_ACC_RAD)."""
-ROVER_STANDING_M_S = 0.3
+    return climbed
 
 
 def at_rest(seen: Telemetry) -> bool:
-    """It hardly moves any more."""
-    limit = STANDING_M_S if seen.kind == DRONE_KIND else ROVER_STANDING_M_S
+    """Return whether the vehicle hardly moves."""
+    limit = AT_REST_M_S if seen.kind == DRONE_KIND else ROVER_AT_REST_M_S
     return hypot(seen.velocity.north, seen.velocity.east) <= limit and not abs(seen.velocity.up) > limit
 
 
 def arrived_at(goal: Position, rover: bool) -> Callable[[Telemetry], bool]:
-    """Near *goal* and nearly standing."""
+    """Return a condition: near *goal* and at rest."""
     frame = LocalFrame(goal.latitude, goal.longitude, 0.0)
     near = ROVER_NEAR_M if rover else NEAR_M
 
     def arrived(seen: Telemetry) -> bool:
-        if seen.position is None or not at_rest(seen):
+        here = seen.position
+        if here is None or not at_rest(seen):
             return False
-        east, north, _ = frame.to_enu(seen.position.latitude, seen.position.longitude, 0.0)
-        return hypot(east, north) <= near and (rover or _up_off(seen, goal) <= NEAR_UP_M)
+        east, north, _ = frame.to_enu(here.latitude, here.longitude, 0.0)
+        return hypot(east, north) <= near and (rover or _vertical_distance(seen, here, goal) <= NEAR_UP_M)
 
     return arrived
 
 
-def _up_off(seen: Telemetry, goal: Position) -> float:
-    """Metres above or below the goal; 0 for kinds of altitude that telemetry does not tell."""
-    if seen.position is None or isnan(seen.above_home):
+def _vertical_distance(seen: Telemetry, here: Position, goal: Position) -> float:
+    """Return the vertical distance from the goal, m; 0 for altitudes that telemetry does not report."""
+    if isnan(seen.above_home):
         return 0.0
     if isinstance(goal.altitude, AboveHome):
         return abs(seen.above_home - goal.altitude.metres)
-    return abs(seen.position.altitude.metres - goal.altitude.metres)
+    return abs(here.altitude.metres - goal.altitude.metres)
 
 
 def horizontal_distance(here: Position | None, there: Position) -> float:
-    """Horizontal metres; infinite from nowhere."""
+    """Return the horizontal distance, m; infinite if *here* is unknown."""
     if here is None:
         return inf
-    east, north, _ = LocalFrame(there.latitude, there.longitude, 0.0).to_enu(
-        here.latitude, here.longitude, 0.0
-    )
+    frame = LocalFrame(there.latitude, there.longitude, 0.0)
+    east, north, _ = frame.to_enu(here.latitude, here.longitude, 0.0)
     return hypot(east, north)
 
 
-def climbed_to(height: float) -> Callable[[Telemetry], bool]:
-    """In the air, *height* metres above home, and no longer going up or down."""
+# -- takeover by another station
 
-    def up(seen: Telemetry) -> bool:
-        near = abs(seen.above_home - height) <= NEAR_UP_M
-        return seen.flying and near and abs(seen.velocity.up) <= STANDING_M_S
 
-    return up
+class Takeover:
+    """Whether another station has control although the vehicle is in the offboard mode.
+
+    The mode does not show it. The other station keeps control until it has selected another mode in between, or
+    the vehicle is disarmed.
+
+    Args:
+        kernel: clock.
+        telemetry: telemetry of the vehicle.
+        mode: the offboard mode.
+    """
+
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, mode: str) -> None:
+        self._kernel = kernel
+        self._telemetry = telemetry
+        self._mode = mode
+        self._check: Handle | None = None
+        self.offboard_mode = mode
+        """What a pilot must select to hand over: the mode, or during a takeover words that are no mode."""
+
+    def begin(self) -> None:
+        """Note that another station has control from now on."""
+        if self._check is None:
+            self.offboard_mode = f"another mode and then to {self._mode}"
+            self._check = self._kernel.every(CHECK_PERIOD, self._end_if_over)
+
+    def end(self) -> None:
+        """Note that the takeover is over."""
+        if self._check is not None:
+            self.offboard_mode = self._mode
+            self._check.cancel()
+            self._check = None
+
+    def _end_if_over(self) -> None:
+        if self._telemetry.mode != self._mode or not self._telemetry.armed:
+            self.end()
+
+
+class TargetMonitor:
+    """Detects that another station sends the vehicle elsewhere, for one target after it is ``set``.
+
+    Where the autopilot's target is not reported, as over MAVROS, nothing is ever detected.
+    """
+
+    def __init__(self, telemetry: Telemetry, takeover: Takeover) -> None:
+        self._telemetry = telemetry
+        self._takeover = takeover
+        self._goal: Position | None = None
+        self._confirmed = False
+        self._other_since: Ns | None = None
+
+    def set(self, goal: Position) -> None:
+        """Begin with a new target; targets reported earlier do not count."""
+        self._goal = goal
+        self._confirmed = False
+        self._other_since = None
+        self._telemetry.target = None
+
+    def step(self, goal: Position, send: Action, mode: str, within: Ns, *, rover: bool = False) -> Step:
+        """Return a step that goes to *goal* in *mode*; *send* is repeated until the target is reported."""
+
+        def send_unless_confirmed() -> None:
+            if self._goal is None or not self._is_confirmed():
+                self.set(goal)
+                send()
+
+        return Step(
+            ask=f"reach {goal}",
+            send=send_unless_confirmed,
+            done=arrived_at(goal, rover),
+            within=within,
+            again=S,
+            mode=mode,
+            armed=True,
+            lost=self.lost,
+        )
+
+    def lost(self) -> str:
+        """Return how another station, which then has control, has changed the target; empty otherwise."""
+        target = self._telemetry.target
+        if target is None or not self._is_confirmed() or self._goal is None or self._reports(self._goal):
+            self._other_since = None
+            return ""
+        if self._other_since is None:
+            self._other_since = self._telemetry.last_message_ns
+        if self._telemetry.last_message_ns - self._other_since < OTHER_TARGET_FOR:
+            return ""
+        self._takeover.begin()
+        return f"was sent elsewhere by another, to {target}"
+
+    def _is_confirmed(self) -> bool:
+        """Return whether the autopilot has reported our target."""
+        if not self._confirmed:
+            self._confirmed = self._goal is not None and self._reports(self._goal)
+        return self._confirmed
+
+    def _reports(self, goal: Position) -> bool:
+        target = self._telemetry.target
+        if target is None or horizontal_distance(target, goal) > SAME_TARGET_M:
+            return False
+        level = isinstance(goal.altitude, AMSL) and self._telemetry.kind == DRONE_KIND
+        return not level or abs(target.altitude.metres - goal.altitude.metres) <= SAME_TARGET_M

@@ -33,8 +33,8 @@ class Flown:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         wanted = parse_simulated(parse(url), "d")
-        self.airfield = fleet_of(self.kernel, [wanted], 1)
-        self.driver = open_simulated_driver(self.kernel, self.airfield, wanted, 1)
+        self.fleet = fleet_of(self.kernel, [wanted], 1)
+        self.driver = open_simulated_driver(self.kernel, self.fleet, wanted, 1)
         self.graph = EmbeddedGraph(self.kernel)
         self.interpreter = MavlinkAdapter(self.kernel, self.driver, ExecutionContext("bridge"))
         names = options.setdefault("names", MAVROS)
@@ -116,7 +116,7 @@ class Flown:
     @property
     def true(self) -> tuple[float, float, float]:
         """East, north and up of where it began."""
-        east, north, up = self.airfield.flights["d"].truth().position
+        east, north, up = self.fleet.flights["d"].truth().position
         return float(east), float(north), float(up)
 
     @property

@@ -307,7 +307,7 @@ def test_a_pilot_who_takes_it_is_shown_and_not_fought(flown: Any) -> None:
     made.hear("state", "mavros_msgs/State")
     made.run(5.0)
     made.take_off(4.0)
-    made.airfield.autopilots["d"].vehicle.sticks.transmitter[4] = 1500  # the mode switch
+    made.fleet.autopilots["d"].vehicle.sticks.transmitter[4] = 1500  # the mode switch
     made.run(2.0)
     assert (made.last("state").mode, made.last("state").guided) == ("ATTITUDE", False)
     assert made.command("cmd/land", "CommandTOL") == (False, 2)

@@ -32,8 +32,8 @@ class Flown:
             {"d": f"sim:dji?start=warm{options}"}, {"d": Drone}, VehicleSettings(seed=seed)
         )
         assert isinstance(opened.kernel, VirtualKernel)
-        assert opened.airfield is not None
-        self.kernel, self.airfield = opened.kernel, opened.airfield
+        assert opened.fleet is not None
+        self.kernel, self.fleet = opened.kernel, opened.fleet
         (vehicle,) = opened.vehicles
         assert isinstance(vehicle, Drone)
         self.drone: Drone = vehicle
@@ -62,12 +62,12 @@ class Flown:
 
     def switch(self, pulse: int) -> None:
         """The pilot's mode switch."""
-        self.airfield.autopilots["d"].vehicle.sticks.transmitter[4] = pulse
+        self.fleet.autopilots["d"].vehicle.sticks.transmitter[4] = pulse
 
     @property
     def height(self) -> float:
         """True metres above where it stood."""
-        return float(self.airfield.flights["d"].truth().position[2])
+        return float(self.fleet.flights["d"].truth().position[2])
 
 
 def at(east: float, north: float, height: float) -> Position:
@@ -128,7 +128,7 @@ def test_sticks_fly_it_without_satellites_from_the_ground_and_back() -> None:
 
     def mission(drone: Drone) -> None:
         flown.wait(1.0)
-        flown.airfield.flights["d"].block_gps()
+        flown.fleet.flights["d"].block_gps()
         flown.wait(12.0)
         assert not drone.ready
         drone.manual_control(0.0, 0.0, 0.0, 0.0)
@@ -141,10 +141,10 @@ def test_sticks_fly_it_without_satellites_from_the_ground_and_back() -> None:
         flown.wait(1.0)
         drone.stabilize()
         flown.wait(1.0)
-        flown.airfield.flights["d"].block_gps(False)
+        flown.fleet.flights["d"].block_gps(False)
         flown.wait(5.0)
         drone.goto(at(5.0, 5.0, 6.0))  # by position again, in flight
-        flown.airfield.flights["d"].block_gps()
+        flown.fleet.flights["d"].block_gps()
         flown.wait(12.0)
         drone.land()
 
@@ -177,7 +177,7 @@ def test_a_low_battery_is_its_own_business() -> None:
 
     def mission(drone: Drone) -> None:
         drone.takeoff(6.0)
-        flown.later(3.0, lambda: flown.airfield.flights["d"].drain_battery(0.2))
+        flown.later(3.0, lambda: flown.fleet.flights["d"].drain_battery(0.2))
         with pytest.raises(Failsafe, match="NAVI_GO_HOME"):
             drone.goto(at(60.0, 0.0, 6.0))
         assert "NAVI_GO_HOME" in drone.come_to_rest()
@@ -197,7 +197,7 @@ def test_a_mission_on_board() -> None:
         assert not drone.armed
 
     flown.fly(mission)
-    east, north, _ = flown.airfield.flights["d"].truth().position
+    east, north, _ = flown.fleet.flights["d"].truth().position
     assert (east, north) == pytest.approx((12.0, 15.0), abs=1.5)
 
 

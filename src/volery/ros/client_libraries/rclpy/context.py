@@ -1,11 +1,11 @@
-"""What one component is to rclpy: its context, its nodes, and whether it is shutting down."""
+"""rclpy's ``Context``: the state of one component, its graph nodes, and its shutdown."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
@@ -15,15 +15,11 @@ from volery.ros.client_libraries.rclpy.errors import NameValidationException, No
 from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
 
-if TYPE_CHECKING:
-    from volery.ros.client_libraries.rclpy.executors import Executor
-
 
 class Context:
-    """One component's. ``rclpy.init()`` starts it, ``rclpy.shutdown()`` ends it; it may be started again.
+    """State of one component. ``rclpy.init()`` starts it, ``rclpy.shutdown()`` ends it; it can be restarted.
 
-    The first node that it makes is called as the component is, whatever the file says, as a launch file does
-    it; further ones keep their own names.
+    As in a launch file, the name of the component names its first node; further nodes keep their own names.
     """
 
     def __init__(self, graph: RosGraph, component: str, launch: Launch | None, node: Node | None) -> None:
@@ -32,50 +28,50 @@ class Context:
         self._launch = launch
         self._given = node
         self._nodes: list[Node] = []
-        self._started = self._asked = False
+        self._started = self._end_requested = False
         self.at_end: AtEnd = ignore_end
         self._hooks: list[Callable[[], Any]] = []
         self.kernel = graph.kernel
         self.changed = Signal(graph.kernel, f"{component} (rclpy)")
-        self.executor: Executor | None = None
-        """The one that ``rclpy.spin`` uses."""
+        self.executor: Any = None
+        """The ``Executor`` of ``rclpy.spin``, or None. It is untyped because executors depend on contexts."""
         self.task = current_task(graph.kernel)
 
     def init(self, args: Any = None, **options: Any) -> None:
-        """Start it. Options about signals and domains are accepted and mean nothing here."""
+        """Start the context. Options about signals and domains are accepted without effect."""
         if self._started:
             raise RuntimeError("Context.init() must only be called once")
         self._started = True
 
     def ok(self) -> bool:
-        """Whether it runs. An interaction point, as every call is."""
+        """Return whether the context runs. An interaction point, as every call is."""
         with self.kernel:
             return self._started
 
     @property
     def running(self) -> bool:
-        """``ok`` without being an interaction point."""
+        """Whether the context runs; unlike ``ok``, no interaction point."""
         return self._started
 
     def on_shutdown(self, callback: Callable[[], Any]) -> None:
-        """Call it at shutdown, or when the run ends."""
-        if not self._asked:
-            self._asked = True
-            self.at_end(self.task.place, self.try_shutdown)
-        self.when_over(callback)
+        """Call *callback* at shutdown or at the end of the run."""
+        if not self._end_requested:
+            self._end_requested = True
+            self.at_end(self.task.context, self.try_shutdown)
+        self.on_end(callback)
 
-    def when_over(self, action: Callable[[], Any]) -> None:
-        """``on_shutdown`` of the house's own: nothing that keeps a run from ending."""
+    def on_end(self, action: Callable[[], Any]) -> None:
+        """Call *action* at shutdown, but not at the end of the run, which it must not delay."""
         self._hooks.append(action)
 
     def shutdown(self) -> None:
-        """End it: who spins returns. Nodes stay until they are destroyed, but nothing spins them."""
+        """End the context: ``spin`` returns. Nodes exist until they are destroyed, but are not spun."""
         if not self._started:
             raise RuntimeError("rcl_shutdown already called on the given context")
         self.try_shutdown()
 
     def try_shutdown(self) -> None:
-        """End it, if it runs."""
+        """End the context, if it runs."""
         if self._started:
             self._started = False
             for hook in self._hooks:
@@ -86,8 +82,8 @@ class Context:
 
     # -- nodes
 
-    def join(self, name: str, namespace: str | None) -> Node:
-        """A new node of the graph."""
+    def create_graph_node(self, name: str, namespace: str | None) -> Node:
+        """Return a new node of the graph."""
         if not self._started:
             raise NotInitializedException("cannot create node: rclpy.init() has not been called")
         if not re.fullmatch(r"[A-Za-z_]\w*", name):
@@ -106,27 +102,27 @@ class Context:
         self._nodes.append(made)
         return made
 
-    def node(self) -> Node:
-        """Its first node: who pays for what no node is named for."""
+    def first_node(self) -> Node:
+        """Return the first node, which is charged for calls that name no node."""
         if not self._nodes:
             raise UsageError(f"{self._component}: create a node first")
         return self._nodes[0]
 
-    def leave(self, node: Node) -> None:
-        """A node was destroyed."""
+    def close_graph_node(self, node: Node) -> None:
+        """Remove a destroyed node from the graph."""
         node.close()
         self.changed.notify()
 
     def sleep(self, duration: Ns) -> None:
         """Block the current task."""
-        self.node().sleep(duration)
+        self.first_node().sleep(duration)
 
     def spawn(self, body: Callable[[], None], label: str) -> None:
-        """A helping task of this component."""
-        place = replace(self.task.place, deadline=None, on_release=None)
-        self.kernel.spawn(body, f"{self._component} ({label})", place, self.task.scope)
+        """Run *body* in a helper task of this component."""
+        context = replace(self.task.context, deadline=None, on_release=None)
+        self.kernel.spawn(body, f"{self._component} ({label})", context, self.task.scope)
 
-    def say(self, severity: int, text: str) -> None:
+    def log(self, severity: int, text: str) -> None:
         """Record a log line. An interaction point."""
         with self.kernel as kernel:
             kernel.record(Text(kernel.now(), self._component, severity, text))
@@ -134,14 +130,14 @@ class Context:
 
 @dataclass(eq=False)
 class Contexts(LaunchedComponents):
-    """All components of one run that import rclpy."""
+    """Contexts of all components of one run that import rclpy."""
 
     levels: dict[str, int] = field(default_factory=dict, init=False)
-    """Of loggers, by name."""
+    """Log levels by logger name."""
     _contexts: dict[str, Context] = field(default_factory=dict, init=False)
 
-    def here(self) -> Context:
-        """That of the component that the current task computes for."""
+    def current(self) -> Context:
+        """Return the context of the component that the current task belongs to."""
         component = self.component
         found = self._contexts.get(component)
         if found is None:
@@ -151,6 +147,6 @@ class Contexts(LaunchedComponents):
         return found
 
     def now(self) -> Ns:
-        """ROS time; an interaction point."""
+        """Return ROS time. An interaction point."""
         with self.kernel as kernel:
             return self.graph.epoch + kernel.now()

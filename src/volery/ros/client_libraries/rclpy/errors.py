@@ -1,4 +1,4 @@
-"""rclpy's exceptions, under its own names."""
+"""rclpy's exceptions under their original names."""
 
 from __future__ import annotations
 
@@ -17,75 +17,75 @@ class ShutdownException(Exception):  # noqa: N818 - rclpy's name
 
 
 class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
-    """The context was shut down while somebody spun."""
+    """The context was shut down while an executor was spinning."""
 
     def __init__(self) -> None:
         super().__init__("context was shut down")
 
 
 class TimeoutException(Exception):  # noqa: N818 - rclpy's name
-    """Nothing became ready in time."""
+    """Nothing became ready before the time-out."""
 
 
 class InvalidHandle(Exception):  # noqa: N818 - rclpy's name
-    """What was destroyed is used."""
+    """A destroyed entity is used."""
 
 
 class ROSInterruptException(Exception):  # noqa: N818 - rclpy's name
-    """The context was shut down while it slept."""
+    """The context was shut down while a rate slept."""
 
     def __init__(self) -> None:
         super().__init__("rclpy has been shut down")
 
 
 class NameValidationException(Exception):  # noqa: N818 - rclpy's name
-    """A name that is no ROS name."""
+    """A name is not a valid ROS name."""
 
 
 class ParameterException(Exception):  # noqa: N818 - rclpy's name
-    """What parameters raise."""
+    """Base class of the errors about parameters."""
 
     def __init__(self, error_msg: str, parameters: Any) -> None:
         super().__init__(error_msg, parameters)
 
 
 class ParameterNotDeclaredException(ParameterException):
-    """A parameter that nobody declared."""
+    """A parameter is not declared."""
 
     def __init__(self, parameters: Any) -> None:
         super().__init__("Invalid access to undeclared parameter(s)", parameters)
 
 
 class ParameterAlreadyDeclaredException(ParameterException):
-    """Declared twice."""
+    """A parameter is declared twice."""
 
     def __init__(self, parameters: Any) -> None:
         super().__init__("Parameter(s) already declared", parameters)
 
 
 class ParameterImmutableException(ParameterException):
-    """It is read-only."""
+    """A parameter is read-only."""
 
     def __init__(self, parameter: Any) -> None:
         super().__init__("Attempted to modify read-only parameter", parameter)
 
 
 class ParameterUninitializedException(ParameterException):
-    """Declared without a value, and none was given."""
+    """A parameter was declared without a value and has none."""
 
     def __init__(self, parameter: Any) -> None:
         super().__init__("The parameter is not initialized", parameter)
 
 
 class InvalidParameterException(ParameterException):
-    """A name that is none."""
+    """A name of a parameter is invalid."""
 
     def __init__(self, parameter: Any) -> None:
         super().__init__("Invalid parameter name", parameter)
 
 
 class InvalidParameterTypeException(ParameterException):
-    """A value of another type than was declared."""
+    """A value has another type than was declared."""
 
     def __init__(self, desired: Any, current: str) -> None:
         super().__init__(
@@ -96,7 +96,7 @@ class InvalidParameterTypeException(ParameterException):
 
 
 class InvalidParameterValueException(ParameterException):
-    """A callback refused the value."""
+    """A value was refused."""
 
     def __init__(self, parameter: Any, value: Any, reason: str) -> None:
         super().__init__(f"Invalid parameter value ({value}) for parameter. {reason}", parameter)
@@ -119,4 +119,4 @@ EXCEPTIONS = {
         ROSInterruptException,
     )
 }
-"""``rclpy.exceptions``."""
+"""Content of ``rclpy.exceptions``."""

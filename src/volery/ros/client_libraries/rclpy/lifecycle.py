@@ -1,4 +1,4 @@
-"""``rclpy.lifecycle``: nodes that are configured, activated and so on by others, as ROS 2 has them.
+"""``rclpy.lifecycle``: managed nodes, whose state other nodes can change.
 
 States and transitions are those of https://design.ros2.org/articles/node_lifecycle.html, their numbers and
 labels those of ``lifecycle_msgs`` and ``rcl_lifecycle``.
@@ -18,19 +18,19 @@ from volery.ros.messages.packages import service_class
 
 
 class TransitionCallbackReturn(IntEnum):
-    """How a transition's callback ended, by the numbers of its transitions."""
+    """Outcome of a transition callback, with the numbers of ``lifecycle_msgs``."""
 
     SUCCESS = 97
     FAILURE = 98
     ERROR = 99
 
     def to_label(self) -> str:
-        """The label of the transition that follows."""
+        """Return the label of the transition that follows."""
         return f"transition_{self.name.lower()}"
 
 
 class LifecycleState(NamedTuple):
-    """A state's number and label."""
+    """Number and label of a state."""
 
     state_id: int
     label: str
@@ -59,7 +59,7 @@ class _Transition(NamedTuple):
     goal: LifecycleState
 
 
-_ASKED = (
+_REQUESTABLE = (
     _Transition(1, "configure", UNCONFIGURED, CONFIGURING),
     _Transition(2, "cleanup", INACTIVE, CLEANING_UP),
     _Transition(3, "activate", INACTIVE, ACTIVATING),
@@ -68,7 +68,7 @@ _ASKED = (
     _Transition(6, "shutdown", INACTIVE, SHUTTING_DOWN),
     _Transition(7, "shutdown", ACTIVE, SHUTTING_DOWN),
 )
-"""What others may ask for."""
+"""Transitions that can be requested."""
 _ENDS: dict[LifecycleState, tuple[str, int, LifecycleState, LifecycleState, LifecycleState]] = {
     CONFIGURING: ("on_configure", 10, INACTIVE, UNCONFIGURED, PROCESSING_ERROR),
     CLEANING_UP: ("on_cleanup", 20, UNCONFIGURED, INACTIVE, PROCESSING_ERROR),
@@ -77,11 +77,11 @@ _ENDS: dict[LifecycleState, tuple[str, int, LifecycleState, LifecycleState, Life
     SHUTTING_DOWN: ("on_shutdown", 50, FINALIZED, FINALIZED, PROCESSING_ERROR),
     PROCESSING_ERROR: ("on_error", 60, UNCONFIGURED, FINALIZED, FINALIZED),
 }
-"""What is called in a passing state, its first transition, and where success, failure and error lead."""
+"""Of each transition state: callback, number of the first transition, goals of success, failure and error."""
 
 
 def _after(state: LifecycleState) -> list[_Transition]:
-    """Where a passing state leads."""
+    """Return the transitions out of a transition state."""
     _, number, *goals = _ENDS[state]
     return [
         _Transition(number + index, outcome.to_label(), state, goal)
@@ -90,57 +90,57 @@ def _after(state: LifecycleState) -> list[_Transition]:
 
 
 class ManagedEntity:
-    """What goes along with its node's transitions. Each callback gets the state that is left."""
+    """An entity that follows the transitions of its node. Each callback gets the state that is left."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The node is being configured."""
+        """Handle the configuration of the node."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The node is being cleaned up."""
+        """Handle the cleanup of the node."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The node is being shut down."""
+        """Handle the shutdown of the node."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The node is being activated."""
+        """Handle the activation of the node."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The node is being deactivated."""
+        """Handle the deactivation of the node."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """A transition ended with an error."""
+        """Handle an error in a transition."""
         return TransitionCallbackReturn.SUCCESS
 
 
 class SimpleManagedEntity(ManagedEntity):
-    """Works while the node is active."""
+    """An entity that is enabled while its node is active."""
 
     def __init__(self) -> None:
         self._enabled = False
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """It works from now on."""
+        """Enable the entity."""
         self._enabled = True
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """It rests from now on."""
+        """Disable the entity."""
         self._enabled = False
         return TransitionCallbackReturn.SUCCESS
 
     @property
     def is_activated(self) -> bool:
-        """Whether it works."""
+        """Whether the entity is enabled."""
         return self._enabled
 
     @staticmethod
     def when_enabled(wrapped: Any = None, *, when_not_enabled: Callable[[], Any] | None = None) -> Any:
-        """A method that does nothing while the node is not active."""
+        """Return a method that does nothing while the node is not active."""
 
         def decorator(method: Callable[..., Any]) -> Callable[..., None]:
             @wraps(method)
@@ -156,27 +156,27 @@ class SimpleManagedEntity(ManagedEntity):
 
 
 class LifecyclePublisher(SimpleManagedEntity, Publisher):
-    """Publishes while its node is active."""
+    """A publisher that publishes only while its node is active."""
 
     def __init__(self, *given: Any) -> None:
         SimpleManagedEntity.__init__(self)
         Publisher.__init__(self, *given)
 
     def publish(self, msg: Any) -> None:
-        """Send a message, if the node is active."""
+        """Publish a message, if the node is active."""
         if self._enabled:
             super().publish(msg)
 
 
 class LifecycleNode(Node, ManagedEntity):
-    """A node with a lifecycle: ``~/change_state`` and its like, ``~/transition_event``."""
+    """A managed node with the services ``~/change_state`` etc. and the topic ``~/transition_event``."""
 
     def __init__(
         self, node_name: str, *, enable_communication_interface: bool = True, **options: Any
     ) -> None:
         super().__init__(node_name, **options)
         self._state = UNCONFIGURED
-        self._entities: list[ManagedEntity] = []
+        self._managed: list[ManagedEntity] = []
         self._events: Publisher | None = None
         if enable_communication_interface:
             kind = message_class("lifecycle_msgs/msg/TransitionEvent")
@@ -185,118 +185,118 @@ class LifecycleNode(Node, ManagedEntity):
 
     def _serve(self) -> None:
         for name, kind, answer in (
-            ("change_state", "ChangeState", self._answer_change),
-            ("get_state", "GetState", self._answer_state),
-            ("get_available_states", "GetAvailableStates", self._answer_states),
-            ("get_available_transitions", "GetAvailableTransitions", self._answer_transitions),
-            ("get_transition_graph", "GetAvailableTransitions", self._answer_graph),
+            ("change_state", "ChangeState", self._handle_change),
+            ("get_state", "GetState", self._handle_state),
+            ("get_available_states", "GetAvailableStates", self._handle_states),
+            ("get_available_transitions", "GetAvailableTransitions", self._handle_transitions),
+            ("get_transition_graph", "GetAvailableTransitions", self._handle_graph),
         ):
             self.create_service(service_class(f"lifecycle_msgs/srv/{kind}"), f"~/{name}", answer)
 
     def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos: Any, **options: Any) -> Any:
-        """A publisher that is silent while the node is not active."""
+        """Create a publisher that publishes only while the node is active."""
         made = self._keep(LifecyclePublisher(self, msg_type, topic, qos))
-        self._entities.append(made)
+        self._managed.append(made)
         return made
 
     def destroy_lifecycle_publisher(self, publisher: LifecyclePublisher) -> bool:
-        """Publish no longer."""
-        self._entities.remove(publisher)
+        """Destroy a lifecycle publisher."""
+        self._managed.remove(publisher)
         return self.destroy_publisher(publisher)
 
     def add_managed_entity(self, entity: ManagedEntity) -> None:
-        """Have it go along with the node's transitions."""
-        self._entities.append(entity)
+        """Let *entity* follow the transitions of the node."""
+        self._managed.append(entity)
 
-    # -- callbacks: what the node does by itself is to take its entities along
+    # -- callbacks: by default the transition is passed to all entities
 
-    def _all(self, callback: str, state: LifecycleState) -> TransitionCallbackReturn:
-        for entity in self._entities:
+    def _call_entities(self, callback: str, state: LifecycleState) -> TransitionCallbackReturn:
+        for entity in self._managed:
             outcome: TransitionCallbackReturn = getattr(entity, callback)(state)
             if outcome is not TransitionCallbackReturn.SUCCESS:
                 return outcome
         return TransitionCallbackReturn.SUCCESS
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Configure; entities come along."""
-        return self._all("on_configure", state)
+        """Configure all entities."""
+        return self._call_entities("on_configure", state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Clean up; entities come along."""
-        return self._all("on_cleanup", state)
+        """Clean up all entities."""
+        return self._call_entities("on_cleanup", state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Shut down; entities come along."""
-        return self._all("on_shutdown", state)
+        """Shut down all entities."""
+        return self._call_entities("on_shutdown", state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Activate; entities come along."""
-        return self._all("on_activate", state)
+        """Activate all entities."""
+        return self._call_entities("on_activate", state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Deactivate; entities come along."""
-        return self._all("on_deactivate", state)
+        """Deactivate all entities."""
+        return self._call_entities("on_deactivate", state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Get over an error; entities come along."""
-        return self._all("on_error", state)
+        """Let all entities handle an error."""
+        return self._call_entities("on_error", state)
 
     # -- transitions
 
     def trigger_configure(self) -> TransitionCallbackReturn:
-        """Have it configured."""
+        """Request the transition configure."""
         return self._change("configure")
 
     def trigger_cleanup(self) -> TransitionCallbackReturn:
-        """Have it cleaned up."""
+        """Request the transition cleanup."""
         return self._change("cleanup")
 
     def trigger_activate(self) -> TransitionCallbackReturn:
-        """Have it activated."""
+        """Request the transition activate."""
         return self._change("activate")
 
     def trigger_deactivate(self) -> TransitionCallbackReturn:
-        """Have it deactivated."""
+        """Request the transition deactivate."""
         return self._change("deactivate")
 
     def trigger_shutdown(self) -> TransitionCallbackReturn:
-        """Have it shut down."""
+        """Request the transition shutdown."""
         return self._change("shutdown")
 
     def _available(self) -> list[_Transition]:
-        return [one for one in _ASKED if one.start == self._state]
+        return [one for one in _REQUESTABLE if one.start == self._state]
 
     def _change(self, label: str) -> TransitionCallbackReturn:
         wanted = next((one for one in self._available() if one.label == label), None)
         if wanted is None:
             raise RuntimeError(f"No transition matching {label} found for current state {self._state.label}")
         before = self._state
-        self._go(wanted)
-        outcome = self._pass(before)
+        self._enter(wanted)
+        outcome = self._run_callback(before)
         if outcome is TransitionCallbackReturn.ERROR:
-            self._pass(before)
+            self._run_callback(before)
         return outcome
 
-    def _pass(self, before: LifecycleState) -> TransitionCallbackReturn:
-        """Have the callback of a passing state called, and go where its outcome leads."""
+    def _run_callback(self, before: LifecycleState) -> TransitionCallbackReturn:
+        """Run the callback of the current transition state and enter the state that its outcome leads to."""
         try:
             outcome: TransitionCallbackReturn = getattr(self, _ENDS[self._state][0])(before)
         except Exception as error:
             self.get_logger().error(f"{_ENDS[self._state][0]}: {error}")
             outcome = TransitionCallbackReturn.ERROR
-        self._go(next(one for one in _after(self._state) if one.label == outcome.to_label()))
+        self._enter(next(one for one in _after(self._state) if one.label == outcome.to_label()))
         return outcome
 
-    def _go(self, by: _Transition) -> None:
+    def _enter(self, by: _Transition) -> None:
         self._state = by.goal
         if self._events is not None:
-            event = _described(new("lifecycle_msgs/msg/TransitionEvent"), by)
+            event = _fill_transition(new("lifecycle_msgs/msg/TransitionEvent"), by)
             event.timestamp = self.get_clock().now().nanoseconds
             self._events.publish(event)
 
-    # -- what others ask
+    # -- services
 
-    def _answer_change(self, request: Any, response: Any) -> Any:
+    def _handle_change(self, request: Any, response: Any) -> Any:
         asked = request.transition
         found = next(
             (
@@ -309,31 +309,31 @@ class LifecycleNode(Node, ManagedEntity):
         response.success = found is not None and self._change(found.label) is TransitionCallbackReturn.SUCCESS
         return response
 
-    def _answer_state(self, request: Any, response: Any) -> Any:
+    def _handle_state(self, request: Any, response: Any) -> Any:
         response.current_state.id, response.current_state.label = self._state
         return response
 
-    def _answer_states(self, request: Any, response: Any) -> Any:
+    def _handle_states(self, request: Any, response: Any) -> Any:
         response.available_states = [
             new("lifecycle_msgs/msg/State", id=number, label=label) for number, label in _STATES
         ]
         return response
 
-    def _answer_transitions(self, request: Any, response: Any) -> Any:
-        response.available_transitions = _descriptions(self._available())
+    def _handle_transitions(self, request: Any, response: Any) -> Any:
+        response.available_transitions = _describe_all(self._available())
         return response
 
-    def _answer_graph(self, request: Any, response: Any) -> Any:
+    def _handle_graph(self, request: Any, response: Any) -> Any:
         ends = [one for state in _ENDS for one in _after(state)]
-        response.available_transitions = _descriptions([*_ASKED, *ends])
+        response.available_transitions = _describe_all([*_REQUESTABLE, *ends])
         return response
 
 
-def _descriptions(transitions: list[_Transition]) -> list[Any]:
-    return [_described(new("lifecycle_msgs/msg/TransitionDescription"), one) for one in transitions]
+def _describe_all(transitions: list[_Transition]) -> list[Any]:
+    return [_fill_transition(new("lifecycle_msgs/msg/TransitionDescription"), one) for one in transitions]
 
 
-def _described(message: Any, by: _Transition) -> Any:
+def _fill_transition(message: Any, by: _Transition) -> Any:
     message.transition.id, message.transition.label = by.number, by.label
     message.start_state.id, message.start_state.label = by.start
     message.goal_state.id, message.goal_state.label = by.goal
@@ -347,4 +347,4 @@ LIFECYCLE: dict[str, Any] = {
     "SimpleManagedEntity": SimpleManagedEntity,
     "TransitionCallbackReturn": TransitionCallbackReturn,
 }
-"""``rclpy.lifecycle``, but for its node, which knows its run."""
+"""Content of ``rclpy.lifecycle`` without the node class, which is specific to a run."""

@@ -1,4 +1,4 @@
-"""rclpy's loggers: a line goes into the trace under the component's name."""
+"""rclpy's loggers. A line is recorded in the trace under the name of the component."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.ros.client_libraries.rclpy.context import Contexts
 
 
 class LoggingSeverity(IntEnum):
-    """rclpy's levels."""
+    """Log levels of rclpy."""
 
     UNSET = 0
     DEBUG = 10
@@ -33,7 +33,7 @@ _SYSLOG = {
 
 
 class Logger:
-    """``node.get_logger()``. *throttle_duration_sec*, *once* and *skip_first* work per text."""
+    """Logger of node.get_logger() *throttle_duration_sec*, *once*, *skip_first* apply per text."""
 
     contexts: ClassVar[Contexts]
 
@@ -44,35 +44,35 @@ class Logger:
         self._seen: set[str] = set()
 
     def get_child(self, name: str) -> Logger:
-        """A logger below this one."""
+        """Return a logger below this one."""
         return type(self)(f"{self.name}.{name}", self._rosout)
 
     def set_level(self, level: int) -> None:
-        """Log nothing that is less severe; for the loggers below this one, too."""
+        """Set the lowest severity that this logger and the loggers below it log."""
         self.contexts.levels[self.name] = int(level)
 
     def get_effective_level(self) -> LoggingSeverity:
-        """What is logged at least: its own level, or that of the nearest logger above it."""
+        """Return the level of this logger, or that of the nearest logger above that has one."""
         name = self.name
         while name and name not in self.contexts.levels:
             name = name.rpartition(".")[0]
         return LoggingSeverity(self.contexts.levels.get(name, LoggingSeverity.INFO))
 
     def is_enabled_for(self, severity: int) -> bool:
-        """Whether a line of that severity would be logged."""
+        """Return whether a line of this severity would be logged."""
         return severity >= self.get_effective_level()
 
     def log(self, message: Any, severity: int, **options: Any) -> bool:
-        """Log a line; False if it was left out."""
+        """Log a line; return False if it was suppressed."""
         return self._log(message, LoggingSeverity(severity), caller(1), options)
 
     def _log(self, message: Any, level: LoggingSeverity, where: Caller, options: dict[str, Any]) -> bool:
         text = str(message)
-        if level < self.get_effective_level() or self._left_out(text, options):
+        if level < self.get_effective_level() or self._suppressed(text, options):
             return False
-        self.contexts.here().say(_SYSLOG[level], text)
+        self.contexts.current().log(_SYSLOG[level], text)
         if self._rosout is not None:
-            self._rosout.tell(partial(self._fill, level, text, where))
+            self._rosout.publish(partial(self._fill, level, text, where))
         return True
 
     def _fill(self, level: int, text: str, where: Caller, message: Any) -> None:
@@ -80,7 +80,7 @@ class Logger:
         message.level, message.name, message.msg = int(level), self.name, text
         message.file, message.function, message.line = where
 
-    def _left_out(self, text: str, options: dict[str, Any]) -> bool:
+    def _suppressed(self, text: str, options: dict[str, Any]) -> bool:
         first = text not in self._seen
         if options.get("once") and not first:
             return True
@@ -98,30 +98,30 @@ class Logger:
         return False
 
     def debug(self, message: Any, **options: Any) -> bool:
-        """For developers."""
+        """Log a line for developers."""
         return self._log(message, LoggingSeverity.DEBUG, caller(1), options)
 
     def info(self, message: Any, **options: Any) -> bool:
-        """For everybody."""
+        """Log information."""
         return self._log(message, LoggingSeverity.INFO, caller(1), options)
 
     def warning(self, message: Any, **options: Any) -> bool:
-        """Something may be wrong."""
+        """Log a warning."""
         return self._log(message, LoggingSeverity.WARN, caller(1), options)
 
     warn = warning
 
     def error(self, message: Any, **options: Any) -> bool:
-        """Something is wrong."""
+        """Log an error."""
         return self._log(message, LoggingSeverity.ERROR, caller(1), options)
 
     def fatal(self, message: Any, **options: Any) -> bool:
-        """It cannot go on."""
+        """Log a fatal error."""
         return self._log(message, LoggingSeverity.FATAL, caller(1), options)
 
 
 def functions(loggers: type[Logger]) -> dict[str, Callable[..., Any]]:
-    """The functions of ``rclpy.logging``."""
+    """Return the functions of ``rclpy.logging`` by name."""
 
     def set_logger_level(name: str, level: int, detailed_error: bool = False) -> None:
         loggers(name).set_level(level)

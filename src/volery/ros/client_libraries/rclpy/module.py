@@ -1,4 +1,4 @@
-"""The ``rclpy`` package of one run, and the message packages beside it."""
+"""The modules of ``rclpy`` for one run, and the message packages."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ from volery.ros.client_libraries.rclpy import (
     parameters,
     qos,
 )
-from volery.ros.client_libraries.rclpy import executors as callback_groups
-from volery.ros.client_libraries.rclpy import executors as tasks
 from volery.ros.client_libraries.rclpy import time as times
 from volery.ros.client_libraries.rclpy.context import Context, Contexts
 from volery.ros.client_libraries.rclpy.executors import Executor, Future
@@ -35,21 +33,21 @@ def modules(
     nodes: Mapping[str, GraphNode] | None = None,
     at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
-    """What the files of a run import: ``rclpy``, ``rclpy.node``, ``std_msgs.msg`` and so on, by name.
+    """Return the modules that files of a run import, by name: ``rclpy``, ``rclpy.node``, ``std_msgs.msg`` ...
 
-    *launched*, *nodes* and *at_end* as in ``faces.rospy.modules``.
+    For the arguments see ``rospy.modules``.
     """
     contexts = Contexts(graph, launched, nodes, at_end)
-    bound = _bound(contexts)
-    parts = _parts(bound)
+    bound = _bound_classes(contexts)
+    parts = _submodules(bound)
     names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": parameters.Parameter}
     found = {f"rclpy.{part}": library_module(f"rclpy.{part}", inside) for part, inside in parts.items()}
     rclpy = library_module("rclpy", {**names, **{part: found[f"rclpy.{part}"] for part in parts}})
     return {**messages.modules(), "rclpy": rclpy, **found}
 
 
-def _bound(contexts: Contexts) -> dict[str, Any]:
-    """The classes that know their run."""
+def _bound_classes(contexts: Contexts) -> dict[str, Any]:
+    """Return the classes that refer to the contexts of their run."""
     kinds: tuple[type, ...] = (
         executors.MultiThreadedExecutor,
         executors.SingleThreadedExecutor,
@@ -68,23 +66,23 @@ def _bound(contexts: Contexts) -> dict[str, Any]:
     return {**bound, **nodes}
 
 
-def _parts(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """What is in each module of the package."""
-    timing = {"Duration": times.Duration, "Infinite": times.Infinite}
+def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the content of each submodule."""
+    duration = {"Duration": times.Duration, "Infinite": times.Infinite}
     return {
         "action": action.ACTION,
         "callback_groups": {
             kind.__name__: kind
             for kind in (
-                callback_groups.CallbackGroup,
-                callback_groups.MutuallyExclusiveCallbackGroup,
-                callback_groups.ReentrantCallbackGroup,
+                executors.CallbackGroup,
+                executors.MutuallyExclusiveCallbackGroup,
+                executors.ReentrantCallbackGroup,
             )
         },
         "client": {"Client": entities.Client},
         "clock": {"ClockType": times.ClockType, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
         "context": {"Context": Context},
-        "duration": timing,
+        "duration": duration,
         "exceptions": errors.EXCEPTIONS,
         "executors": {
             "Executor": Executor,
@@ -103,72 +101,73 @@ def _parts(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "node": {"Node": bound["Node"]},
         "parameter": {"Parameter": parameters.Parameter},
         "publisher": {"Publisher": entities.Publisher},
-        "qos": {**qos.QOS, **timing},
+        "qos": {**qos.QOS, **duration},
         "service": {"Service": entities.Service},
         "subscription": {"Subscription": entities.Subscription},
-        "task": {"Future": tasks.Future, "Task": tasks.Task},
+        "task": {"Future": executors.Future, "Task": executors.Task},
         "time": {"Time": times.Time, "Duration": times.Duration, "ClockType": times.ClockType},
         "timer": {"Rate": times.Rate, "Timer": entities.Timer},
     }
 
 
 def _functions(contexts: Contexts, bound: Mapping[str, Any]) -> dict[str, Callable[..., Any]]:
-    """The functions of rclpy, bound to one run."""
-    single = bound["SingleThreadedExecutor"]
-    found: tuple[Any, ...] = (init, shutdown, try_shutdown, ok, get_default_context)
-    spinning: tuple[Any, ...] = (spin, spin_once, spin_until_future_complete, get_global_executor)
+    """Return the functions of rclpy, bound to one run."""
+
+    def global_executor() -> Executor:
+        context = contexts.current()
+        if context.executor is None:
+            if not context.running:
+                raise errors.NotInitializedException()
+            context.executor = bound["SingleThreadedExecutor"]()
+        used: Executor = context.executor
+        return used
+
+    of_contexts: tuple[Any, ...] = (init, shutdown, try_shutdown, ok, get_default_context)
+    of_executor: tuple[Any, ...] = (spin, spin_once, spin_until_future_complete, get_global_executor)
     return {
-        **{one.__name__: partial(one, contexts) for one in found},
-        **{one.__name__: partial(one, lambda: _global(contexts, single)) for one in spinning},
+        **{one.__name__: partial(one, contexts) for one in of_contexts},
+        **{one.__name__: partial(one, global_executor) for one in of_executor},
         "create_node": bound["Node"],
     }
 
 
 def init(contexts: Contexts, *, args: Any = None, context: Context | None = None, **options: Any) -> None:
     """Start the context of this component."""
-    (context or contexts.here()).init(args, **options)
+    (context or contexts.current()).init(args, **options)
 
 
 def shutdown(contexts: Contexts, *, context: Context | None = None, **options: Any) -> None:
     """End the context of this component."""
-    (context or contexts.here()).shutdown()
+    (context or contexts.current()).shutdown()
 
 
 def try_shutdown(contexts: Contexts, *, context: Context | None = None, **options: Any) -> None:
     """End the context of this component, if it runs."""
-    (context or contexts.here()).try_shutdown()
+    (context or contexts.current()).try_shutdown()
 
 
 def ok(contexts: Contexts, *, context: Context | None = None) -> bool:
-    """Whether the context of this component runs."""
-    return (context or contexts.here()).ok()
+    """Return whether the context of this component runs."""
+    return (context or contexts.current()).ok()
 
 
 def get_default_context(contexts: Contexts) -> Context:
-    """That of this component."""
-    return contexts.here()
+    """Return the context of this component."""
+    return contexts.current()
 
 
-def _global(contexts: Contexts, kind: Callable[[], Executor]) -> Executor:
-    context = contexts.here()
-    if context.executor is None:
-        if not context.running:
-            raise errors.NotInitializedException()
-        context.executor = kind()
-    return context.executor
+GlobalExecutor = Callable[[], Executor]
+"""Returns the executor of ``rclpy.spin``, which is created by the first call."""
 
 
-UsualExecutor = Callable[[], Executor]
+def get_global_executor(global_executor: GlobalExecutor) -> Executor:
+    """Return the executor of ``rclpy.spin``."""
+    return global_executor()
 
 
-def get_global_executor(usual: UsualExecutor) -> Executor:
-    """The one that ``rclpy.spin`` uses."""
-    return usual()
-
-
-def spin(usual: UsualExecutor, node: Node, executor: Executor | None = None) -> None:
-    """Run the callbacks of *node* as they come, until the context is shut down."""
-    used = executor or usual()
+def spin(global_executor: GlobalExecutor, node: Node, executor: Executor | None = None) -> None:
+    """Run the callbacks of *node* until the context is shut down."""
+    used = executor or global_executor()
     added = used.add_node(node)
     try:
         while used.context.ok():
@@ -179,10 +178,14 @@ def spin(usual: UsualExecutor, node: Node, executor: Executor | None = None) -> 
 
 
 def spin_once(
-    usual: UsualExecutor, node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None
+    global_executor: GlobalExecutor,
+    node: Node,
+    *,
+    executor: Executor | None = None,
+    timeout_sec: float | None = None,
 ) -> None:
     """Wait for a callback of *node* and run it."""
-    used = executor or usual()
+    used = executor or global_executor()
     added = used.add_node(node)
     try:
         used.spin_once(timeout_sec=timeout_sec)
@@ -192,14 +195,14 @@ def spin_once(
 
 
 def spin_until_future_complete(
-    usual: UsualExecutor,
+    global_executor: GlobalExecutor,
     node: Node,
     future: Future,
     executor: Executor | None = None,
     timeout_sec: float | None = None,
 ) -> None:
-    """Run the callbacks of *node* as they come until *future* is done."""
-    used = executor or usual()
+    """Run the callbacks of *node* until *future* is done."""
+    used = executor or global_executor()
     added = used.add_node(node)
     try:
         used.spin_until_future_complete(future, timeout_sec)

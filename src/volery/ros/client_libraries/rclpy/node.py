@@ -1,4 +1,4 @@
-"""rclpy's ``Node``, which users' classes derive from."""
+"""rclpy's ``Node``, the base class of users' nodes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from volery.ros.client_libraries.rclpy.entities import (
     Service,
     Subscription,
     Timer,
-    period_of,
+    timer_period,
 )
 from volery.ros.client_libraries.rclpy.executors import (
     CallbackGroup,
+    CallbackQueue,
     Executor,
     MutuallyExclusiveCallbackGroup,
-    Queue,
     Task,
 )
 from volery.ros.client_libraries.rclpy.logging import Logger
@@ -40,7 +40,7 @@ _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service
 
 
 class Node(NodeParameters):
-    """A node. As a launch file does, the component's name names its first node."""
+    """A node. As in a launch file, the name of the component names its first node."""
 
     contexts: ClassVar[Contexts]
     loggers: ClassVar[type[Logger]]
@@ -61,15 +61,15 @@ class Node(NodeParameters):
         for name in services:
             if name not in _SERVICES:
                 raise TypeError(f"Node() has no argument {name!r}")
-        self._context = context or self.contexts.here()
-        self.graph_node = self._context.join(node_name, namespace)
-        self.queues: list[Queue] = []
+        self._context = context or self.contexts.current()
+        self.graph_node = self._context.create_graph_node(node_name, namespace)
+        self.queues: list[CallbackQueue] = []
         self._executor: Executor | None = None
         self._default_group = MutuallyExclusiveCallbackGroup()
-        self._made: list[Any] = []
+        self._entities: list[Any] = []
         rosout = Rosout(self.contexts.graph, self.graph_node, "rcl_interfaces/msg/Log", _ROSOUT)
-        told = rosout if services.get("enable_rosout", True) else None
-        self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."), told)
+        used_rosout = rosout if services.get("enable_rosout", True) else None
+        self._logger = self.loggers(self.graph_node.name.strip("/").replace("/", "."), used_rosout)
         self._clock = self.clocks(clock_type=ClockType.ROS_TIME)
         self._declared = DeclaredParameters(
             self.graph_node, parameter_overrides or (), allow_undeclared_parameters
@@ -78,90 +78,94 @@ class Node(NodeParameters):
             for override in parameter_overrides or ():
                 self._declared.declare(override.name, override.value)
         if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, EmbeddedGraph):
-            serve_parameters(self)  # elsewhere the transport's own node does
+            serve_parameters(self, self.create_service)  # on real ROS the node of the transport serves them
 
-    # -- who it is
+    # -- identity
 
     @property
     def context(self) -> Context:
-        """The context that it belongs to."""
+        """Context of the node."""
         return self._context
 
     @property
     def default_callback_group(self) -> CallbackGroup:
-        """For what is made without one."""
+        """Callback group of entities that are created without one."""
         return self._default_group
 
     def get_name(self) -> str:
-        """Its name without the namespace."""
+        """Return the name without the namespace."""
         return self.graph_node.name.rpartition("/")[2]
 
     def get_namespace(self) -> str:
-        """Its namespace."""
+        """Return the namespace."""
         return self.graph_node.namespace
 
     def get_fully_qualified_name(self) -> str:
-        """Namespace and name."""
+        """Return namespace and name."""
         return self.graph_node.name
 
     def get_logger(self) -> Logger:
-        """Its logger."""
+        """Return the logger of the node."""
         return self._logger
 
     def get_clock(self) -> Clock:
-        """Its clock: ROS time."""
+        """Return the clock of the node, which shows ROS time."""
         return self._clock
 
-    # -- who spins it
+    # -- executor
 
     @property
     def executor(self) -> Executor | None:
-        """Who spins it."""
+        """Executor that spins the node."""
         return self._executor
 
     @executor.setter
     def executor(self, executor: Executor) -> None:
+        self.attach_executor(executor)
+
+    def attach_executor(self, executor: Executor) -> None:
+        """Let *executor* spin the node from now on, instead of the previous one."""
         previous, self._executor = self._executor, executor
         if previous is not None and previous is not executor:
             previous.remove_node(self)
         executor.add_node(self)
         executor.wake()
 
-    def drop_executor(self, executor: Executor) -> None:
-        """*executor* spins it no longer."""
+    def detach_executor(self, executor: Executor) -> None:
+        """Stop using *executor*, if it spins the node."""
         if self._executor is executor:
             self._executor = None
 
-    def _filled(self) -> None:
+    def _wake_executor(self) -> None:
         if self._executor is not None:
             self._executor.wake()
 
-    def _queue(self, group: CallbackGroup | None) -> Queue:
+    def _queue(self, group: CallbackGroup | None) -> CallbackQueue:
         wanted = group or self._default_group
         for queue in self.queues:
             if queue.group is wanted:
                 return queue
         ready = self.graph_node.group()
-        ready.on_ready = self._filled
-        made = Queue(wanted, ready)
+        ready.on_ready = self._wake_executor
+        made = CallbackQueue(wanted, ready)
         self.queues.append(made)
         return made
 
     def execute(self, callback: Callable[..., Any], *args: Any) -> None:
-        """Run a callback; a coroutine is carried on by the executor."""
+        """Run a callback; a coroutine is continued by the executor."""
         if self._executor is not None and iscoroutinefunction(callback):
             Task(callback, args, self._executor)()
         else:
             callback(*args)
 
-    # -- what it makes
+    # -- entities
 
     def _keep(self, made: Any) -> Any:
-        self._made.append(made)
+        self._entities.append(made)
         return made
 
     def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Publisher:
-        """Publish to a topic; *qos_profile* is a profile or a depth."""
+        """Create a publisher; *qos_profile* is a profile or a depth."""
         made: Publisher = self._keep(Publisher(self, msg_type, topic, qos_profile))
         return made
 
@@ -176,7 +180,7 @@ class Node(NodeParameters):
         raw: bool = False,
         **options: Any,
     ) -> Subscription:
-        """Call back with each message of a topic."""
+        """Call *callback* with each message of a topic."""
         if raw:
             raise NotImplementedError("create_subscription(raw=True) is not there on the embedded graph")
         queue = self._queue(callback_group)
@@ -194,29 +198,29 @@ class Node(NodeParameters):
         callback_group: CallbackGroup | None = None,
         **options: Any,
     ) -> Service:
-        """Answer requests."""
+        """Handle the requests of a service with *callback*."""
         made: Service = self._keep(Service(self, srv_type, srv_name, callback, self._queue(callback_group)))
         return made
 
     def create_waiting_service(
         self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any]
     ) -> Service:
-        """A service whose callback may wait: each request has a task of its own, beside the executor.
+        """Create a service whose callback may block: each request runs in a task beside the executor.
 
-        rclpy has none; its action servers need one.
+        rclpy has no such function; action servers need it.
         """
 
         def start(work: Work) -> None:
             self._context.spawn(work.run, srv_name)
 
-        queue = Queue(CallbackGroup(), self.graph_node.group(start))
+        queue = CallbackQueue(CallbackGroup(), self.graph_node.group(start))
         made: Service = self._keep(Service(self, srv_type, srv_name, callback, queue))
         return made
 
     def create_client(
         self, srv_type: Any, srv_name: str, *, callback_group: CallbackGroup | None = None, **options: Any
     ) -> Client:
-        """Call a service."""
+        """Create a client of a service."""
         made: Client = self._keep(Client(self, srv_type, srv_name, self._queue(callback_group)))
         return made
 
@@ -229,115 +233,115 @@ class Node(NodeParameters):
         *,
         autostart: bool = True,
     ) -> Timer:
-        """Call back each period."""
+        """Call *callback* each period."""
         queue = self._queue(callback_group)
         made: Timer = self._keep(
-            Timer(self, period_of(timer_period_sec), callback, queue, autostart=autostart)
+            Timer(self, timer_period(timer_period_sec), callback, queue, autostart=autostart)
         )
         return made
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
-        """Keep a loop at *frequency* in Hz."""
+        """Create a rate of *frequency* Hz."""
         if frequency <= 0:
             raise ValueError("frequency must be > 0")
         return Rate(self._context, round(S / frequency))
 
     def _destroy(self, made: Any) -> bool:
-        if made not in self._made:
+        if made not in self._entities:
             return False
-        self._made.remove(made)
+        self._entities.remove(made)
         made.destroy()
         return True
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
-        """Take it away; False if it is not this node's."""
+        """Destroy a publisher; return False if it is not this node's."""
         return self._destroy(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """Take it away; False if it is not this node's."""
+        """Destroy a subscription; return False if it is not this node's."""
         return self._destroy(subscription)
 
     def destroy_service(self, service: Service) -> bool:
-        """Take it away; False if it is not this node's."""
+        """Destroy a service; return False if it is not this node's."""
         return self._destroy(service)
 
     def destroy_client(self, client: Client) -> bool:
-        """Take it away; False if it is not this node's."""
+        """Destroy a client; return False if it is not this node's."""
         return self._destroy(client)
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """Take it away; False if it is not this node's."""
+        """Destroy a timer; return False if it is not this node's."""
         return self._destroy(timer)
 
     def destroy_rate(self, rate: Rate) -> bool:
-        """Nothing to let go of."""
+        """Do nothing: a rate holds no resources."""
         return True
 
     def destroy_node(self) -> None:
-        """Leave the graph, and with it all that this node has made."""
-        for made in tuple(self._made):
+        """Destroy all entities of the node and leave the graph."""
+        for made in tuple(self._entities):
             self._destroy(made)
         if self._executor is not None:
             self._executor.remove_node(self)
-        self._context.leave(self.graph_node)
+        self._context.close_graph_node(self.graph_node)
 
-    def _of(self, kind: type) -> list[Any]:
-        return [made for made in self._made if isinstance(made, kind)]
+    def _entities_of(self, kind: type) -> list[Any]:
+        return [made for made in self._entities if isinstance(made, kind)]
 
     @property
     def publishers(self) -> list[Publisher]:
-        """All of them."""
-        return self._of(Publisher)
+        """All publishers of the node."""
+        return self._entities_of(Publisher)
 
     @property
     def subscriptions(self) -> list[Subscription]:
-        """All of them."""
-        return self._of(Subscription)
+        """All subscriptions of the node."""
+        return self._entities_of(Subscription)
 
     @property
     def clients(self) -> list[Client]:
-        """All of them."""
-        return self._of(Client)
+        """All clients of the node."""
+        return self._entities_of(Client)
 
     @property
     def services(self) -> list[Service]:
-        """All of them."""
-        return self._of(Service)
+        """All services of the node."""
+        return self._entities_of(Service)
 
     @property
     def timers(self) -> list[Timer]:
-        """All of them."""
-        return self._of(Timer)
+        """All timers of the node."""
+        return self._entities_of(Timer)
 
     # -- the graph
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
-        """The absolute name."""
+        """Return the absolute name of a topic."""
         return self.graph_node.resolve(topic)
 
     resolve_service_name = resolve_topic_name
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:
-        """The topics that somebody publishes or listens to."""
+        """Return all topics with a publisher or a subscription."""
         with self._context.kernel:
             return [(one.name, [one.type]) for one in self.contexts.graph.topics()]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """The services that somebody serves."""
+        """Return all services that have a server."""
         with self._context.kernel:
             return [(one.name, [one.type]) for one in self.contexts.graph.services()]
 
     def get_node_names(self) -> list[str]:
-        """The nodes' names without their namespaces."""
+        """Return the names of all nodes without their namespaces."""
         with self._context.kernel:
             return [name.rpartition("/")[2] for name in self.contexts.graph.node_names()]
 
     def count_publishers(self, topic_name: str) -> int:
-        """How many publish it."""
+        """Return the number of publishers of a topic."""
         return self._count(topic_name, "publishers")
 
     def count_subscribers(self, topic_name: str) -> int:
-        """How many listen to it."""
+        """Return the number of subscriptions to a topic."""
         return self._count(topic_name, "subscribers")
 
     def _count(self, topic_name: str, side: str) -> int:

@@ -1,11 +1,4 @@
-"""What a parameter's descriptor allows, refused in rclpy's words.
-
-rclpy's parameters: declared, typed, and watched by callbacks.
-
-What an rclpy node does with its parameters.
-
-The services by which other nodes read and set a node's parameters.
-"""
+"""Parameters of rclpy: values, declarations with constraints, methods of the node, and services."""
 
 from __future__ import annotations
 
@@ -13,7 +6,7 @@ from array import array
 from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
 from math import isclose
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,69 +23,6 @@ from volery.ros.graph import Node
 from volery.ros.messages import new
 from volery.ros.messages.packages import service_class
 
-if TYPE_CHECKING:
-    from volery.ros.client_libraries.rclpy.node import Node
-
-_NAMES = (
-    "NOT_SET", "BOOL", "INTEGER", "DOUBLE", "STRING",
-    "BYTE_ARRAY", "BOOL_ARRAY", "INTEGER_ARRAY", "DOUBLE_ARRAY", "STRING_ARRAY",
-)  # fmt: skip
-_NEAR = 1e-6
-"""How near a double must be to a bound or a step to count as on it, relatively."""
-
-
-def constraint_violation(one: Parameter, descriptor: Any, *, declared: bool) -> str:
-    """Why *one* may not be set; empty if it may. *declared*: it has been there before."""
-    if declared and descriptor.read_only:
-        return f"Trying to set a read-only parameter: {one.name}."
-    if not descriptor.dynamic_typing:
-        if declared and not one.type_:
-            return "Static parameter cannot be undeclared"
-        if one.type_ and descriptor.type and one.type_ != descriptor.type:
-            expected, given = _NAMES[descriptor.type], _NAMES[one.type_]
-            return f"Wrong parameter type, expected 'Type.{expected}' got 'Type.{given}'"
-    whole = isinstance(one.value, int) and not isinstance(one.value, bool)
-    if whole and len(descriptor.integer_range):
-        return _beyond_integers(one, descriptor.integer_range[0])
-    if isinstance(one.value, float) and len(descriptor.floating_point_range):
-        return _beyond_doubles(one, descriptor.floating_point_range[0])
-    return ""
-
-
-def _bounds(limits: Any) -> tuple[Any, Any]:
-    return min(limits.from_value, limits.to_value), max(limits.from_value, limits.to_value)
-
-
-def _beyond_integers(one: Parameter, limits: Any) -> str:
-    least, most = _bounds(limits)
-    if one.value in (least, most):
-        return ""
-    if not least < one.value < most:
-        return f"Parameter {one.name} out of range. Min: {least}, Max: {most}, value: {one.value}"
-    if limits.step and (one.value - least) % limits.step:
-        return (
-            f"The parameter value for {one.name} is not a valid step. "
-            f"Min: {least}, max: {most}, value: {one.value}, step: {limits.step}"
-        )
-    return ""
-
-
-def _beyond_doubles(one: Parameter, limits: Any) -> str:
-    least, most = _bounds(limits)
-    if any(isclose(one.value, bound, rel_tol=_NEAR) for bound in (least, most)):
-        return ""
-    if not least < one.value < most:
-        return f"Parameter {one.name} out of range Min: {least}, Max: {most}, value: {one.value}"
-    if limits.step:
-        nearest = least + round((one.value - least) / limits.step) * limits.step
-        if not isclose(nearest, one.value, rel_tol=_NEAR):
-            return (
-                f"The parameter value for {one.name} is not close enough to a valid step. "
-                f"Min: {least}, max: {most}, value: {one.value}, step: {limits.step}"
-            )
-    return ""
-
-
 _RESULT = "rcl_interfaces/msg/SetParametersResult"
 _DESCRIPTOR = "rcl_interfaces/msg/ParameterDescriptor"
 
@@ -101,7 +31,7 @@ class Parameter:
     """A name with a typed value."""
 
     class Type(IntEnum):
-        """As ``rcl_interfaces/msg/ParameterType``."""
+        """Parameter types of ``rcl_interfaces/msg/ParameterType``."""
 
         NOT_SET = 0
         BOOL = 1
@@ -116,14 +46,14 @@ class Parameter:
 
         @classmethod
         def from_parameter_value(cls, value: Any) -> Parameter.Type:
-            """The type of a Python value. ``TypeError`` if parameters cannot hold it."""
+            """Return the type of a Python value; raise ``TypeError`` if parameters cannot hold it."""
             found = _type_of(value)
             if found is None:
                 raise TypeError(f"The given value {value!r} is not one of the allowed types for a parameter")
             return cls(found)
 
         def check(self, value: Any) -> bool:
-            """Whether *value* is of this type."""
+            """Return whether *value* is of this type."""
             return _type_of(value) == self or (isinstance(value, list) and not value and self >= 5)
 
     def __init__(self, name: str, type_: Parameter.Type | None = None, value: Any = None) -> None:
@@ -135,7 +65,7 @@ class Parameter:
 
     @classmethod
     def from_parameter_msg(cls, message: Any) -> Parameter:
-        """From ``rcl_interfaces/msg/Parameter``."""
+        """Return the parameter in an ``rcl_interfaces/msg/Parameter``."""
         kind = Parameter.Type(message.value.type)
         value: Any = getattr(message.value, f"{kind.name.lower()}_value") if kind else None
         if kind is Parameter.Type.BYTE_ARRAY:
@@ -145,14 +75,14 @@ class Parameter:
         return cls(message.name, kind, value)
 
     def get_parameter_value(self) -> Any:
-        """As ``rcl_interfaces/msg/ParameterValue``."""
+        """Return the value as ``rcl_interfaces/msg/ParameterValue``."""
         message = new("rcl_interfaces/msg/ParameterValue", type=int(self.type_))
         if self.type_:
             setattr(message, f"{self.type_.name.lower()}_value", self.value)
         return message
 
     def to_parameter_msg(self) -> Any:
-        """As ``rcl_interfaces/msg/Parameter``."""
+        """Return the parameter as ``rcl_interfaces/msg/Parameter``."""
         return new("rcl_interfaces/msg/Parameter", name=self.name, value=self.get_parameter_value())
 
     def __repr__(self) -> str:
@@ -170,11 +100,78 @@ def _type_of(value: Any) -> int | None:
     return {1: 6, 2: 7, 3: 8, 4: 9, 5: 5}.get(next(iter(inner), 5) or -1)
 
 
-Watcher = Callable[[list[Parameter]], Any]
+# -- constraints of descriptors, with rclpy's texts
+
+_NEAR = 1e-6
+"""Relative distance within which a double counts as equal to a bound or a step."""
+
+
+def constraint_violation(parameter: Parameter, descriptor: Any, *, declared: bool) -> str:
+    """Return why *descriptor* forbids to set *parameter*, or ``""``.
+
+    Args:
+        parameter: The new value.
+        descriptor: An ``rcl_interfaces/msg/ParameterDescriptor``.
+        declared: Whether the parameter is already declared.
+    """
+    kind, value = parameter.type_, parameter.value
+    if declared and descriptor.read_only:
+        return f"Trying to set a read-only parameter: {parameter.name}."
+    if not descriptor.dynamic_typing:
+        if declared and not kind:
+            return "Static parameter cannot be undeclared"
+        if kind and descriptor.type and kind != descriptor.type:
+            expected = Parameter.Type(descriptor.type).name
+            return f"Wrong parameter type, expected 'Type.{expected}' got 'Type.{kind.name}'"
+    if isinstance(value, int) and not isinstance(value, bool) and len(descriptor.integer_range):
+        return _integer_violation(parameter, descriptor.integer_range[0])
+    if isinstance(value, float) and len(descriptor.floating_point_range):
+        return _double_violation(parameter, descriptor.floating_point_range[0])
+    return ""
+
+
+def _bounds(limits: Any) -> tuple[Any, Any]:
+    return min(limits.from_value, limits.to_value), max(limits.from_value, limits.to_value)
+
+
+def _integer_violation(one: Parameter, limits: Any) -> str:
+    least, most = _bounds(limits)
+    if one.value in (least, most):
+        return ""
+    if not least < one.value < most:
+        return f"Parameter {one.name} out of range. Min: {least}, Max: {most}, value: {one.value}"
+    if limits.step and (one.value - least) % limits.step:
+        return (
+            f"The parameter value for {one.name} is not a valid step. "
+            f"Min: {least}, max: {most}, value: {one.value}, step: {limits.step}"
+        )
+    return ""
+
+
+def _double_violation(one: Parameter, limits: Any) -> str:
+    least, most = _bounds(limits)
+    if any(isclose(one.value, bound, rel_tol=_NEAR) for bound in (least, most)):
+        return ""
+    if not least < one.value < most:
+        return f"Parameter {one.name} out of range Min: {least}, Max: {most}, value: {one.value}"
+    if limits.step:
+        nearest = least + round((one.value - least) / limits.step) * limits.step
+        if not isclose(nearest, one.value, rel_tol=_NEAR):
+            return (
+                f"The parameter value for {one.name} is not close enough to a valid step. "
+                f"Min: {least}, max: {most}, value: {one.value}, step: {limits.step}"
+            )
+    return ""
+
+
+# -- declared parameters of a node
+
+Validator = Callable[[list[Parameter]], Any]
+"""A callback that accepts or refuses new values with a ``SetParametersResult``."""
 
 
 class DeclaredParameters:
-    """The parameters of one node. What a launch file says overrides what is declared."""
+    """The declared parameters of one node. Values of a launch file override declared defaults."""
 
     def __init__(self, node: Node, overrides: Iterable[Parameter], undeclared_allowed: bool) -> None:
         self._node = node
@@ -182,15 +179,15 @@ class DeclaredParameters:
         self._overrides = {one.name: one.value for one in overrides}
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Any] = {}
-        self._watchers: list[Watcher] = []
+        self._validators: list[Validator] = []
 
-    def watch(self, callback: Watcher) -> None:
-        """Ask it before values are set; it may refuse."""
-        self._watchers.insert(0, callback)
+    def add_validator(self, callback: Validator) -> None:
+        """Call *callback* before values are set; it may refuse them."""
+        self._validators.insert(0, callback)
 
-    def unwatch(self, callback: Watcher) -> None:
-        """Ask it no longer; ``ValueError`` if it was not asked."""
-        self._watchers.remove(callback)
+    def remove_validator(self, callback: Validator) -> None:
+        """Remove a callback; raise ``ValueError`` if it was not added."""
+        self._validators.remove(callback)
 
     def _private(self, name: str) -> str:
         if not name or not all(name.split(".")):
@@ -200,7 +197,7 @@ class DeclaredParameters:
     def declare(
         self, name: str, value: Any = None, descriptor: Any = None, ignore: bool = False
     ) -> Parameter:
-        """See ``Node.declare_parameter``."""
+        """Declare a parameter; see ``Node.declare_parameter``."""
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException([name])
         private = self._private(name)
@@ -208,29 +205,27 @@ class DeclaredParameters:
         if isinstance(value, type) and issubclass(value, (bool, int, float, str)):
             kind = Parameter.Type.from_parameter_value(value())
         default = None if kind is not None else value
-        given = default if ignore else self._given(name, private, default)
+        given = default if ignore else self._override(name, private, default)
         described = self._descriptors[name] = descriptor or new(_DESCRIPTOR)
         if kind is None and given is not None and not described.dynamic_typing:
             kind = Parameter(name, value=default if default is not None else given).type_
         described.name, described.type = name, int(kind or 0)
-        parameter = Parameter(name, kind if given is not None else None, self._fitting(kind, given))
-        refused = self._refused([parameter])
-        if refused.startswith("Wrong parameter type"):
+        # An integer in a launch file is a double where a double was declared.
+        integer = isinstance(given, int) and not isinstance(given, bool)
+        fitting = float(given) if kind is Parameter.Type.DOUBLE and integer else given
+        parameter = Parameter(name, kind if given is not None else None, fitting)
+        refusal = self._refusal([parameter])
+        if refusal.startswith("Wrong parameter type"):
             raise InvalidParameterTypeException(parameter, Parameter.Type(described.type).name)
-        if refused:
-            raise InvalidParameterValueException(name, given, refused)
+        if refusal:
+            raise InvalidParameterValueException(name, given, refusal)
         self._keep(parameter)
         return parameter
 
-    def _given(self, name: str, private: str, default: Any) -> Any:
+    def _override(self, name: str, private: str, default: Any) -> Any:
         if name in self._overrides:
             return self._overrides[name]
         return self._node.get_parameter(private) if self._node.has_parameter(private) else default
-
-    def _fitting(self, kind: Parameter.Type | None, value: Any) -> Any:
-        """A whole number in a launch file is a double where one was declared."""
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        return float(value) if kind is Parameter.Type.DOUBLE and whole else value
 
     def _keep(self, parameter: Parameter) -> None:
         self._parameters[parameter.name] = parameter
@@ -238,15 +233,15 @@ class DeclaredParameters:
             self._node.set_parameter(self._private(parameter.name), parameter.value)
 
     def has(self, name: str) -> bool:
-        """Whether it is declared."""
+        """Return whether a parameter is declared."""
         return name in self._parameters
 
     def names(self) -> list[str]:
-        """All that are declared, in order."""
+        """Return the names of all declared parameters in the order of their declaration."""
         return list(self._parameters)
 
     def get(self, name: str) -> Parameter:
-        """Its value now."""
+        """Return the current value of a parameter."""
         found = self._parameters.get(name)
         if found is None:
             if self._undeclared_allowed:
@@ -257,13 +252,13 @@ class DeclaredParameters:
         return found
 
     def descriptor(self, name: str) -> Any:
-        """Its description."""
+        """Return the descriptor of a parameter."""
         if name not in self._descriptors:
             raise ParameterNotDeclaredException(name)
         return self._descriptors[name]
 
-    def forget(self, name: str) -> None:
-        """Undeclare it."""
+    def undeclare(self, name: str) -> None:
+        """Remove a parameter."""
         if name not in self._parameters:
             raise ParameterNotDeclaredException(name)
         if self._descriptors[name].read_only:
@@ -273,51 +268,51 @@ class DeclaredParameters:
             self._node.delete_parameter(self._private(name))
 
     def set(self, parameters: Sequence[Parameter]) -> Any:
-        """All or none; a ``SetParametersResult``."""
+        """Set all parameters or none; return a ``SetParametersResult``."""
         unknown = [one.name for one in parameters if one.name not in self._parameters]
         if unknown and not self._undeclared_allowed:
             raise ParameterNotDeclaredException(unknown)
-        why = self._refused(list(parameters))
-        if why:
-            return new(_RESULT, successful=False, reason=why)
+        refusal = self._refusal(list(parameters))
+        if refusal:
+            return new(_RESULT, successful=False, reason=refusal)
         for parameter in parameters:
             kind = int(parameter.type_)
             self._descriptors.setdefault(parameter.name, new(_DESCRIPTOR, name=parameter.name, type=kind))
             self._keep(parameter)
         return new(_RESULT, successful=True)
 
-    def _refused(self, parameters: list[Parameter]) -> str:
+    def _refusal(self, parameters: list[Parameter]) -> str:
         for one in parameters:
-            descriptor = self._descriptors.get(one.name)
-            why = (
-                ""
-                if descriptor is None
-                else constraint_violation(one, descriptor, declared=one.name in self._parameters)
-            )
-            if why:
-                return why
-        for watcher in self._watchers:
-            result = watcher(parameters)
+            if one.name in self._descriptors:
+                declared = one.name in self._parameters
+                violation = constraint_violation(one, self._descriptors[one.name], declared=declared)
+                if violation:
+                    return violation
+        for validator in self._validators:
+            result = validator(parameters)
             if not result.successful:
                 return result.reason or "a callback refused it"
         return ""
 
 
+# -- methods of a node
+
+
 class NodeParameters:
-    """The part of ``Node`` that is about parameters."""
+    """The methods of ``Node`` that concern parameters."""
 
     _declared: DeclaredParameters
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False
     ) -> Parameter:
-        """Declare a parameter with its default; what a launch file gives comes first."""
+        """Declare a parameter with its default value; the value of a launch file takes precedence."""
         return self._declared.declare(name, value, descriptor, ignore_override)
 
     def declare_parameters(
         self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
     ) -> list[Parameter]:
-        """Several: ``(name,)``, ``(name, value)`` or ``(name, value, descriptor)``."""
+        """Declare parameters given as ``(name,)``, ``(name, value)`` or ``(name, value, descriptor)``."""
         prefix = f"{namespace}." if namespace else ""
         declared = []
         for name, *rest in parameters:
@@ -326,67 +321,67 @@ class NodeParameters:
         return declared
 
     def undeclare_parameter(self, name: str) -> None:
-        """Forget it."""
-        self._declared.forget(name)
+        """Remove a parameter."""
+        self._declared.undeclare(name)
 
     def has_parameter(self, name: str) -> bool:
-        """Whether it is declared."""
+        """Return whether a parameter is declared."""
         return self._declared.has(name)
 
     def get_parameter(self, name: str) -> Parameter:
-        """Its value now."""
+        """Return the current value of a parameter."""
         return self._declared.get(name)
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Several."""
+        """Return the current values of parameters."""
         return [self._declared.get(name) for name in names]
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
-        """Its value now, or the alternative."""
+        """Return the current value of a parameter, or the alternative if it is not declared."""
         known = self._declared.has(name)
         return self._declared.get(name) if known else alternative_value or Parameter(name)
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Those below *prefix*, without it."""
+        """Return the parameters below *prefix* by their names without it."""
         start = f"{prefix}." if prefix else ""
         names = [name for name in self._declared.names() if name.startswith(start)]
         return {name.removeprefix(start): self._declared.get(name) for name in names}
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[Any]:
-        """Each for itself."""
+        """Set each parameter independently of the others."""
         return [self._declared.set([one]) for one in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> Any:
-        """All or none."""
+        """Set all parameters or none."""
         return self._declared.set(parameter_list)
 
     def describe_parameter(self, name: str) -> Any:
-        """Its descriptor."""
+        """Return the descriptor of a parameter."""
         return self._declared.descriptor(name)
 
-    def add_on_set_parameters_callback(self, callback: Watcher) -> Watcher:
-        """Ask it before values are set."""
-        self._declared.watch(callback)
+    def describe_parameters(self, names: Sequence[str]) -> list[Any]:
+        """Return the descriptors of parameters."""
+        return [self._declared.descriptor(name) for name in names]
+
+    def add_on_set_parameters_callback(self, callback: Validator) -> Validator:
+        """Call *callback* before values are set; it may refuse them."""
+        self._declared.add_validator(callback)
         return callback
 
-    def remove_on_set_parameters_callback(self, callback: Watcher) -> None:
-        """Ask it no longer."""
-        self._declared.unwatch(callback)
+    def remove_on_set_parameters_callback(self, callback: Validator) -> None:
+        """Remove a callback that was added."""
+        self._declared.remove_validator(callback)
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
-        """The type of its value now."""
+        """Return the type of the current value of a parameter."""
         return self._declared.get(name).type_
 
     def get_parameter_types(self, names: Sequence[str]) -> list[Parameter.Type]:
-        """Several."""
+        """Return the types of the current values of parameters."""
         return [self.get_parameter_type(name) for name in names]
 
-    def describe_parameters(self, names: Sequence[str]) -> list[Any]:
-        """Several descriptors."""
-        return [self._declared.descriptor(name) for name in names]
-
     def list_parameters(self, prefixes: Sequence[str], depth: int) -> Any:
-        """A ``ListParametersResult``: names at most *depth* levels below a prefix (0: all levels)."""
+        """Return a ``ListParametersResult`` of the names at most *depth* levels below a prefix (0: all)."""
         result = new("rcl_interfaces/msg/ListParametersResult")
         for name in self._declared.names():
             if any(_is_below(name, prefix, depth) for prefix in prefixes or ("",)):
@@ -404,50 +399,53 @@ def _is_below(name: str, prefix: str, depth: int) -> bool:
     return name.startswith(start) and (not depth or name.removeprefix(start).count(".") < depth)
 
 
-Answer = Callable[["Node", Any, Any], None]
+# -- services
+
+Handler = Callable[[NodeParameters, Any, Any], None]
+"""Fills the response to a request for the parameters of a node."""
 
 
-def _get(node: Node, request: Any, response: Any) -> None:
+def _get(node: NodeParameters, request: Any, response: Any) -> None:
     try:
         response.values = [node.get_parameter(name).get_parameter_value() for name in request.names]
     except (ParameterNotDeclaredException, ParameterUninitializedException):
         response.values = []
 
 
-def _types(node: Node, request: Any, response: Any) -> None:
+def _types(node: NodeParameters, request: Any, response: Any) -> None:
     try:
         response.types = [int(node.get_parameter_type(name)) for name in request.names]
     except ParameterNotDeclaredException:
         response.types = []
 
 
-def _describe(node: Node, request: Any, response: Any) -> None:
+def _describe(node: NodeParameters, request: Any, response: Any) -> None:
     try:
         response.descriptors = node.describe_parameters(request.names)
     except ParameterNotDeclaredException:
         response.descriptors = []
 
 
-def _list(node: Node, request: Any, response: Any) -> None:
+def _list(node: NodeParameters, request: Any, response: Any) -> None:
     response.result = node.list_parameters(request.prefixes, request.depth)
 
 
-def _set(node: Node, request: Any, response: Any) -> None:
-    response.results = [_atomically(node, [one]) for one in request.parameters]
+def _set(node: NodeParameters, request: Any, response: Any) -> None:
+    response.results = [_set_messages(node, [one]) for one in request.parameters]
 
 
-def _set_atomically(node: Node, request: Any, response: Any) -> None:
-    response.result = _atomically(node, request.parameters)
+def _set_atomically(node: NodeParameters, request: Any, response: Any) -> None:
+    response.result = _set_messages(node, request.parameters)
 
 
-def _atomically(node: Node, given: list[Any]) -> Any:
+def _set_messages(node: NodeParameters, messages: list[Any]) -> Any:
     try:
-        return node.set_parameters_atomically([Parameter.from_parameter_msg(one) for one in given])
+        return node.set_parameters_atomically([Parameter.from_parameter_msg(one) for one in messages])
     except ParameterNotDeclaredException as error:
         return new("rcl_interfaces/msg/SetParametersResult", successful=False, reason=str(error))
 
 
-_SERVICES: dict[str, tuple[str, Answer]] = {
+_SERVICES: dict[str, tuple[str, Handler]] = {
     "describe_parameters": ("DescribeParameters", _describe),
     "get_parameter_types": ("GetParameterTypes", _types),
     "get_parameters": ("GetParameters", _get),
@@ -457,15 +455,20 @@ _SERVICES: dict[str, tuple[str, Answer]] = {
 }
 
 
-def serve_parameters(node: Node) -> None:
-    """Serve them below the node's name, in its default callback group."""
-    for name, (kind, answer) in _SERVICES.items():
-        node.create_service(service_class(f"rcl_interfaces/srv/{kind}"), f"~/{name}", _bound(node, answer))
+def serve_parameters(node: NodeParameters, create_service: Callable[..., object]) -> None:
+    """Offer the services through which other nodes read and set the parameters of *node*.
 
+    Args:
+        node: The node whose parameters are served.
+        create_service: The node's ``create_service``.
+    """
 
-def _bound(node: Node, answer: Answer) -> Callable[[Any, Any], Any]:
-    def callback(request: Any, response: Any) -> Any:
-        answer(node, request, response)
-        return response
+    def callback(handler: Handler) -> Callable[[Any, Any], Any]:
+        def respond(request: Any, response: Any) -> Any:
+            handler(node, request, response)
+            return response
 
-    return callback
+        return respond
+
+    for name, (kind, handler) in _SERVICES.items():
+        create_service(service_class(f"rcl_interfaces/srv/{kind}"), f"~/{name}", callback(handler))

@@ -1,4 +1,4 @@
-"""rclpy's quality of service: profiles, policies and presets."""
+"""rclpy's quality of service: policies, profiles and presets."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from volery.ros.graph.interface import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TR
 
 
 class InvalidQoSProfileException(Exception):  # noqa: N818 - rclpy's name
-    """A profile that makes no sense."""
+    """A profile that is contradictory or incomplete."""
 
 
 class HistoryPolicy(IntEnum):
-    """What is kept."""
+    """Which messages are kept."""
 
     SYSTEM_DEFAULT = 0
     KEEP_LAST = 1
@@ -25,7 +25,7 @@ class HistoryPolicy(IntEnum):
 
 
 class ReliabilityPolicy(IntEnum):
-    """Whether what is lost is sent again."""
+    """Whether lost messages are sent again."""
 
     SYSTEM_DEFAULT = 0
     RELIABLE = 1
@@ -35,7 +35,7 @@ class ReliabilityPolicy(IntEnum):
 
 
 class DurabilityPolicy(IntEnum):
-    """Whether those who come late get what was sent before."""
+    """Whether late subscriptions receive earlier messages."""
 
     SYSTEM_DEFAULT = 0
     TRANSIENT_LOCAL = 1
@@ -45,7 +45,7 @@ class DurabilityPolicy(IntEnum):
 
 
 class LivelinessPolicy(IntEnum):
-    """Accepted; liveliness is not watched on the embedded graph."""
+    """Liveliness policies, which are accepted without effect on the embedded graph."""
 
     SYSTEM_DEFAULT = 0
     AUTOMATIC = 1
@@ -55,8 +55,10 @@ class LivelinessPolicy(IntEnum):
 
 
 class QoSProfile:
-    """As rclpy's: ``QoSProfile(depth=10)``. Deadlines, lifespans and liveliness are refused when they are
-    finite: the embedded graph does not watch them.
+    """A profile as in rclpy: ``QoSProfile(depth=10)``.
+
+    Finite deadlines, lifespans and lease durations are refused, because the embedded graph does not monitor
+    them.
     """
 
     def __init__(self, **policies: Any) -> None:
@@ -74,7 +76,7 @@ class QoSProfile:
             span = policies.pop(name, None)
             setattr(self, name, span or Duration())
             if span is not None and 0 < span.nanoseconds < (1 << 62):
-                raise UsageError(f"QoSProfile: a {name} is not watched on the embedded graph; leave it out")
+                raise UsageError(f"QoSProfile: a {name} is not monitored on the embedded graph; leave it out")
         if policies:
             raise TypeError(f"QoSProfile has no {sorted(policies)[0]!r}")
 
@@ -105,7 +107,7 @@ _DURABILITY = {
 
 
 def graph_qos(given: Any) -> QoS:
-    """The graph's words for what a user gave: a profile, or a depth."""
+    """Return the quality of service of the graph for a profile or a depth."""
     if isinstance(given, bool) or not isinstance(given, (int, QoSProfile)):
         raise TypeError(f"Expected QoSProfile or int, but received {type(given)!r}")
     if isinstance(given, int):
@@ -137,4 +139,4 @@ QOS = {
     "qos_profile_services_default": qos_profile_services_default,
     "qos_profile_system_default": qos_profile_system_default,
 }
-"""``rclpy.qos``."""
+"""Content of ``rclpy.qos``."""

@@ -1,4 +1,4 @@
-"""rclpy's ``Time``, ``Duration`` and ``Clock``: nanoseconds of the graph's time."""
+"""rclpy's ``Time``, ``Duration``, ``Clock`` and ``Rate`` over the time of the graph."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from volery.ros.messages.stamp import nanoseconds
 
 
 class ClockType(IntEnum):
-    """Which clock a time was read from. On the embedded graph they all tell the graph's time."""
+    """The clock that a time was read from. On the embedded graph all clocks show the time of the graph."""
 
     ROS_TIME = 1
     SYSTEM_TIME = 2
     STEADY_TIME = 3
 
 
-def _whole(seconds: float, nanoseconds_: float) -> Ns:
+def _total_ns(seconds: float, nanoseconds_: float) -> Ns:
     return (from_seconds(seconds) if isinstance(seconds, float) else seconds * S) + int(nanoseconds_)
 
 
 @total_ordering
 class Duration:
-    """A span of time; may be negative."""
+    """A duration, which may be negative."""
 
     def __init__(self, *, seconds: float = 0, nanoseconds: float = 0) -> None:
-        self.nanoseconds: Ns = _whole(seconds, nanoseconds)
+        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds)
 
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self.nanoseconds})"
@@ -60,13 +60,13 @@ class Duration:
     __rmul__ = __mul__
 
     def to_msg(self) -> Any:
-        """A ``builtin_interfaces/msg/Duration``."""
+        """Return the duration as ``builtin_interfaces/msg/Duration``."""
         seconds, rest = divmod(self.nanoseconds, S)
         return new("builtin_interfaces/msg/Duration", sec=seconds, nanosec=rest)
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
-        """From a ``builtin_interfaces/msg/Duration``."""
+        """Return the duration in a ``builtin_interfaces/msg/Duration``."""
         return cls(nanoseconds=nanoseconds(msg))
 
 
@@ -75,12 +75,12 @@ Infinite = Duration(nanoseconds=(1 << 63) - 1)
 
 @total_ordering
 class Time:
-    """A point in time. Two of different clocks can be neither compared nor subtracted."""
+    """A point in time. Times of different clocks can be neither compared nor subtracted."""
 
     def __init__(
         self, *, seconds: float = 0, nanoseconds: float = 0, clock_type: ClockType = ClockType.SYSTEM_TIME
     ) -> None:
-        self.nanoseconds: Ns = _whole(seconds, nanoseconds)
+        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds)
         self.clock_type = ClockType(clock_type)
         if self.nanoseconds < 0:
             raise ValueError("Seconds value must not be negative")
@@ -92,7 +92,7 @@ class Time:
         return hash((self.nanoseconds, self.clock_type))
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
-        """Whole seconds and the rest."""
+        """Return seconds and remaining nanoseconds."""
         return divmod(self.nanoseconds, S)
 
     def _check(self, other: Time) -> None:
@@ -127,18 +127,18 @@ class Time:
         return NotImplemented
 
     def to_msg(self) -> Any:
-        """A ``builtin_interfaces/msg/Time``."""
+        """Return the time as ``builtin_interfaces/msg/Time``."""
         seconds, rest = self.seconds_nanoseconds()
         return new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
 
     @classmethod
     def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
-        """From a ``builtin_interfaces/msg/Time``."""
+        """Return the time in a ``builtin_interfaces/msg/Time``."""
         return cls(nanoseconds=nanoseconds(msg), clock_type=clock_type)
 
 
 class Clock:
-    """Tells the graph's time."""
+    """A clock that shows the time of the graph."""
 
     contexts: ClassVar[Contexts]
 
@@ -147,26 +147,26 @@ class Clock:
 
     @property
     def ros_time_is_active(self) -> bool:
-        """Always: the graph's time is ROS time."""
+        """Whether the clock shows ROS time, which is the time of the graph."""
         return self.clock_type is ClockType.ROS_TIME
 
     def now(self) -> Time:
-        """The time it is. An interaction point."""
+        """Return the current time. An interaction point."""
         return Time(nanoseconds=self.contexts.now(), clock_type=self.clock_type)
 
     def sleep_until(self, until: Time, context: Context | None = None) -> bool:
-        """Block until then; False if the context was shut down meanwhile."""
+        """Block until a time; return False if the context was shut down meanwhile."""
         if until.clock_type is not self.clock_type:
             raise ValueError("until's clock type does not match this clock's type")
-        used = context or self.contexts.here()
+        used = context or self.contexts.current()
         if not used.ok():
             raise NotInitializedException()
         used.sleep(until.nanoseconds - self.contexts.now())
         return used.ok()
 
     def sleep_for(self, rel_time: Duration, context: Context | None = None) -> bool:
-        """Block for so long; False if the context was shut down meanwhile."""
-        used = context or self.contexts.here()
+        """Block for a duration; return False if the context was shut down meanwhile."""
+        used = context or self.contexts.current()
         if not used.ok():
             raise NotInitializedException()
         used.sleep(rel_time.nanoseconds)
@@ -174,21 +174,21 @@ class Clock:
 
 
 class ROSClock(Clock):
-    """A clock of ``ROS_TIME``."""
+    """A clock of type ``ROS_TIME``."""
 
     def __init__(self) -> None:
         super().__init__(clock_type=ClockType.ROS_TIME)
 
 
 class Rate:
-    """Keeps a loop at a period. It does not need the node to be spun."""
+    """Keeps a loop at a period, without a spinning executor."""
 
     def __init__(self, context: Context, period: Ns) -> None:
         self._context = context
-        self._rate = context.node().rate(period)
+        self._rate = context.first_node().rate(period)
 
     def sleep(self) -> None:
-        """Block until the next release; ``ROSInterruptException`` at shutdown."""
+        """Block until the next release; raise ``ROSInterruptException`` at shutdown."""
         if not self._context.ok():
             raise ROSInterruptException()
         self._rate.sleep()
@@ -196,4 +196,4 @@ class Rate:
             raise ROSInterruptException()
 
     def destroy(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: a rate holds no resources."""

@@ -1,8 +1,8 @@
 """``roscpp`` on a graph: headers that a component's C++ file includes, and what answers its questions.
 
 ``include/`` holds ``ros/ros.h`` and its kin, in place of roscpp's own; ``headers.generate`` writes the
-headers of messages; ``request_handlers`` does on the graph what the code asks. Where Boost is not installed, the
-little that roscpp's interface needs of it is in ``fallback/``.
+headers of messages; ``request_handlers`` does on the graph what the code asks. Where Boost is not installed,
+the little that roscpp's interface needs of it is in ``fallback/``.
 
 As a launch file does, the component's name names the node, whatever ``ros::init`` says.
 

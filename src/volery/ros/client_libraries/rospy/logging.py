@@ -31,7 +31,7 @@ class _Log:
         self._said: dict[tuple[str, str], Ns] = {}
 
     def _component(self) -> str:
-        return current_task(self._sessions.kernel).place.component
+        return current_task(self._sessions.kernel).context.component
 
     def say(self, msg: Any, *args: Any, **options: Any) -> None:
         """Log ``msg % args``."""

@@ -80,7 +80,7 @@ class Session:
     def say(self, severity: int, text: str) -> None:
         """Record a log line of this node. An interaction point."""
         with self.kernel as kernel:
-            kernel.record(Text(kernel.now(), self.node.place.component, severity, text))
+            kernel.record(Text(kernel.now(), self.node.context.component, severity, text))
 
     def check(self) -> None:
         """``ROSInterruptException`` if it is shutting down."""
@@ -90,7 +90,7 @@ class Session:
     def on_shutdown(self, hook: Callable[[], Any]) -> None:
         """Call it when the node shuts down, by itself or with the run."""
         if not self.hooks:
-            self.at_end(self.node.place, lambda: self.end("the run has ended"))
+            self.at_end(self.node.context, lambda: self.end("the run has ended"))
         self.hooks.append(hook)
 
     def end(self, why: str) -> None:
@@ -126,7 +126,7 @@ class Session:
         return self.node.group(start)
 
     def _start(self, body: Callable[[], None], label: str) -> None:
-        place = replace(self.node.place, deadline=None, on_release=None)
+        place = replace(self.node.context, deadline=None, on_release=None)
         self.kernel.spawn(body, f"{place.component} ({label})", place, self.scope)
 
     def _guarded(self, run: Callable[[], object], what: str) -> None:
@@ -143,7 +143,7 @@ class Session:
             self.say(ERROR, f"bad callback: {text}")
             if text not in self.failures:
                 self.failures.add(text)
-                self.kernel.record(Failure(self.kernel.now(), self.node.place.component, text))
+                self.kernel.record(Failure(self.kernel.now(), self.node.context.component, text))
 
 
 def _in_words(error: Exception) -> str:

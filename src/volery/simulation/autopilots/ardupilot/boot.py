@@ -12,9 +12,9 @@ from functools import partial
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
-from volery.simulation.autopilots.firmware import BootEvent, VehicleAction
+from volery.simulation.autopilots.firmware import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 
 DEBUG = 7
 
@@ -213,7 +213,7 @@ def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
 
 def each_second(vehicle: Vehicle, before_arming: Problems) -> None:
     """Readiness, and the counters of hours."""
-    if vehicle.uptime() < vehicle.firmware.ready_after:
+    if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return
     update_prearm_state(vehicle, before_arming)
     if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:

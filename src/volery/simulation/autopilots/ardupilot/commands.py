@@ -90,7 +90,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """MISSION_START: AUTO, and off the ground if it is armed."""
-    auto = next(number for number, mode in vehicle.firmware.modes.items() if mode.name == "AUTO")
+    auto = next(number for number, mode in vehicle.rules.modes.items() if mode.name == "AUTO")
     if not vehicle.armed or not change_mode(vehicle, auto):
         return FAILED
     manoeuvre = vehicle.manoeuvre
@@ -169,7 +169,7 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
             return FAILED
     if command.param1 > 0.0:
         vehicle.speed = command.param1
-    yaw = None if isnan(command.param4) or not vehicle.firmware.stands else command.param4
+    yaw = None if isnan(command.param4) or not vehicle.flies else command.param4
     return ACCEPTED if go_to(vehicle, command.frame, (command.x, command.y, command.z), yaw) else FAILED
 
 

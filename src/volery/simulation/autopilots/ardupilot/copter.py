@@ -8,11 +8,10 @@ from volery.base.time import MS, S, from_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
 from volery.simulation.autopilots.ardupilot.firmware import (
-    MESSAGE_HANDLERS,
-    ardupilot_firmware,
     ardupilot_mavlink,
     builders,
     introduce,
+    own_parameters,
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
@@ -44,12 +43,22 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     Health,
 )
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Loiter, Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.mavlink.firmware import LinkStart
+from volery.simulation.autopilots.vehicle_state import (
+    ArmingTimes,
+    Mode,
+    ParameterTable,
+    RcDefaults,
+    StartupTimes,
+    Vehicle,
+    VehicleRules,
+)
 
 QUADROTOR = 2
 """MAV_TYPE."""
@@ -81,7 +90,7 @@ MODES = {
             3,
             "AUTO",
             BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, copter_leg, mission.leaves_ground),
+            lambda vehicle: FlyMission(vehicle, copter_leg, mission.COPTER_MISSION, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
             armable=False,
@@ -177,7 +186,7 @@ def on_step(vehicle: Vehicle) -> None:
         return
     if not vehicle.landed:
         vehicle.idle_since = vehicle.kernel.now()
-        vehicle.flight_time += COPTER.tick
+        vehicle.flight_time += COPTER.periodic.tick
         _notice_flight(vehicle)
     else:
         _disarm_by_itself(vehicle)
@@ -209,11 +218,6 @@ def _disarm_by_itself(vehicle: Vehicle) -> None:
         disarm(vehicle, ARMED_WORDS[1], force=True)
 
 
-def on_disarmed(vehicle: Vehicle) -> None:
-    """The hover throttle that was learnt is stored."""
-    vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
-
-
 def system_status(vehicle: Vehicle) -> int:
     """MAV_STATE: a failsafe, standing, or flying."""
     if vehicle.failsafes:
@@ -234,18 +238,14 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.ardupilot", "data/copter.parameters")
 
 
-def _ignored(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
-    """A copter does not store stream rates."""
-
-
-_FAILSAFES = CopterFailsafes(change_mode, ARMED_WORDS[1])
-
 _MAVLINK = ardupilot_mavlink(
-    boot_bytes=boot.bytes_at(
-        (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
+    start=LinkStart(
+        boot_bytes=boot.bytes_at(
+            (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
+        ),
+        heartbeat_first=(round(1.05 * S),),
+        heartbeat_from=round(2.037 * S),
     ),
-    heartbeat_first=(round(1.05 * S),),
-    heartbeat_from=round(2.037 * S),
     messages={
         **builders(QUADROTOR, CAPABILITIES, HEALTH, system_status),
         "ESC_TELEMETRY_1_TO_4": telemetry.esc_telemetry,
@@ -253,12 +253,10 @@ _MAVLINK = ardupilot_mavlink(
         "WIND": telemetry.wind,
     },
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
-    on_stream_request=_ignored,
     commands=commands.copter_commands(
         problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
     ),
     handlers={
-        **MESSAGE_HANDLERS,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,
@@ -266,31 +264,27 @@ _MAVLINK = ardupilot_mavlink(
     on_parameter_list=greet,
 )
 
-COPTER = ardupilot_firmware(
+COPTER = Firmware(
+    name="ardupilot",
     kind="multirotor",
-    face=partial(MavlinkEndpoint, _MAVLINK),
-    boot_mode=MODES[0],
-    boot_events=boot.copter_events(ready),
-    ready_after=READY,
-    origin_after=ORIGIN,
-    position_after=POSITION,
-    local_position_after=POSITION,
-    on_warm=warm,
-    on_warm_position=partial(boot.on_position, before_arming=before_arming),
-    each_second=partial(boot.each_second, before_arming=before_arming),
-    each_second_from=EACH_SECOND,
-    modes=MODES,
-    tuning=copter_tuning,
-    transmitter=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
-    stands=True,
-    motors_rest=2 * S,
-    spool_time=500 * MS,
-    takeoff_slew=100 * MS,
-    resigns_after=1500 * MS,
-    watches=_FAILSAFES.watches(),
-    on_step=on_step,
-    on_disarmed=on_disarmed,
-    mission_ended=mission.copter_ended,
-    parameters=parameters,
-    supported_parameters=COPTER_SUPPORTED,
+    rules=VehicleRules(
+        modes=MODES,
+        boot_mode=MODES[0],
+        startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
+        arming=ArmingTimes(
+            motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS
+        ),
+        parameters=ParameterTable(parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
+        rc=RcDefaults((1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0)),
+    ),
+    boot=BootSequence(
+        boot.copter_events(ready), warm, partial(boot.on_position, before_arming=before_arming)
+    ),
+    periodic=PeriodicWork(
+        on_step=on_step,
+        each_second=partial(boot.each_second, before_arming=before_arming),
+        each_second_from=EACH_SECOND,
+    ),
+    failsafes=CopterFailsafes(change_mode, ARMED_WORDS[1]).watches(),
+    endpoint=partial(MavlinkEndpoint, _MAVLINK),
 )

@@ -107,12 +107,11 @@ class CopterFailsafes:
                 "station", station_lost, self.on_station_lost, lambda vehicle: self._clear(vehicle, "GCS")
             ),
             Failsafe("radio", radio_lost, self.on_radio_lost, lambda vehicle: self._clear(vehicle, "Radio")),
-            Failsafe("battery low", battery_low, lambda vehicle: self.on_battery(vehicle, "low"), _nothing),
+            Failsafe("battery low", battery_low, lambda vehicle: self.on_battery(vehicle, "low")),
             Failsafe(
                 "battery critical",
                 battery_critical,
                 lambda vehicle: self.on_battery(vehicle, "critical"),
-                _nothing,
             ),
             Failsafe("estimator", estimator_lost, self.on_estimator_lost, self.on_estimator_back),
         )
@@ -209,8 +208,8 @@ class RoverFailsafes:
         return (
             Failsafe("station", station_lost, lambda v: self._begin(v, "GCS"), lambda v: self._end(v, "GCS")),
             Failsafe("radio", radio_lost, lambda v: self._begin(v, "Radio"), lambda v: self._end(v, "Radio")),
-            Failsafe("battery low", battery_low, lambda v: self._battery(v, "low"), _nothing),
-            Failsafe("battery critical", battery_critical, lambda v: self._battery(v, "critical"), _nothing),
+            Failsafe("battery low", battery_low, lambda v: self._battery(v, "low")),
+            Failsafe("battery critical", battery_critical, lambda v: self._battery(v, "critical")),
         )
 
     def _begin(self, vehicle: Vehicle, what: str) -> None:
@@ -237,7 +236,3 @@ class RoverFailsafes:
         for mode in self.ACTIONS.get(action, ()):
             if self._switch(vehicle, mode):
                 return
-
-
-def _nothing(_vehicle: Vehicle) -> None:
-    """A battery does not recover."""

@@ -8,16 +8,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from volery.base.time import MS, S
-from volery.simulation.autopilots.ardupilot import commands, mission, pilot_input, telemetry
+from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.ardupilot import mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.telemetry import Health
-from volery.simulation.autopilots.firmware import Firmware
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink import message_fields
-from volery.simulation.autopilots.mavlink.command import DENIED, FAILED
-from volery.simulation.autopilots.mavlink.firmware import Builder, MavlinkFirmware
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.firmware import (
+    Builder,
+    CommandPolicy,
+    LinkStart,
+    MavlinkFirmware,
+    MessageHandler,
+    MissionPolicy,
+    TelemetryPolicy,
+)
+from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 
 RAW_SENSORS, EXTENDED_STATUS, RC_CHANNELS, RAW_CONTROLLER, POSITION = 1, 2, 3, 4, 6
 EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
@@ -188,6 +196,10 @@ def refuse_interval(vehicle: Vehicle, number: int) -> int:
     return DENIED
 
 
+def ignore_stream_request(_vehicle: Vehicle, _link: int, _stream: int, _rate: int) -> None:
+    """Store no stream rates (copter)."""
+
+
 def builders(
     kind: int, capabilities: int, health: Health, system_status: Callable[[Vehicle], int]
 ) -> Mapping[str, Builder]:
@@ -211,29 +223,43 @@ MESSAGE_HANDLERS = {
 }
 """What every vehicle obeys of sticks and stations."""
 
-ardupilot_mavlink = partial(
-    MavlinkFirmware,
-    deaf_until=100 * MS,
-    message_order=ORDER,
-    refuse_interval=refuse_interval,
-    unknown_message=FAILED,
-    set_mode=set_mode,
-    set_mode_ack=11,
-    mission_runs=mission.runs,
-    stored_item=mission.stored_item,
-    home_item=mission.home_item,
-    go_to_item=commands.go_to_item,
-    mission_grew=mission.mission_grew,
-    timesync_every=10 * S,
-)
-"""A ``MavlinkFirmware`` but for what depends on the kind."""
 
-ardupilot_firmware = partial(
-    Firmware,
-    name="ardupilot",
-    mission_item_done=mission.item_done,
-    mission_item_begins=mission.item_begins,
-    mission_action=mission.act,
-    own_parameters=own_parameters,
-)
-"""A ``Firmware`` but for what depends on the kind."""
+def ardupilot_mavlink(
+    *,
+    start: LinkStart,
+    messages: Mapping[str, Builder],
+    streams: Mapping[int, Sequence[str]],
+    commands: Mapping[int, Handler],
+    handlers: Mapping[str, MessageHandler],
+    on_parameter_list: VehicleAction,
+    on_stream_request: Callable[[Vehicle, int, int, int], None] = ignore_stream_request,
+    least_period: Ns = 3 * MS,
+) -> MavlinkFirmware:
+    """Return the MAVLink of one kind of vehicle: what copter and rover share, and the arguments."""
+    return MavlinkFirmware(
+        start=start._replace(timesync_every=10 * S),
+        telemetry=TelemetryPolicy(
+            messages=messages,
+            message_order=ORDER,
+            streams=streams,
+            on_stream_request=on_stream_request,
+            least_period=least_period,
+            intervals_after=100 * MS,
+            refuse_interval=refuse_interval,
+            unknown_message=FAILED,
+        ),
+        commands=CommandPolicy(
+            commands=commands,
+            handlers={**MESSAGE_HANDLERS, **handlers},
+            set_mode=set_mode,
+            set_mode_ack=11,
+        ),
+        missions=MissionPolicy(
+            runs=mission.runs,
+            stored_item=mission.stored_item,
+            home_item=mission.home_item,
+            go_to_item=go_to_item,
+            grew=mission.mission_grew,
+        ),
+        on_parameter_list=on_parameter_list,
+    )

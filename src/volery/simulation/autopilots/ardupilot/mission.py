@@ -6,6 +6,7 @@ from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
 from volery.simulation.autopilots.ardupilot.modes import INFO, disarm
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
 from volery.simulation.autopilots.mavlink.message_fields import finite
 from volery.simulation.autopilots.onboard_mission import (
@@ -195,3 +196,7 @@ def copter_ended(vehicle: Vehicle) -> None:
 def rover_ended(vehicle: Vehicle) -> None:
     """It holds."""
     vehicle.say(INFO, "Mission Complete")
+
+
+COPTER_MISSION = MissionRules(item_begins=item_begins, item_done=item_done, act=act, ended=copter_ended)
+ROVER_MISSION = MissionRules(item_begins=item_begins, item_done=item_done, act=act, ended=rover_ended)

@@ -53,7 +53,7 @@ def needs_no_position(start: float, end: float) -> Callable[[Vehicle], bool]:
 
 def lost_position(vehicle: Vehicle) -> bool:
     """The mode needs a position, home is set, but there is no position."""
-    settled = vehicle.uptime() >= vehicle.firmware.origin_after
+    settled = vehicle.uptime() >= vehicle.rules.startup.origin_after
     return vehicle.mode.needs_position and settled and not vehicle.has_position
 
 
@@ -80,7 +80,7 @@ def not_armable(vehicle: Vehicle) -> list[str]:
     """The text that refuses the mode itself; copter names it, rover does not."""
     if vehicle.mode.armable:
         return []
-    name = f"{vehicle.mode.name} mode not armable" if vehicle.firmware.stands else "Mode not armable"
+    name = f"{vehicle.mode.name} mode not armable" if vehicle.flies else "Mode not armable"
     return [name]
 
 
@@ -106,11 +106,12 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
     """Disarm, in the air only by force; returns a MAV_RESULT."""
     if not vehicle.armed:
         return ACCEPTED
-    if vehicle.firmware.stands and not vehicle.landed and not force:
+    if vehicle.flies and not vehicle.landed and not force:
         return FAILED
     vehicle.disarm()
     vehicle.say(INFO, words)
-    vehicle.firmware.on_disarmed(vehicle)
+    if vehicle.flies:
+        vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
     return ACCEPTED
 
 
@@ -142,7 +143,7 @@ def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
 
 def change_mode(vehicle: Vehicle, number: int) -> bool:
     """Enter that mode if it may be; else say why not."""
-    mode = vehicle.firmware.modes.get(number)
+    mode = vehicle.rules.modes.get(number)
     if mode is None:
         vehicle.say(WARNING, f"No such mode {number}")
         return False
@@ -151,9 +152,7 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
     reason = refusal(vehicle, mode) if vehicle.armed else ""
     if reason:
         words = (
-            f"Mode change to {mode.name} failed: {reason}"
-            if vehicle.firmware.stands
-            else "Flight mode change failed"
+            f"Mode change to {mode.name} failed: {reason}" if vehicle.flies else "Flight mode change failed"
         )
         vehicle.say(WARNING, words)
         return False
@@ -167,7 +166,7 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
         return "requires position"
     if mode.name == "AUTO" and len(vehicle.plan) <= 1:
         return "init failed"
-    if vehicle.firmware.stands and vehicle.landed:
+    if vehicle.flies and vehicle.landed:
         return _refusal_on_ground(vehicle, mode)
     return ""
 

@@ -50,9 +50,9 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
     vehicle.station_seen = now
     sticks = vehicle.tuning.sticks
     roll, pitch, throttle, yaw = sticks.travels
-    middle = vehicle.firmware.throttle_centred
+    middle = vehicle.rules.rc.throttle_centred
     _give(vehicle, sticks.roll, roll, _share(fields["y"]))
-    if vehicle.firmware.stands:
+    if vehicle.flies:
         _give(
             vehicle,
             sticks.pitch,
@@ -86,7 +86,7 @@ def _moved(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """At each tick: a transmitter that fails or comes back, overrides that expire."""
-    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(vehicle.firmware.transmitter):
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(vehicle.rules.rc.transmitter):
         fail(vehicle)
     expire(vehicle)
 
@@ -105,5 +105,5 @@ def fail(vehicle: Vehicle) -> None:
     Both look the same to the firmware: a throttle of 950.
     """
     throttle = vehicle.tuning.sticks.throttle
-    healthy = vehicle.firmware.transmitter[throttle - 1]
+    healthy = vehicle.rules.rc.transmitter[throttle - 1]
     vehicle.sticks.transmitter[throttle - 1] = 950 if vehicle.parameters["SIM_RC_FAIL"] else healthy

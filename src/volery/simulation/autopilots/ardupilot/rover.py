@@ -9,11 +9,10 @@ from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilo
 from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
-    MESSAGE_HANDLERS,
-    ardupilot_firmware,
     ardupilot_mavlink,
     builders,
     introduce,
+    own_parameters,
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import rover_global, rover_local
@@ -45,6 +44,7 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     nav_controller,
 )
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
@@ -54,8 +54,16 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
     rover_leg,
 )
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
+from volery.simulation.autopilots.mavlink.firmware import LinkStart
 from volery.simulation.autopilots.mavlink.message_fields import Fields
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import (
+    Mode,
+    ParameterTable,
+    RcDefaults,
+    StartupTimes,
+    Vehicle,
+    VehicleRules,
+)
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -72,6 +80,17 @@ POSITION = round(42.08 * S)
 
 ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
 
+
+def guided_arrived(vehicle: Vehicle) -> None:
+    """A rover says so as if it were a mission."""
+    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": 0})
+
+
+def guided_stale(vehicle: Vehicle) -> None:
+    """No target for three seconds."""
+    vehicle.say(WARNING, "target not received last 3secs, stopping")
+
+
 MODES = {
     mode.number: mode
     for mode in (
@@ -81,12 +100,19 @@ MODES = {
             10,
             "AUTO",
             BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, rover_leg),
+            lambda vehicle: FlyMission(vehicle, rover_leg, mission.ROVER_MISSION),
             STEERED,
             needs_position=True,
         ),
         Mode(11, "RTL", BY_ITSELF, ReturnRover, STEERED, needs_position=True, armable=False),
-        Mode(15, "GUIDED", BY_ITSELF, GuidedRover, STEERED, needs_position=True),
+        Mode(
+            15,
+            "GUIDED",
+            BY_ITSELF,
+            lambda vehicle: GuidedRover(vehicle, guided_arrived, guided_stale),
+            STEERED,
+            needs_position=True,
+        ),
     )
 }
 
@@ -145,17 +171,7 @@ def on_step(vehicle: Vehicle) -> None:
     """At each tick: sticks that expire."""
     pilot_input.on_step(vehicle)
     if vehicle.armed:
-        vehicle.flight_time += ROVER.tick
-
-
-def guided_arrived(vehicle: Vehicle) -> None:
-    """A rover says so as if it were a mission."""
-    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": 0})
-
-
-def guided_stale(vehicle: Vehicle) -> None:
-    """No target for three seconds."""
-    vehicle.say(WARNING, "target not received last 3secs, stopping")
+        vehicle.flight_time += ROVER.periodic.tick
 
 
 def system_status(vehicle: Vehicle) -> int:
@@ -190,15 +206,14 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
 
 
-_FAILSAFES = RoverFailsafes(change_mode, ARMED_WORDS[1])
-
 _MAVLINK = ardupilot_mavlink(
-    boot_bytes=boot.bytes_at(
-        (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+    start=LinkStart(
+        boot_bytes=boot.bytes_at(
+            (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+        ),
+        heartbeat_first=(round(1.025 * S),),
+        heartbeat_from=round(3.04 * S),
     ),
-    heartbeat_first=(round(1.025 * S),),
-    heartbeat_from=round(3.04 * S),
-    least_period=25 * MS,
     messages={
         **builders(GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
         "NAV_CONTROLLER_OUTPUT": navigation,
@@ -206,41 +221,33 @@ _MAVLINK = ardupilot_mavlink(
     },
     streams=streams(("RC_CHANNELS_SCALED",), ()),
     on_stream_request=on_stream_request,
+    least_period=25 * MS,
     commands=commands.rover_commands(
         problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
     ),
     handlers={
-        **MESSAGE_HANDLERS,
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
         "SET_POSITION_TARGET_LOCAL_NED": rover_local,
     },
     on_parameter_list=greet,
 )
 
-ROVER = ardupilot_firmware(
+ROVER = Firmware(
+    name="ardupilot",
     kind="rover",
-    face=partial(MavlinkEndpoint, _MAVLINK),
-    boot_mode=INITIALISING,
-    boot_events=boot.rover_events(ready),
-    ready_after=READY,
-    origin_after=HOME,
-    position_after=POSITION,
-    local_position_after=HOME,
-    on_warm=warm,
-    on_warm_position=partial(boot.on_position, before_arming=before_arming),
-    each_second=partial(boot.each_second, before_arming=before_arming),
-    each_second_from=round(0.345 * S),
-    modes=MODES,
-    tuning=rover_tuning,
-    transmitter=(1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
-    throttle_centred=True,
-    stands=False,
-    watches=_FAILSAFES.watches(),
-    on_step=on_step,
-    on_disarmed=lambda _vehicle: None,
-    guided_arrived=guided_arrived,
-    guided_stale=guided_stale,
-    mission_ended=mission.rover_ended,
-    parameters=parameters,
-    supported_parameters=ROVER_SUPPORTED,
+    rules=VehicleRules(
+        modes=MODES,
+        boot_mode=INITIALISING,
+        startup=StartupTimes(READY, HOME, POSITION, HOME),
+        parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
+        rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),
+    ),
+    boot=BootSequence(boot.rover_events(ready), warm, partial(boot.on_position, before_arming=before_arming)),
+    periodic=PeriodicWork(
+        on_step=on_step,
+        each_second=partial(boot.each_second, before_arming=before_arming),
+        each_second_from=round(0.345 * S),
+    ),
+    failsafes=RoverFailsafes(change_mode, ARMED_WORDS[1]).watches(),
+    endpoint=partial(MavlinkEndpoint, _MAVLINK),
 )

@@ -59,7 +59,7 @@ def global_position(vehicle: Vehicle) -> Fields:
 
 def local_position(vehicle: Vehicle) -> Fields | None:
     """LOCAL_POSITION_NED: only with a position."""
-    if vehicle.uptime() < vehicle.firmware.local_position_after:
+    if vehicle.uptime() < vehicle.rules.startup.local_position_after:
         return None
     estimate = vehicle.estimate
     if not estimate.position_ok:
@@ -99,7 +99,7 @@ def _imu(vehicle: Vehicle) -> Fields:
 
 
 def _compass(vehicle: Vehicle) -> Fields:
-    if vehicle.uptime() < vehicle.firmware.ready_after:
+    if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return {}
     x, y, z = vehicle.estimate.mag
     return {"xmag": to_int16(x * 1000.0), "ymag": to_int16(y * 1000.0), "zmag": to_int16(z * 1000.0)}

@@ -244,7 +244,7 @@ class DjiEndpoint:
     @property
     def speaks(self) -> bool:
         """It is switched on and has booted."""
-        return self._on and self._vehicle.uptime() >= self._vehicle.firmware.ready_after
+        return self._on and self._vehicle.uptime() >= self._vehicle.rules.startup.ready_after
 
     def stamp(self) -> Ns:
         """ROS time."""
@@ -265,7 +265,7 @@ class DjiEndpoint:
         if self._node is not None:
             raise UsageError(f"{self._vehicle.name} is on a graph already, as {self._node.name}")
         self._graph, self._place = graph, place
-        node = self._node = graph.node(package, above or "/", place=place)
+        node = self._node = graph.node(package, above or "/", context=place)
         self._advertise(node, package)
         self._listen(node, package)
         services = Services(self.controller, self._publish_reference)

@@ -32,12 +32,25 @@ from volery.simulation.autopilots.dji.sdk_setpoints import (
     SdkControl,
 )
 from volery.simulation.autopilots.dji.services import ACCEPTED, REFUSED
-from volery.simulation.autopilots.firmware import BootEvent, Failsafe, Firmware
+from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Failsafe, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
+    FlyMission,
+    MissionRules,
+    copter_leg,
+)
 from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import (
+    ArmingTimes,
+    Manoeuvre,
+    Mode,
+    ParameterTable,
+    RcDefaults,
+    StartupTimes,
+    Vehicle,
+    VehicleRules,
+)
 
 READY, ORIGIN, POSITION = 3 * S, 15 * S, 25 * S
 """After it was switched on: when it speaks, when it knows where it is, when that may be trusted. Assumed."""
@@ -50,8 +63,15 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
     return TakeOff(vehicle, vehicle.parameters["TAKEOFF_HEIGHT"])
 
 
+MISSION_RULES = MissionRules(
+    first_item=0,
+    item_begins=lambda vehicle, number, item: controller_of(vehicle).item_begins(number, item),
+    ended=lambda vehicle: controller_of(vehicle).mission_ended(),
+)
+
+
 def _mission(vehicle: Vehicle) -> Manoeuvre:
-    return FlyMission(vehicle, copter_leg)
+    return FlyMission(vehicle, copter_leg, MISSION_RULES)
 
 
 MODES = {
@@ -76,10 +96,6 @@ def ready(vehicle: Vehicle) -> None:
     vehicle.enter(MODES[DisplayMode.P_GPS])
 
 
-def _nothing(_vehicle: Vehicle) -> None:
-    """Nothing is done then."""
-
-
 def _below(percent: str) -> Failsafe:
     begins = {
         "LOW_BATTERY": FlightController.low_battery,
@@ -89,7 +105,6 @@ def _below(percent: str) -> Failsafe:
         percent.lower().replace("_", " "),
         lambda vehicle: vehicle.estimate.battery_left * 100.0 < vehicle.parameters[percent],
         lambda vehicle: begins(controller_of(vehicle)),
-        _nothing,
     )
 
 
@@ -101,37 +116,22 @@ def own_parameters(_system: int, _flight: Flight) -> dict[str, float]:
 COPTER = Firmware(
     name="dji",
     kind="multirotor",
-    face=DjiEndpoint,
-    memory=FlightController,
-    boot_mode=MODES[DisplayMode.P_GPS],
-    boot_events=(BootEvent(READY, ready), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())),
-    ready_after=READY,
-    origin_after=ORIGIN,
-    position_after=POSITION,
-    local_position_after=POSITION,
-    on_warm=ready,
-    on_warm_position=_nothing,
-    each_second=_nothing,
-    modes=MODES,
-    tuning=tuning,
-    transmitter=(1500, 1500, 1500, 1500, 2000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0, 0, 0),
-    stands=True,
-    motors_rest=S,
-    spool_time=S,
-    takeoff_slew=100 * MS,
-    resigns_after=1500 * MS,
-    watches=(_below("LOW_BATTERY"), _below("CRITICAL_BATTERY")),
-    on_step=lambda vehicle: controller_of(vehicle).step(),
-    on_disarmed=_nothing,
-    throttle_centred=True,
-    first_item=0,
-    mission_item_begins=lambda vehicle, number, item: controller_of(vehicle).item_begins(number, item),
-    mission_ended=lambda vehicle: controller_of(vehicle).mission_ended(),
-    parameters=parameters,
-    own_parameters=own_parameters,
-    supported_parameters=SUPPORTED,
+    rules=VehicleRules(
+        modes=MODES,
+        boot_mode=MODES[DisplayMode.P_GPS],
+        startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
+        arming=ArmingTimes(motors_rest=S, spool_up=S, takeoff_slew=100 * MS, abandoned_after=1500 * MS),
+        parameters=ParameterTable(parameters, tuning, own_parameters, SUPPORTED),
+        rc=RcDefaults((1500, 1500, 1500, 1500, 2000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0, 0, 0), True),
+        firmware_state=FlightController,
+    ),
+    boot=BootSequence(
+        (BootEvent(READY, ready), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())), ready
+    ),
+    periodic=PeriodicWork(on_step=lambda vehicle: controller_of(vehicle).step()),
+    failsafes=(_below("LOW_BATTERY"), _below("CRITICAL_BATTERY")),
+    endpoint=DjiEndpoint,
 )
-
 
 ASSUMED: Mapping[str, str] = {
     "switching on": f"it speaks after {to_seconds(READY):g} s, knows where it is after "

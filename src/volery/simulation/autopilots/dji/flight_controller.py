@@ -419,10 +419,10 @@ class FlightController:
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
         self._asked_by_sdk = by_sdk
-        self.vehicle.enter(self.vehicle.firmware.modes[mode])
+        self.vehicle.enter(self.vehicle.rules.modes[mode])
 
 
 def controller_of(vehicle: Vehicle) -> FlightController:
     """The flight controller of a vehicle of this dialect."""
-    controller: FlightController = vehicle.memory
+    controller: FlightController = vehicle.firmware_state
     return controller

@@ -49,16 +49,40 @@ MakeLeg = Callable[[Vehicle, MissionItem, bool], Leg]
 """Vehicle, item, whether the mission goes on to a waypoint without a stop."""
 
 
+def _ignore(*_event: object) -> None:
+    """Do nothing: the default of mission events."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionRules:
+    """What a firmware does while it flies a mission."""
+
+    first_item: int = 1
+    """Index of the first item that is flown: 1 where item 0 is the home position."""
+    reports_actions: bool = False
+    """Whether ``item_done`` is called for items that do not navigate, too."""
+    item_begins: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    item_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    act: Callable[[Vehicle, MissionItem], None] = _ignore
+    """Execute an item that does not navigate."""
+    ended: Callable[[Vehicle], None] = _ignore
+
+
 class FlyMission(Manoeuvre):
     """Runs the vehicle's plan from its current item."""
 
     slow_start = True
 
     def __init__(
-        self, vehicle: Vehicle, make_leg: MakeLeg, leaves_ground: Callable[[Vehicle], bool] | None = None
+        self,
+        vehicle: Vehicle,
+        make_leg: MakeLeg,
+        rules: MissionRules,
+        leaves_ground: Callable[[Vehicle], bool] | None = None,
     ) -> None:
         super().__init__(vehicle)
         self._make_leg = make_leg
+        self._rules = rules
         self._leaves_ground = leaves_ground
         self._leg: Leg | None = None
         self._flown = (0, MissionItem(WAYPOINT))
@@ -124,11 +148,11 @@ class FlyMission(Manoeuvre):
     def _begin_current(self) -> None:
         plan = self.vehicle.plan
         if len(plan) and not plan.complete:
-            self._advance_to(max(self.vehicle.firmware.first_item, plan.current))
+            self._advance_to(max(self._rules.first_item, plan.current))
 
     def _finish(self) -> None:
         index, item = self._flown
-        self.vehicle.firmware.mission_item_done(self.vehicle, index, item)
+        self._rules.item_done(self.vehicle, index, item)
         self._advance_to(index + 1)
 
     def _advance_to(self, index: int) -> None:
@@ -145,12 +169,12 @@ class FlyMission(Manoeuvre):
             index = self._act(index, item)
         plan.complete = True
         plan.current = 0
-        vehicle.firmware.mission_ended(vehicle)
+        self._rules.ended(vehicle)
 
     def _begin(self, index: int, item: MissionItem) -> None:
         vehicle = self.vehicle
         vehicle.plan.current = index
-        vehicle.firmware.mission_item_begins(vehicle, index, item)
+        self._rules.item_begins(vehicle, index, item)
         self._flown = index, item
         self._leg = self._make_leg(vehicle, item, self._goes_on(index))
         self._reached_at = None
@@ -176,8 +200,8 @@ class FlyMission(Manoeuvre):
             self._held.append(item)
         else:
             self._do(item)
-            if self.vehicle.firmware.actions_count:
-                self.vehicle.firmware.mission_item_done(self.vehicle, index, item)
+            if self._rules.reports_actions:
+                self._rules.item_done(self.vehicle, index, item)
         return index + 1
 
     def _jump(self, index: int, item: MissionItem) -> int:
@@ -185,10 +209,10 @@ class FlyMission(Manoeuvre):
         if item.param2 != FOREVER and done >= item.param2:
             return index + 1
         self._jumps[index] = done + 1
-        return max(self.vehicle.firmware.first_item, round(item.param1))
+        return max(self._rules.first_item, round(item.param1))
 
     def _do(self, item: MissionItem) -> None:
-        self.vehicle.firmware.mission_action(self.vehicle, item)
+        self._rules.act(self.vehicle, item)
 
     def _run_held(self) -> None:
         while self._held:

@@ -17,7 +17,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction
 
 AT_POINT = 1.0
 """Metres within which a rover that is to stop has arrived."""
@@ -101,8 +101,9 @@ class FollowSpeed(Manoeuvre):
 class GuidedRover(Manoeuvre):
     """Whatever was commanded last."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, on_arrival: VehicleAction, on_timeout: VehicleAction) -> None:
         super().__init__(vehicle)
+        self._on_arrival, self._on_timeout = on_arrival, on_timeout
         self._doing: Manoeuvre = Stand(vehicle)
         self._told = True
 
@@ -124,10 +125,10 @@ class GuidedRover(Manoeuvre):
             return
         if isinstance(doing, DriveTo) and doing.arrived():
             self._told = True
-            self.vehicle.firmware.guided_arrived(self.vehicle)
+            self._on_arrival(self.vehicle)
         elif isinstance(doing, FollowSpeed) and doing.stale:
             self._told = True
-            self.vehicle.firmware.guided_stale(self.vehicle)
+            self._on_timeout(self.vehicle)
 
     def go_to(self, point: Vector) -> None:
         """To a point north, east, down about the estimator's origin."""

@@ -45,7 +45,7 @@ class MavlinkEndpoint:
         self._after: list[Action] = []
         self._text_id = 0
         self._clocks: list[Handle] = []
-        self._parameters = parameters = ParameterService(vehicle, firmware.parameter_habits)
+        self._parameters = parameters = ParameterService(vehicle, firmware.parameters)
         missions = MissionService(vehicle, firmware)
         self._commands = CommandService(vehicle, firmware)
         self._handlers: dict[str, Handler] = {
@@ -74,25 +74,25 @@ class MavlinkEndpoint:
     @property
     def banner(self) -> bytes:
         """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
-        return self.firmware.boot_bytes[0].data if self.firmware.boot_bytes else b""
+        return self.firmware.start.boot_bytes[0].data if self.firmware.start.boot_bytes else b""
 
     def connect(self, link: Link, use: str = "") -> None:
         """Listen to and speak on this link, too. *use* is what the firmware has it for."""
-        vehicle, uses = self._vehicle, self.firmware.uses
+        vehicle, uses = self._vehicle, self.firmware.telemetry.link_uses
         taken = {channel.index for channel in self.channels}
         index = next(index for index in count() if index not in taken)
         channel = MavlinkChannel(link, index, vehicle.system, uses[use] if use else next(iter(uses.values())))
         channel.streams = MessageStreams(
             self._kernel,
-            self.firmware.message_order,
+            self.firmware.telemetry.message_order,
             lambda names: self._burst(channel, names),
-            least=self.firmware.least_period,
+            least=self.firmware.telemetry.least_period,
         )
         channel.texts = StatusTextQueue(
             self._kernel, self.firmware.texts, lambda fields: channel.send("STATUSTEXT", fields)
         )
         self.channels.append(channel)
-        if vehicle.uptime() >= vehicle.firmware.ready_after:
+        if vehicle.uptime() >= vehicle.rules.startup.ready_after:
             channel.stream()
         link.receive(lambda frame: self._hear(channel, frame))
 
@@ -111,10 +111,10 @@ class MavlinkEndpoint:
     @property
     def listens_to(self) -> frozenset[str]:
         """The messages that change something or are answered."""
-        return frozenset(self._handlers) | frozenset(self.firmware.handlers)
+        return frozenset(self._handlers) | frozenset(self.firmware.commands.handlers)
 
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
-        messages, vehicle = self.firmware.messages, self._vehicle
+        messages, vehicle = self.firmware.telemetry.messages, self._vehicle
         for name in names:
             fields = messages[name](vehicle)
             if fields is not None:
@@ -132,18 +132,18 @@ class MavlinkEndpoint:
         self.stop()
         vehicle, firmware = self._vehicle, self.firmware
         age = vehicle.uptime()
-        for words in firmware.boot_bytes[1:] if not age else ():
+        for words in firmware.start.boot_bytes[1:] if not age else ():
             self._at_uptime(words.after, partial(self._send_bytes, words.data))
-        for after in firmware.heartbeat_first:
+        for after in firmware.start.heartbeat_first:
             if after >= age:
                 self._at_uptime(after, lambda: self.announce("HEARTBEAT"))
-        self._regularly(firmware.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
-        if firmware.timesync_every:
-            self._regularly(firmware.timesync_every, firmware.timesync_every, self._ask_time)
-        if age >= vehicle.firmware.ready_after:
+        self._regularly(firmware.start.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
+        if firmware.start.timesync_every:
+            self._regularly(firmware.start.timesync_every, firmware.start.timesync_every, self._ask_time)
+        if age >= vehicle.rules.startup.ready_after:
             self.stream()
         else:
-            self._at_uptime(vehicle.firmware.ready_after, self.stream)
+            self._at_uptime(vehicle.rules.startup.ready_after, self.stream)
 
     def stop(self) -> None:
         """Fall silent."""
@@ -197,17 +197,17 @@ class MavlinkEndpoint:
 
     def mode_changed(self) -> None:
         """What a change of mode sends, to everyone."""
-        for message in self.firmware.mode_told:
+        for message in self.firmware.telemetry.on_mode_change:
             self.announce(message)
 
     def home_changed(self) -> None:
         """What a change of home sends, to everyone."""
-        for message in self.firmware.home_told:
+        for message in self.firmware.telemetry.on_home_change:
             self.announce(message)
 
     def announce(self, message: str) -> None:
         """That message to everyone."""
-        fields = self.firmware.messages[message](self._vehicle)
+        fields = self.firmware.telemetry.messages[message](self._vehicle)
         if fields is not None:
             self._tell_all(message, fields)
 
@@ -226,7 +226,7 @@ class MavlinkEndpoint:
         """Once the frame in hand has been answered; at once if there is none, or the autopilot is still
         booting.
         """
-        if self._handling and self._vehicle.uptime() >= self._vehicle.firmware.ready_after:
+        if self._handling and self._vehicle.uptime() >= self._vehicle.rules.startup.ready_after:
             self._after.append(action)
         else:
             action()
@@ -237,7 +237,7 @@ class MavlinkEndpoint:
         if not channel.open:
             return
         self._arrived.append((channel, frame))
-        self._kernel.call_at(self._kernel.now() + self.firmware.answer_delay, self._handle)
+        self._kernel.call_at(self._kernel.now() + self.firmware.commands.answer_delay, self._handle)
 
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
@@ -252,7 +252,7 @@ class MavlinkEndpoint:
         if own is not None:
             own(Peer(channel, frame.system, frame.component), fields)
         else:
-            heard = self.firmware.handlers.get(frame.name)
+            heard = self.firmware.commands.handlers.get(frame.name)
             if heard is not None:
                 heard(self._vehicle, fields, frame.system)
         self._handling = False
@@ -261,7 +261,7 @@ class MavlinkEndpoint:
             action()
 
     def _is_for_me(self, frame: Frame) -> bool:
-        fields, strict = frame.fields, self.firmware.wrong_target is not None
+        fields, strict = frame.fields, self.firmware.commands.wrong_target is not None
         system, component = fields.get("target_system", BROADCAST), fields.get("target_component", BROADCAST)
         if strict and frame.name in COMMANDS and system != self._vehicle.system:
             return False
@@ -270,7 +270,7 @@ class MavlinkEndpoint:
         return not strict or component in (BROADCAST, AUTOPILOT)
 
     def _turn_away(self, channel: MavlinkChannel, frame: Frame) -> None:
-        result = self.firmware.wrong_target
+        result = self.firmware.commands.wrong_target
         if result is not None and frame.name in COMMANDS:
             peer = Peer(channel, frame.system, frame.component)
             self._commands.acknowledge(peer, frame.fields["command"], result)
@@ -286,14 +286,14 @@ class MavlinkEndpoint:
         vehicle, firmware = self._vehicle, self.firmware
         stream = fields["req_stream_id"]
         rate = fields["req_message_rate"] if fields["start_stop"] else 0
-        names = firmware.streams.get(stream)
+        names = firmware.telemetry.streams.get(stream)
         if names is not None:
             peer.channel.streams.set(names, S // rate if rate else 0)
-            firmware.on_stream_request(vehicle, peer.channel.index, stream, rate)
+            firmware.telemetry.on_stream_request(vehicle, peer.channel.index, stream, rate)
 
     def _on_set_mode(self, peer: Peer, fields: dict[str, Any]) -> None:
-        result = self.firmware.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
-        self._commands.acknowledge(peer, self.firmware.set_mode_ack, result)
+        result = self.firmware.commands.set_mode(self._vehicle, fields["base_mode"], fields["custom_mode"])
+        self._commands.acknowledge(peer, self.firmware.commands.set_mode_ack, result)
 
     def _on_ping(self, peer: Peer, fields: dict[str, Any]) -> None:
         if fields["target_system"] == BROADCAST:

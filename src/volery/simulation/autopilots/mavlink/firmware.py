@@ -10,10 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import VehicleAction
 from volery.simulation.autopilots.mavlink.command import Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
+
+
+def _ignore(*_event: object) -> None:
+    """Do nothing: the default of events."""
 
 
 def _always_plain(_number: int) -> str:
@@ -65,7 +68,10 @@ class MissionUploadPolicy(NamedTuple):
 
 
 Builder = Callable[[Vehicle], dict[str, Any] | None]
-"""The fields of a message as it would be sent now; ``None`` while the firmware does not send it."""
+"""Returns the fields of a message as sent now, or ``None`` while the firmware does not send it."""
+
+MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
+"""Handles a message that needs no answer: vehicle, fields, system id of the sender."""
 
 
 class BootBytes(NamedTuple):
@@ -75,58 +81,92 @@ class BootBytes(NamedTuple):
     data: bytes
 
 
-@dataclass(frozen=True, kw_only=True)
-class MavlinkFirmware:
-    """One firmware's MAVLink, for one kind of vehicle."""
+class LinkStart(NamedTuple):
+    """What the firmware sends after boot before anything is requested."""
 
     boot_bytes: tuple[BootBytes, ...] = ()
-    """The first of them is the banner: whoever accepts a client sends it."""
+    """The first of them is the banner, which the server sends when it accepts a client."""
     heartbeat_first: tuple[Ns, ...] = ()
-    """Heartbeats before the regular ones, after boot."""
+    """Uptimes of heartbeats before the regular ones."""
     heartbeat_from: Ns = S
-    """First of the regular ones, each second."""
-    answer_delay: Ns = 5 * MS
-    deaf_until: Ns = 0
-    """Before that, message intervals are acknowledged and forgotten."""
-    least_period: Ns = 3 * MS
-    """No message is streamed more often."""
-    uses: Mapping[str, Mapping[str, Ns]] = field(default_factory=lambda: {"": {}})
-    """What a link is for, to what is streamed on it unasked; the first is what a link is for by default."""
-    mode_told: Sequence[str] = ("HEARTBEAT",)
-    """Messages that a change of mode sends at once, to everyone."""
-    home_told: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")
-    """Messages that a change of home sends at once, to everyone."""
-    texts: StatusTextPolicy = field(default_factory=StatusTextPolicy)
-    parameter_habits: ParameterPolicy = field(default_factory=ParameterPolicy)
-    upload_habits: MissionUploadPolicy = field(default_factory=MissionUploadPolicy)
-    wrong_target: int | None = None
-    """MAV_RESULT of a command for another system or component; ``None``: silence, and components do not
-    matter.
-    """
-    reads_nan: bool = False
-    """Whether a parameter of a command may be no number, which means: not given."""
+    """Uptime of the first regular heartbeat; one each second follows."""
+    timesync_every: Ns = 0
+    """Period of TIMESYNC requests; 0: none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TelemetryPolicy:
+    """Which messages are sent, in which order and how often."""
 
     messages: Mapping[str, Builder]
     message_order: Sequence[str]
-    streams: Mapping[int, Sequence[str]]
-    """What belongs to each MAV_DATA_STREAM."""
-    on_stream_request: Callable[[Vehicle, int, int, int], None]
-    """Vehicle, index of the link, stream, rate."""
+    """Order of the messages within one burst."""
+    streams: Mapping[int, Sequence[str]] = field(default_factory=dict)
+    """The messages of each MAV_DATA_STREAM; empty where REQUEST_DATA_STREAM is not supported."""
+    on_stream_request: Callable[[Vehicle, int, int, int], None] = _ignore
+    """Called with the vehicle, the index of the link, the stream and its rate [Hz]."""
+    link_uses: Mapping[str, Mapping[str, Ns]] = field(default_factory=lambda: {"": {}})
+    """What a link is used for, to the periods of its unrequested streams. The first use is the default."""
+    least_period: Ns = 3 * MS
+    """Shortest period of a stream."""
+    intervals_after: Ns = 0
+    """Before that uptime message intervals are acknowledged and ignored."""
     refuse_interval: Callable[[Vehicle, int], int]
+    """Return the MAV_RESULT of an interval for an unknown message number."""
     unknown_message: int
+    """MAV_RESULT of a request for an unknown message."""
+    on_mode_change: Sequence[str] = ("HEARTBEAT",)
+    """Messages that a change of mode sends at once on all links."""
+    on_home_change: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")
+    """Messages that a change of the home position sends at once on all links."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandPolicy:
+    """How commands and other messages are handled and answered."""
+
     commands: Mapping[int, Handler]
-    handlers: Mapping[str, Callable[[Vehicle, dict[str, Any], int], None]] = field(default_factory=dict)
-    """Messages that are for this vehicle and need no answer: vehicle, fields, sender's system id."""
+    handlers: Mapping[str, MessageHandler]
+    """Messages for this vehicle that need no answer."""
     set_mode: Callable[[Vehicle, int, int], int]
-    """SET_MODE: base mode, custom mode; returns a MAV_RESULT."""
+    """Handle SET_MODE (base mode, custom mode) and return a MAV_RESULT."""
     set_mode_ack: int
-    on_parameter_list: VehicleAction
-    mission_runs: Callable[[Vehicle], bool]
-    """Whether it may not be cleared now."""
+    """Number of the command that acknowledges SET_MODE."""
+    answer_delay: Ns = 5 * MS
+    wrong_target: int | None = None
+    """MAV_RESULT of a command for another system or component; ``None``: no answer, and the component is
+    ignored.
+    """
+    reads_nan: bool = False
+    """Whether a NaN parameter of a command means that the parameter is not given."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionPolicy:
+    """How missions are stored and read back."""
+
+    upload: MissionUploadPolicy = field(default_factory=MissionUploadPolicy)
+    runs: Callable[[Vehicle], bool]
+    """Whether the mission may not be cleared now."""
     stored_item: Callable[[MissionItem], MissionItem | int]
-    """An uploaded item as it is kept, or the MAV_MISSION_RESULT that refuses it."""
+    """Return an uploaded item as it is stored, or the MAV_MISSION_RESULT that refuses it."""
     home_item: Callable[[Vehicle], MissionItem | None]
-    """Item 0 where the firmware has its home there."""
+    """Return item 0 where the firmware stores its home position there."""
     go_to_item: Callable[[Vehicle, MissionItem], bool]
-    mission_grew: Callable[[Vehicle, int], None]
-    timesync_every: Ns = 0
+    """Fly to an item that is sent outside an upload (``current`` 2)."""
+    grew: Callable[[Vehicle, int], None] = _ignore
+    """Called with the number of items after a change."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MavlinkFirmware:
+    """The MAVLink of one firmware for one kind of vehicle."""
+
+    start: LinkStart
+    telemetry: TelemetryPolicy
+    commands: CommandPolicy
+    missions: MissionPolicy
+    parameters: ParameterPolicy = field(default_factory=ParameterPolicy)
+    texts: StatusTextPolicy = field(default_factory=StatusTextPolicy)
+    on_parameter_list: VehicleAction = do_nothing
+    """Called when a station lists the parameters."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zlib import crc32
 
 from volery.base.time import MS, US, Ns, S
@@ -29,14 +29,10 @@ from volery.simulation.autopilots.mavlink.command import (
     from_int,
     from_long,
 )
-from volery.simulation.autopilots.mavlink.firmware import ParameterPolicy
+from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
 from volery.simulation.autopilots.mavlink.message_fields import finite
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
-
-if TYPE_CHECKING:
-    from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware
-    from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
 REQUEST_CAPABILITIES = 520
@@ -57,18 +53,18 @@ class CommandService:
 
     def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
         """COMMAND_LONG."""
-        self._perform(peer, from_long(fields, self._firmware.reads_nan))
+        self._perform(peer, from_long(fields, self._firmware.commands.reads_nan))
 
     def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
         """COMMAND_INT."""
-        self._perform(peer, from_int(fields, self._firmware.reads_nan))
+        self._perform(peer, from_int(fields, self._firmware.commands.reads_nan))
 
     def _perform(self, peer: Peer, command: Command) -> None:
         own = self._own.get(command.number)
         if own is not None:
             result = own(peer, command)
         else:
-            handler = self._firmware.commands.get(command.number)
+            handler = self._firmware.commands.commands.get(command.number)
             result = UNSUPPORTED if handler is None else handler(self._vehicle, command)
         self.acknowledge(peer, command.number, result)
 
@@ -91,8 +87,8 @@ class CommandService:
         number, interval = round(finite(command.param1)), finite(command.param2)
         name = self._name(number)
         if name is None:
-            return self._firmware.refuse_interval(self._vehicle, number)
-        if self._vehicle.uptime() < self._firmware.deaf_until:
+            return self._firmware.telemetry.refuse_interval(self._vehicle, number)
+        if self._vehicle.uptime() < self._firmware.telemetry.intervals_after:
             return ACCEPTED
         if interval == 0.0:
             period = peer.channel.usual.get(name, 0)
@@ -104,14 +100,14 @@ class CommandService:
     def _request_message(self, peer: Peer, command: Command) -> int:
         name = self._name(round(finite(command.param1)))
         if name is None:
-            return self._firmware.unknown_message
+            return self._firmware.telemetry.unknown_message
         return self._send(peer, name)
 
     def _send(self, peer: Peer, name: str) -> int:
         """Send it after the acknowledgement."""
 
         def send() -> None:
-            fields = self._firmware.messages[name](self._vehicle)
+            fields = self._firmware.telemetry.messages[name](self._vehicle)
             if fields is not None:
                 peer.channel.send(name, fields)
 
@@ -120,7 +116,7 @@ class CommandService:
 
     def _name(self, number: int) -> str | None:
         kind = message_type_of(number)
-        return kind.name if kind is not None and kind.name in self._firmware.messages else None
+        return kind.name if kind is not None and kind.name in self._firmware.telemetry.messages else None
 
 
 UNSOLICITED = 65535
@@ -261,7 +257,7 @@ class MissionService:
             self._vehicle.plan.clear()
             self._acknowledge(peer, MISSION_ACCEPTED)
         else:
-            if not self._firmware.upload_habits.keeps_old:
+            if not self._firmware.missions.upload.keeps_old:
                 self._vehicle.plan.clear()
             self._upload = _Upload(peer, fields["count"], self._kernel.now())
             self._ask()
@@ -276,7 +272,7 @@ class MissionService:
             self._upload = None
             return
         asked = len(upload.items)
-        request = REQUEST_INT if upload.by_integers else self._firmware.upload_habits.asks_with(asked)
+        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.asks_with(asked)
         upload.peer.answer(request, seq=asked, mission_type=MISSION)
         upload.reminder = self._kernel.call_at(self._kernel.now() + ASK_AGAIN, self._ask)
 
@@ -308,7 +304,10 @@ class MissionService:
         )
         if fields["current"] == GUIDED_ITEM:
             self._acknowledge(
-                peer, MISSION_ACCEPTED if self._firmware.go_to_item(self._vehicle, item) else MISSION_ERROR
+                peer,
+                MISSION_ACCEPTED
+                if self._firmware.missions.go_to_item(self._vehicle, item)
+                else MISSION_ERROR,
             )
         elif self._upload is None:
             self._acknowledge(peer, MISSION_ERROR)
@@ -318,7 +317,7 @@ class MissionService:
             self._take(self._upload, item)
 
     def _take(self, upload: _Upload, item: MissionItem) -> None:
-        stored = self._firmware.stored_item(item)
+        stored = self._firmware.missions.stored_item(item)
         if isinstance(stored, int):
             self._drop_upload()
             self._acknowledge(upload.peer, stored)
@@ -333,9 +332,9 @@ class MissionService:
             self._upload = None
             self._vehicle.plan.replace(upload.items)
             self._acknowledge(upload.peer, MISSION_ACCEPTED)
-            if self._firmware.upload_habits.received:
-                self._vehicle.say(6, self._firmware.upload_habits.received)
-        self._firmware.mission_grew(self._vehicle, len(upload.items))
+            if self._firmware.missions.upload.received:
+                self._vehicle.say(6, self._firmware.missions.upload.received)
+        self._firmware.missions.grew(self._vehicle, len(upload.items))
 
     # -- download
 
@@ -360,7 +359,7 @@ class MissionService:
     def _requested(self, peer: Peer, fields: dict[str, Any]) -> MissionItem | None:
         sequence, plan = fields["seq"], self._vehicle.plan
         if fields["mission_type"] == MISSION:
-            home = self._firmware.home_item(self._vehicle)
+            home = self._firmware.missions.home_item(self._vehicle)
             if sequence == 0 and home is not None:
                 return home
             if sequence < len(plan):
@@ -394,27 +393,27 @@ class MissionService:
 
     def on_clear(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_CLEAR_ALL: not while the mission is flown."""
-        if self._firmware.mission_runs(self._vehicle):
+        if self._firmware.missions.runs(self._vehicle):
             self._acknowledge(peer, MISSION_ERROR, fields["mission_type"])
             return
         if fields["mission_type"] in (MISSION, 255):
             self._drop_upload()
             self._vehicle.plan.clear()
         self._acknowledge(peer, MISSION_ACCEPTED, fields["mission_type"])
-        self._firmware.mission_grew(self._vehicle, 0)
+        self._firmware.missions.grew(self._vehicle, 0)
 
     def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_SET_CURRENT."""
         if self._vehicle.choose_item(fields["seq"]):
             peer.channel.send(
-                "MISSION_CURRENT", self._firmware.messages["MISSION_CURRENT"](self._vehicle) or {}
+                "MISSION_CURRENT", self._firmware.telemetry.messages["MISSION_CURRENT"](self._vehicle) or {}
             )
 
     def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_ACK: a download has ended, or the question for an item is not understood."""
         upload = self._upload
         refused = upload is not None and fields["type"] == MISSION_UNSUPPORTED and not upload.by_integers
-        if upload is not None and refused and self._firmware.upload_habits.turns_to_integers:
+        if upload is not None and refused and self._firmware.missions.upload.turns_to_integers:
             upload.by_integers = True
             if upload.reminder is not None:
                 upload.reminder.cancel()

@@ -4,13 +4,15 @@ The protocol and the firmware's rules are from public definitions; none of it wa
 """
 
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.simulation.autopilots.firmware import FirmwareFamily, Station
+from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
 from volery.simulation.autopilots.paparazzi.firmware import ROTORCRAFT
 
-GROUND_SEGMENT = Station("udp://127.0.0.1:4242?from=4243")
+GROUND_SEGMENT = DefaultLink("udp://127.0.0.1:4242?from=4243")
 """Paparazzi's ground segment hears aircraft at port 4242 and speaks to their port 4243."""
 
-FIRMWARE = FirmwareFamily("paparazzi", {"multirotor": ROTORCRAFT}, codec=PPRZLINK, stations=(GROUND_SEGMENT,))
+FIRMWARE = FirmwareFamily(
+    "paparazzi", {"multirotor": ROTORCRAFT}, codec=PPRZLINK, default_links=(GROUND_SEGMENT,)
+)
 """The firmware. Rovers are built from another firmware, which is not simulated."""
 
 __all__ = ["FIRMWARE"]

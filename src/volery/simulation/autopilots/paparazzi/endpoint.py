@@ -57,7 +57,7 @@ class PaparazziEndpoint:
         """Regular telemetry begins when the firmware is up, one kind after the other."""
         self.stop()
         vehicle = self._vehicle
-        ready = max(0, vehicle.firmware.ready_after - vehicle.uptime())
+        ready = max(0, vehicle.rules.startup.ready_after - vehicle.uptime())
         self._after(ready, self._listen)
         for place, regular in enumerate(REGULAR):
             self._after(ready + place * PHASE, partial(self._begin, regular))

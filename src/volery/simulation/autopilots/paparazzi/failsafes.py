@@ -81,21 +81,17 @@ def came_down(vehicle: Vehicle) -> bool:
     return vehicle.mode.number == FAILSAFE and not in_flight(vehicle)
 
 
-def _nothing(_vehicle: Vehicle) -> None:
-    """The mode stays what it has become."""
-
-
 def stop_motors(vehicle: Vehicle) -> None:
     """KILL."""
     set_mode(vehicle, KILL)
 
 
 WATCHES = (
-    Failsafe("too far from home", too_far, go_home, _nothing),
-    Failsafe("too high", too_high, go_home, _nothing),
-    Failsafe("datalink", datalink_lost, go_home, _nothing),
-    Failsafe("radio", radio_lost, come_down, _nothing),
-    Failsafe("battery", battery_gone, come_down, _nothing),
-    Failsafe("satellites", satellites_lost, come_down, _nothing),
-    Failsafe("on the ground", came_down, stop_motors, _nothing),
+    Failsafe("too far from home", too_far, go_home),
+    Failsafe("too high", too_high, go_home),
+    Failsafe("datalink", datalink_lost, go_home),
+    Failsafe("radio", radio_lost, come_down),
+    Failsafe("battery", battery_gone, come_down),
+    Failsafe("satellites", satellites_lost, come_down),
+    Failsafe("on the ground", came_down, stop_motors),
 )

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import BootEvent, Firmware
+from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
 from volery.simulation.autopilots.paparazzi import parameters
 from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
@@ -38,7 +38,15 @@ from volery.simulation.autopilots.paparazzi.rotorcraft_state import (
     state_of,
     update_fix,
 )
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import (
+    ArmingTimes,
+    Mode,
+    ParameterTable,
+    RcDefaults,
+    StartupTimes,
+    Vehicle,
+    VehicleRules,
+)
 
 TICK: Ns = S // 16
 """Navigation runs sixteen times a second; so does everything else here."""
@@ -94,40 +102,28 @@ def on_step(vehicle: Vehicle) -> None:
         vehicle.landed = True
 
 
-def _nothing(_vehicle: Vehicle) -> None:
-    """Nothing is done then."""
-
-
 ROTORCRAFT = Firmware(
     name="paparazzi",
     kind="multirotor",
-    face=PaparazziEndpoint,
-    memory=rotorcraft_state,
-    boot_mode=MODES[0],
-    boot_events=(BootEvent(READY, ready),),
-    ready_after=READY,
-    origin_after=ACQUIRED_AFTER,
-    position_after=0,
-    local_position_after=0,
-    on_warm=warm,
-    on_warm_position=Vehicle.home_is_here,
-    tick=TICK,
-    watch_every=1,
-    each_second=_nothing,
-    modes=MODES,
-    tuning=parameters.tuning,
-    transmitter=(1500, 1500, 1000, 1500),
-    stands=True,
-    spool_time=500 * MS,
-    resigns_after=1500 * MS,
-    watches=WATCHES,
-    on_step=on_step,
-    on_disarmed=_nothing,
-    parameters=parameters.default_parameters,
-    own_parameters=parameters.own_parameters,
-    supported_parameters={name: figure.what for name, figure in parameters.FIGURES.items()},
+    rules=VehicleRules(
+        modes=MODES,
+        boot_mode=MODES[0],
+        startup=StartupTimes(READY, ACQUIRED_AFTER, 0, 0),
+        arming=ArmingTimes(spool_up=500 * MS, abandoned_after=1500 * MS),
+        parameters=ParameterTable(
+            parameters.default_parameters,
+            parameters.tuning,
+            parameters.own_parameters,
+            {name: figure.what for name, figure in parameters.FIGURES.items()},
+        ),
+        rc=RcDefaults((1500, 1500, 1000, 1500)),
+        firmware_state=rotorcraft_state,
+    ),
+    boot=BootSequence((BootEvent(READY, ready),), warm, Vehicle.home_is_here),
+    periodic=PeriodicWork(tick=TICK, on_step=on_step, failsafe_ticks=1),
+    failsafes=WATCHES,
+    endpoint=PaparazziEndpoint,
 )
-
 
 ASSUMED: Mapping[str, str] = {
     "aircraft": "the stock rotorcraft: settings, blocks and waypoints of the files in "

@@ -45,7 +45,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     """
     if not aligned(vehicle):
         number = round(vehicle.parameters["MODE_STARTUP"])
-    mode = vehicle.firmware.modes.get(number)
+    mode = vehicle.rules.modes.get(number)
     if mode is None:
         return False
     if mode is not vehicle.mode:

@@ -71,7 +71,7 @@ class RadioControl:
 
 @dataclass
 class RotorcraftState:
-    """``Vehicle.memory`` of a Paparazzi rotorcraft."""
+    """``Vehicle.firmware_state`` of a Paparazzi rotorcraft."""
 
     navigation: Navigation
     radio: RadioControl = field(default_factory=RadioControl)
@@ -90,7 +90,7 @@ class RotorcraftState:
 
 def state_of(vehicle: Vehicle) -> RotorcraftState:
     """What is kept about *vehicle*."""
-    kept = vehicle.memory
+    kept = vehicle.firmware_state
     assert isinstance(kept, RotorcraftState)
     return kept
 

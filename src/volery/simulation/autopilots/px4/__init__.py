@@ -2,15 +2,15 @@
 it is.
 """
 
-from volery.simulation.autopilots.firmware import FirmwareFamily, Station
+from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
 from volery.simulation.autopilots.px4.copter import COPTER
 from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
 from volery.simulation.autopilots.px4.rover import ROVER
 
-STATIONS = (Station("udp://127.0.0.1:14540", ONBOARD), Station("udp://127.0.0.1:14550", STATION))
+DEFAULT_LINKS = (DefaultLink("udp://127.0.0.1:14540", ONBOARD), DefaultLink("udp://127.0.0.1:14550", STATION))
 """As the firmware's own simulator has them: for programs, and for ground stations."""
 
-FIRMWARE = FirmwareFamily("px4", {"multirotor": COPTER, "rover": ROVER}, stations=STATIONS)
+FIRMWARE = FirmwareFamily("px4", {"multirotor": COPTER, "rover": ROVER}, default_links=DEFAULT_LINKS)
 """The firmware, by kind of vehicle."""
 
 __all__ = ["FIRMWARE"]

@@ -5,7 +5,7 @@ Messages that PX4 takes without an answer: heartbeats, sticks, set-points.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import isfinite, isnan
 from typing import Any, Protocol, runtime_checkable
 
@@ -19,6 +19,7 @@ from volery.simulation.autopilots.mavlink.command import (
     Command,
     Handler,
 )
+from volery.simulation.autopilots.mavlink.firmware import MessageHandler
 from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
 from volery.simulation.autopilots.px4 import events, modes, offboard
@@ -233,8 +234,6 @@ COPTER_COMMANDS: Mapping[int, Handler] = {
 """A multirotor's. All others are unsupported, among them NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
 
 
-MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
-
 FROM_JOYSTICK = (1, 2, 3)
 """Values of COM_RC_IN_MODE with which MANUAL_CONTROL counts."""
 
@@ -281,7 +280,7 @@ def _override(commander: Commander) -> None:
     number = vehicle.mode.number
     by_itself = number in modes.AUTOMATIC and may & OVERRIDE_AUTOMATIC
     by_computer = number == modes.OFFBOARD and may & OVERRIDE_OFFBOARD
-    resting = vehicle.firmware.stands and vehicle.landed
+    resting = vehicle.flies and vehicle.landed
     if resting or not (by_itself or by_computer):
         return
     if commander.joystick.moved(vehicle.parameters["COM_RC_STICK_OV"] / 100.0):
@@ -297,7 +296,7 @@ def _take(vehicle: Vehicle, target: offboard.OffboardTarget | offboard.AttitudeT
         commander.give_back()
     if isinstance(vehicle.manoeuvre, Follower):
         vehicle.manoeuvre.take(target)
-        if vehicle.armed and not (vehicle.firmware.stands and vehicle.landed):
+        if vehicle.armed and not (vehicle.flies and vehicle.landed):
             vehicle.act()
 
 
@@ -325,6 +324,3 @@ MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
     "SET_POSITION_TARGET_LOCAL_NED": on_local_target,
 }
 """What a multirotor hears."""
-
-ROVER_MESSAGE_HANDLERS: Mapping[str, MessageHandler] = MESSAGE_HANDLERS
-"""What a rover hears: it makes nothing of attitudes."""

@@ -15,7 +15,7 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMi
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.px4 import commands, events, mission, modes
 from volery.simulation.autopilots.px4.failsafes import on_step
-from volery.simulation.autopilots.px4.firmware import px4_firmware, px4_mavlink
+from volery.simulation.autopilots.px4.firmware import own_parameters, px4_firmware, px4_mavlink
 from volery.simulation.autopilots.px4.flight_modes import (
     Descent,
     Hold,
@@ -27,7 +27,7 @@ from volery.simulation.autopilots.px4.flight_modes import (
 from volery.simulation.autopilots.px4.modes import INFO, commander_of
 from volery.simulation.autopilots.px4.offboard import Offboard
 from volery.simulation.autopilots.px4.parameters import COPTER_SUPPORTED, copter_tuning
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, Mode, ParameterTable, Vehicle
 
 
 def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
@@ -95,7 +95,7 @@ MODES = {
             modes.MISSION,
             "AUTO.MISSION",
             modes.BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, mission.leg, lambda _vehicle: True),
+            lambda vehicle: FlyMission(vehicle, mission.leg, mission.MISSION_RULES, lambda _vehicle: True),
             needs_position=True,
         ),
         Mode(
@@ -135,17 +135,9 @@ def parameters() -> tuple[Parameter, ...]:
 
 COPTER = px4_firmware(
     kind="multirotor",
-    face=partial(
-        MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, commands.MESSAGE_HANDLERS)
-    ),
-    boot_mode=MODES[modes.LOITER],
     modes=MODES,
-    tuning=copter_tuning,
-    stands=True,
-    spool_time=1 * S,
-    takeoff_slew=200 * MS,
-    resigns_after=1500 * MS,
+    arming=ArmingTimes(spool_up=1 * S, takeoff_slew=200 * MS, abandoned_after=1500 * MS),
+    parameters=ParameterTable(parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
     on_step=_on_step,
-    parameters=parameters,
-    supported_parameters=COPTER_SUPPORTED,
+    endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS)),
 )

@@ -80,7 +80,7 @@ def _notice_silence(commander: Commander, now: Ns) -> None:
 
 def _notice_ground(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
-    if not vehicle.firmware.stands:
+    if not vehicle.flies:
         return
     flying = not vehicle.estimate.landed and not vehicle.landed
     if flying and not commander.flying:
@@ -102,7 +102,7 @@ def _notice_ground(commander: Commander, now: Ns) -> None:
 
 def _disarm_by_itself(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
-    if not vehicle.firmware.stands or not vehicle.landed:
+    if not vehicle.flies or not vehicle.landed:
         return
     after_landing = vehicle.parameters["COM_DISARM_LAND"]
     waiting = vehicle.parameters["COM_DISARM_PRFLT"]
@@ -119,7 +119,7 @@ def _disarm_by_itself(commander: Commander, now: Ns) -> None:
 def _watch(commander: Commander, passed: float) -> None:
     vehicle = commander.vehicle
     _recover(commander, passed)
-    if vehicle.firmware.stands and vehicle.landed:
+    if vehicle.flies and vehicle.landed:
         _end_of_offboard_on_ground(commander)
         return
     _hold_ends(commander)
@@ -272,7 +272,7 @@ def _watch_position(commander: Commander) -> None:
         if not lost and not commander.descending:
             commander.give_back()
         return
-    needs = vehicle.firmware.modes[flown].needs_position or flown == modes.LAND
+    needs = vehicle.rules.modes[flown].needs_position or flown == modes.LAND
     if not lost or not needs:
         return
     vehicle.say(CRITICAL, "Failsafe activated\t")

@@ -11,22 +11,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import BootEvent, Firmware
+from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (
     Builder,
+    CommandPolicy,
+    LinkStart,
     MavlinkFirmware,
+    MissionPolicy,
     MissionUploadPolicy,
     ParameterPolicy,
     StatusTextPolicy,
+    TelemetryPolicy,
 )
-from volery.simulation.autopilots.px4 import commands, mission, telemetry
-from volery.simulation.autopilots.px4.modes import READY_AFTER, Commander, commander_of
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.px4 import mission, telemetry
+from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
+from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
+from volery.simulation.autopilots.vehicle_state import (
+    ArmingTimes,
+    Mode,
+    ParameterTable,
+    RcDefaults,
+    StartupTimes,
+    Vehicle,
+    VehicleAction,
+    VehicleRules,
+)
 
 ORIGIN: Ns = 6_200 * MS
 """Recorded: positions from 6.4 s on."""
@@ -68,15 +82,6 @@ def on_position(vehicle: Vehicle) -> None:
     """A warm vehicle has found its place."""
     home_set(vehicle)
     commander_of(vehicle).reported = commander_of(vehicle).checks()
-
-
-def memory(vehicle: Vehicle) -> Commander:
-    """What PX4 alone keeps."""
-    return Commander(vehicle)
-
-
-def nothing(_vehicle: Vehicle) -> None:
-    """There is nothing to do then."""
 
 
 def own_parameters(system: int, _flight: Flight) -> Mapping[str, float]:
@@ -181,13 +186,6 @@ ORDER: Sequence[str] = tuple(sorted(BUILDERS))
 """Of the messages within one burst."""
 
 
-def builders(kind: int) -> Mapping[str, Builder]:
-    """All of them; *kind* is the MAV_TYPE of the heartbeat."""
-    return {**BUILDERS, "HEARTBEAT": partial(telemetry.heartbeat, kind=kind)}
-
-
-MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
-
 TEXTS = StatusTextPolicy(numbered=True, to_stations=True, spacing=48 * MS)
 """Recorded: at most one text each 48 to 52 ms."""
 
@@ -203,74 +201,68 @@ PARAMETERS = ParameterPolicy(
 """Recorded: 877 parameters in 0.85 s."""
 
 
-def _no_streams(_vehicle: Vehicle, _index: int, _stream: int, _rate: int) -> None:
-    """REQUEST_DATA_STREAM means nothing to PX4."""
-
-
 def _refuse_interval(_vehicle: Vehicle, _number: int) -> int:
     return FAILED
 
 
-def px4_mavlink(
-    kind: int, commanded: Mapping[int, Handler], heard: Mapping[str, MessageHandler]
-) -> MavlinkFirmware:
-    """*kind* is the MAV_TYPE of the heartbeat; *commanded* and *heard* are what it obeys."""
+def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmware:
+    """Return the MAVLink of a vehicle of that MAV_TYPE that supports these commands."""
     return MavlinkFirmware(
-        heartbeat_from=FIRST_HEARTBEAT,
-        answer_delay=6 * MS,
-        uses=USES,
-        mode_told=(),
-        home_told=("GPS_GLOBAL_ORIGIN",),
-        texts=TEXTS,
-        parameter_habits=PARAMETERS,
-        upload_habits=MissionUploadPolicy(
-            mission.asks_with, received="", turns_to_integers=True, keeps_old=True
+        start=LinkStart(heartbeat_from=FIRST_HEARTBEAT),
+        telemetry=TelemetryPolicy(
+            messages={**BUILDERS, "HEARTBEAT": partial(telemetry.heartbeat, kind=mav_type)},
+            message_order=ORDER,
+            link_uses=USES,
+            refuse_interval=_refuse_interval,
+            unknown_message=DENIED,
+            on_mode_change=(),
+            on_home_change=("GPS_GLOBAL_ORIGIN",),
         ),
-        wrong_target=FAILED,
-        reads_nan=True,
-        messages=builders(kind),
-        message_order=ORDER,
-        streams={},
-        on_stream_request=_no_streams,
-        refuse_interval=_refuse_interval,
-        unknown_message=DENIED,
-        commands=commanded,
-        handlers=heard,
-        set_mode=commands.set_mode,
-        set_mode_ack=commands.DO_SET_MODE,
-        on_parameter_list=nothing,
-        mission_runs=mission.runs,
-        stored_item=mission.stored_item,
-        home_item=mission.no_home_item,
-        go_to_item=mission.goes_nowhere,
-        mission_grew=mission.grew,
+        commands=CommandPolicy(
+            commands=commands,
+            handlers=MESSAGE_HANDLERS,
+            set_mode=set_mode,
+            set_mode_ack=DO_SET_MODE,
+            answer_delay=6 * MS,
+            wrong_target=FAILED,
+            reads_nan=True,
+        ),
+        missions=MissionPolicy(
+            upload=MissionUploadPolicy(
+                mission.asks_with, received="", turns_to_integers=True, keeps_old=True
+            ),
+            runs=mission.runs,
+            stored_item=mission.stored_item,
+            home_item=mission.no_home_item,
+            go_to_item=mission.goes_nowhere,
+        ),
+        parameters=PARAMETERS,
+        texts=TEXTS,
     )
 
 
-STICKS_AT_REST = (1500,) * 4 + (0,) * 12
-
-px4_firmware = partial(
-    Firmware,
-    name="px4",
-    memory=memory,
-    boot_events=EVENTS,
-    ready_after=STREAMS,
-    origin_after=HOME,
-    position_after=READY_AFTER,
-    local_position_after=STREAMS,
-    on_warm=stand,
-    on_warm_position=on_position,
-    watch_every=1,
-    each_second=nothing,
-    transmitter=STICKS_AT_REST,
-    on_disarmed=nothing,
-    throttle_centred=True,
-    first_item=0,
-    actions_count=True,
-    mission_item_done=mission.item_done,
-    mission_item_begins=mission.item_begins,
-    mission_ended=mission.ended,
-    mission_action=mission.act,
-    own_parameters=own_parameters,
-)
-"""A ``Firmware`` but for what depends on the kind."""
+def px4_firmware(
+    kind: str,
+    modes: Mapping[int, Mode],
+    parameters: ParameterTable,
+    endpoint: Callable[[Vehicle], MavlinkEndpoint],
+    on_step: VehicleAction,
+    arming: ArmingTimes = ArmingTimes(),
+) -> Firmware:
+    """Return the firmware of one kind of vehicle: what all kinds share, and the arguments."""
+    return Firmware(
+        name="px4",
+        kind=kind,
+        rules=VehicleRules(
+            modes=modes,
+            boot_mode=modes[LOITER],
+            startup=StartupTimes(STREAMS, HOME, READY_AFTER, STREAMS),
+            arming=arming,
+            parameters=parameters,
+            rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
+            firmware_state=Commander,
+        ),
+        boot=BootSequence(EVENTS, stand, on_position),
+        periodic=PeriodicWork(on_step=on_step, failsafe_ticks=1),
+        endpoint=endpoint,
+    )

@@ -34,7 +34,7 @@ def interpolated(value: float, low: tuple[float, float], high: tuple[float, floa
 
 def climb_share(vehicle: Vehicle) -> float:
     """How much of its climb rate it may use: little just after it has left the ground."""
-    lifted = vehicle.memory.lifted_at
+    lifted = vehicle.firmware_state.lifted_at
     if lifted == NEVER:
         return CLIMB_RAMP[0][1]
     along = to_seconds(vehicle.kernel.now() - lifted) / max(0.1, vehicle.parameters["MPC_TKO_RAMP_T"])
@@ -127,7 +127,7 @@ class Descent(Land):
 
     def sink(self) -> float:
         """Metres per second down at the present height."""
-        p, height = self.vehicle.parameters, self.vehicle.memory.above_ground
+        p, height = self.vehicle.parameters, self.vehicle.firmware_state.above_ground
         middle = p["MPC_LAND_SPEED"]
         if height > p["MPC_LAND_ALT2"]:
             return interpolated(
@@ -304,12 +304,12 @@ class PositionControl(ByPilot):
 
     @property
     def _sticks(self) -> bool:
-        valid: bool = self.vehicle.memory.joystick.valid
+        valid: bool = self.vehicle.firmware_state.joystick.valid
         return valid
 
     def _climb(self) -> float:
         p = self.vehicle.parameters
-        asked = curve(self.vehicle.memory.joystick.now.throttle, p["MPC_HOLD_DZ"])
+        asked = curve(self.vehicle.firmware_state.joystick.now.throttle, p["MPC_HOLD_DZ"])
         return asked * (p["MPC_Z_VEL_MAX_UP"] if asked > 0.0 else p["MPC_Z_VEL_MAX_DN"])
 
     def step(self) -> None:
@@ -328,7 +328,7 @@ class PositionControl(ByPilot):
         vehicle, tuning, p = self.vehicle, self.vehicle.tuning, self.vehicle.parameters
         now = vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
-        sticks, dead = vehicle.memory.joystick.now, p["MPC_HOLD_DZ"]
+        sticks, dead = vehicle.firmware_state.joystick.now, p["MPC_HOLD_DZ"]
         forward, right = curve(sticks.pitch, dead), curve(sticks.roll, dead)
         self._move(forward, right, passed)
         climb = self._climb()

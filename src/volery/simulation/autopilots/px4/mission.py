@@ -7,6 +7,7 @@ from volery.base.time import MS, Ns, from_seconds
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     FOREVER,
     Leg,
+    MissionRules,
     item_point,
     point_height,
 )
@@ -81,10 +82,6 @@ def goes_nowhere(_vehicle: Vehicle, _item: MissionItem) -> bool:
     return False
 
 
-def grew(_vehicle: Vehicle, _count: int) -> None:
-    """Nothing counts along."""
-
-
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """MISSION_ITEM_REACHED, again and again."""
 
@@ -118,6 +115,11 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
     """Items that are done at once."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
         vehicle.speed = item.param2
+
+
+MISSION_RULES = MissionRules(
+    first_item=0, reports_actions=True, item_begins=item_begins, item_done=item_done, act=act, ended=ended
+)
 
 
 class ReturnFromMission(Manoeuvre):

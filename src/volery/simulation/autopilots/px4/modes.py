@@ -105,7 +105,7 @@ THROTTLE_HIGH = 0.2
 
 
 class Commander:
-    """``Vehicle.memory`` of a PX4."""
+    """``Vehicle.firmware_state`` of a PX4."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
@@ -176,13 +176,13 @@ class Commander:
             sticks=self.joystick.valid,
             mission=len(vehicle.plan) > 0,
             offboard=self.stream_alive(),
-            mode=vehicle.armed or vehicle.firmware.modes[self.wished].armable,
+            mode=vehicle.armed or vehicle.rules.modes[self.wished].armable,
         )
 
     def can_fly(self, number: int) -> bool:
         """Whether that mode has what it needs."""
         vehicle = self.vehicle
-        mode = vehicle.firmware.modes[number]
+        mode = vehicle.rules.modes[number]
         if mode.needs_position and not vehicle.has_position:
             return False
         if number in NEEDS_STICKS and not self.joystick.valid:
@@ -196,7 +196,7 @@ class Commander:
     def wish(self, number: int) -> int:
         """The user asks for a mode; returns a MAV_RESULT. Disarmed every mode is accepted."""
         vehicle = self.vehicle
-        if number not in vehicle.firmware.modes:
+        if number not in vehicle.rules.modes:
             return ACCEPTED if not vehicle.armed else UNSUPPORTED
         if vehicle.armed and not self.can_fly(number):
             vehicle.say(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
@@ -209,14 +209,14 @@ class Commander:
     def _take_wish(self, number: int) -> None:
         vehicle = self.vehicle
         self.wished = number
-        if vehicle.firmware.modes[number].armable:
+        if vehicle.rules.modes[number].armable:
             self.after_disarming = number
         self.end_failsafe()
         self.joystick.rest()
         self._fly(number)
 
     def _fly(self, number: int, anew: bool = False) -> None:
-        mode = self.vehicle.firmware.modes[number]
+        mode = self.vehicle.rules.modes[number]
         if mode is not self.vehicle.mode or anew:
             self.vehicle.enter(mode)
 
@@ -230,7 +230,7 @@ class Commander:
     def follow_up(self, number: int) -> None:
         """A mode has ended; another one follows by itself."""
         self.wished = number
-        if self.vehicle.firmware.modes[number].armable:
+        if self.vehicle.rules.modes[number].armable:
             self.after_disarming = number
         self.joystick.rest()
         self._fly(number)
@@ -300,7 +300,7 @@ class Commander:
     @property
     def armable(self) -> bool:
         """Whether the checks let it arm in the wished mode."""
-        mode = self.vehicle.firmware.modes[self.wished]
+        mode = self.vehicle.rules.modes[self.wished]
         return self._fit(mode.needs_position) and mode.armable and self.can_fly(self.wished)
 
     def _fit(self, to_go_by_position: bool) -> bool:
@@ -313,7 +313,7 @@ class Commander:
     def _throttle_is_high(self) -> bool:
         if not self.joystick.valid or self.wished not in NEEDS_STICKS:
             return False
-        by_thrust = self.vehicle.firmware.stands and self.wished in (
+        by_thrust = self.vehicle.flies and self.wished in (
             MANUAL,
             STABILIZE,
             ACRO,
@@ -325,7 +325,7 @@ class Commander:
         vehicle = self.vehicle
         if not vehicle.armed:
             return ACCEPTED
-        if vehicle.firmware.stands and not vehicle.landed and not force:
+        if vehicle.flies and not vehicle.landed and not force:
             vehicle.say(CRITICAL, "Disarming denied! Not landed\t")
             self.log.tell(events.DISARM_REFUSED)
             return TEMPORARILY_REJECTED
@@ -338,7 +338,6 @@ class Commander:
         vehicle.disarm()
         vehicle.say(INFO, f"Disarmed by {words}\t")
         self.log.tell(events.DISARMED, reason)
-        vehicle.firmware.on_disarmed(vehicle)
         self.end_failsafe()
         self.takeoff_amsl = None
         self.wished = self.after_disarming
@@ -365,5 +364,5 @@ OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3
 
 def commander_of(vehicle: Vehicle) -> Commander:
     """The commander of a vehicle."""
-    commander: Commander = vehicle.memory
+    commander: Commander = vehicle.firmware_state
     return commander

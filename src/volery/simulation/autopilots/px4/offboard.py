@@ -294,7 +294,7 @@ class Offboard(Manoeuvre):
     def enter(self) -> None:
         """Stay until told."""
         self._pursuit.enter()
-        self.take(self.vehicle.memory.stream.target)
+        self.take(self.vehicle.firmware_state.stream.target)
 
     def take(self, target: OffboardTarget | AttitudeTarget | None) -> None:
         """A set-point came."""

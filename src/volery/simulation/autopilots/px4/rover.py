@@ -22,13 +22,13 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 )
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, UNSUPPORTED, Command, Handler
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.px4 import commands, copter, modes
+from volery.simulation.autopilots.px4 import commands, copter, mission, modes
 from volery.simulation.autopilots.px4.failsafes import on_step
-from volery.simulation.autopilots.px4.firmware import px4_firmware, px4_mavlink
+from volery.simulation.autopilots.px4.firmware import own_parameters, px4_firmware, px4_mavlink
 from volery.simulation.autopilots.px4.modes import commander_of
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, OffboardTarget
 from volery.simulation.autopilots.px4.parameters import ROVER_SUPPORTED, rover_tuning
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, ParameterTable, Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -146,7 +146,7 @@ MODES = {
             modes.MISSION,
             "AUTO.MISSION",
             modes.BY_ITSELF,
-            lambda vehicle: FlyMission(vehicle, rover_leg, lambda _vehicle: True),
+            lambda vehicle: FlyMission(vehicle, rover_leg, mission.MISSION_RULES, lambda _vehicle: True),
             needs_position=True,
         ),
         Mode(modes.RTL, "AUTO.RTL", modes.BY_ITSELF, ReturnRover, needs_position=True, armable=False),
@@ -167,12 +167,8 @@ def parameters() -> tuple[Parameter, ...]:
 
 ROVER = px4_firmware(
     kind="rover",
-    face=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, COMMANDS, commands.MESSAGE_HANDLERS)),
-    boot_mode=MODES[modes.LOITER],
     modes=MODES,
-    tuning=rover_tuning,
-    stands=False,
+    parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
     on_step=on_step,
-    parameters=parameters,
-    supported_parameters=ROVER_SUPPORTED,
+    endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, COMMANDS)),
 )

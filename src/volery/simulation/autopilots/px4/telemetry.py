@@ -402,7 +402,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
     """EXTENDED_SYS_STATE."""
     manoeuvre = vehicle.manoeuvre
     state = IN_AIR
-    if not vehicle.firmware.stands or not commander_of(vehicle).flying:
+    if not vehicle.flies or not commander_of(vehicle).flying:
         state = ON_GROUND
     elif manoeuvre.taking_off:
         state = TAKING_OFF

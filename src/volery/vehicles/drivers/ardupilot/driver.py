@@ -31,6 +31,7 @@ from volery.vehicles.drivers.steps import (
     READY_WITHIN,
     STOPPED_WITHIN,
     TURNED_WITHIN,
+    TargetMonitor,
     at_rest,
     check_throttle,
     climbed_to,
@@ -39,7 +40,6 @@ from volery.vehicles.drivers.steps import (
     immediate_step,
     send_nothing,
 )
-from volery.vehicles.drivers.takeover import TargetMonitor
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Velocity
 

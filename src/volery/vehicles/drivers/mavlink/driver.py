@@ -25,12 +25,12 @@ from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     ARMED_WITHIN,
     ROVER_NEAR_M,
+    Takeover,
     at_rest,
     horizontal_distance,
     ready_step,
     send_nothing,
 )
-from volery.vehicles.drivers.takeover import Takeover
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 

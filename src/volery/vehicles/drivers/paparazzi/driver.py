@@ -30,12 +30,13 @@ from volery.vehicles.drivers.steps import (
     DRONE_KIND,
     READY_WITHIN,
     TURNED_WITHIN,
+    Takeover,
+    TargetMonitor,
     check_throttle,
     heading_reached,
     immediate_step,
     ready_step,
 )
-from volery.vehicles.drivers.takeover import Takeover, TargetMonitor
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 

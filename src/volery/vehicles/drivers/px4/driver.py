@@ -49,6 +49,7 @@ from volery.vehicles.drivers.steps import (
     ROVER_KIND,
     STOPPED_WITHIN,
     TURNED_WITHIN,
+    TargetMonitor,
     arrived_at,
     at_rest,
     check_throttle,
@@ -57,7 +58,6 @@ from volery.vehicles.drivers.steps import (
     immediate_step,
     send_nothing,
 )
-from volery.vehicles.drivers.takeover import TargetMonitor
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
 

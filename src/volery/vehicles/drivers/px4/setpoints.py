@@ -21,7 +21,7 @@ from volery.vehicles.driver import ManualControl
 from volery.vehicles.drivers.mavlink import backend as key
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, OFFBOARD
-from volery.vehicles.drivers.takeover import Takeover
+from volery.vehicles.drivers.steps import Takeover
 from volery.vehicles.telemetry import Velocity
 
 SETPOINT_PERIOD: Ns = 100 * MS
