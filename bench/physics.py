@@ -98,11 +98,11 @@ def flying(vehicles: int) -> tuple[Clock, list[Flight]]:
         flight.drive(Setpoint(Control.IDLE))
     clock.now = 2 * S
     for flight in flights:
-        flight.look()
+        flight.estimate()
         flight.drive(Setpoint(Control.POSITION, position=(500.0, 0.0, -20.0)))
     clock.now = 5 * S
     for flight in flights:
-        flight.look()
+        flight.estimate()
     return clock, flights
 
 
@@ -114,12 +114,12 @@ def flight_cost(vehicles: int, simulated: int) -> tuple[float, float]:
         for _ in range(10 * simulated):
             clock.now += 100 * MS
             for flight in flights:
-                flight.look()
+                flight.estimate()
 
     def look() -> None:
         for _ in range(1000):
             for flight in flights:
-                flight.look()
+                flight.estimate()
 
     return seconds_for(fly) / simulated * 1e3, seconds_for(look) / (1000 * vehicles) * 1e6
 

@@ -42,10 +42,10 @@ def flown(drives, looks):
         elif what:
             flights[body].truth()
         else:
-            flights[body].look()
+            flights[body].estimate()
     now = LENGTH * MS
     for flight in flights:
-        flight.look()
+        flight.estimate()
     return world.arrays.rows.tobytes()
 
 

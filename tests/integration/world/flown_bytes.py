@@ -20,18 +20,18 @@ def main():
         flight.set_origin()
     now = 5 * S
     for flight in flights:
-        flight.look()
+        flight.estimate()
         flight.drive(Setpoint(Control.IDLE))
     for second in range(6, 40):
         now = second * S
         for index, flight in enumerate(flights):
-            flight.look()
+            flight.estimate()
             goal = (3.0 * second * (index - 1), 40.0 - second, -10.0)
             flight.drive(Setpoint(Control.POSITION, position=goal, yaw=0.1 * second, speed=5.0))
     now = 40 * S + 500 * MS
     digest = hashlib.sha256()
     for flight in flights:
-        estimate = flight.look()
+        estimate = flight.estimate()
         digest.update(repr((estimate.position, estimate.attitude, flight.truth())).encode())
     digest.update(world.arrays.rows.tobytes())
     sys.stdout.write(digest.hexdigest())

@@ -30,7 +30,7 @@ class Flown:
         seen = []
         while self.now < start + round(seconds * S):
             self.now += LOOK
-            estimate, truth = self.flight.look(), self.flight.truth()
+            estimate, truth = self.flight.estimate(), self.flight.truth()
             seen.append(((self.now - start) / S, estimate, truth))
             if until(estimate, truth):
                 break

@@ -15,14 +15,14 @@ from volery.simulation.world.environment_models import Wind
 def test_off_means_that_motors_stand_still_and_idle_that_they_turn(drone):
     flown = drone("perfect")
     flown.wait(1)
-    assert flown.flight.look().motor_pwm == (1000, 1000, 1000, 1000)
+    assert flown.flight.estimate().motor_pwm == (1000, 1000, 1000, 1000)
     flown.drive(Control.IDLE)
     flown.wait(2)
-    assert flown.flight.look().motor_pwm == (1100, 1100, 1100, 1100)
-    assert flown.flight.look().landed
+    assert flown.flight.estimate().motor_pwm == (1100, 1100, 1100, 1100)
+    assert flown.flight.estimate().landed
     flown.drive(Control.OFF)
     flown.wait(0.1)
-    assert flown.flight.look().motors == (0.0, 0.0, 0.0, 0.0)
+    assert flown.flight.estimate().motors == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_position_holds_still_to_a_nanometre_without_noise(drone):
@@ -46,7 +46,7 @@ def test_velocity_is_limited_in_the_plane_and_in_height(drone):
     flown = drone("perfect").hover(20.0)
     flown.drive(Control.VELOCITY, velocity=(30.0, 0.0, 9.0), speed=4.0, speed_down=1.0)
     flown.wait(8)
-    velocity = flown.flight.look().velocity
+    velocity = flown.flight.estimate().velocity
     assert velocity[0] == pytest.approx(4.0, abs=0.1)
     assert velocity[2] == pytest.approx(1.0, abs=0.1)
 
@@ -57,16 +57,16 @@ def test_a_zero_velocity_brakes_and_stays(drone):
     flown.wait(8)
     flown.drive(Control.VELOCITY, velocity=(0.0, 0.0, 0.0))
     flown.wait(12)
-    first = flown.flight.look().position
+    first = flown.flight.estimate().position
     flown.wait(5)
-    assert math.dist(first, flown.flight.look().position) < 0.1
+    assert math.dist(first, flown.flight.estimate().position) < 0.1
 
 
 def test_height_is_kept_while_flying_at_a_velocity(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.VELOCITY_HEIGHT, position=(0.0, 0.0, -12.0), velocity=(3.0, 0.0, 0.0))
     flown.wait(12)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.position[2] == pytest.approx(-12.0, abs=0.1)
     assert estimate.velocity[0] == pytest.approx(3.0, abs=0.1)
 
@@ -75,7 +75,7 @@ def test_climb_holds_a_rate_and_leans_as_told(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.CLIMB, climb=1.0, roll=radians(5.0))
     flown.wait(4)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert -estimate.velocity[2] == pytest.approx(1.0, abs=0.1)
     assert math.degrees(estimate.attitude[0]) == pytest.approx(5.0, abs=0.5)
     assert estimate.velocity[1] > 0.5  # to the right, east
@@ -83,15 +83,15 @@ def test_climb_holds_a_rate_and_leans_as_told(drone):
 
 def test_attitude_flies_angles_and_throttle(drone):
     flown = drone("perfect").hover(30.0)
-    hover = flown.flight.look().throttle
+    hover = flown.flight.estimate().throttle
     flown.drive(Control.ATTITUDE, pitch=radians(-10.0), throttle=hover)
     flown.wait(2)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert math.degrees(estimate.attitude[1]) == pytest.approx(-10.0, abs=1.0)
     assert estimate.velocity[0] > 1.0
     flown.drive(Control.ATTITUDE, throttle=0.0)
     flown.wait(1)
-    assert flown.flight.look().velocity[2] > 4.0  # it falls
+    assert flown.flight.estimate().velocity[2] > 4.0  # it falls
 
 
 @pytest.mark.parametrize(("turn", "expected"), [({"yaw": 1.5}, 1.5), ({"yaw": -2.5}, -2.5)])
@@ -99,25 +99,25 @@ def test_yaw_goes_to_an_angle_the_short_way(drone, turn, expected):
     flown = drone("perfect").hover()
     flown.drive(Control.POSITION, position=(0.0, 0.0, -10.0), **turn)
     flown.wait(8)
-    assert flown.flight.look().attitude[2] == pytest.approx(expected, abs=0.02)
-    assert math.dist(flown.flight.look().position, (0.0, 0.0, -10.0)) < 0.2
+    assert flown.flight.estimate().attitude[2] == pytest.approx(expected, abs=0.02)
+    assert math.dist(flown.flight.estimate().position, (0.0, 0.0, -10.0)) < 0.2
 
 
 def test_yaw_turns_at_a_rate(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.POSITION, position=(0.0, 0.0, -10.0), yaw_rate=0.5)
     flown.wait(4)
-    assert flown.flight.look().rates[2] == pytest.approx(0.5, abs=0.02)
+    assert flown.flight.estimate().rates[2] == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_change_of_control_does_not_jerk(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.POSITION, position=(100.0, 0.0, -10.0))
     flown.wait(6)
-    fast = flown.flight.look()
+    fast = flown.flight.estimate()
     flown.drive(Control.CLIMB, pitch=fast.attitude[1])
     flown.wait(0.2)
-    assert abs(flown.flight.look().velocity[2]) < 0.1
+    assert abs(flown.flight.estimate().velocity[2]) < 0.1
     flown.drive(Control.VELOCITY, velocity=fast.velocity)
     tilts = [estimate.attitude[1] for _, estimate, _ in flown.wait(2)]
     assert max(abs(tilt - fast.attitude[1]) for tilt in tilts) < radians(12.0)
@@ -150,8 +150,8 @@ def test_it_takes_off_again_after_a_landing(drone):
     flown.wait(30, until=lambda estimate, truth: estimate.landed)
     flown.drive(Control.POSITION, position=(0.0, 0.0, -5.0))
     flown.wait(15)
-    assert flown.flight.look().position[2] == pytest.approx(-5.0, abs=0.3)
-    assert not flown.flight.look().landed
+    assert flown.flight.estimate().position[2] == pytest.approx(-5.0, abs=0.3)
+    assert not flown.flight.estimate().landed
 
 
 def test_the_tilt_limit_holds(drone):
@@ -165,7 +165,7 @@ def test_a_rover_steers_as_told_and_stops(rover):
     flown = rover("perfect").ready(2)
     flown.drive(Control.STEER, throttle=0.1, steering=0.5)
     flown.wait(5)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.rates[2] > 0.2  # clockwise: to the right
     assert estimate.motor_pwm == (1750, 0, 1550, 0)
     flown.drive(Control.DRIVE)
@@ -177,10 +177,10 @@ def test_a_rover_drives_a_heading_and_backwards(rover):
     flown = rover("perfect").ready(2)
     flown.drive(Control.DRIVE, velocity=(2.0, 0.0, 0.0), yaw=1.0, accel=1.0)
     flown.wait(10)
-    assert flown.flight.look().attitude[2] == pytest.approx(1.0, abs=0.03)
+    assert flown.flight.estimate().attitude[2] == pytest.approx(1.0, abs=0.03)
     flown.drive(Control.DRIVE, velocity=(-1.0, 0.0, 0.0), yaw=1.0, accel=1.0)
     flown.wait(10)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.velocity[0] == pytest.approx(-math.cos(estimate.attitude[2]), abs=0.1)
 
 
@@ -196,9 +196,9 @@ def test_set_points_that_make_no_sense_are_refused(drone):
 
 def test_a_look_is_the_same_object_until_the_next_grid_step(drone):
     flown = drone("perfect")
-    first = flown.flight.look()
+    first = flown.flight.estimate()
     flown.now += 1 * MS
-    assert flown.flight.look() is first
+    assert flown.flight.estimate() is first
     flown.now += 1 * MS
-    assert flown.flight.look() is not first
+    assert flown.flight.estimate() is not first
     assert first.time == 0

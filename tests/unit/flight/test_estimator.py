@@ -82,23 +82,23 @@ def test_without_satellites_it_reckons_on_and_says_so(drone):
     flown = drone("consumer").hover()
     flown.flight.block_gps()
     flown.wait(5)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.gps.fix_type == 0
     assert estimate.gps.satellites == 0
     assert estimate.gps_age == pytest.approx(5.0, abs=0.3)
     assert estimate.position_ok
     flown.wait(6)
-    assert not flown.flight.look().position_ok
+    assert not flown.flight.estimate().position_ok
     flown.flight.block_gps(False)
     flown.wait(2)
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.position_ok
     assert estimate.gps.fix_type == 3
 
 
 def test_the_fix_is_where_the_vehicle_is(drone):
     flown = drone("rtk").hover()
-    estimate, truth = flown.flight.look(), flown.flight.truth()
+    estimate, truth = flown.flight.estimate(), flown.flight.truth()
     fix = estimate.gps
     north, east, down = flown.flight.frame.to_ned(fix.latitude, fix.longitude, fix.amsl)
     assert math.hypot(north - truth.position[1], east - truth.position[0]) < 0.2
@@ -122,10 +122,10 @@ def test_instruments_at_rest_show_gravity_field_and_air(drone):
 
 def test_the_range_finder_ends_at_its_reach(drone):
     flown = drone("perfect").hover(20.0)
-    assert flown.flight.look().rangefinder == pytest.approx(20.1, abs=0.1)
+    assert flown.flight.estimate().rangefinder == pytest.approx(20.1, abs=0.1)
     flown.drive(Control.POSITION, position=(0.0, 0.0, -40.0))
     flown.wait(20)
-    assert flown.flight.look().rangefinder is None
+    assert flown.flight.estimate().rangefinder is None
 
 
 def test_a_stuck_barometer_and_compass_show_in_their_samples(drone):
@@ -134,9 +134,9 @@ def test_a_stuck_barometer_and_compass_show_in_their_samples(drone):
     flown.flight.block_barometer()
     flown.flight.block_compass()
     flown.wait(0.1)
-    before = flown.flight.look()
+    before = flown.flight.estimate()
     flown.wait(2)
-    after = flown.flight.look()
+    after = flown.flight.estimate()
     assert (after.baro_altitude, after.mag) == (before.baro_altitude, before.mag)
     assert after.gyro != before.gyro
 
@@ -152,10 +152,10 @@ def test_losing_half_of_a_motor_turns_the_vehicle_over(drone):
 def test_the_computers_drain_shows_in_the_battery(drone):
     flown = drone("perfect")
     flown.wait(1)
-    before = flown.flight.look().battery_amps
+    before = flown.flight.estimate().battery_amps
     flown.flight.payload_power(10.0)
     flown.wait(1)
-    assert flown.flight.look().battery_amps - before == pytest.approx(10.0 / 12.6, rel=0.01)
+    assert flown.flight.estimate().battery_amps - before == pytest.approx(10.0 / 12.6, rel=0.01)
     assert flown.flight.truth().payload_j == pytest.approx(10.0, abs=0.1)
 
 

@@ -57,7 +57,7 @@ def test_landing_from_ten_metres(drone, recorded, sensors):
 
 def test_hover_takes_the_recorded_throttle(drone, recorded):
     flown = drone("perfect").hover()
-    estimate = flown.flight.look()
+    estimate = flown.flight.estimate()
     assert estimate.throttle == pytest.approx(recorded["copter"]["hover_throttle"], rel=FIFTH)
     assert estimate.motor_pwm[0] == pytest.approx(recorded["copter"]["hover_pwm"], abs=60)
 

@@ -180,7 +180,7 @@ class Autopilot:
 
     def state(self) -> VehicleState:
         """The vehicle now, as it is and as its autopilot believes: for a trace."""
-        truth, estimate = self._flight.truth(), self._flight.look()
+        truth, estimate = self._flight.truth(), self._flight.estimate()
         x, y, z = truth.position
         east, north, up = (nan, nan, nan)
         if self.vehicle.has_position:

@@ -278,7 +278,7 @@ class Vehicle:
     @property
     def estimate(self) -> Estimate:
         """What the estimator believes now."""
-        return self.flight.look()
+        return self.flight.estimate()
 
     @property
     def has_position(self) -> bool:

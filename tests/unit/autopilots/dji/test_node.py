@@ -165,7 +165,7 @@ def test_a_position_is_a_remaining_offset_and_an_absolute_height(apron: Make) ->
             yard.wait(0.02)
         assert yard.mode == 17
         assert yard.place == pytest.approx((8.0, -6.0, 5.0), abs=0.6)
-        assert abs(yard.flight.look().attitude[2]) < 0.1  # north
+        assert abs(yard.flight.estimate().attitude[2]) < 0.1  # north
 
     yard.run(body)
 
@@ -369,7 +369,7 @@ def test_without_satellites_it_holds_its_attitude_only(apron: Make) -> None:
         yard.flight.block_gps()
         yard.until(lambda: yard.mode == 1, within=15.0)
         yard.keep_sending(1.0, "ENUvelocity_yawrate", 3.0, 0.0, 0.0, 0.0)
-        assert abs(yard.flight.look().attitude[0]) < 0.1
+        assert abs(yard.flight.estimate().attitude[0]) < 0.1
         assert not yard.task(GO_HOME)
         assert yard.task(LAND)
         yard.until(lambda: yard.status == 0)

@@ -1,1 +1,1 @@
-"""The simulated flight stack: estimator, cascaded control, modes, and what all dialects of it share."""
+"""Flight stack of a simulated autopilot: estimator, guidance, attitude control and the compiled step."""

@@ -1,15 +1,12 @@
-"""The landed detector of a multirotor: motors at their lower limit and nothing moves for a second.
+"""Attitude and rate loops, motor mixer and landed detector of a multirotor.
 
-The rule is ArduCopter's as documented: while flying, lower limit and acceleration below 1 m/s^2 and vertical
-speed below 1 m/s for one second; on the ground, flight begins when the collective leaves the lower half of
-hover.
-
-Attitude and rate loops and the motor mixer of a multirotor: every grid step.
-
-Attitude error as a quaternion, square-root limited into rates; a PID on each rate with its derivative on the
-measurement; motors mixed so that roll and pitch come before yaw and yaw before collective. Motor output is
-linear in thrust through ArduPilot's thrust curve (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX: documented
-parameters).
+* Attitude and rates, every grid step: the attitude error as a quaternion, limited by a square-root law, gives
+  rates; a PID on each rate has its derivative on the measurement. The mixer gives roll and pitch precedence
+  over yaw, and yaw over collective. Motor output is linear in thrust through ArduPilot's thrust curve
+  (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX).
+* Landed detector, every guidance period: ArduCopter's documented rule. In flight: collective at its lower
+  limit, acceleration below 1 m/s^2 and vertical speed below 1 m/s for one second. On the ground, flight
+  begins when the collective exceeds 0.8 of hover.
 """
 
 from __future__ import annotations
@@ -49,7 +46,7 @@ _SURE = 1.0  # [s]
 
 @njit(cache=False)
 def detect_landing(row: Array, control: int) -> None:
-    """One guidance period of the detector."""
+    """Update the landed detector: one guidance period."""
     motion = 0.0
     for axis in range(3):
         smooth = row[K_FILTERED_ACCEL + axis]
@@ -92,7 +89,7 @@ _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 @njit(cache=False)
 def _rate_targets(row: Array) -> tuple[float, float, float]:
-    """Rates that turn the attitude into the demanded one, forward, right, down [rad/s]."""
+    """Return the rates that turn the attitude into the target, forward, right, down [rad/s]."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     tw, tx, ty, tz = (
         row[K_TARGET_QUATERNION],
@@ -114,7 +111,7 @@ def _rate_targets(row: Array) -> tuple[float, float, float]:
 
 @njit(cache=False)
 def _torque(row: Array, axis: int, wanted: float) -> float:
-    """One rate's PID: a share of full thrust by which motors are to differ."""
+    """Return the output of one rate's PID as a share of full thrust by which motors differ."""
     rate = row[K_RATES + axis]
     error = wanted - rate
     if row[K_LANDED] > 0.5 or row[K_SPOOL] < 1.0:
@@ -131,7 +128,7 @@ def _torque(row: Array, axis: int, wanted: float) -> float:
 
 @njit(cache=False)
 def motor_output(thrust: float) -> float:
-    """Motor command 0..1 for a share of full thrust."""
+    """Return the motor command 0..1 for a share of full thrust."""
     linear = 1.0 - _EXPO
     curve = (sqrt(linear * linear + 4.0 * _EXPO * clip(thrust, 0.0, 1.0)) - linear) / (2.0 * _EXPO)
     return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * curve
@@ -139,7 +136,7 @@ def motor_output(thrust: float) -> float:
 
 @njit(cache=False)
 def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
-    """Motor commands from three torques and the collective."""
+    """Write motor commands from three torques and the collective."""
     reach = 1e-9
     for i in range(4):
         reach = max(reach, abs(row[P_ROTOR_X + i]), abs(row[P_ROTOR_Y + i]))
@@ -162,7 +159,7 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
 
 @njit(cache=False)
 def run_attitude_loops(row: Array, control: int) -> None:
-    """One grid step of the inner loops: from the demanded attitude and collective to four motor commands."""
+    """Run one grid step of the inner loops, from target attitude and collective to four motor commands."""
     if control in (OFF, IDLE):
         idle = _SPIN_ARM if control == IDLE else 0.0
         for i in range(4):

@@ -1,10 +1,10 @@
-"""The estimator, compiled: what an autopilot believes, from its instruments alone.
+"""State estimator: a complementary attitude filter, and a Kalman filter for position and velocity.
 
-Attitude: gyros integrated every step; heading held by the compass; tilt held by what the velocity filter
-finds wrong with the acceleration (it takes an unknown lean for an acceleration that is not there), or by
-gravity itself while no satellites help. Position and velocity: one Kalman filter for each axis, of position,
-velocity and acceleration error (Gelb, Applied Optimal Estimation, 4.2), fed by satellites in the plane and by
-the barometer in height, or by satellites alone where they are the better (a real-time kinematic fix).
+Attitude: gyroscope integration, corrected by the magnetometer's heading and by the acceleration error that
+the position filter finds (without satellites: by the accelerometer's direction), with a gyro bias. Position:
+three axes, each with a Kalman filter of position, velocity and acceleration bias (Brown and Hwang,
+Introduction to Random Signals and Applied Kalman Filtering, 4.2), fed by satellites horizontally and by the
+barometer in height, or by satellites alone where they are better (a real-time kinematic fix).
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ _STALE = 1.0  # [s] after which a fix no longer holds the tilt
 
 @njit(cache=False)
 def _euler(row: Array) -> None:
-    """Roll, pitch and yaw of the estimated quaternion."""
+    """Compute roll, pitch and yaw of the estimated quaternion."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     sine = min(max(2.0 * (w * y - z * x), -1.0), 1.0)
     row[K_EULER] = arc_tangent2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
@@ -95,8 +95,8 @@ def _euler(row: Array) -> None:
 
 
 @njit(cache=False)
-def _turn_body(row: Array, x: float, y: float, z: float) -> None:
-    """Turn the attitude by a small angle about body axes [rad]."""
+def _rotate_attitude(row: Array, x: float, y: float, z: float) -> None:
+    """Rotate the attitude by a small angle about body axes [rad]."""
     w0, x0, y0, z0 = (
         row[K_ATTITUDE],
         row[K_ATTITUDE + 1],
@@ -125,8 +125,8 @@ def _horizontal(row: Array, x: float, y: float, z: float) -> tuple[float, float]
 
 
 @njit(cache=False)
-def _correct(row: Array, integral: float) -> None:
-    """Turn the attitude by *turn* about north, east, down and move the gyro bias the other way."""
+def _correct_attitude(row: Array, integral: float) -> None:
+    """Rotate the attitude by W_CORRECTION, and move the gyro bias by -*integral* of it."""
     for axis in range(3):
         angle = (
             row[W_DCM + axis] * row[W_CORRECTION]
@@ -149,15 +149,15 @@ def _correct(row: Array, integral: float) -> None:
         + row[W_DCM + 5] * row[W_CORRECTION + 1]
         + row[W_DCM + 8] * row[W_CORRECTION + 2]
     )
-    _turn_body(row, bx, by, bz)
+    _rotate_attitude(row, bx, by, bz)
 
 
 @njit(cache=False)
 def _predict(row: Array) -> None:
-    """One grid step of dead reckoning."""
+    """Advance the estimate by one grid step of dead reckoning."""
     for axis in range(3):
         row[K_RATES + axis] = row[M_GYRO + axis] - row[K_GYRO_BIAS + axis]
-    _turn_body(row, row[K_RATES] * STEP_S, row[K_RATES + 1] * STEP_S, row[K_RATES + 2] * STEP_S)
+    _rotate_attitude(row, row[K_RATES] * STEP_S, row[K_RATES + 1] * STEP_S, row[K_RATES + 2] * STEP_S)
     rotation_matrix(row, K_ATTITUDE, W_DCM)
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     aided = row[K_AIDED] > 0.5
@@ -173,7 +173,7 @@ def _predict(row: Array) -> None:
 
 
 @njit(cache=False)
-def _spread(row: Array, axis: int) -> None:
+def _propagate_covariance(row: Array, axis: int) -> None:
     """Propagate one axis' covariance (pp pv pb vv vb bb) over a fusion period."""
     at = K_COVARIANCE + 6 * axis
     t = _FUSE_S
@@ -189,7 +189,14 @@ def _spread(row: Array, axis: int) -> None:
 
 @njit(cache=False)
 def _fuse_position(row: Array, axis: int, innovation: float, variance: float) -> float:
-    """Kalman's update of one axis by a position; returns the innovation in sigmas."""
+    """Update one axis by a position measurement and return the innovation in its standard deviations.
+
+    Args:
+        row: State row.
+        axis: 0 north, 1 east, 2 down.
+        innovation: Measurement less estimate [m].
+        variance: Variance of the measurement [m^2].
+    """
     at = K_COVARIANCE + 6 * axis
     pp, pv, pb = row[at], row[at + 1], row[at + 2]
     total = pp + variance
@@ -208,7 +215,7 @@ def _fuse_position(row: Array, axis: int, innovation: float, variance: float) ->
 
 @njit(cache=False)
 def _fuse_velocity(row: Array, axis: int, innovation: float, variance: float) -> None:
-    """Kalman's update of one axis by a velocity."""
+    """Update one axis by a velocity measurement [m/s] with its variance."""
     at = K_COVARIANCE + 6 * axis
     pv, vv, vb = row[at + 1], row[at + 3], row[at + 4]
     total = vv + variance
@@ -234,8 +241,8 @@ def _variance(row: Array, error: int) -> float:
 
 
 @njit(cache=False)
-def _trust(row: Array, axis: int, position: float, velocity: float) -> None:
-    """Start one axis' covariance with two variances."""
+def _reset_covariance(row: Array, axis: int, position: float, velocity: float) -> None:
+    """Reset one axis' covariance to a variance of position and of velocity."""
     at = K_COVARIANCE + 6 * axis
     for i in range(6):
         row[at + i] = 0.0
@@ -245,8 +252,8 @@ def _trust(row: Array, axis: int, position: float, velocity: float) -> None:
 
 
 @njit(cache=False)
-def _aid(row: Array) -> None:
-    """Begin or end the use of satellites as told."""
+def _switch_aiding(row: Array) -> None:
+    """Begin or end the use of satellites as commanded by C_AIDED."""
     wanted = row[C_AIDED] > 0.5
     if wanted and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
         row[K_AIDED] = 1.0
@@ -257,7 +264,9 @@ def _aid(row: Array) -> None:
         for axis in range(2):
             row[K_VELOCITY + axis] = row[M_GPS_VELOCITY + axis]
             row[K_ACCEL_BIAS + axis] = 0.0
-            _trust(row, axis, _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR))
+            _reset_covariance(
+                row, axis, _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
+            )
         row[K_BARO_OFFSET] = row[M_BARO] + row[M_GPS + 2]
     if not wanted and row[K_AIDED] > 0.5:
         row[K_AIDED] = 0.0
@@ -267,8 +276,8 @@ def _aid(row: Array) -> None:
 
 
 @njit(cache=False)
-def _hear_satellites(row: Array) -> None:
-    """Fuse a new fix, and let the tilt take over part of what the filter calls an acceleration error."""
+def _fuse_gps(row: Array) -> None:
+    """Fuse a new fix, and correct the tilt by part of the estimated acceleration bias."""
     level, speed = _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
     worst = 0.0
     for axis in range(2):
@@ -287,25 +296,25 @@ def _hear_satellites(row: Array) -> None:
     row[W_CORRECTION] = east / row[P_GRAVITY]
     row[W_CORRECTION + 1] = -north / row[P_GRAVITY]
     row[W_CORRECTION + 2] = 0.0
-    _correct(row, _TILT_INTEGRAL / _TILT_GAIN)
+    _correct_attitude(row, _TILT_INTEGRAL / _TILT_GAIN)
     row[K_GPS_AGE] = 0.0
 
 
 @njit(cache=False)
-def _feel_gravity(row: Array, gravity: float) -> None:
-    """Without satellites: what the accelerometer calls up is up."""
+def _fuse_gravity(row: Array, gravity: float) -> None:
+    """Correct the tilt by the accelerometer: without satellites its mean direction is up."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     north, east = _horizontal(row, fx, fy, fz)
     share = _GRAVITY_GAIN * _FUSE_S / gravity
     row[W_CORRECTION] = -east * share
     row[W_CORRECTION + 1] = north * share
     row[W_CORRECTION + 2] = 0.0
-    _correct(row, 0.02)
+    _correct_attitude(row, 0.02)
 
 
 @njit(cache=False)
-def _hear_compass(row: Array) -> None:
-    """Turn towards the heading in which the measured field points as the earth's does here."""
+def _fuse_heading(row: Array) -> None:
+    """Correct the heading by the difference of the measured field's direction and the declination."""
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
     north, east = _horizontal(row, mx, my, mz)
     declination = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
@@ -314,17 +323,17 @@ def _hear_compass(row: Array) -> None:
     row[W_CORRECTION] = 0.0
     row[W_CORRECTION + 1] = 0.0
     row[W_CORRECTION + 2] = -_HEADING_GAIN * _FUSE_S * error
-    _correct(row, _HEADING_INTEGRAL / _HEADING_GAIN)
+    _correct_attitude(row, _HEADING_INTEGRAL / _HEADING_GAIN)
 
 
 @njit(cache=False)
 def _fuse(row: Array) -> None:
-    """What falls due twenty times a second."""
-    _aid(row)
+    """Fuse the measurements that are new: 20 times a second."""
+    _switch_aiding(row)
     row[K_GPS_AGE] += _FUSE_S
     for axis in range(3):
         if axis == 2 or row[K_AIDED] > 0.5:
-            _spread(row, axis)
+            _propagate_covariance(row, axis)
     if row[M_BARO_COUNT] != row[K_USED_BARO]:
         row[K_USED_BARO] = row[M_BARO_COUNT]
         if not (row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5):
@@ -332,12 +341,12 @@ def _fuse(row: Array) -> None:
             _fuse_position(row, 2, missed, _variance(row, P_BARO_ERROR))
     if row[M_MAG_COUNT] != row[K_USED_MAG]:
         row[K_USED_MAG] = row[M_MAG_COUNT]
-        _hear_compass(row)
+        _fuse_heading(row)
     if row[M_GPS_COUNT] != row[K_USED_GPS] and row[K_AIDED] > 0.5:
         row[K_USED_GPS] = row[M_GPS_COUNT]
-        _hear_satellites(row)
+        _fuse_gps(row)
     if row[K_AIDED] < 0.5 or row[K_GPS_AGE] > _STALE:
-        _feel_gravity(row, row[P_GRAVITY])
+        _fuse_gravity(row, row[P_GRAVITY])
     for index in range(2):
         at = K_COVARIANCE + 12 * index
         row[K_SIGMA + index] = sqrt(max(row[at], 0.0))
@@ -346,7 +355,7 @@ def _fuse(row: Array) -> None:
 
 @njit(cache=False)
 def _align(row: Array) -> None:
-    """The first attitude: level by the accelerometer, heading by the compass."""
+    """Initialise the attitude: tilt from the accelerometer, heading from the magnetometer."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     roll = arc_tangent2(-fy, -fz)
     pitch = arc_tangent2(fx, sqrt(fy * fy + fz * fz))
@@ -369,8 +378,8 @@ def _align(row: Array) -> None:
 
 
 @njit(cache=False)
-def _know(row: Array) -> None:
-    """The belief of a vehicle with perfect instruments: the truth, in the autopilot's axes."""
+def _copy_truth(row: Array) -> None:
+    """Set the estimate of a vehicle with perfect sensors: the true state in the autopilot's axes."""
     for axis in range(3):
         source = 1 - axis if axis < 2 else 2
         sign = 1.0 if axis < 2 else -1.0
@@ -397,21 +406,21 @@ def _know(row: Array) -> None:
 
 @njit(cache=False)
 def initialise_estimate(row: Array) -> None:
-    """What the estimator makes of the first samples."""
+    """Initialise the estimate from the first samples."""
     if row[P_PERFECT] > 0.5:
-        _know(row)
+        _copy_truth(row)
     else:
         _align(row)
         row[K_BARO_OFFSET] = row[M_BARO]
-        _trust(row, 2, _variance(row, P_BARO_ERROR), 0.01)
+        _reset_covariance(row, 2, _variance(row, P_BARO_ERROR), 0.01)
     _euler(row)
 
 
 @njit(cache=False)
 def update_estimate(row: Array, k: int) -> None:
-    """The estimate of grid step *k*, just reached."""
+    """Compute the estimate of grid step *k*, just reached."""
     if row[P_PERFECT] > 0.5:
-        _know(row)
+        _copy_truth(row)
     else:
         _predict(row)
         if k % FUSE_EVERY == 0:

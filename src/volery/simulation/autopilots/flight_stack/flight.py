@@ -1,12 +1,10 @@
-"""The one compiled step: all bodies with their estimators and inner loops, composed by import.
+"""Handle on one vehicle of the world, and the compiled step of its flight stack.
 
-A grid step is: guidance (every fifth step) and attitude loops on what is believed at step k, then the body's
-law from k to k + 1 and the samples due there, then the estimate of k + 1.
-
-One vehicle's handle on the world: look at what its estimator believes, drive its inner loops. No stepping.
+One grid step of a vehicle is: guidance (every fifth step) and attitude loops on the estimate of step k, then
+the body's motion from k to k + 1 with the samples due there, then the estimate of k + 1.
 
 Positions are metres north, east, down about the estimator's origin, along the axes of the world's frame;
-angles radians; ``Flight.to_ned`` and ``Flight.from_ned`` are the way to and from degrees and metres AMSL.
+angles are radians. ``Flight.to_ned`` and ``Flight.from_ned`` convert from and to degrees and metres AMSL.
 """
 
 from __future__ import annotations
@@ -29,11 +27,14 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     C_AIDED,
     C_CONTROL,
     FLIGHT,
+    HOLD_HEADING,
     K_HOVER_THROTTLE,
     K_LANDED,
     K_MOTORS,
     K_POSITION,
     VISIBLE,
+    YAW_ANGLE,
+    YAW_RATE,
     Control,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
@@ -42,7 +43,7 @@ from volery.simulation.autopilots.flight_stack.state_estimate import Airframe, E
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.body_step import digest_of, start_body, step_body, world_sources
 from volery.simulation.world.environment_models import Terrain, Wind
-from volery.simulation.world.sensors import Sigma, declared_sigma, sensor_suite
+from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     M_GYRO,
     MULTIROTOR,
@@ -69,7 +70,7 @@ _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 
 @njit(cache=False)
 def _boot(row: Array) -> None:
-    """What an autopilot believes before its first step."""
+    """Initialise the flight stack of one vehicle before its first step."""
     row[K_HOVER_THROTTLE] = _FIRST_HOVER
     row[K_LANDED] = 1.0
     initialise_estimate(row)
@@ -77,7 +78,7 @@ def _boot(row: Array) -> None:
 
 @njit(cache=False)
 def _control(row: Array, k: int) -> None:
-    """From the belief at step *k* to motor commands."""
+    """Compute the motor commands of step *k* from the estimate at that step."""
     due = k % GUIDE_EVERY == 0
     if row[P_KIND] != MULTIROTOR:
         if due:
@@ -97,7 +98,7 @@ def _control(row: Array, k: int) -> None:
 def _compose(sources: str) -> Advance:
     @njit(cache=True)
     def advance_flights(bodies: Bodies, goals: NDArray[np.int64]) -> None:
-        if not sources:  # never so: its being named here makes the digest part of the cache's key
+        if not sources:  # never true: naming the digest makes it part of the cache's key
             return
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
@@ -114,7 +115,7 @@ def _compose(sources: str) -> Advance:
 
 
 advance_flights = _compose(digest_of([*world_sources(), *Path(__file__).parent.glob("*.py")]))
-"""Advance each body to its goal step under the set-points in its inputs."""
+"""Advance each body to its goal step under the set-points in its row."""
 
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
@@ -122,14 +123,27 @@ __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
 @dataclass(frozen=True, slots=True)
 class Setpoint:
-    """What the inner loops are to hold until the next set-point. What a control does not use is ignored.
+    """Set-point of the inner loops, in force until the next one.
 
-    ``position`` north, east, down about the estimator's origin [m]; ``velocity`` north, east, down [m/s];
-    ``yaw`` clockwise from north [rad] or ``yaw_rate`` [rad/s], neither: hold the present heading (rover
-    DRIVE: neither drives straight on); ``climb`` m/s up; ``throttle`` 0..1 (rover -1..1), ``steering`` -1..1,
-    right positive. Limits: ``speed`` in the plane (rover DRIVE: the speed itself comes from ``velocity[0]``,
-    forward), ``speed_up``, ``speed_down`` [m/s], ``accel`` in the plane, ``accel_z`` [m/s^2], ``tilt`` [rad],
-    ``jerk`` [m/s^3] (its default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z).
+    Fields that the control does not use are ignored.
+
+    Args:
+        control: The quantities to control.
+        position: North, east, down about the estimator's origin [m].
+        velocity: North, east, down [m/s]; rover DRIVE: the first is the forward speed.
+        roll: Roll angle [rad]; likewise ``pitch``.
+        yaw: Yaw angle, clockwise from north [rad], or
+        yaw_rate: yaw rate [rad/s]; neither: hold the heading (rover DRIVE: drive straight on).
+        throttle: Collective 0..1; rover -1..1.
+        steering: Rover: -1..1, right positive.
+        climb: Climb rate [m/s].
+        speed: Limit of horizontal speed [m/s].
+        speed_up: Limit of climb rate [m/s].
+        speed_down: Limit of descent rate [m/s].
+        accel: Limit of horizontal acceleration [m/s^2].
+        accel_z: Limit of vertical acceleration [m/s^2].
+        tilt: Limit of tilt [rad].
+        jerk: Limit of the target's jerk [m/s^3]; the default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z.
     """
 
     control: Control
@@ -151,10 +165,12 @@ class Setpoint:
     jerk: float = 5.0
 
     def row(self) -> tuple[float, ...]:
-        """The values in the order of the command columns, from ``C_CONTROL`` on."""
+        """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
         if self.yaw is not None and self.yaw_rate is not None:
             raise UsageError("a set-point with both a yaw and a yaw rate; give one of them or neither")
-        turning = 1.0 if self.yaw is not None else 2.0 if self.yaw_rate is not None else 0.0
+        turning = (
+            YAW_ANGLE if self.yaw is not None else YAW_RATE if self.yaw_rate is not None else HOLD_HEADING
+        )
         return (
             float(self.control),
             *self.position,
@@ -163,7 +179,7 @@ class Setpoint:
             self.pitch,
             self.yaw or 0.0,
             self.yaw_rate or 0.0,
-            turning,
+            float(turning),
             self.throttle,
             self.steering,
             self.climb,
@@ -178,7 +194,7 @@ class Setpoint:
 
 
 class Flight:
-    """One vehicle: look and drive. Whatever it is told takes effect at the next grid step."""
+    """One vehicle: read its estimate and give set-points. Every change has effect from the next grid step."""
 
     def __init__(self, world: World, body: int) -> None:
         self._world = world
@@ -188,30 +204,32 @@ class Flight:
         self.flying = isinstance(self.spec, Multirotor)
         """True for a multirotor, False for a rover."""
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
-        """Of the full battery [A s]."""
+        """Capacity of the battery [A s]."""
         self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
-        self._seen: Estimate | None = None
+        self._latest: Estimate | None = None
 
-    def look(self) -> Estimate:
-        """What the autopilot knows now; the same object until the next grid step."""
+    def estimate(self) -> Estimate:
+        """Return the estimate now; the same object until the next grid step."""
         step = self._world.advance_to_now(self._body)
         time = step * STEP
-        seen = self._seen
-        if seen is not None and seen.time == time:
-            return seen
+        if self._latest is not None and self._latest.time == time:
+            return self._latest
         row = self._world.arrays.rows[self._body]
         rows = (
             row[K_POSITION:VISIBLE].tolist(),
             row[M_GYRO:SAMPLES_END].tolist(),
             row[S_CHARGE : S_AMPS + 1].tolist(),
         )
-        self._seen = Estimate(self._airframe, time, rows)
-        return self._seen
+        self._latest = Estimate(self._airframe, time, rows)
+        return self._latest
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Hold *setpoint* from the next grid step on. None expires here: time-outs are the modes'.
+        """Control to *setpoint* from the next grid step on.
 
-        Raises ``UsageError`` for a value that is not a finite number.
+        Set-points never expire; time-outs belong to the modes.
+
+        Raises:
+            UsageError: A value is not a finite number.
         """
         row = setpoint.row()
         if not isfinite(sum(row)):
@@ -219,11 +237,19 @@ class Flight:
         self._world.set_input(self._body, C_CONTROL, *row)
 
     def truth(self) -> Truth:
-        """The true state, for judges and recorders; an autopilot must not ask."""
+        """Return the true state, for recorders and requirements; an autopilot must not use it."""
         return self._world.truth(self._body)
 
+    def measurement(self, sensor: str) -> Measurement:
+        """Return the last sample of a sensor that a package added to this vehicle.
+
+        Raises:
+            UsageError: The vehicle has no such sensor.
+        """
+        return self._world.measurement(self._body, sensor)
+
     def set_origin(self) -> None:
-        """Use satellites from now on; the origin is where the receiver says the vehicle is then."""
+        """Use satellites from now on; the origin becomes the receiver's position."""
         self._world.set_input(self._body, C_AIDED, 1.0)
 
     def forget_origin(self) -> None:
@@ -231,11 +257,11 @@ class Flight:
         self._world.set_input(self._body, C_AIDED, 0.0)
 
     def payload_power(self, watts: float) -> None:
-        """Drain of the on-board computers from the next grid step on [W]."""
+        """Set the power of the on-board computers [W]."""
         self._world.payload_power(self._body, watts)
 
     def block_gps(self, blocked: bool = True) -> None:
-        """Fault: the receiver sees no satellites (or sees them again)."""
+        """Inject or clear a fault: the receiver sees no satellites."""
         self._world.set_input(self._body, U_GPS_BLOCKED, float(blocked))
 
     def drift_gps(self, north: float, east: float) -> None:
@@ -245,46 +271,53 @@ class Flight:
             north: Speed of the drift to the north [m/s]; 0 for both ends the drift and its offset.
             east: Speed of the drift to the east [m/s].
         """
-        self._world.set_input(self._body, U_GPS_DRIFT, north, east, float(self._world.advance_to_now(self._body)))
+        self._world.set_input(
+            self._body, U_GPS_DRIFT, north, east, float(self._world.advance_to_now(self._body))
+        )
 
     def short_cells(self, cells: int) -> None:
         """Fault: `cells` of the battery give no voltage (0: all do again). One cell always stays alive."""
         self._world.set_input(self._body, P_CELLS, float(max(1, self.spec.battery.cells - cells)))
 
     def block_barometer(self, blocked: bool = True) -> None:
-        """Fault: the barometer is stuck."""
+        """Inject or clear a fault: the barometer gives no new samples."""
         self._world.set_input(self._body, U_BARO_BLOCKED, float(blocked))
 
     def block_compass(self, blocked: bool = True) -> None:
-        """Fault: the magnetometer is stuck."""
+        """Inject or clear a fault: the magnetometer gives no new samples."""
         self._world.set_input(self._body, U_MAG_BLOCKED, float(blocked))
 
     def drain_battery(self, left: float) -> None:
-        """Fault: from the next grid step on only the fraction *left* of the charge is in it."""
+        """Inject a fault: only the fraction *left* of the charge remains."""
         if not 0.0 <= left <= 1.0:
             raise UsageError(f"a battery with {left} left: 0 to 1")
         self._world.set_input(self._body, S_CHARGE, self.capacity_as * (1.0 - left))
 
     def weaken_motor(self, motor: int, health: float) -> None:
-        """Fault: *motor* (0 to 3) gives only the fraction *health* of its thrust."""
+        """Inject a fault: a motor gives only a fraction of its thrust.
+
+        Args:
+            motor: Index of the motor, 0 to 3.
+            health: Fraction of the thrust, 0..1.
+        """
         if not 0 <= motor <= 3 or not 0.0 <= health <= 1.0:
             raise UsageError(f"motor {motor} at {health}: motors are 0 to 3, health 0 to 1")
         self._world.set_input(self._body, U_MOTOR_HEALTH + motor, health)
 
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
-        """Degrees and metres AMSL to north, east, down about the estimator's present origin."""
+        """Convert degrees and metres AMSL to north, east, down about the estimator's present origin [m]."""
         north, east, down = self.frame.to_ned(latitude, longitude, amsl)
-        origin = self.look().origin_ned
+        origin = self.estimate().origin_ned
         return north - origin[0], east - origin[1], down - origin[2]
 
     def from_ned(self, ned: Vector) -> Vector:
-        """North, east, down about the estimator's present origin to degrees and metres AMSL."""
-        origin = self.look().origin_ned
+        """Convert north, east, down about the estimator's present origin [m] to degrees and metres AMSL."""
+        origin = self.estimate().origin_ned
         return self.frame.from_ned((ned[0] + origin[0], ned[1] + origin[1], ned[2] + origin[2]))
 
     @property
     def sigma(self) -> Sigma:
-        """The declared standard deviations of the vehicle's sensors [m]."""
+        """Declared standard deviations of the vehicle's position sensors [m]."""
         return declared_sigma(self.spec.sensors)
 
 
@@ -297,8 +330,15 @@ def make_world(
     wind: Wind | None = None,
     terrain: Terrain | None = None,
 ) -> tuple[World, list[Flight]]:
-    """A world in which each body has an estimator and inner loops, and a handle on each, in the order of
-    *specs*.
+    """Return a world whose bodies have an estimator and inner loops, and a handle on each.
+
+    Args:
+        now: Returns the time [ns].
+        specs: The bodies; the handles are in the same order.
+        seed: Seed of all noise.
+        frame: Local frame whose origin is the world's.
+        wind: Wind; ``None``: still air.
+        terrain: Terrain; ``None``: level ground.
     """
     world = World(
         now,

@@ -1,10 +1,8 @@
-"""Kinematic shaping: targets that a vehicle can follow, with limited speed, acceleration and jerk.
+"""Guidance of a multirotor, 100 times a second: from a set-point to a target attitude and a collective.
 
-Guidance of a multirotor, 100 times a second: from a set-point to a demanded attitude and a collective.
-
-A target moves ahead with limited speed, acceleration and jerk; the vehicle follows it by position and
-velocity loops with the target's acceleration fed forward, and leans its thrust to where that acceleration
-points. Gains are the documented defaults of ArduPilot 4.5's PSC_* parameters where one exists.
+A target moves with limited speed, acceleration and jerk. The vehicle follows it by position and velocity
+loops with the target's acceleration fed forward, and tilts its thrust towards the resulting acceleration.
+Gains are the documented defaults of ArduPilot 4.5's PSC_* parameters where one exists.
 """
 
 from __future__ import annotations
@@ -66,10 +64,15 @@ from volery.simulation.world.state_layout import Array
 
 @njit(cache=False)
 def approach(error: float, gain: float, brake: float) -> float:
-    """The rate at which to close *error* so that *brake* suffices to stop at zero.
+    """Return the rate at which to close *error* so that a deceleration of *brake* suffices to stop at zero.
 
-    Proportional (*gain*) near the goal; further out the square-root law v = sqrt(2 a (e - a / 2 gain^2)) that
-    joins it with equal value and slope.
+    Proportional (*gain*) near zero; farther away the square-root law v = sqrt(2 a (e - a / 2 gain^2)), which
+    continues it with equal value and slope.
+
+    Args:
+        error: Distance to close.
+        gain: Gain near zero [1/s].
+        brake: Largest deceleration; not above 0: proportional everywhere.
     """
     if brake <= 0.0:
         return error * gain
@@ -83,13 +86,13 @@ def approach(error: float, gain: float, brake: float) -> float:
 
 @njit(cache=False)
 def ramp(value: float, goal: float, most: float) -> float:
-    """*value* moved towards *goal* by at most *most*."""
+    """Return *value* moved towards *goal* by at most *most*."""
     return value + clip(goal - value, -most, most)
 
 
 @njit(cache=False)
 def shorten(x: float, y: float, most: float) -> tuple[float, float]:
-    """The vector (x, y), scaled down where it is longer than *most*."""
+    """Return the vector (x, y), scaled to the length *most* where it is longer."""
     length = sqrt(x * x + y * y)
     if length <= most:
         return x, y
@@ -106,38 +109,42 @@ _VELOCITY_INTEGRAL = 1.0  # PSC_VELXY_I
 _CLIMB_GAIN = 5.0  # PSC_VELZ_P
 _CLIMB_INTEGRAL = 1.5
 _SHAPING_GAIN = 2.5  # [1/s] of target speed
-_BRAKE_SHARE = 0.5  # of the acceleration limit: how a height is approached
-_PLANE_SHARE = 0.39  # the same for a point in the plane
-_LEASH = 4.0  # [m] that the target may be ahead in the plane: in wind it waits
-_HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground it waits
+_BRAKE_SHARE = 0.5  # share of the acceleration limit with which a height is approached
+_HORIZONTAL_BRAKE_SHARE = 0.39  # the same for a horizontal point
+_LEASH = 4.0  # [m] largest horizontal distance of target and vehicle: in wind the target waits
+_HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
 _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
 _TC = 0.15  # [s] ATC_INPUT_TC
 _LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
-_MOST_LIFT = 2.2  # of gravity
+_MAX_LIFT = 2.2  # in multiples of gravity
 
 
 @njit(cache=False)
-def in_plane(control: int) -> bool:
-    """Does this control hold anything in the plane?"""
+def controls_horizontal(control: int) -> bool:
+    """Return whether a control determines horizontal motion."""
     return control in (VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT)
 
 
 @njit(cache=False)
-def _vertical(control: int) -> bool:
-    return in_plane(control) or control == CLIMB
+def _controls_vertical(control: int) -> bool:
+    """Return whether a control determines vertical motion."""
+    return controls_horizontal(control) or control == CLIMB
 
 
 @njit(cache=False)
-def _upright(row: Array) -> float:
-    """Cosine of the tilt, held above a half."""
+def _cos_tilt(row: Array) -> float:
+    """Return the cosine of the tilt, at least one half."""
     x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
     return clip(1.0 - 2.0 * (x * x + y * y), 0.5, 1.0)
 
 
 @njit(cache=False)
 def _disturbance(row: Array, axis: int) -> float:
-    """What the thrust now balances besides inertia (drag, wind, a wrong hover throttle) [m/s^2]."""
+    """Return the acceleration that the present thrust balances besides inertia [m/s^2].
+
+    Its causes are drag, wind and a wrong hover throttle.
+    """
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     lift = row[K_THROTTLE] / row[K_HOVER_THROTTLE] * _GRAVITY
     if axis == 0:
@@ -145,16 +152,19 @@ def _disturbance(row: Array, axis: int) -> float:
     elif axis == 1:
         thrust = -2.0 * (y * z - w * x) * lift
     else:
-        thrust = _GRAVITY - _upright(row) * lift
+        thrust = _GRAVITY - _cos_tilt(row) * lift
     return clip(thrust - row[K_ACCEL + axis], -4.0, 4.0)
 
 
 @njit(cache=False)
-def _enter(row: Array, control: int, before: int) -> None:
-    """A new control takes over where the vehicle is, as fast as it is, and with what holds it now."""
+def _enter_control(row: Array, control: int, before: int) -> None:
+    """Initialise a new control at the present position and velocity.
+
+    The integrators start with the acceleration that the thrust balances now.
+    """
     grounded = before in (OFF, IDLE)
     for axis in range(3):
-        known = in_plane(before) if axis < 2 else _vertical(before)
+        known = controls_horizontal(before) if axis < 2 else _controls_vertical(before)
         if not known:
             row[K_TARGET + axis] = row[K_POSITION + axis]
             row[K_TARGET_VELOCITY + axis] = row[K_VELOCITY + axis]
@@ -168,8 +178,8 @@ def _enter(row: Array, control: int, before: int) -> None:
 
 
 @njit(cache=False)
-def _stay(row: Array) -> None:
-    """On the ground: the target is where the vehicle stands, nothing is wound up."""
+def _reset_target(row: Array) -> None:
+    """Put the target where the vehicle stands and reset the integrators, on the ground."""
     for axis in range(3):
         row[K_TARGET + axis] = row[K_POSITION + axis]
         row[K_TARGET_VELOCITY + axis] = 0.0
@@ -179,7 +189,7 @@ def _stay(row: Array) -> None:
 
 @njit(cache=False)
 def _move_target(row: Array, axis: int, speed: float, accel: float) -> None:
-    """Integrate one axis of the target towards a speed; *accel* is what the limits allow now."""
+    """Integrate one axis of the target; *accel* is the acceleration that the limits allow."""
     target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, row[C_JERK] * GUIDE_S)
     row[K_TARGET_ACCEL + axis] = target_accel
     before = row[K_TARGET_VELOCITY + axis]
@@ -188,13 +198,14 @@ def _move_target(row: Array, axis: int, speed: float, accel: float) -> None:
 
 
 @njit(cache=False)
-def _shape_plane(row: Array, control: int) -> None:
+def _shape_horizontal(row: Array, control: int) -> None:
+    """Move the horizontal target by one guidance period."""
     limit = row[C_ACCEL]
     if control in (POSITION, POSITION_CLIMB):
         north = row[C_POSITION] + row[K_ORIGIN] - row[K_TARGET]
         east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_TARGET + 1]
         distance = sqrt(north * north + east * east)
-        speed = min(approach(distance, _POSITION_GAIN, _PLANE_SHARE * limit), row[C_SPEED])
+        speed = min(approach(distance, _POSITION_GAIN, _HORIZONTAL_BRAKE_SHARE * limit), row[C_SPEED])
         scale = speed / distance if distance > 1e-9 else 0.0
         north, east = north * scale, east * scale
     else:
@@ -214,7 +225,8 @@ def _shape_plane(row: Array, control: int) -> None:
 
 
 @njit(cache=False)
-def _shape_height(row: Array, control: int) -> None:
+def _shape_vertical(row: Array, control: int) -> None:
+    """Move the vertical target by one guidance period."""
     limit = row[C_ACCEL_Z]
     if control in (POSITION, VELOCITY_HEIGHT):
         left = row[C_POSITION + 2] + row[K_ORIGIN + 2] - row[K_TARGET + 2]
@@ -231,8 +243,8 @@ def _shape_height(row: Array, control: int) -> None:
 
 
 @njit(cache=False)
-def _wanted_accel(row: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
-    """Position and velocity loop of one axis [m/s^2]."""
+def _target_accel(row: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
+    """Return the acceleration [m/s^2] that position and velocity loop of one axis request."""
     error = row[K_TARGET + axis] - row[K_POSITION + axis]
     speed = row[K_TARGET_VELOCITY + axis] + approach(error, _POSITION_GAIN, 2.5)
     miss = speed - row[K_VELOCITY + axis]
@@ -244,7 +256,7 @@ def _wanted_accel(row: Array, axis: int, gain: float, integral: float, hold: boo
 
 
 @njit(cache=False)
-def _turn(row: Array) -> None:
+def _shape_yaw(row: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
     kind = int(row[C_YAW_MODE])
     if kind == 2:
@@ -262,8 +274,8 @@ def _turn(row: Array) -> None:
 
 
 @njit(cache=False)
-def _demand_angles(row: Array, roll: float, pitch: float) -> None:
-    """Demand a roll, a pitch and the yaw target."""
+def _set_target_angles(row: Array, roll: float, pitch: float) -> None:
+    """Set the target attitude from roll, pitch and the yaw target."""
     yaw = row[K_YAW_TARGET]
     row[K_TARGET_EULER] = roll
     row[K_TARGET_EULER + 1] = pitch
@@ -278,9 +290,14 @@ def _demand_angles(row: Array, roll: float, pitch: float) -> None:
 
 
 @njit(cache=False)
-def _lean(row: Array, north: float, east: float, lift: float) -> None:
-    """Demand the attitude whose thrust gives an acceleration in the plane at a *lift* [m/s^2 up, with
-    gravity].
+def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
+    """Set the target attitude whose thrust gives a horizontal acceleration.
+
+    Args:
+        row: State row.
+        north: Acceleration to the north [m/s^2].
+        east: Acceleration to the east [m/s^2].
+        lift: Vertical specific force, gravity included [m/s^2, up].
     """
     sy, cy = sine_cosine(row[K_YAW_TARGET])
     most = row[C_TILT]
@@ -291,12 +308,12 @@ def _lean(row: Array, north: float, east: float, lift: float) -> None:
     pitch = arc_tangent2(-forward, max(lift, 3.0))
     _, cp = sine_cosine(pitch)
     roll = arc_tangent2(right * cp, max(lift, 3.0))
-    _demand_angles(row, clip(roll, -most, most), clip(pitch, -most, most))
+    _set_target_angles(row, clip(roll, -most, most), clip(pitch, -most, most))
 
 
 @njit(cache=False)
-def _learn_hover(row: Array) -> None:
-    """Learn the collective that carries the weight, while the vehicle hardly accelerates."""
+def _learn_hover_throttle(row: Array) -> None:
+    """Adapt the hover throttle while the vehicle hardly accelerates."""
     steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
     level = row[K_ATTITUDE + 1] ** 2 + row[K_ATTITUDE + 2] ** 2 < 0.002
     if steady and level and abs(row[K_ACCEL + 2]) < 1.0:
@@ -307,63 +324,63 @@ def _learn_hover(row: Array) -> None:
 
 
 @njit(cache=False)
-def _rest(row: Array) -> None:
-    """Nothing is held: the vehicle stands or falls."""
-    _stay(row)
+def _hold_nothing(row: Array) -> None:
+    """Reset target and attitude: the vehicle stands, or falls."""
+    _reset_target(row)
     row[K_THROTTLE] = 0.0
     row[K_YAW_TARGET] = row[K_EULER + 2]
-    _demand_angles(row, 0.0, 0.0)
+    _set_target_angles(row, 0.0, 0.0)
 
 
 @njit(cache=False)
 def _follow_angles(row: Array) -> None:
-    """Roll and pitch as told, smoothed."""
+    """Low-pass the commanded roll and pitch into the target attitude."""
     share = GUIDE_S / _TC
     roll = row[K_TARGET_EULER] + share * (row[C_ROLL] - row[K_TARGET_EULER])
     pitch = row[K_TARGET_EULER + 1] + share * (row[C_PITCH] - row[K_TARGET_EULER + 1])
-    _demand_angles(row, roll, pitch)
+    _set_target_angles(row, roll, pitch)
 
 
 @njit(cache=False)
-def _follow_plane(row: Array, control: int) -> None:
-    """Lean so that the vehicle follows the target in the plane."""
-    _shape_plane(row, control)
+def _follow_horizontal(row: Array, control: int) -> None:
+    """Tilt so that the vehicle follows the horizontal target."""
+    _shape_horizontal(row, control)
     landed = row[K_LANDED] > 0.5
-    north = _wanted_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-    east = _wanted_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-    _lean(row, north, east, _GRAVITY)
+    north = _target_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+    east = _target_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+    _tilt_thrust(row, north, east, _GRAVITY)
 
 
 @njit(cache=False)
-def _follow_height(row: Array, control: int) -> None:
-    """Lift so that the vehicle follows the target in height."""
-    _shape_height(row, control)
+def _follow_vertical(row: Array, control: int) -> None:
+    """Set the collective so that the vehicle follows the vertical target."""
+    _shape_vertical(row, control)
     lower = row[K_AT_LOWER_LIMIT] > 0.5
-    down = _wanted_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
-    lift = clip(_GRAVITY - down, 0.0, _MOST_LIFT * _GRAVITY)
-    row[K_THROTTLE] = clip(row[K_HOVER_THROTTLE] * lift / _GRAVITY / _upright(row), 0.0, 1.0)
-    _learn_hover(row)
+    down = _target_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
+    lift = clip(_GRAVITY - down, 0.0, _MAX_LIFT * _GRAVITY)
+    row[K_THROTTLE] = clip(row[K_HOVER_THROTTLE] * lift / _GRAVITY / _cos_tilt(row), 0.0, 1.0)
+    _learn_hover_throttle(row)
 
 
 @njit(cache=False)
 def guide_multirotor(row: Array) -> None:
-    """One guidance period."""
+    """Run one guidance period: update the targets, the target attitude and the collective."""
     control = int(row[C_CONTROL])
     before = int(row[K_CONTROL])
     if control != before:
-        _enter(row, control, before)
+        _enter_control(row, control, before)
         row[K_CONTROL] = control
     if control in (OFF, IDLE):
-        _rest(row)
+        _hold_nothing(row)
         return
-    _turn(row)
+    _shape_yaw(row)
     if row[K_SPOOL] < 1.0 and row[K_LANDED] > 0.5:
-        _stay(row)
-    if in_plane(control):
-        _follow_plane(row, control)
+        _reset_target(row)
+    if controls_horizontal(control):
+        _follow_horizontal(row, control)
     else:
         _follow_angles(row)
     if control == ATTITUDE:
-        row[K_THROTTLE] = clip(row[C_THROTTLE] / _upright(row), 0.0, 1.0)
+        row[K_THROTTLE] = clip(row[C_THROTTLE] / _cos_tilt(row), 0.0, 1.0)
     else:
-        _follow_height(row, control)
+        _follow_vertical(row, control)

@@ -49,11 +49,12 @@ _SPEED_GAIN = 0.2  # ATC_SPEED_P [1/(m/s)]
 _SPEED_INTEGRAL = 0.2  # ATC_SPEED_I
 _POINT_GAIN = 0.7  # [1/s] of speed on the last metre
 _BRAKE_SHARE = 0.6  # of the acceleration limit: how a point is approached
-_CLOSE = 0.3  # [m]: where a rover stops chasing the point
+_CLOSE = 0.3  # [m] to a point, within which the rover stops
 
 
 @njit(cache=False)
 def _forward_speed(row: Array) -> float:
+    """Return the estimated speed along the heading [m/s]."""
     s, c = sine_cosine(row[K_EULER + 2])
     speed: float = row[K_VELOCITY] * c + row[K_VELOCITY + 1] * s
     return speed
@@ -61,7 +62,13 @@ def _forward_speed(row: Array) -> float:
 
 @njit(cache=False)
 def _steer_for(row: Array, rate: float, speed: float) -> float:
-    """Steering -1..1, right positive, that turns at *rate* clockwise [rad/s] at a *speed*."""
+    """Return the steering -1..1, right positive, that turns at a rate.
+
+    Args:
+        row: State row.
+        rate: Turn rate [rad/s, clockwise].
+        speed: Forward speed [m/s].
+    """
     if row[P_SKID_STEERED] > 0.5:
         return clip(rate / row[P_MAX_TURN_RATE], -1.0, 1.0)
     pace = speed if abs(speed) > 0.3 else (0.3 if speed >= 0.0 else -0.3)
@@ -71,7 +78,7 @@ def _steer_for(row: Array, rate: float, speed: float) -> float:
 
 @njit(cache=False)
 def _throttle_for(row: Array, wanted: float) -> float:
-    """A speed controller: feed-forward and PI."""
+    """Return the throttle -1..1 for a speed [m/s]: feed-forward and PI."""
     miss = wanted - _forward_speed(row)
     if wanted == 0.0 and abs(miss) < 0.05:
         row[K_SPEED_INTEGRAL] = 0.0
@@ -83,7 +90,7 @@ def _throttle_for(row: Array, wanted: float) -> float:
 
 @njit(cache=False)
 def _to_point(row: Array) -> tuple[float, float]:
-    """Speed and turn rate on the way to a point."""
+    """Return speed [m/s] and turn rate [rad/s] on the way to the commanded point."""
     north = row[C_POSITION] + row[K_ORIGIN] - row[K_POSITION]
     east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_POSITION + 1]
     distance = sqrt(north * north + east * east)
@@ -99,7 +106,7 @@ def _to_point(row: Array) -> tuple[float, float]:
 
 @njit(cache=False)
 def _along(row: Array) -> tuple[float, float]:
-    """Speed and turn rate as told."""
+    """Return the commanded speed [m/s] and turn rate [rad/s]."""
     kind = int(row[C_YAW_MODE])
     rate = 0.0
     if kind == 1:
@@ -111,7 +118,7 @@ def _along(row: Array) -> tuple[float, float]:
 
 @njit(cache=False)
 def guide_rover(row: Array) -> None:
-    """One guidance period."""
+    """Run one guidance period."""
     control = int(row[C_CONTROL])
     if control != int(row[K_CONTROL]):
         row[K_CONTROL] = control

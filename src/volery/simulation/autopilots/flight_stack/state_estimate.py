@@ -1,4 +1,4 @@
-"""What one autopilot knows at one grid step, and how its rows of numbers are read."""
+"""Estimate of one autopilot at one grid step: a read-only view of its part of the state row."""
 
 from __future__ import annotations
 
@@ -43,16 +43,28 @@ from volery.simulation.world.state_layout import (
     M_GYRO,
     M_MAG,
     M_RANGE,
+    S_AMPS,
+    S_CHARGE,
+    S_ENERGY,
+    S_VOLTS,
 )
 
 
 @dataclass(frozen=True, slots=True)
 class GpsFix:
-    """The receiver's last fix. Degrees, metres AMSL; velocity north, east, down m/s; ``fix_type`` as in
-    MAVLink.
+    """The receiver's last fix; without one, ``fix_type`` and ``satellites`` are 0 and the rest is outdated.
 
-    ``h_acc`` and ``v_acc`` are the receiver's declared standard deviations [m], ``eph`` and ``epv`` dilutions
-    of precision. Without a fix ``fix_type`` and ``satellites`` are 0 and the rest is stale.
+    Args:
+        fix_type: MAVLink GPS_FIX_TYPE.
+        latitude: Latitude [degrees].
+        longitude: Longitude [degrees].
+        amsl: Height above mean sea level [m].
+        velocity: North, east, down [m/s].
+        h_acc: Declared standard deviation of each horizontal axis [m]; likewise ``v_acc`` of the height.
+        speed_acc: Declared standard deviation of the velocity [m/s].
+        eph: Horizontal dilution of precision; likewise ``epv`` vertical.
+        satellites: Number of satellites in use.
+        count: Number of fixes so far.
     """
 
     fix_type: int
@@ -71,7 +83,7 @@ class GpsFix:
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """What stays the same about a vehicle and is needed to read its estimate."""
+    """Constants of a vehicle that are needed to read its estimate."""
 
     frame: LocalFrame
     flying: bool
@@ -80,7 +92,7 @@ class Airframe:
 
 
 def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
-    """The receiver's sample among *sensed*, a row of measurements from ``M_GYRO`` on, as a fix."""
+    """Return the receiver's sample as a fix; *sensed* are the measurements from ``M_GYRO`` on."""
     north, east, down, *velocity = sensed[M_GPS - M_GYRO : M_GPS_VELOCITY - M_GYRO + 3]
     latitude, longitude, amsl = about.frame.from_ned((north, east, down))
     kind = int(sensed[M_GPS_FIX - M_GYRO])
@@ -102,17 +114,22 @@ def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
 
 
 class Estimate:
-    """What one autopilot knows at one grid step: an immutable snapshot, converted only where asked."""
+    """Estimate and measurements of one autopilot at one grid step; immutable, converted on access.
+
+    Args:
+        about: Constants of the vehicle.
+        time: Time of the grid step [ns].
+        rows: Columns from K_POSITION to VISIBLE, from M_GYRO to SAMPLES_END, and from S_CHARGE to S_AMPS.
+    """
 
     __slots__ = ("__dict__", "_about", "_memory", "_sensed", "_state", "time")
 
     def __init__(self, about: Airframe, time: Ns, rows: tuple[list[float], list[float], list[float]]) -> None:
         self._about = about
         self.time = time
-        """Of the grid step whose state this is [ns]."""
         self._memory, self._sensed, self._state = rows
 
-    def _one(self, column: int) -> float:
+    def _value(self, column: int) -> float:
         return self._memory[column - K_POSITION]
 
     def _vector(self, column: int) -> Vector:
@@ -137,32 +154,32 @@ class Estimate:
 
     @property
     def position(self) -> Vector:
-        """North, east, down about the estimator's origin [m]."""
+        """Position north, east, down about the estimator's origin [m]."""
         return self._about_origin(K_POSITION)
 
     @cached_property
     def geodetic(self) -> Vector:
-        """Estimated latitude, longitude [degrees] and metres AMSL."""
+        """Estimated latitude and longitude [degrees] and height AMSL [m]."""
         return self._about.frame.from_ned(self._vector(K_POSITION))
 
     @cached_property
     def origin(self) -> Vector:
-        """Latitude, longitude and metres AMSL of the estimator's origin."""
+        """Latitude and longitude [degrees] and height AMSL [m] of the estimator's origin."""
         return self._about.frame.from_ned(self._vector(K_ORIGIN))
 
     @property
     def origin_ned(self) -> Vector:
-        """The estimator's origin: north, east, down about the world's [m]."""
+        """The estimator's origin, north, east, down about the world's [m]."""
         return self._vector(K_ORIGIN)
 
     @property
     def velocity(self) -> Vector:
-        """North, east, down [m/s]."""
+        """Velocity north, east, down [m/s]."""
         return self._vector(K_VELOCITY)
 
     @property
     def acceleration(self) -> Vector:
-        """North, east, down, without gravity [m/s^2]."""
+        """Acceleration without gravity, north, east, down [m/s^2]."""
         return self._vector(K_ACCEL)
 
     @property
@@ -172,104 +189,104 @@ class Estimate:
 
     @property
     def quaternion(self) -> Quaternion:
-        """Forward, right, down to north, east, down; (w, x, y, z)."""
+        """Quaternion (w, x, y, z) from forward, right, down to north, east, down."""
         return self._four(K_ATTITUDE)
 
     @property
     def rates(self) -> Vector:
-        """About forward, right, down, without the estimated gyro bias [rad/s]."""
+        """Body rates about forward, right, down, less the estimated gyro bias [rad/s]."""
         return self._vector(K_RATES)
 
     @property
     def attitude_ok(self) -> bool:
-        """Tilt and heading are aligned."""
-        return self._one(K_ALIGNED) > 0.5
+        """Whether tilt and heading are initialised."""
+        return self._value(K_ALIGNED) > 0.5
 
     @property
     def position_ok(self) -> bool:
-        """Position and velocity in the plane are aided by satellites, or were within the last ten seconds."""
-        return self._one(K_AIDED) > 0.5 and self._one(K_GPS_AGE) < 10.0
+        """Whether horizontal position and velocity are aided by satellites, or were within ten seconds."""
+        return self._value(K_AIDED) > 0.5 and self._value(K_GPS_AGE) < 10.0
 
     @property
     def gps_age(self) -> float:
-        """Seconds since the estimator last used a fix."""
-        return self._one(K_GPS_AGE)
+        """Time since the estimator last fused a fix [s]."""
+        return self._value(K_GPS_AGE)
 
     @property
-    def spread(self) -> tuple[float, float, float, float]:
-        """The estimator's own standard deviations: plane, height [m]; speed in the plane, up [m/s]."""
+    def sigmas(self) -> tuple[float, float, float, float]:
+        """Standard deviations: horizontal, vertical position [m]; the same of velocity [m/s]."""
         return self._four(K_SIGMA)
 
     @property
     def heading_error(self) -> float:
-        """Last difference of compass and estimate [rad]."""
-        return self._one(K_HEADING_ERROR)
+        """Last magnetometer heading less the estimate [rad]."""
+        return self._value(K_HEADING_ERROR)
 
     @property
     def gps_innovation(self) -> float:
-        """Last difference of fix and estimate in the plane, in standard deviations of it."""
-        return self._one(K_GPS_INNOVATION)
+        """Last horizontal innovation of a fix, in its standard deviations."""
+        return self._value(K_GPS_INNOVATION)
 
     @property
     def gyro(self) -> Vector:
-        """Raw: forward, right, down [rad/s]."""
+        """Gyroscope sample, forward, right, down [rad/s]."""
         return self._sample(M_GYRO)
 
     @property
     def accel(self) -> Vector:
-        """Raw specific force: forward, right, down [m/s^2]; at rest (0, 0, -9.8)."""
+        """Accelerometer sample, forward, right, down [m/s^2]; at rest (0, 0, -9.8)."""
         return self._sample(M_ACCEL)
 
     @property
     def mag(self) -> Vector:
-        """Raw field: forward, right, down [gauss]."""
+        """Magnetometer sample, forward, right, down [gauss]."""
         return self._sample(M_MAG)
 
     @property
     def baro_altitude(self) -> float:
-        """The barometer's height about the world's origin [m up]."""
+        """Barometer sample as height about the world's origin [m up]."""
         return self._sensed[M_BARO - M_GYRO]
 
     @property
     def pressure(self) -> float:
-        """Absolute [hPa], by the standard atmosphere at the barometer's height AMSL."""
+        """Absolute pressure [hPa], by the standard atmosphere at the barometer's height AMSL."""
         return float(pressure_at(self._about.frame.amsl + self._sensed[M_BARO - M_GYRO])) / 100.0
 
     @property
     def rangefinder(self) -> float | None:
-        """Metres to the ground along the body's down axis; None out of range."""
+        """Distance to the ground along the body's down axis [m]; None out of range."""
         distance = self._sensed[M_RANGE - M_GYRO]
         return distance if distance >= 0.0 else None
 
     @cached_property
     def gps(self) -> GpsFix:
-        """The last fix."""
+        """The receiver's last fix."""
         return _fix_of(self._about, self._sensed)
 
     @property
     def battery_volts(self) -> float:
-        """At the terminals [V]."""
-        return self._state[2]
+        """Battery voltage at the terminals [V]."""
+        return self._state[S_VOLTS - S_CHARGE]
 
     @property
     def battery_amps(self) -> float:
-        """Drawn [A]."""
-        return self._state[3]
+        """Battery current [A]."""
+        return self._state[S_AMPS - S_CHARGE]
 
     @property
     def battery_used_mah(self) -> float:
-        """Charge drawn since the pack was full [mAh]."""
+        """Charge drawn since the battery was full [mAh]."""
         return self._state[0] / 3.6
 
     @property
     def battery_left(self) -> float:
-        """Fraction of the capacity left, 0..1."""
+        """Fraction of the battery charge left, 0..1."""
         return max(0.0, 1.0 - self._state[0] / self._about.capacity_as)
 
     @property
     def battery_energy_j(self) -> float:
-        """Energy drawn at the terminals since the start [J]."""
-        return self._state[1]
+        """Energy drawn from the battery since the start [J]."""
+        return self._state[S_ENERGY - S_CHARGE]
 
     @property
     def motors(self) -> tuple[float, float, float, float]:
@@ -278,9 +295,7 @@ class Estimate:
 
     @property
     def motor_pwm(self) -> tuple[int, int, int, int]:
-        """Motor outputs as pulse widths [us]: 1000 stopped to 2000 full. Rover: steering and throttle about
-        1500.
-        """
+        """Motor outputs as pulse widths [us], 1000 to 2000; rover: steering and throttle about 1500."""
         if self._about.flying:
             first, second, third, fourth = (round(1000.0 + 1000.0 * motor) for motor in self.motors)
             return first, second, third, fourth
@@ -289,30 +304,30 @@ class Estimate:
 
     @property
     def throttle(self) -> float:
-        """Collective, 0..1 (rover: -1..1)."""
-        return self._one(K_THROTTLE)
+        """Collective 0..1; rover: throttle -1..1."""
+        return self._value(K_THROTTLE)
 
     @property
     def hover_throttle(self) -> float:
-        """Collective that is learnt to carry the weight."""
-        return self._one(K_HOVER_THROTTLE)
+        """Learnt collective in hover, 0..1."""
+        return self._value(K_HOVER_THROTTLE)
 
     @property
     def landed(self) -> bool:
-        """The landed detector is sure that it stands on the ground."""
-        return self._one(K_LANDED) > 0.5
+        """Whether the landed detector reports landed."""
+        return self._value(K_LANDED) > 0.5
 
     @property
     def target(self) -> Vector:
-        """Where the shaped target is: north, east, down about the estimator's origin [m]."""
+        """Shaped target position, north, east, down about the estimator's origin [m]."""
         return self._about_origin(K_TARGET)
 
     @property
     def target_velocity(self) -> Vector:
-        """Velocity of the shaped target: north, east, down [m/s]."""
+        """Velocity of the shaped target, north, east, down [m/s]."""
         return self._vector(K_TARGET_VELOCITY)
 
     @property
     def target_attitude(self) -> Vector:
-        """Roll, pitch, yaw that the attitude loop is asked for [rad]."""
+        """Roll, pitch, yaw target of the attitude loop [rad]."""
         return self._vector(K_TARGET_EULER)

@@ -84,7 +84,7 @@ def odometry(vehicle: Vehicle) -> Fields:
     p, q, r = estimate.rates
     x, y, z = estimate.position
     vx, vy, vz = estimate.velocity
-    plane, height, speed, climb = (spread**2 for spread in estimate.spread)
+    plane, height, speed, climb = (spread**2 for spread in estimate.sigmas)
     return {
         "time_usec": boot_us(vehicle),
         "frame_id": 1,
@@ -414,7 +414,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
 def estimator_status(vehicle: Vehicle) -> Fields:
     """ESTIMATOR_STATUS."""
     estimate = vehicle.estimate
-    plane, height, _, _ = estimate.spread
+    plane, height, _, _ = estimate.sigmas
     return {
         "time_usec": boot_us(vehicle),
         "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
