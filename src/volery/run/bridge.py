@@ -1,9 +1,8 @@
-"""``bridge``: a vehicle on a real ROS graph, under MAVROS's names, roscopter's or pprzros's, until it is
-stopped.
+"""``bridge``: a vehicle on a real ROS graph under the names of MAVROS, roscopter or pprzros.
 
-A vehicle that is out there lives in real time; a simulated one in a world of its own, whose time passes
-*speed* times as fast. Where an autopilot does not speak the protocol of the names, its driver hears and flies
-it, and an interpreter speaks for it.
+A real vehicle lives in real time, a simulated one in a world of its own whose time passes *speed* times as
+fast. If the names are made for another protocol than the autopilot's, the autopilot's driver decodes and
+commands it and an ``Interpreter`` presents it in the protocol of the names.
 """
 
 from __future__ import annotations
@@ -11,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, choices, did_you_mean
 from volery.base.geoid import EGM96_NAME, parse_geoid
@@ -31,34 +31,47 @@ from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.run.assembly.ros_graphs import GRAPHS
-from volery.run.assembly.simulated_vehicles import link_to, parse_simulated
+from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simulated
 from volery.run.assembly.vehicle_nodes import open_simulated_driver
 from volery.run.assembly.vehicles import EMBEDDED, RealGraphs, for_driver
 from volery.trace.events import Record, ignore
 from volery.vehicles.address import LOCAL_PORT, REPLY_PORT, Address, open_link, parse
 from volery.vehicles.driver import drivers
 
+if TYPE_CHECKING:
+    pass
+
+if TYPE_CHECKING:
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
+
 MAVLINK_NAMES: Mapping[str, NamingScheme] = {"mavros": MAVROS, "roscopter": ROSCOPTER}
 NAMES: Mapping[str, tuple[str, ...]] = {"MAVLink": tuple(MAVLINK_NAMES), "pprzlink": ("pprzros",)}
-"""By the protocol that they are made for; the first is usual. Those of MAVLink serve every autopilot."""
+"""By the protocol that the names are made for; the first is the default. MAVLink's serve every autopilot."""
 KNOWN = tuple(name for names in NAMES.values() for name in names)
 ON_A_GRAPH = (*GRAPHS, EMBEDDED)
 
 NAMESPACES: Mapping[str, str] = {"mavros": "/mavros", "roscopter": "/", "pprzros": "/"}
-"""Where a node of these names is on a real vehicle."""
+"""Namespace of a node with these names on a real vehicle."""
 
-T = TypeVar("T")
-
-FASTEST_HZ = 1000
-MOST_IDS = 255
+MAX_RATE_HZ = 1000
+MAX_SYSTEM_ID = 255
 
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeOptions:
-    """What is wanted. ``names`` and ``namespace`` are the usual ones if they are empty.
+    """Options of a bridge.
 
-    ``rate`` in hertz is what the autopilot is asked for, ``system`` the id that the bridge speaks as;
-    ``control``: roscopter's ``send_rc`` is taken. ``geoid``: see ``parse_geoid``.
+    Attributes:
+        url: Address of the vehicle.
+        graph: ``ros1`` or ``ros2``.
+        names: Set of names; empty for the default of the autopilot.
+        namespace: Namespace of the names; empty for the default of the set.
+        rate: Rate of telemetry that is requested from the autopilot, Hz; 0 requests nothing.
+        control: Accept roscopter's ``send_rc``.
+        system: MAVLink system id of the bridge.
+        geoid: See ``parse_geoid``.
+        speed: Simulated seconds per second, for a simulated vehicle.
+        seed: Seed of the simulation.
     """
 
     url: str
@@ -74,11 +87,16 @@ class BridgeOptions:
 
 
 class Bridge:
-    """It is on the graph as soon as it runs.
+    """A vehicle as a node of a real ROS graph, visible there while ``run`` runs.
 
-    Raises ``UsageError`` for what makes no sense, ``CapabilityError`` for names that do not go with the
-    autopilot, and what ``open_graph`` raises. *record* is told when links are lost and come back, and what
-    goes wrong.
+    Args:
+        wanted: Options.
+        record: Receives the events of links and warnings.
+
+    Raises:
+        UsageError: An option is wrong, or the graph is not available.
+        CapabilityError: The names do not fit the autopilot.
+        LinkError: The graph does not answer.
     """
 
     def __init__(self, wanted: BridgeOptions, record: Record = ignore) -> None:
@@ -91,31 +109,37 @@ class Bridge:
         self.kernel = VirtualKernel(record, pace=wanted.speed) if in_simulation else WallKernel(record)
         self._graphs = RealGraphs(self.kernel)
         self._interpreted = self.names not in _own_names(address)
-        way = self._interpreter if self._interpreted else self._way
         with ExitStack() as undo:
             undo.callback(self._graphs.close)
-            self._link = way(address, wanted)
+            self._link = (
+                self._interpreter(address, wanted)
+                if self._interpreted
+                else self._direct_link(address, wanted)
+            )
             undo.callback(self._link.close)
-            self._node = self._made(address, wanted)
+            self._node = self._make_node(address, wanted)
             undo.pop_all()
         self._node.start(ExecutionContext("bridge"), self.kernel.root)
 
-    def _way(self, address: Address, wanted: BridgeOptions) -> Link:
-        """To an autopilot that speaks the protocol of the names."""
+    def _direct_link(self, address: Address, wanted: BridgeOptions) -> Link:
+        """Return the link to an autopilot with the protocol of the names."""
         if address.carrier == "sim":
-            return _in_the_air(self.kernel, address, wanted.seed, link_to)
+            vehicle = parse_simulated(address, address.driver)
+            return _fleet(self.kernel, vehicle, wanted.seed).link_for(vehicle)
         address.only("baud", "system", LOCAL_PORT, REPLY_PORT)
         return open_link(self.kernel, address, drivers.load(address.driver).codec)
 
     def _interpreter(self, address: Address, wanted: BridgeOptions) -> Link:
-        """To one that does not."""
+        """Return a link to an interpreter, for an autopilot with another protocol."""
         name, factory = address.driver, drivers.load(address.driver)
         if address.carrier == "sim":
-            driver = _in_the_air(self.kernel, address, wanted.seed, open_simulated_driver)
+            vehicle = parse_simulated(address, address.driver)
+            fleet = _fleet(self.kernel, vehicle, wanted.seed)
+            driver = open_simulated_driver(self.kernel, fleet, vehicle, wanted.seed)
         elif address.carrier in GRAPHS:
             driver = self._graphs.driver(name, address)
         else:
-            assert factory.on_link is not None, "seen when the names were chosen"
+            assert factory.on_link is not None, "checked when the names were chosen"
             link = open_link(self.kernel, address, factory.codec)
             try:
                 driver = factory.on_link(self.kernel, link, name, for_driver(address))
@@ -124,7 +148,7 @@ class Bridge:
                 raise
         return MavlinkAdapter(self.kernel, driver, ExecutionContext("bridge"))
 
-    def _made(self, address: Address, wanted: BridgeOptions) -> VehicleNode | PprzrosNode:
+    def _make_node(self, address: Address, wanted: BridgeOptions) -> VehicleNode | PprzrosNode:
         graph = self._graphs.graph(wanted.graph)
         if self.names not in MAVLINK_NAMES:
             return PprzrosNode(graph, self._link, self.namespace)
@@ -142,15 +166,17 @@ class Bridge:
 
     @property
     def status(self) -> str:
-        """In one line: whom it hears, or what is wrong with the way there."""
-        return self._node.summary or f"hears no autopilot: {self._link.problem() or 'nothing has come yet'}"
+        """State of the connection in one line."""
+        return (
+            self._node.summary or f"no autopilot: {self._link.problem() or 'nothing has been received yet'}"
+        )
 
     def every(self, period: Ns, action: Callable[[], None]) -> None:
-        """Do something now and then each *period* while it runs."""
+        """Call *action* periodically while the bridge runs, from now on."""
         self.kernel.every(period, action)
 
     def run(self) -> None:
-        """Until the process is told to stop (``KeyboardInterrupt``)."""
+        """Run until ``KeyboardInterrupt``, then close the link and the graph."""
         try:
             self.kernel.run(FOREVER)
         finally:
@@ -162,20 +188,20 @@ class Bridge:
 def _check(wanted: BridgeOptions) -> None:
     if wanted.graph == "embedded":
         raise UsageError(
-            "the embedded graph is inside a run, where vehicles are bridged to it by themselves; "
-            f"from outside it is {choices(GRAPHS)}"
+            "the embedded graph is inside a run, which puts its vehicles on the graph itself; "
+            f"a bridge needs {choices(GRAPHS)}"
         )
-    if not 0 <= wanted.rate <= FASTEST_HZ:
-        raise UsageError(f"a rate of {wanted.rate} Hz: 1 to {FASTEST_HZ}, or 0 to ask for nothing")
-    if not 1 <= wanted.system <= MOST_IDS:
-        raise UsageError(f"{wanted.system} is no system id; 1 to {MOST_IDS} are")
+    if not 0 <= wanted.rate <= MAX_RATE_HZ:
+        raise UsageError(f"a rate of {wanted.rate} Hz: give 1 to {MAX_RATE_HZ}, or 0 to request nothing")
+    if not 1 <= wanted.system <= MAX_SYSTEM_ID:
+        raise UsageError(f"{wanted.system} is no system id; give 1 to {MAX_SYSTEM_ID}")
     if not 0.0 < wanted.speed < float("inf"):
-        raise UsageError(f"a speed of {wanted.speed:g}: simulated seconds per second, above 0")
+        raise UsageError(f"a speed of {wanted.speed:g}: give simulated seconds per second, above 0")
     parse_geoid(wanted.geoid)
 
 
 def _own_names(address: Address) -> tuple[str, ...]:
-    """The names that are made for the protocol in which the autopilot is reached there."""
+    """Return the names that are made for the protocol of the autopilot at *address*."""
     factory = drivers.load(address.driver)
     if factory.on_link is None or address.carrier in ON_A_GRAPH:
         return ()
@@ -183,8 +209,8 @@ def _own_names(address: Address) -> tuple[str, ...]:
 
 
 def _names(address: Address, wanted: str) -> str:
-    """Which set of names it is."""
-    _check_where(address, wanted)
+    """Return the set of names."""
+    _check_graph_names(address, wanted)
     own = _own_names(address)
     valid = (*own, *(name for name in MAVLINK_NAMES if name not in own))
     if not wanted:
@@ -200,28 +226,26 @@ def _names(address: Address, wanted: str) -> str:
     return wanted
 
 
-def _check_where(address: Address, wanted: str) -> None:
-    """A vehicle that is on a graph under names of its own gets others if they are asked for."""
+def _check_graph_names(address: Address, wanted: str) -> None:
+    """Check that a vehicle which is a ROS node itself is bridged under other names than its own."""
     factory = drivers.load(address.driver)
     if factory.on_link is not None and address.carrier not in ON_A_GRAPH:
         return
     own = factory.graph_names
     if own in MAVLINK_NAMES or address.carrier == EMBEDDED:
         raise CapabilityError(
-            f"{address}: that vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
+            f"{address}: the vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
         )
     if wanted in ("", own):
         served = f"`volery serve {address.driver} --graph ros1`"
         raise CapabilityError(
-            f"{address}: {address.driver} is on a graph by itself, under {own}'s names "
-            f"(a simulated one: {served}); for others say --names {choices(MAVLINK_NAMES)}"
+            f"{address}: {address.driver} is a ROS node itself, under {own}'s names "
+            f"(a simulated one: {served}); for other names give --names {choices(MAVLINK_NAMES)}"
         )
 
 
-def _in_the_air(kernel: Kernel, address: Address, seed: int, reach: Callable[..., T]) -> T:
-    """What *reach* makes of a simulated vehicle in a world of its own."""
-
+def _fleet(kernel: Kernel, vehicle: SimulatedVehicle, seed: int) -> SimulatedFleet:
+    """Return a fleet of one vehicle in a world of its own."""
     from volery.run.assembly.simulated_fleet import fleet_of
 
-    wanted = parse_simulated(address, address.driver)
-    return reach(kernel, fleet_of(kernel, [wanted], seed), wanted, seed)
+    return fleet_of(kernel, [vehicle], seed)

@@ -1,4 +1,4 @@
-"""``connect`` and ``connect_fleet``: vehicles for a script or a REPL."""
+"""``connect`` and ``connect_fleet``: vehicles for a script or an interactive session."""
 
 from __future__ import annotations
 
@@ -26,14 +26,24 @@ def connect(
     limits: Limits | None = None,
     fence: Fence | None = None,
 ) -> Iterator[V]:
-    """The vehicle at *url*, heard of, for as long as the context lasts: a ``Drone``, or *kind*.
+    """Connect to the vehicle at *url* and yield it as soon as its telemetry arrives.
 
-    Works in a plain script and in a REPL. A simulated vehicle (``sim:ardupilot``) lives in virtual time: that
-    passes while a call blocks and stands still while the script thinks. A real one lives in real time. When
-    the context is left, an armed vehicle that nobody else has is brought down.
+    Works in a plain script and in an interactive session. A simulated vehicle (``sim:ardupilot``) lives in
+    virtual time, which passes only while a call blocks. A real vehicle lives in real time. At the end of the
+    context an armed vehicle lands, unless an operator has taken it over.
 
-    Raises ``UsageError`` for an address that makes no sense, ``LinkSilent`` or ``LinkGarbled`` if no
-    autopilot is heard there, ``CapabilityError`` if what answers is of another kind.
+    Args:
+        url: Address, such as ``sim:px4`` or ``ardupilot+serial:///dev/ttyUSB0``.
+        kind: ``Drone`` or ``Rover``.
+        seed: Seed of the simulation.
+        limits: Limits that every operation must keep.
+        fence: Geofence that every operation must keep.
+
+    Raises:
+        UsageError: The address is wrong, or the fence excludes home.
+        LinkSilent: No autopilot answers at the address.
+        LinkGarbled: Something else than the expected protocol arrives.
+        CapabilityError: The autopilot that answers is of another kind.
     """
     name = parse(url).driver
     with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
@@ -56,7 +66,7 @@ def connect_fleet(
     limits: Limits | None = None,
     fence: Fence | None = None,
 ) -> Iterator[Fleet]:
-    """Several vehicles, by the names that *urls* gives them, all heard of: as ``connect`` does for one.
+    """Connect to several vehicles, as ``connect`` does to one, and yield them as a fleet.
 
     ```python
     with connect_fleet({"a": "sim:px4", "b": "sim:ardupilot"}) as fleet:
@@ -64,18 +74,26 @@ def connect_fleet(
         fleet["a"].goto(...)
     ```
 
-    Any mix of autopilots, all simulated (in one world, on one clock) or all real. Vehicles behind one radio
-    or one UDP port say which they are: ``ardupilot+udp://:14550?system=2``. *kind* may differ by name; a
-    vehicle that is not in it is a ``Drone``. *limits* and *fence* hold for each.
+    The autopilots may differ. Either all vehicles are simulated, in one world and on one clock, or all are
+    real. Vehicles behind one radio or one UDP port need a system id: ``ardupilot+udp://:14550?system=2``.
 
-    Raises what ``connect`` raises; ``FleetError`` if some of them are not heard.
+    Args:
+        urls: Addresses by vehicle name.
+        kind: Kind of all vehicles, or of each by name; a vehicle without an entry is a ``Drone``.
+        seed: Seed of the simulation.
+        limits: Limits of each vehicle.
+        fence: Geofence of each vehicle.
+
+    Raises:
+        FleetError: Some of the vehicles do not answer.
+        VoleryError: As for ``connect``.
     """
     if not urls:
-        raise UsageError("a fleet of no vehicles; give at least one name and its address")
+        raise UsageError("a fleet needs at least one vehicle; give its name and its address")
     kinds = {name: kind if isinstance(kind, type) else kind.get(name, Drone) for name in urls}
     with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
-        fleet.each(lambda vehicle: vehicle.wait_connected(), "be heard")
+        fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
         try:
             yield fleet
         finally:
@@ -87,7 +105,7 @@ def connect_fleet(
 def _opened(
     urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> Iterator[OpenedVehicles]:
-    """Vehicles for the flow of control that calls this."""
+    """Open vehicles for the calling thread and close them at the end."""
     opened = open_vehicles(urls, kinds, stated)
     kernel = opened.kernel
     if isinstance(kernel, WallKernel):

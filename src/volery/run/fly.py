@@ -1,4 +1,4 @@
-"""``fly``: mission code on vehicles, simulated or real."""
+"""``fly``: mission code on simulated or real vehicles."""
 
 from __future__ import annotations
 
@@ -24,8 +24,16 @@ from volery.run.ending import Ending
 from volery.run.progress import LostLinkReporter, ProgressReporter
 from volery.run.recording import Recording
 from volery.run.result import DEFAULT_OPTIONS, Options, Run
-from volery.run.trace_setup import setup_of_flight
+from volery.trace.attachments import (
+    WORLD_ATTACHMENT,
+    Origin,
+    RunSetup,
+    Scenery,
+    VehicleSetup,
+    scenery_to_json,
+)
 from volery.trace.events import Failure
+from volery.trace.mcap_writer import Attachment
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import parse
 
@@ -37,8 +45,12 @@ FUNCTION = "mission"
 
 @dataclass(frozen=True, kw_only=True)
 class Restrictions:
-    """What holds instead of what a mission's file states: ``fence`` for its ``FENCE``; ``highest`` (metres
-    above home) and ``battery_reserve`` (0..1) for those of its ``LIMITS``.
+    """Limits that override those of a mission file.
+
+    Attributes:
+        fence: Geofence in the place of the file's ``FENCE``.
+        highest: Greatest height above home in metres.
+        battery_reserve: Battery reserve, 0 to 1.
     """
 
     fence: Fence | None = None
@@ -46,7 +58,7 @@ class Restrictions:
     battery_reserve: float | None = None
 
     def applied_to(self, limits: Limits | None) -> Limits | None:
-        """*limits* with what is stated here."""
+        """Return *limits* with these restrictions."""
         stated = {"highest": self.highest, "battery_reserve": self.battery_reserve}
         changed = {name: value for name, value in stated.items() if value is not None}
         return replace(limits or Limits(), **changed) if changed else limits
@@ -61,19 +73,29 @@ def fly(
     options: Options = DEFAULT_OPTIONS,
     restrictions: Restrictions = NO_RESTRICTIONS,
 ) -> Run:
-    """Fly *mission* (a function, or a file that defines ``mission``) on the vehicle at the address *on*.
+    """Fly a mission on one or several vehicles and return its record.
 
-    A file's ``HOME`` is where simulated vehicles stand, its ``FENCE`` and ``LIMITS`` hold for all vehicles;
-    *restrictions* override these. With several addresses each vehicle flies it, all at once. The parameter's
-    annotation says whether the mission is for a ``Drone`` (also without one) or a ``Rover``. Simulated
-    vehicles fly in virtual time, real ones in real time.
+    Simulated vehicles fly in virtual time, real ones in real time. The annotation of the mission's parameter
+    chooses ``Drone`` (also without an annotation) or ``Rover``.
 
-    Raises ``UsageError`` and ``ModelError`` before anything has started; what happens later is in the
-    ``Run``.
+    Args:
+        mission: A function of one vehicle, or a Python file that defines ``mission``. The file may also
+            define ``HOME`` (of simulated vehicles), ``FENCE`` and ``LIMITS``.
+        on: Address of the vehicle, such as ``sim:ardupilot``, or several. With several addresses all vehicles
+            fly the mission at the same time.
+        options: Seed, pace, run folder and progress reports.
+        restrictions: Override ``FENCE`` and ``LIMITS`` of the file.
+
+    Returns:
+        The run. An error during the flight is its ``error`` and is not raised.
+
+    Raises:
+        UsageError: An address, the file or its definitions are wrong; nothing has started.
+        CapabilityError: The vehicles cannot be flown together or in this way; nothing has started.
     """
     urls = [on] if isinstance(on, str) else list(on)
     if not urls:
-        raise UsageError("fly: no address to fly on; sim:ardupilot is one")
+        raise UsageError("fly: no address is given; sim:ardupilot is one")
     return _Flight(mission, urls, options, restrictions).run()
 
 
@@ -88,21 +110,21 @@ class _Flight:
         restrictions: Restrictions,
     ) -> None:
         self._path = None if callable(mission) else Path(mission)
-        looked_at = mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION)
+        function = mission if callable(mission) else load_function(Loader(), Path(mission), FUNCTION)
         stated = VehicleSettings(
             seed=options.seed,
             pace=options.pace,
-            home=home_of(looked_at),
-            limits=restrictions.applied_to(_beside(looked_at, "LIMITS", Limits)),
-            fence=restrictions.fence or _beside(looked_at, "FENCE", Fence),
+            home=home_of(function),
+            limits=restrictions.applied_to(_global_of(function, "LIMITS", Limits)),
+            fence=restrictions.fence or _global_of(function, "FENCE", Fence),
         )
         named = names_of(urls)
-        self._opened: OpenedVehicles = open_vehicles(named, dict.fromkeys(named, kind_of(looked_at)), stated)
+        self._opened: OpenedVehicles = open_vehicles(named, dict.fromkeys(named, kind_of(function)), stated)
         self._kernel = kernel = self._opened.kernel
         self._mission = self._load(mission, options.seed)
         self._ending = Ending(kernel)
         self._ending.vehicles = self._opened.vehicles
-        setup, attachments = setup_of_flight(self._path, urls, self._opened, options.seed)
+        setup, attachments = self._setup(urls, options.seed)
         self._recording = Recording(setup, options.out, attachments)
         kernel.record = self._recording.stream
         if options.tell is not None:
@@ -111,18 +133,38 @@ class _Flight:
         self._states.sample()
         if options.show is not None:
             self._recording.stream.tap(ProgressReporter(kernel, 0, self._states.progress, options.show))
-        self._under_way = len(self._opened.vehicles)
+        self._flying = len(self._opened.vehicles)
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
-        """In virtual time a file gets stand-ins for ``time`` and ``random``, as a component's does."""
+        """Return the mission; in virtual time a file gets virtual ``time`` and ``random`` modules."""
         if callable(mission):
             return mission
         modules = virtual_modules(self._kernel, seed) if isinstance(self._kernel, VirtualKernel) else {}
         loaded: Mission = load_function(Loader(modules), Path(mission), FUNCTION)
         return loaded
 
+    def _setup(self, urls: Sequence[str], seed: int) -> tuple[RunSetup, list[Attachment]]:
+        """Return the header of the trace, the map, and the text of the mission file."""
+        opened, path = self._opened, self._path
+        vehicles = tuple(
+            VehicleSetup(
+                vehicle.name, parse(url).driver, "multirotor" if isinstance(vehicle, Drone) else "rover"
+            )
+            for vehicle, url in zip(opened.vehicles, urls, strict=True)
+        )
+        fidelity = "code" if opened.fleet else "hardware"
+        setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
+        attachments = []
+        if opened.fleet is not None:
+            origin = opened.fleet.frame
+            scenery = Scenery(Origin(origin.latitude, origin.longitude, origin.amsl))
+            attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", scenery_to_json(scenery)))
+        if path is not None:
+            attachments.append(Attachment(path.name, "text/x-python", path.read_bytes()))
+        return setup, attachments
+
     def run(self) -> Run:
-        """Start, let time pass, end in order, close the books; also if the house itself has a fault."""
+        """Start, let time pass, end in order and finish the recording, even after an internal error."""
         kernel, ending = self._kernel, self._ending
         register_kernel(kernel)
         for vehicle in self._opened.vehicles:
@@ -153,8 +195,8 @@ class _Flight:
             failed = ComponentError(FUNCTION, describe(error))
             failed.__cause__ = error
             self._fail(failed)
-        self._under_way -= 1
-        if not self._under_way:
+        self._flying -= 1
+        if not self._flying:
             with self._kernel.guard:
                 self._ending.begin("completed", "the mission is over")
 
@@ -165,7 +207,7 @@ class _Flight:
 
 
 def kind_of(mission: Mission) -> type[Vehicle]:
-    """``Drone`` or ``Rover``: what the mission's first parameter is annotated with, a drone if it is not."""
+    """Return ``Rover`` if the mission's parameter is annotated so, else ``Drone``."""
     try:
         names = list(signature(mission).parameters)
         hints = get_type_hints(mission)
@@ -180,29 +222,25 @@ def kind_of(mission: Mission) -> type[Vehicle]:
 
 
 def names_of(urls: Sequence[str]) -> dict[str, str]:
-    """The addresses by the names of their vehicles: the autopilot's, with a number if there are several."""
-    autopilots = [parse(url).driver for url in urls]
+    """Return the addresses by vehicle name: that of the driver, with a number if there are several."""
     if len(urls) == 1:
-        return {autopilots[0]: urls[0]}
-    return {
-        f"{autopilot}_{number}": url
-        for number, (autopilot, url) in enumerate(zip(autopilots, urls, strict=True), 1)
-    }
+        return {parse(urls[0]).driver: urls[0]}
+    return {f"{parse(url).driver}_{number}": url for number, url in enumerate(urls, 1)}
 
 
 def home_of(mission: Mission) -> Position:
-    """Where simulated vehicles stand: the ``HOME`` beside the mission in its file, if there is one."""
+    """Return the home of simulated vehicles: ``HOME`` of the mission's file, or the default."""
     home = getattr(mission, "__globals__", {}).get("HOME", HOME)
     if not isinstance(home, Position) or not isinstance(home.altitude, AMSL):
-        raise UsageError(f"HOME is {home!r}; state it as Position(LATITUDE, LONGITUDE, AMSL(METRES))")
+        raise UsageError(f"HOME is {home!r}; write Position(LATITUDE, LONGITUDE, AMSL(METRES))")
     return home
 
 
 T = TypeVar("T")
 
 
-def _beside(mission: Mission, name: str, kind: type[T]) -> T | None:
-    """What the mission's file states under that *name*; ``None`` if it does not."""
+def _global_of(mission: Mission, name: str, kind: type[T]) -> T | None:
+    """Return the global *name* of the mission's file, or None."""
     found = getattr(mission, "__globals__", {}).get(name)
     if found is not None and not isinstance(found, kind):
         raise UsageError(f"{name} is {found!r}; state it as volery.{kind.__name__}(...)")

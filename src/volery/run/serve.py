@@ -1,4 +1,4 @@
-"""``serve``: a simulated vehicle for ground stations, MAVSDK, MAVProxy, nodes or a script of your own."""
+"""``serve``: a simulated vehicle for ground stations, client libraries, ROS nodes or a script."""
 
 from __future__ import annotations
 
@@ -18,16 +18,23 @@ from volery.vehicles.address import Address, listen, parse_listen
 
 
 def has_links(autopilot: str) -> bool:
-    """Whether a simulated *autopilot* is reached over links; else over a graph."""
+    """Return True if a simulated *autopilot* is reached over links, False if over a ROS graph."""
     return firmwares.load(autopilot).codec is not None
 
 
 class VehicleServer:
-    """One simulated vehicle, reachable at *address* in virtual time that passes *speed* times as fast as real
-    time; ``None``: where those who fly its firmware usually listen.
+    """One simulated vehicle that is served over links.
 
-    TCP serves any number of clients; UDP sends to a host, or answers the first who speaks. Raises
-    ``UsageError`` for an address that cannot be opened, and for a firmware that has no links.
+    TCP serves any number of clients. UDP sends to a host, or answers the first client that sends.
+
+    Args:
+        wanted: The vehicle.
+        address: Where to serve it; None for the addresses at which ground stations expect its firmware.
+        speed: Simulated seconds per second.
+        seed: Seed of the simulation.
+
+    Raises:
+        UsageError: The address cannot be opened, or the firmware has no links.
     """
 
     def __init__(
@@ -52,9 +59,7 @@ class VehicleServer:
         self.links[place].send_bytes(self._autopilot.banner)
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serve until the process is told to stop (``KeyboardInterrupt``). *ready* is called once it can be
-        reached.
-        """
+        """Call *ready* and serve until ``KeyboardInterrupt``."""
         ready()
         try:
             self.kernel.run(FOREVER)
@@ -65,10 +70,18 @@ class VehicleServer:
 
 
 class VehicleNodeServer:
-    """One simulated vehicle as a node of a real ROS graph (``ros1``, ``ros2``), under *namespace*; by default
-    as its own node is called on a real aircraft.
+    """One simulated vehicle that is served as a node of a real ROS graph.
 
-    Raises ``UsageError`` for a firmware that speaks on links, and what ``open_graph`` raises.
+    Args:
+        wanted: The vehicle.
+        graph: ``ros1`` or ``ros2``.
+        namespace: Namespace of the node; by default that of the node of a real aircraft.
+        speed: Simulated seconds per second.
+        seed: Seed of the simulation.
+
+    Raises:
+        UsageError: The firmware is reached over links, or the graph is not available.
+        LinkError: The graph does not answer.
     """
 
     def __init__(
@@ -78,7 +91,7 @@ class VehicleNodeServer:
         self.fleet: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
         if self.fleet.family(name).codec is not None:
-            raise UsageError(f"{name}: a simulated {wanted.vehicle.autopilot} is no node; it speaks on links")
+            raise UsageError(f"{name}: a simulated {wanted.vehicle.autopilot} has a link and no ROS node")
         usual = graph_access(wanted.vehicle.autopilot, name).namespace.removeprefix(f"/{name}")
         self.namespace = namespace or usual
         self.graph = open_graph(self.kernel, graph)

@@ -123,7 +123,7 @@ class _Simulation:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        builder = Builder(self._system, self._kernel, platform, self._airfield, self._ending)
+        builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending)
         return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
     def prepare(self) -> None:
@@ -132,7 +132,7 @@ class _Simulation:
         platform = self._platform()
         setup = self._setup(platform)
         surroundings = system.environment
-        self._airfield = SimulatedFleet(
+        self._fleet = SimulatedFleet(
             kernel,
             system.vehicles,
             surroundings.origin,
@@ -150,16 +150,14 @@ class _Simulation:
             self._recording.stream.tap(self._goal)
             kernel.every(GOAL_PERIOD, self._look_at_goal)
         if options.show is not None:
-            reporter = ProgressReporter(
-                kernel, system.limits.duration_ns, self._airfield.progress, options.show
-            )
+            reporter = ProgressReporter(kernel, system.limits.duration_ns, self._fleet.progress, options.show)
             self._recording.stream.tap(reporter)
-        self._feed = PowerFeed(kernel, platform, self._airfield)
-        self._airfield.sample()
+        self._feed = PowerFeed(kernel, platform, self._fleet)
+        self._fleet.sample()
         affected = Affected(
             kernel,
-            self._airfield,
-            FleetLinks(self._airfield),
+            self._fleet,
+            FleetLinks(self._fleet),
             surroundings.wind,
             platform.processors,
             platform.networks,
@@ -194,7 +192,7 @@ class _Simulation:
     def _close(self, left: Sequence[str]) -> Run:
         now, ending = self._kernel.now(), self._ending
         self._built.finish()
-        self._airfield.record_states()
+        self._fleet.record_states()
         for warning in self._built.warnings():
             self._recording.stream(Text(now, WHO, WARNING, warning))
         verdicts = self._observers.verdicts(now)
@@ -203,7 +201,7 @@ class _Simulation:
 
 
 class _OnGraph(_Simulation):
-    """One execution of ``simulate`` on a real graph: components are processes, see ``volery.run.distributed``."""
+    """One execution of ``simulate`` on a real graph; see ``volery.run.distributed``."""
 
     def __init__(self, system: System, options: Options) -> None:
         pace = options.pace or 1.0
@@ -223,7 +221,7 @@ class _OnGraph(_Simulation):
         return setup_of(unallocated(self._system), platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        return self._apart.build(platform, self._airfield)
+        return self._apart.build(platform, self._fleet)
 
     def _start(self) -> None:
         self._apart.start()

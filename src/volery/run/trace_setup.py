@@ -1,10 +1,8 @@
-"""A run's circumstances for its trace: the setup, the map and the model's own text."""
+"""Header and attachments of the trace of a simulation: the setup, the map, the text of the model."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from volery.cost import NOT_COUNTED, Basis, ProcessorPrices
 from volery.model.components import CPP_LANGUAGES
@@ -13,6 +11,7 @@ from volery.model.instances import Instance
 from volery.model.system import Processor, System
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.cpp import core_of
+from volery.run.assembly.vehicle_nodes import node_name
 from volery.trace.attachments import (
     MODEL_ATTACHMENT,
     WORLD_ATTACHMENT,
@@ -32,21 +31,16 @@ from volery.trace.attachments import (
 )
 from volery.trace.events import NONE
 from volery.trace.mcap_writer import Attachment
-from volery.vehicles import Drone
-from volery.vehicles.address import parse
-
-if TYPE_CHECKING:
-    from volery.run.assembly.vehicles import OpenedVehicles
 
 ALWAYS_LEFT_OUT = (
     "the operating system and everything else that runs on a computer",
     "caches and memory traffic that components share",
 )
-"""What no figure of a run includes."""
+"""Costs that no figure of a run includes."""
 
 
 def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> RunSetup:
-    """The setup of a simulation of *system*."""
+    """Return the setup of a simulation of *system*."""
     return RunSetup(
         system=system.name,
         fidelity=fidelity,
@@ -109,7 +103,7 @@ def _processor(model: Processor, prices: ProcessorPrices) -> ProcessorSetup:
 
 
 def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetup]:
-    """One entry per kind of processor and law, whatever the number of computers of that kind."""
+    """Yield one entry for each kind of processor and law, whatever the number of computers of that kind."""
     first: dict[str, Processor] = {}
     for one in system.processors:
         first.setdefault(one.kind, one)
@@ -121,7 +115,7 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
 
 
 def _code_bases(system: System, prices: ProcessorPrices, kind: str) -> Iterable[Basis]:
-    """The laws that the code of components is counted by, as far as there are such components."""
+    """Yield the laws of counted code that apply to at least one component."""
     kinds = {one.name: one.kind for one in system.processors}
     there = [one for one in system.instances if kinds.get(one.processor or "") == kind and one.component.path]
     if any(one.component.language not in CPP_LANGUAGES for one in there):
@@ -131,7 +125,7 @@ def _code_bases(system: System, prices: ProcessorPrices, kind: str) -> Iterable[
 
 
 def _missing_networks(system: System) -> Iterable[str]:
-    """Connections between two processors that no network joins."""
+    """Yield the connections between two processors that no network joins."""
     where = {instance.name: instance.processor for instance in system.instances}
     for instance in system.instances:
         for connection in instance.connections.values():
@@ -141,11 +135,11 @@ def _missing_networks(system: System) -> Iterable[str]:
                     yield f"{instance.name} calls {target} in no time: no network joins {here} and {there}"
 
 
-# -- what is attached
+# -- attachments
 
 
 def attachments_of(system: System) -> list[Attachment]:
-    """The map and the text of every file that the model was read from."""
+    """Return the map and the text of every file of the model."""
     scenery = scenery_to_json(scenery_of(system.environment))
     found = [Attachment(WORLD_ATTACHMENT, "application/json", scenery)]
     for number, source in enumerate(system.sources):
@@ -155,7 +149,7 @@ def attachments_of(system: System) -> list[Attachment]:
 
 
 def scenery_of(environment: Environment) -> Scenery:
-    """What there is to draw."""
+    """Return the map of an environment, for reports."""
     origin = environment.origin
     return Scenery(
         origin=Origin(origin.latitude, origin.longitude, origin.amsl),

@@ -214,7 +214,9 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     )
     assert stated == read
     for firmware in FIRMWARE.kinds.values():
-        assert set(firmware.rules.parameters.supported) <= {parameter.name for parameter in firmware.rules.parameters.defaults()}
+        assert set(firmware.rules.parameters.supported) <= {
+            parameter.name for parameter in firmware.rules.parameters.defaults()
+        }
     assert REAL32 == 9
 
 

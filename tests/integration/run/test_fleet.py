@@ -131,7 +131,7 @@ def test_each_has_a_system_id_of_its_own() -> None:
         (
             {"a": "ardupilot+tcp://127.0.0.1:5760", "b": "sim:ardupilot"},
             CapabilityError,
-            "simulated and real vehicles do not share a clock",
+            "simulated and real vehicles have different clocks",
         ),
         (
             {"a": "ardupilot+udp://:45123", "b": "px4+udp://:45123"},
@@ -141,7 +141,7 @@ def test_each_has_a_system_id_of_its_own() -> None:
         (
             {"a": "ardupilot+udp://:45123?system=2", "b": "px4+udp://:45123?system=2"},
             UsageError,
-            "say which is which",
+            "give each its system id",
         ),
         (
             {"a": "ardupilot+udp://:45123?system=1", "b": "paparazzi+udp://:45123?system=2"},

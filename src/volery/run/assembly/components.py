@@ -38,9 +38,8 @@ from volery.ros.messages import define_imported
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
-from volery.run.assembly.vehicle_nodes import graph_access, serve_on_graph
+from volery.run.assembly.vehicle_nodes import graph_access, node_name, serve_on_graph
 from volery.run.ending import Ending, Landable
-from volery.run.trace_setup import node_name
 from volery.vehicles import Drone, Rover, Vehicle
 
 if TYPE_CHECKING:
@@ -162,7 +161,7 @@ class Builder:
         self._system = system
         self._kernel = kernel
         self._platform = platform
-        self._airfield = fleet
+        self._fleet = fleet
         self._ending = ending
         self._fence = fence_of(system.environment)
         self._part = part
@@ -260,8 +259,8 @@ class Builder:
         return found
 
     def _body(self, vehicle: str) -> Body:
-        assert self._airfield is not None, "components of the environment live where the vehicles are"
-        return Body(self._kernel, vehicle, self._airfield.truth(vehicle))
+        assert self._fleet is not None, "components of the environment live where the vehicles are"
+        return Body(self._kernel, vehicle, self._fleet.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
         other = self._system.instance(callee)
@@ -307,7 +306,7 @@ class Builder:
     # -- nodes that serve vehicles
 
     def _vehicle_nodes(self) -> Iterable[Callable[[], object]]:
-        if self._airfield is None:
+        if self._fleet is None:
             return
         commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
@@ -317,7 +316,7 @@ class Builder:
                 )  # one that cannot be served is told before the start
                 if vehicle.name not in commanded:
                     self._leave_unattended(vehicle.name, INTERFACES[vehicle.kind])
-                yield partial(self._serve, self._airfield, vehicle.name, vehicle.processor)
+                yield partial(self._serve, self._fleet, vehicle.name, vehicle.processor)
 
     def _leave_unattended(self, name: str, interface: str) -> None:
         opened = partial(self._open, name=name, interface=interface)

@@ -281,7 +281,7 @@ class PowerFeed:
     def __init__(self, kernel: Kernel, platform: Platform, fleet: SimulatedFleet) -> None:
         self._kernel = kernel
         self._platform = platform
-        self._airfield = fleet
+        self._fleet = fleet
         self._fed = platform.powered_by()
         self._busy: dict[str, Ns] = {name: 0 for names in self._fed.values() for name in names}
         self._then: Ns = kernel.now()
@@ -303,7 +303,7 @@ class PowerFeed:
         if now == self._then:
             return
         for vehicle, names in self._fed.items():
-            self._airfield.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
+            self._fleet.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
         self._then = now
 
     def _watts(self, processor: str, now: Ns) -> float:

@@ -1,14 +1,12 @@
-"""A fence from a file: GeoJSON (RFC 7946), as map editors write it.
+"""Geofences from a GeoJSON file and from the no-fly zones of a model.
+
+The file is GeoJSON (RFC 7946) as map editors write it; longitude comes before latitude.
 
 | in the file | in the fence |
 |---|---|
-| a polygon; its properties ``floor``, ``ceiling`` | stay inside; metres above home |
+| a polygon; its properties ``floor``, ``ceiling`` | inclusion polygon; metres above home |
 | holes of that polygon | no-fly zones at any height |
 | a polygon whose property ``no_fly`` is true; ``name``, ``floor``, ``ceiling`` | a no-fly zone |
-
-GeoJSON says longitude before latitude.
-
-The no-fly zones of a model as the fence of every drone that its components command.
 """
 
 from __future__ import annotations
@@ -25,50 +23,52 @@ from volery.model.environment import Environment, Prism
 from volery.vehicles import Fence, Zone
 from volery.vehicles.limits import Corner
 
-_LARGEST = 4_000_000
+_MAX_BYTES = 4_000_000
 
 
 def read_fence(path: Path) -> Fence:
-    """The fence that the file describes. Raises ``UsageError`` naming file, place and what is wrong."""
+    """Read a fence from a GeoJSON file. Raises ``UsageError`` that names the file and the polygon."""
     try:
-        if path.stat().st_size > _LARGEST:
-            raise UsageError(f"{path}: a fence of more than {_LARGEST // 1_000_000} MB; simplify its outline")
+        if path.stat().st_size > _MAX_BYTES:
+            raise UsageError(
+                f"{path}: the file is larger than {_MAX_BYTES // 1_000_000} MB; simplify the outline"
+            )
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise UsageError(f"cannot read the fence {str(path)!r}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise UsageError(f"{path}: not a text file; a fence is GeoJSON") from None
+        raise UsageError(f"{path}: this is no text file; a fence is GeoJSON") from None
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise UsageError(f"{path}: a fence is GeoJSON, and this is no JSON: {error}") from None
+        raise UsageError(f"{path}: this is no JSON; a fence is GeoJSON: {error}") from None
     return _Reader(path).read(document)
 
 
 class _Reader:
-    """Reads one document; ``self._where`` is the file, for messages."""
+    """Reader of one document. ``_where`` names the file in messages."""
 
     def __init__(self, path: Path) -> None:
         self._where = str(path)
 
     def read(self, document: object) -> Fence:
-        """All of its polygons."""
+        """Return the fence of all polygons in *document*."""
         outline: tuple[Corner, ...] = ()
         heights: tuple[AboveHome | None, AboveHome | None] = None, None
         zones: list[Zone] = []
-        for number, (rings, said) in enumerate(self._polygons(document), 1):
-            what = str(said.get("name", f"polygon {number}"))
-            low, high = self._metres(what, said, "floor"), self._metres(what, said, "ceiling")
+        for number, (rings, properties) in enumerate(self._polygons(document), 1):
+            what = str(properties.get("name", f"polygon {number}"))
+            low, high = self._metres(what, properties, "floor"), self._metres(what, properties, "ceiling")
             corners, *holes = (self._ring(what, ring) for ring in rings)
-            if said.get("no_fly", False) is True:
+            if properties.get("no_fly", False) is True:
                 zones.append(Zone(what, corners, low, high))
                 continue
             if outline:
-                raise self._wrong(f"{what}: a second polygon to stay in; mark no-fly zones with no_fly: true")
+                raise self._wrong(f"{what}: a second inclusion polygon; mark no-fly zones with no_fly: true")
             outline, heights = corners, (low, high)
             zones += [Zone(f"hole {n} of {what}", hole) for n, hole in enumerate(holes, 1)]
         if not outline and not zones:
-            raise self._wrong("no polygon in it")
+            raise self._wrong("it contains no polygon")
         return Fence(outline, *heights, no_fly=tuple(zones))
 
     def _polygons(self, thing: object) -> Iterator[tuple[Sequence[object], Mapping[str, Any]]]:
@@ -79,11 +79,11 @@ class _Reader:
             for feature in self._list(thing, "features"):
                 yield from self._polygons(feature)
         elif kind == "Feature":
-            said = thing.get("properties") or {}
-            if not isinstance(said, Mapping):
+            properties = thing.get("properties") or {}
+            if not isinstance(properties, Mapping):
                 raise self._wrong("properties: a mapping is expected")
             for rings, _ in self._polygons(thing.get("geometry")):
-                yield rings, said
+                yield rings, properties
         elif kind == "Polygon":
             yield self._list(thing, "coordinates"), {}
         elif kind == "MultiPolygon":
@@ -98,13 +98,13 @@ class _Reader:
 
     def _listed(self, what: str, found: object) -> Sequence[object]:
         if not isinstance(found, list) or not found:
-            raise self._wrong(f"{what}: a list is expected that is not empty")
+            raise self._wrong(f"{what}: a list with at least one entry is expected")
         return found
 
     def _ring(self, what: str, ring: object) -> tuple[Corner, ...]:
         corners = [self._corner(what, point) for point in self._listed(what, ring)]
         if len(corners) > 1 and corners[0] == corners[-1]:
-            corners.pop()  # a ring is closed by saying its first point again
+            corners.pop()  # a ring repeats its first point at the end
         return tuple(corners)
 
     def _corner(self, what: str, point: object) -> Corner:
@@ -112,11 +112,11 @@ class _Reader:
             raise self._wrong(f"{what}: {point!r} is no [longitude, latitude] in degrees")
         longitude, latitude = float(point[0]), float(point[1])
         if abs(latitude) > 90.0 >= abs(longitude):
-            raise self._wrong(f"{what}: {point!r}: GeoJSON says longitude first; are they swapped?")
+            raise self._wrong(f"{what}: {point!r}: GeoJSON has longitude first; are they swapped?")
         return latitude, longitude
 
-    def _metres(self, what: str, said: Mapping[str, Any], key: str) -> AboveHome | None:
-        found = said.get(key)
+    def _metres(self, what: str, properties: Mapping[str, Any], key: str) -> AboveHome | None:
+        found = properties.get(key)
         if found is None:
             return None
         if not _is_number(found):
@@ -132,14 +132,14 @@ def _is_number(thing: object) -> bool:
 
 
 def fence_of(environment: Environment) -> Fence | None:
-    """Out of every no-fly zone; ``None`` if there is none. Checked before a command and on the way."""
+    """Return a fence of the model's no-fly zones, or None if there are none."""
     if not environment.no_fly_zones:
         return None
     return Fence(no_fly=tuple(_zone(prism, environment) for prism in environment.no_fly_zones))
 
 
 def _zone(prism: Prism, environment: Environment) -> Zone:
-    """A zone from the ground up has no floor: a drone that stands a little lower is still in it."""
+    """Return a zone. One that starts at the ground has no floor, so a drone on lower ground is inside it."""
     origin = environment.origin
     places = [origin.from_enu((east, north, 0.0)) for east, north in prism.corners]
     return Zone(

@@ -1,4 +1,4 @@
-"""Real ROS graphs by name, and a script's way onto them."""
+"""Real ROS graphs by name. ROS itself is imported when a graph is opened."""
 
 from __future__ import annotations
 
@@ -27,17 +27,23 @@ def _ros2(kernel: Kernel, start_master: bool, epoch: Ns | None) -> TransportGrap
 
 _OPENERS: dict[str, Callable[[Kernel, bool, Ns | None], TransportGraph]] = {"ros1": _ros1, "ros2": _ros2}
 GRAPHS = tuple(_OPENERS)
-"""``ros1``: that of ``ROS_MASTER_URI``. ``ros2``: that of ``ROS_DOMAIN_ID``."""
+"""``ros1`` is the graph of ``ROS_MASTER_URI``, ``ros2`` that of ``ROS_DOMAIN_ID``."""
 
 
 def open_graph(
     kernel: Kernel, name: str, *, start_master: bool = False, epoch: Ns | None = None
 ) -> TransportGraph:
-    """The graph called *name*, one of ``GRAPHS``. *epoch*: ROS time at the kernel's zero, else Unix time.
+    """Join a real ROS graph.
 
-    *start_master* starts a ROS 1 master where none answers, and stops it when the graph is closed.
-    Raises ``UsageError`` if there is no such kind or it is not installed, ``LinkError`` if it does not
-    answer.
+    Args:
+        kernel: Clock and tasks of the callbacks.
+        name: One of ``GRAPHS``.
+        start_master: Start a ROS 1 master if none answers, and stop it when the graph is closed.
+        epoch: ROS time at the zero of the kernel in nanoseconds; None for Unix time.
+
+    Raises:
+        UsageError: *name* is unknown, or that version of ROS is not installed.
+        LinkError: The graph does not answer.
     """
     if name not in _OPENERS:
         raise UsageError(f"no graph {name!r}{did_you_mean(name, GRAPHS)}; there is {choices(GRAPHS)}")
@@ -46,7 +52,7 @@ def open_graph(
 
 @contextmanager
 def on_graph(name: str, script: str) -> Iterator[RosGraph]:
-    """The graph called *name*, in real time, for a script of that name; closed when the context is left."""
+    """Join the graph *name* in real time for the calling thread, called *script*; leave it at the end."""
     kernel = WallKernel()
     kernel.start()
     try:

@@ -137,7 +137,7 @@ class SimulatedFleet:
         return self._faulty.get(vehicle, ())
 
     def truth(self, vehicle: str) -> Callable[[], Position]:
-        """Return a function for the true position of *vehicle*: to judge an operation, never to command it."""
+        """Return a function for the true position of *vehicle*, for judging its operations only."""
         flight = self.flights[vehicle]
 
         def position() -> Position:

@@ -6,16 +6,12 @@ This module describes them only and imports nothing of the simulation; see ``sim
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
-from volery.base.seeds import stream
 from volery.base.time import MS, Ns
-from volery.kernel.api import Kernel
-from volery.links.link import Link
-from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, faulty_pair, parse_wire_faults
+from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, parse_wire_faults
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
 from volery.vehicles.address import Address
 
@@ -138,4 +134,3 @@ def _faults(address: Address) -> WireFaults | None:
             raise UsageError(f"{address}: {choices(wanted)} needs a link through bytes; add wire=bytes")
         return None
     return parse_wire_faults(wanted)
-

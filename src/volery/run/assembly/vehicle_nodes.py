@@ -119,7 +119,9 @@ Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]
 """``serve(graph, link, vehicle, context, origin)``."""
 
 
-def _mavros(graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame) -> object:
+def _mavros(
+    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame
+) -> object:
     return serve_vehicle(graph, link, vehicle, context, VehicleNodeOptions(origin=origin))
 
 
@@ -133,7 +135,7 @@ NODES: Mapping[str, Serve] = {"MAVLink": _mavros, "pprzlink": _pprzros}
 """By the name of the codec."""
 
 SIMULATED_LINK_OPTIONS = {"texts": "unrecorded"}
-"""Driver options for a simulated vehicle on a link: the simulated autopilot records its status texts itself."""
+"""Driver options for a simulated vehicle on a link: its autopilot records its status texts itself."""
 
 
 def node_name(vehicle: str) -> str:
@@ -158,7 +160,8 @@ def graph_access(autopilot: str, vehicle: str) -> GraphAccess:
     factory = drivers.load(autopilot)
     if factory.on_graph is None:
         raise CapabilityError(
-            f"{vehicle}: components command vehicles over a ROS graph, which the driver {autopilot!r} cannot use"
+            f"{vehicle}: components command vehicles over a ROS graph, "
+            f"which the driver {autopilot!r} cannot use"
         )
     return GraphAccess(factory.on_graph, factory.namespace.format(name=vehicle))
 

@@ -1,6 +1,6 @@
-"""From addresses to vehicles: simulated ones in one world, or those that are out there.
+"""From addresses to vehicles: simulated ones in one world, or real ones.
 
-Vehicles that are out there, recorded as their autopilots say that they are.
+A real vehicle must not load the simulation, so the simulated fleet is imported inside a function.
 """
 
 from __future__ import annotations
@@ -40,26 +40,34 @@ EMBEDDED = "graph"
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
 
 
-def _nothing() -> None:
-    """There is no graph to leave."""
-
-
 @dataclass(frozen=True)
 class OpenedVehicles:
-    """A kernel and the vehicles that were opened on it; ``fleet`` is ``None`` for vehicles that are out
-    there.
+    """A kernel and the vehicles that were opened on it.
+
+    Attributes:
+        kernel: Virtual clock for simulated vehicles, wall clock for real ones.
+        vehicles: In the order of their addresses.
+        fleet: The simulated fleet, or None for real vehicles.
+        leave: Closes the ROS graphs of the vehicles; called after the vehicles are closed.
     """
 
     kernel: VirtualKernel | WallKernel
     vehicles: tuple[Vehicle, ...]
     fleet: SimulatedFleet | None = None
-    leave: Action = _nothing
-    """Leave the graphs that lead to them; once they are closed."""
+    leave: Action = lambda: None
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleSettings:
-    """What holds for all vehicles that are opened together. *home* is where simulated ones stand."""
+    """Settings of all vehicles that are opened together.
+
+    Attributes:
+        seed: Seed of the simulation.
+        pace: Simulated seconds per second, or None for as fast as possible.
+        home: Home position of simulated vehicles.
+        limits: Limits that every operation must keep.
+        fence: Geofence that every operation must keep.
+    """
 
     seed: int = 1
     pace: float | None = None
@@ -71,14 +79,20 @@ class VehicleSettings:
 def open_vehicles(
     urls: Mapping[str, str], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
-    """Open all of *urls*, by the vehicles' names: either simulated ones, in one world, or real ones.
+    """Open all vehicles, which are either all simulated, in one world, or all real.
 
-    Raises ``UsageError`` for an address that makes no sense or a fence that excludes a simulated home,
-    ``CapabilityError`` for what cannot be opened together or so.
+    Args:
+        urls: Addresses by vehicle name.
+        kinds: ``Drone`` or ``Rover`` by vehicle name.
+        stated: Settings of all vehicles.
+
+    Raises:
+        UsageError: An address is wrong, or the fence excludes a simulated home.
+        CapabilityError: The vehicles cannot be opened together, or not in this way.
     """
     addresses = {name: parse(url) for name, url in urls.items()}
     for address in addresses.values():
-        drivers.load(address.driver)  # a name that is none is told before anything else
+        drivers.load(address.driver)  # report an unknown name before anything else
     if any(address.carrier != "sim" for address in addresses.values()):
         return _open_real(addresses, kinds, stated)
     return _open_simulated(addresses, kinds, stated)
@@ -119,7 +133,7 @@ def _simulated_vehicle(
     return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=fleet.truth(name))
 
 
-# -- out there
+# -- real vehicles
 
 
 def _open_real(
@@ -128,7 +142,7 @@ def _open_real(
     for address in addresses.values():
         if address.carrier == "sim":
             raise CapabilityError(
-                f"{address}: simulated and real vehicles do not share a clock; fly them apart"
+                f"{address}: simulated and real vehicles have different clocks; fly them in separate runs"
             )
         if address.carrier == EMBEDDED:
             raise CapabilityError(
@@ -137,38 +151,38 @@ def _open_real(
             )
     kernel = WallKernel()
     by_graph = {name: one for name, one in addresses.items() if one.carrier in GRAPHS}
-    ways = _RealLinks(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
+    links = _RealLinks(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
     graphs = RealGraphs(kernel)
     try:
         vehicles = []
         for name, address in addresses.items():
-            driver = graphs.driver(name, address) if name in by_graph else ways.driver(name, address)
+            driver = graphs.driver(name, address) if name in by_graph else links.driver(name, address)
             vehicles.append(kinds[name](kernel, name, driver, limits=stated.limits, fence=stated.fence))
     except VoleryError:
-        ways.close()
+        links.close()
         graphs.close()
         raise
     return OpenedVehicles(kernel, tuple(vehicles), leave=graphs.close)
 
 
 class RealGraphs:
-    """Real ROS graphs, each opened once, with a node of ours for each vehicle."""
+    """Real ROS graphs, each opened once, with one node of volery for each vehicle."""
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
         self._open: dict[str, RosGraph] = {}
 
     def graph(self, name: str) -> RosGraph:
-        """The graph called *name*. Raises what ``open_graph`` raises."""
+        """Return the graph called *name*. Raises what ``open_graph`` raises."""
         if name not in self._open:
             self._open[name] = open_graph(self._kernel, name)
         return self._open[name]
 
     def driver(self, name: str, address: Address) -> Driver:
-        """The driver of the vehicle called *name*; the address's path is where its names are."""
+        """Return the driver of the vehicle *name*; the path of the address is the namespace."""
         open_driver = drivers.load(address.driver).on_graph
         if open_driver is None:
-            raise UsageError(f"{address}: {address.driver} is reached over bytes, not over a graph")
+            raise UsageError(f"{address}: {address.driver} is reached over a link, not over a ROS graph")
         node = self.graph(address.carrier).node(
             f"volery_{name}", anonymous=True, context=ExecutionContext(name)
         )
@@ -177,14 +191,14 @@ class RealGraphs:
         return open_driver(self._kernel, node, name, {**stated, **address.options})
 
     def close(self) -> None:
-        """Leave them."""
+        """Leave the graphs."""
         for graph in self._open.values():
             graph.close()
         self._open.clear()
 
 
 class _RealLinks:
-    """The links of vehicles that are out there: one each, or one for all behind the same radio or port."""
+    """Links to real vehicles: one each, or one for all vehicles behind the same radio or port."""
 
     def __init__(self, kernel: Kernel, addresses: Mapping[str, Address]) -> None:
         self._kernel = kernel
@@ -194,21 +208,21 @@ class _RealLinks:
         self._behind: dict[tuple[object, ...], list[str]] = {}
         for name, address in addresses.items():
             if drivers.load(address.driver).on_link is None:
-                raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
+                raise UsageError(f"{address}: {address.driver} is reached over a ROS graph, not over a link")
             self._behind.setdefault(_endpoint(address), []).append(name)
         for names in self._behind.values():
             self._check_distinct(names)
 
     def _check_distinct(self, names: list[str]) -> None:
-        """Several vehicles behind one link: it must be said which is which, in one protocol."""
+        """Check that vehicles behind one link have distinct system ids and one protocol."""
         if len(names) == 1:
             return
         first, *others = (self._addresses[name] for name in names)
         systems = [self._addresses[name].options.get("system", "") for name in names]
         if "" in systems or len(set(systems)) < len(systems):
             raise UsageError(
-                f"{' and '.join(names)} are behind the same {first.carrier} address; say which is which by "
-                f"their system ids, as in {first.text.partition('?')[0]}?system=1"
+                f"{' and '.join(names)} share one {first.carrier} address; give each its system id, "
+                f"as in {first.text.partition('?')[0]}?system=1"
             )
         for other in others:
             codecs = {self._factory(one).codec.name for one in (first, other)}
@@ -221,36 +235,35 @@ class _RealLinks:
         return drivers.load(address.driver)
 
     def driver(self, name: str, address: Address) -> Driver:
-        """The driver of the vehicle called *name*."""
+        """Return the driver of the vehicle *name*."""
         open_driver = self._factory(address).on_link
-        assert open_driver is not None, "seen when the ways were made"
-        return open_driver(self._kernel, self.to(name), name, for_driver(address))
+        assert open_driver is not None, "checked when the links were made"
+        return open_driver(self._kernel, self._link(name), name, for_driver(address))
 
-    def to(self, name: str) -> Link:
-        """The link for the driver of the vehicle called *name*."""
+    def _link(self, name: str) -> Link:
         address = self._addresses[name]
-        codec, way = self._factory(address).codec, _endpoint(address)
-        if len(self._behind[way]) == 1:
+        codec, endpoint = self._factory(address).codec, _endpoint(address)
+        if len(self._behind[endpoint]) == 1:
             self._links.append(open_link(self._kernel, address, codec))
             return self._links[-1]
-        if way not in self._shared:
+        if endpoint not in self._shared:
             self._links.append(open_link(self._kernel, address, codec, shared=True))
-            self._shared[way] = SharedLink(self._links[-1])
-        return self._shared[way].share()
+            self._shared[endpoint] = SharedLink(self._links[-1])
+        return self._shared[endpoint].share()
 
     def close(self) -> None:
-        """Of those that were opened, each."""
+        """Close every link that was opened."""
         for link in self._links:
             link.close()
 
 
 def _endpoint(address: Address) -> tuple[object, ...]:
-    """What two vehicles behind one link have in common."""
+    """Return what two vehicles behind one link have in common."""
     return address.carrier, address.host, address.port, address.path
 
 
 def for_driver(address: Address) -> dict[str, str]:
-    """Options of the address that are not for the carrier."""
+    """Return the options of an address that are meant for the driver, not for the carrier."""
     return {key: value for key, value in address.options.items() if key != "baud"}
 
 
@@ -258,7 +271,11 @@ UNKNOWN = (nan, nan, nan)
 
 
 class ObservedVehicles:
-    """Vehicles of which nobody knows the truth. The origin is where the first of them was seen first."""
+    """Real vehicles, recorded as their telemetry reports them.
+
+    The origin of the local frame is the first position that is received. The true acceleration and angular
+    rates stay unknown.
+    """
 
     def __init__(self, kernel: Kernel, vehicles: Sequence[Vehicle]) -> None:
         self._kernel = kernel
@@ -266,16 +283,16 @@ class ObservedVehicles:
         self._frame: LocalFrame | None = None
 
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
-        """Record the state of every vehicle now and then each *period*."""
+        """Record the state of every vehicle periodically, from now on."""
         self._kernel.every(period, self.record_states)
 
     def progress(self) -> tuple[VehicleProgress, ...]:
-        """What those that have been heard do now."""
-        heard = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.last_message_ns >= 0]
-        return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in heard)
+        """Return the present state of each vehicle whose telemetry arrives."""
+        known = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.last_message_ns >= 0]
+        return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in known)
 
     def record_states(self) -> None:
-        """Record the state of every vehicle that has been heard."""
+        """Record the present state of each vehicle whose telemetry arrives."""
         for vehicle in self._vehicles:
             if vehicle.telemetry.last_message_ns >= 0:
                 self._kernel.record(self._state(vehicle))
@@ -290,14 +307,14 @@ class ObservedVehicles:
             seen.velocity.east,
             seen.velocity.north,
             seen.velocity.up,
-            *self._about_origin(seen.position),
+            *self._enu(seen.position),
             *seen.battery,
             seen.armed,
             seen.mode,
         )
 
-    def _about_origin(self, at: Position | None) -> tuple[float, float, float]:
-        """ENU [m] of a position above mean sea level; NaN while it is not known."""
+    def _enu(self, at: Position | None) -> tuple[float, float, float]:
+        """Return metres east, north and up of the origin; NaN while the position is unknown."""
         if at is None:
             return nan, nan, nan
         amsl = at.altitude.metres
@@ -307,5 +324,5 @@ class ObservedVehicles:
 
 
 def _attitude(seen: Attitude) -> Quaternion:
-    """FLU body in ENU."""
+    """Return the attitude of the FLU body in ENU."""
     return attitude_ned_to_enu(euler_to_quaternion(*map(radians, seen)))

@@ -14,4 +14,4 @@ what of a model means nothing then.
 from volery.run.distributed.plan import NODE, HostPlatform, unallocated, without_computers
 from volery.run.distributed.processes import DistributedRun, GraphSettings
 
-__all__ = ["NODE", "DistributedRun", "HostPlatform", "GraphSettings", "unallocated", "without_computers"]
+__all__ = ["NODE", "DistributedRun", "GraphSettings", "HostPlatform", "unallocated", "without_computers"]

@@ -37,7 +37,7 @@ LEAF, ENTRY, BODY, EXIT = range(4)
 def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
     machine = MachineCode(BLOCKS, machine_blocks(TEXT))
     walked = reconstruct_path(machine, BlockTrace([ENTRY, BODY, LEAF, BODY, LEAF, EXIT]))
-    names = [machine.pieces[number].instructions[0].mnemonic for number in walked.pieces]
+    names = [machine.machine_blocks[number].instructions[0].mnemonic for number in walked.blocks]
     assert names == ["test", "call", "ret", "dec", "call", "ret", "dec", "xor", "ret"]
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, LEAF, BODY, BODY, EXIT]
     assert walked.taken[3] == 1  # back to the loop
