@@ -136,11 +136,12 @@ def honoured(firmware: Firmware) -> str:
         firmware.parameters,
         "Those in the tables change what the vehicle does; the others change nothing.",
     ]
-    for kind, dialect in firmware.family.kinds.items():
-        every = [one.name for one in dialect.parameters()]
-        kept = [name for name in every if name not in dialect.honoured]
-        lines += [f"\n## {dialect.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
-        lines += [f"| `{name}` | {what} |" for name, what in sorted(dialect.honoured.items())]
+    for kind, one in firmware.family.kinds.items():
+        table = one.rules.parameters
+        every = [parameter.name for parameter in table.defaults()]
+        kept = [name for name in every if name not in table.supported]
+        lines += [f"\n## {one.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
+        lines += [f"| `{name}` | {what} |" for name, what in sorted(table.supported.items())]
         lines += [
             f"\nKept and not honoured, {len(kept)} of {len(every)}:\n",
             ", ".join(f"`{one}`" for one in kept),

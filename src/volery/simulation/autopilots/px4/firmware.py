@@ -241,13 +241,17 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
     )
 
 
+ROVER_ARMING = ArmingTimes()
+"""Wheels have nothing to spool up."""
+
+
 def px4_firmware(
     kind: str,
     modes: Mapping[int, Mode],
     parameters: ParameterTable,
     endpoint: Callable[[Vehicle], MavlinkEndpoint],
     on_step: VehicleAction,
-    arming: ArmingTimes = ArmingTimes(),
+    arming: ArmingTimes = ROVER_ARMING,
 ) -> Firmware:
     """Return the firmware of one kind of vehicle: what all kinds share, and the arguments."""
     return Firmware(
