@@ -82,15 +82,15 @@ void __sanitizer_cov_pcs_init(const uintptr_t *at, const uintptr_t *end) {}
 
 def mca_costs(program: Program) -> tuple[Any, Any]:
     """Return cycles per entry of each block: in a steady state, and as reciprocal throughput."""
-    machine = MachineCode(program.blocks, program.pieces)
+    machine = MachineCode(program.blocks, program.machine_blocks)
     text = [".intel_syntax noprefix", ".L0:"]
-    for block, first in machine.piece_of_block.items():
+    for block, first in machine.first_of_block.items():
         lines = [
             f"{one.mnemonic} .L0"
             if one.mnemonic.startswith("j")
             else f"{one.mnemonic}\t{', '.join(one.operands)}"
             for piece in blocks_of(machine, first)
-            for one in program.pieces[piece].instructions
+            for one in program.machine_blocks[piece].instructions
             if not one.mnemonic.startswith(("call", "ret")) and one.mnemonic != "jmp"
         ]
         if lines:

@@ -66,4 +66,4 @@ def test_measuring_a_model_without_nodes(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["validate", str(tmp_path / "nowhere.yaml")])
     assert done.exit_code == 2
     done = CliRunner().invoke(app, ["validate", str(tmp_path), "--runs", "0"])
-    assert "--runs 0: at least one is needed" in done.stderr
+    assert "--runs 0: give at least 1" in done.stderr

@@ -21,7 +21,7 @@ from types import ModuleType
 
 from volery.base.time import MS, Ns
 from volery.calibration.python.statements import PREAMBLE, STATEMENTS
-from volery.cost.instrumentation import StepCounter
+from volery.cost import StepCounter
 from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS
 
 ShowRounds = Callable[[int, int, int], None]

@@ -14,6 +14,7 @@ This package may import ``cost`` and ``base`` only. Other packages import from h
 from volery.cost.native.block_costs import (
     BlockCosts,
     Instrumented,
+    block_steps,
     instrument,
     load_costs,
     save_costs,
@@ -47,6 +48,7 @@ __all__ = [
     "Program",
     "ProgramEstimate",
     "SourceLineCost",
+    "block_steps",
     "cache_settings",
     "compile_program",
     "estimate_program",

@@ -1,37 +1,16 @@
-"""Operands of an instruction, in assembly as in LLVM's intermediate code.
+"""Assembly text as machine blocks: straight runs of instructions that end in one jump, call or return.
 
-What an instruction does to a processor: which operations it takes, what it reads, writes and remembers.
-
-Assembly text as pieces: straight runs of instructions that end in one jump, call or return.
-
-LLVM writes beside each label of which block of its intermediate code it comes (``# %for.body``). Where the
-code generator made blocks of its own, split edges for instance, there is no such name.
+LLVM writes beside each label the basic block of its intermediate code that the label comes from
+(``# %for.body``). Blocks that the code generator made itself, such as split edges, have no such name. The
+modules ``isa_*`` say what an instruction does to a core (``Effect``).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
-
-_OPEN, _SHUT = frozenset("([{"), frozenset(")]}")
-
-
-def split_operands(text: str) -> Iterator[str]:
-    """What stands between commas that are in no brackets; nothing for an empty text."""
-    depth, start = 0, 0
-    for at, sign in enumerate(text):
-        if sign in _OPEN:
-            depth += 1
-        elif sign in _SHUT:
-            depth -= 1
-        elif sign == "," and depth == 0:
-            yield text[start:at].strip()
-            start = at + 1
-    if text[start:].strip():
-        yield text[start:].strip()
-
 
 OPERATION_CLASSES = (
     "alu", "move", "increment", "shift", "shifted_alu", "multiply", "divide32", "divide64",
@@ -39,15 +18,47 @@ OPERATION_CLASSES = (
     "fp_add", "fp_compare", "fp_multiply", "fp_fma", "fp_divide32", "fp_divide64", "fp_root32", "fp_root64",
     "convert", "transfer", "vector", "vector_move", "vector_multiply", "shuffle",
 )  # fmt: skip
-"""The classes of operations that a core has figures for (``volery.cost.code_laws``)."""
+"""Classes of operations, for which a ``CoreLaw`` has figures."""
+
+_OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
+_FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
+_LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
+_CAME_FROM = re.compile(r'(?:#|//) %("[^"]+"|[^\s"]+)')
+_LOCATION = re.compile(r"^\t\.loc\t(\d+) (\d+)")
+_FILE = re.compile(r'^\t\.file\t(\d+) (?:"([^"]*)" )?"([^"]*)"')
+_ALIGN = re.compile(r"^\t\.p2align\t(\d+)(?:, [^,]*, (\d+))?")
+_COMMENT = re.compile(r"\s+(?:#|//) .*$|\s+//.*$")
+_DIRECT = re.compile(r"^[.\w$]+(?:@PLT)?$")
+
+_JUMPS = {"jmp", "b"}
+_CALLS = {"call", "bl", "blr"}
+_RETURNS = {"ret", "ud2", "brk"}
+
+
+def split_operands(text: str) -> Iterator[str]:
+    """Yield the operands of an instruction: the texts between commas outside brackets."""
+    depth, start = 0, 0
+    for at, character in enumerate(text):
+        if character in _OPENING:
+            depth += 1
+        elif character in _CLOSING:
+            depth -= 1
+        elif character == "," and depth == 0:
+            yield text[start:at].strip()
+            start = at + 1
+    if text[start:].strip():
+        yield text[start:].strip()
 
 
 @dataclass(frozen=True)
 class MemoryOperand:
-    """What an instruction loads from or stores to, as far as its text tells.
+    """Address of a load or store, as far as the text shows it.
 
-    The ``registers`` of the address; ``place`` is its text without the ``displacement``, empty where it says
-    nothing; ``size`` in bytes.
+    Attributes:
+        registers: Registers of the address.
+        place: Text of the address without the displacement; empty where it does not identify an address.
+        displacement: Constant part of the address, bytes.
+        size: Size of the access, bytes.
     """
 
     registers: tuple[str, ...] = ()
@@ -61,11 +72,19 @@ NO_MEMORY = MemoryOperand()
 
 @dataclass(frozen=True)
 class Effect:
-    """An instruction, for a core model.
+    """What an instruction does to a core. A register has one name whatever part of it is accessed.
 
-    ``slots`` of the front end; ``loads`` loads of the class ``load`` before the ``operation`` (``times`` of
-    it), and a store after it; registers by one name each: ``reads`` for the operation, ``writes`` when it is
-    done, ``bumps`` an address register at once.
+    Attributes:
+        slots: Slots of the front end.
+        load: Class of the loads before the operation, empty if there are none.
+        loads: Number of loads.
+        operation: Class of the operation, empty if there is none.
+        times: Number of operations.
+        store: Whether a store follows.
+        memory: Address of the loads or the store.
+        reads: Registers that the operation reads.
+        writes: Registers that are written when the operation is done.
+        bumps: Address registers that are written as soon as the address is known.
     """
 
     slots: float = 1.0
@@ -80,22 +99,8 @@ class Effect:
     bumps: tuple[str, ...] = ()
 
 
-_FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
-_LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
-_CAME_FROM = re.compile(r'(?:#|//) %("[^"]+"|[^\s"]+)')
-_PLACE = re.compile(r"^\t\.loc\t(\d+) (\d+)")
-_FILE = re.compile(r'^\t\.file\t(\d+) (?:"([^"]*)" )?"([^"]*)"')
-_ALIGN = re.compile(r"^\t\.p2align\t(\d+)(?:, [^,]*, (\d+))?")
-_COMMENT = re.compile(r"\s+(?:#|//) .*$|\s+//.*$")
-_DIRECT = re.compile(r"^[.\w$]+(?:@PLT)?$")
-
-_JUMPS = {"jmp", "b"}
-_CALLS = {"call", "bl", "blr"}
-_RETURNS = {"ret", "ud2", "brk"}
-
-
 class End(Enum):
-    """How a piece ends."""
+    """How a machine block ends."""
 
     FALLS = "falls"
     BRANCH = "branch"
@@ -107,7 +112,7 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Instruction:
-    """One line: its mnemonic, its operands, the source line it stands for (``file:line``, empty if none)."""
+    """One line of assembly; ``source`` is its source line (``file:line``), empty if there is none."""
 
     mnemonic: str
     operands: tuple[str, ...]
@@ -116,7 +121,16 @@ class Instruction:
 
 @dataclass
 class MachineBlock:
-    """A straight run. ``came_from`` is a block's name or ``None``; ``target``: a label or symbol."""
+    """A straight run of instructions.
+
+    Attributes:
+        function: Symbol of its function.
+        label: Its label, empty if it has none.
+        came_from: Name of its basic block in the intermediate code, or None.
+        instructions: The instructions.
+        end: How it ends.
+        target: Label or symbol that it jumps to or calls, empty if it is computed.
+    """
 
     function: str
     label: str
@@ -125,11 +139,19 @@ class MachineBlock:
     end: End = End.FALLS
     target: str = ""
 
+    def calls_library(self, defined: Container[str]) -> bool:
+        """Return whether it calls a function that is not ``defined`` by the program."""
+        leaves = self.end in (End.CALL, End.JUMP) and self.target and not self.target.startswith(".L")
+        return bool(leaves) and self.target not in defined
+
 
 def machine_blocks(text: str, bytes_each: int = 0) -> list[MachineBlock]:
-    """All pieces of a file of assembly, in its order: what falls through goes on in the next.
+    """Parse a file of assembly into machine blocks, in order: a block falls through to the next.
 
-    Where all instructions are *bytes_each* long, those that pad the code to an alignment are entered, too.
+    Args:
+        text: The assembly.
+        bytes_each: Size of an instruction where all have the same size, else 0. With a size, executed
+            padding for alignment is inserted as ``nop`` instructions.
     """
     found: list[MachineBlock] = []
     files: dict[str, str] = {}
@@ -148,28 +170,29 @@ def machine_blocks(text: str, bytes_each: int = 0) -> list[MachineBlock]:
         elif label := _LABEL.match(line):
             came = _CAME_FROM.search(label[2])
             found.append(MachineBlock(function, label[1] or "", came[1].strip('"') if came else None))
-        elif place := _PLACE.match(line):
-            source = f"{files.get(place[1], '?')}:{place[2]}" if place[2] != "0" else ""
+        elif location := _LOCATION.match(line):
+            source = f"{files.get(location[1], '?')}:{location[2]}" if location[2] != "0" else ""
         elif bytes_each and (aligned := _ALIGN.match(line)):
             offset += _pad(found, aligned, offset, bytes_each)
         elif line.startswith("\t") and line[1:2] not in ".#/" and found:
-            _enter(found, _instruction(line, source))
+            _append(found, _instruction(line, source))
             offset += bytes_each
     return found
 
 
 def _pad(found: list[MachineBlock], aligned: re.Match[str], offset: int, bytes_each: int) -> int:
-    """Enter what pads from *offset* on, where it is run through; how many bytes that is."""
+    """Insert the padding at ``offset`` where it is executed; return its size in bytes."""
     padding = -offset % (1 << int(aligned[1]))
     if padding > int(aligned[2] or padding):
         return 0
     if found and found[-1].end in (End.FALLS, End.BRANCH, End.CALL):
         for _ in range(padding // bytes_each):
-            _enter(found, Instruction("nop", (), ""))
+            _append(found, Instruction("nop", (), ""))
     return padding
 
 
-def _enter(found: list[MachineBlock], one: Instruction) -> None:
+def _append(found: list[MachineBlock], one: Instruction) -> None:
+    """Append an instruction to the last block, or to a new one if that has ended."""
     last = found[-1]
     if last.end is not End.FALLS:
         last = MachineBlock(last.function, "", last.came_from)
@@ -189,24 +212,18 @@ def _instruction(line: str, source: str) -> Instruction:
 
 
 def _ending(one: Instruction) -> tuple[End, str]:
+    """Return how a block ends after an instruction, and the target."""
     name, last = one.mnemonic, one.operands[-1] if one.operands else ""
     if name in _RETURNS:
         return End.RETURN, ""
     if name in _CALLS:
         direct = name != "blr" and _DIRECT.match(last) is not None
         return End.CALL, last.removesuffix("@PLT") if direct else ""
-    if name in _JUMPS:
-        return (
-            (End.JUMP, last.removesuffix("@PLT"))
-            if _DIRECT.match(last) and not _register(last)
-            else (End.COMPUTED, "")
-        )
-    if name == "br":
+    is_register = re.fullmatch(r"r[a-ds][xip]|r[sd]i|r\d+", last) is not None
+    if name in _JUMPS and _DIRECT.match(last) and not is_register:
+        return End.JUMP, last.removesuffix("@PLT")
+    if name in _JUMPS or name == "br":
         return End.COMPUTED, ""
     if name.startswith(("j", "b.")) or name in ("cbz", "cbnz", "tbz", "tbnz"):
         return End.BRANCH, last
     return End.FALLS, ""
-
-
-def _register(operand: str) -> bool:
-    return re.fullmatch(r"r[a-ds][xip]|r[sd]i|r\d+", operand) is not None

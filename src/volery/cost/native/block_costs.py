@@ -1,8 +1,7 @@
-"""What each block of a program costs on its core: from a trace, or from its code alone.
+"""Cost of each basic block of a program on its core: from a trace, from its code alone, or from the cache.
 
-Costs that were taken from a trace, kept in the user's cache by what was compiled for what.
-
-For components: sources become one object that counts its blocks, and what each block costs.
+Costs that were taken from a trace are kept in the user's cache under the key of the program, which stands
+for the code and the core.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ from volery.cost.native.instruction_tables import InstructionTables, instruction
 from volery.cost.native.instrumented_run import BlockTrace
 from volery.cost.native.llvm_ir import access_counts
 from volery.cost.native.path_reconstruction import ExecutedPath, MachineCode, reconstruct_path
+from volery.cost.pricing import STEPS_PER_CYCLE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -33,8 +33,13 @@ LINE_BYTES = 64.0
 
 @dataclass(frozen=True)
 class BlockCosts:
-    """Per block: ``cycles`` and ``instructions`` of one entry, the nanoseconds it waits for ``memory`` beside
-    its cycles, and whether a trace has ``seen`` it.
+    """Costs by basic block.
+
+    Attributes:
+        cycles: Cycles of one entry.
+        instructions: Instructions of one entry.
+        memory: Time of one entry that it waits for memory in addition to its cycles, ns.
+        seen: Whether a trace contains the block.
     """
 
     cycles: Array
@@ -43,116 +48,141 @@ class BlockCosts:
     seen: Array
 
     def total(self, counts: Array) -> float:
-        """Cycles of so many entries of each block."""
+        """Return the cycles of ``counts`` entries of each block."""
         return float(self.cycles @ counts)
 
     def waiting(self, counts: Array) -> float:
-        """Nanoseconds of waiting for memory in so many entries of each block."""
+        """Return the time of waiting for memory in ``counts`` entries of each block, ns."""
         return float(self.memory @ counts)
 
 
+def block_steps(cycles: Array, memory: Array, frequency_mhz: float, charged: Array) -> Array:
+    """Return the whole steps of one entry of each block, which ``ProcessorPrices.compiled_code`` prices.
+
+    Args:
+        cycles: Cycles of one entry.
+        memory: Waiting for memory in one entry, ns.
+        frequency_mhz: Frequency of the core, MHz.
+        charged: Whether a block is charged; blocks of the framework have prices of their own.
+    """
+    whole = (cycles + memory * frequency_mhz / 1000.0) * charged
+    steps: Array = np.rint(whole * STEPS_PER_CYCLE).astype(np.int64)
+    return steps
+
+
 def static_costs(program: Program) -> BlockCosts:
-    """Costs from the code alone: each block as if it ran several times in a row, no branch mispredicted."""
-    machine = MachineCode(program.blocks, program.pieces)
-    encoded = instruction_tables(program.pieces, program.law, program.defined)
+    """Estimate costs from the code alone: each block runs several times in a row, without mispredictions."""
+    code = MachineCode(program.blocks, program.machine_blocks)
+    tables = instruction_tables(program.machine_blocks, program.law, program.defined)
     cycles, instructions = np.zeros(len(program.blocks)), np.zeros(len(program.blocks))
-    for block, first in machine.piece_of_block.items():
-        own = blocks_of(machine, first)
+    for block, first in code.first_of_block.items():
+        own = blocks_of(code, first)
         repeated = np.array(own * REPEATS, dtype=np.int64)
-        took, _ = execute(encoded, ExecutionSequence(repeated, np.zeros(len(repeated), dtype=np.int8)))
-        cycles[block] = took.sum() / REPEATS
-        instructions[block] = sum(encoded.instructions(one) for one in own)
+        block_cycles, _ = execute(tables, ExecutionSequence(repeated, np.zeros(len(repeated), dtype=np.int8)))
+        cycles[block] = block_cycles.sum() / REPEATS
+        instructions[block] = sum(tables.instructions(one) for one in own)
     none = np.zeros(len(program.blocks))
     return BlockCosts(cycles, instructions, none, none > 0.0)
 
 
 def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, ExecutedPath]:
-    """Costs from what ran: the mean of each block that was entered, the others from the code alone.
+    """Return costs from a trace: the mean of each block that was entered, the others from the code alone.
 
-    What a wrong prediction costs belongs to the way that was taken then: the more often that is taken with
-    other data, the more there are.
+    The cost of a misprediction belongs to the edge that was taken then: the more often other data take that
+    edge, the more mispredictions there are.
     """
-    machine = MachineCode(program.blocks, program.pieces)
-    encoded = instruction_tables(program.pieces, program.law, program.defined)
-    walked = reconstruct_path(machine, trace)
-    late = cache_misses(walked, encoded, access_counts(program.text))
-    ran = ExecutionSequence(
-        np.array(walked.pieces, dtype=np.int64), np.array(walked.taken, dtype=np.int8), late
+    code = MachineCode(program.blocks, program.machine_blocks)
+    tables = instruction_tables(program.machine_blocks, program.law, program.defined)
+    path = reconstruct_path(code, trace)
+    sequence = ExecutionSequence(
+        np.array(path.blocks, dtype=np.int64),
+        np.array(path.taken, dtype=np.int8),
+        cache_misses(path, tables, access_counts(program.text)),
     )
-    took, stalled = execute(encoded, ran)
+    cycles, stalled = execute(tables, sequence)
     size = len(program.blocks)
-    owners, reached = np.array(walked.owners, dtype=np.int64), np.array(walked.reached, dtype=np.int64)
+    owners, reached = np.array(path.owners, dtype=np.int64), np.array(path.reached, dtype=np.int64)
     entered = np.bincount(np.array(trace.blocks, dtype=np.int64), minlength=size)
-    lengths = np.diff(encoded.first)[np.array(walked.pieces, dtype=np.int64)]
-    cycles = np.bincount(owners, weights=took - stalled, minlength=size)
-    cycles += np.bincount(reached, weights=stalled, minlength=size)
+    lengths = np.diff(tables.first)[sequence.blocks]
+    block_cycles = np.bincount(owners, weights=cycles - stalled, minlength=size)
+    block_cycles += np.bincount(reached, weights=stalled, minlength=size)
     instructions = np.bincount(owners, weights=lengths, minlength=size)
-    waited = np.bincount(owners, weights=_waiting_ns(program.law, encoded, ran, took), minlength=size)
+    waiting_ns = _waiting_ns(program.law, tables, sequence, cycles)
+    waited = np.bincount(owners, weights=waiting_ns, minlength=size)
     static = static_costs(program)
     seen = entered > 0
     divisor = np.maximum(entered, 1)
     return BlockCosts(
-        np.where(seen, cycles / divisor, static.cycles),
+        np.where(seen, block_cycles / divisor, static.cycles),
         np.where(seen, instructions / divisor, static.instructions),
         np.maximum(waited, 0.0) / divisor,
         seen,
-    ), walked
+    ), path
 
 
 @dataclass(frozen=True)
 class ExecutionSequence:
-    """Pieces in the order in which they ran, whether the branch of each was taken, and which accesses the
-    first cache did not serve (``memory.served_late``).
-    """
+    """What ran: machine blocks in order, whether the branch of each was taken, and ``cache_misses``."""
 
-    pieces: Array
+    blocks: Array
     taken: Array
-    late: Array = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
+    misses: Array = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
 
 
 def execute(
-    encoded: InstructionTables, ran: ExecutionSequence, memory_cycles: tuple[float, float] | None = None
+    tables: InstructionTables,
+    sequence: ExecutionSequence,
+    memory_cycles: tuple[float, float] | None = None,
 ) -> tuple[Array, Array]:
-    """Run pieces through the core model: cycles of each, and how many of them were lost to a wrong prediction
-    before it.
+    """Run a sequence through the core model.
 
-    *memory_cycles*: the latency of memory and what a line takes; unless given, memory is as fast as the last
-    cache.
+    Args:
+        tables: The program's instructions.
+        sequence: What ran.
+        memory_cycles: Latency of memory and time of one line, cycles; by default memory is as fast as the
+            last cache.
+
+    Returns:
+        Cycles of each machine block, and the part lost to a misprediction before it.
     """
-    last = encoded.levels[-1:] if memory_cycles is None else np.array(memory_cycles[:1])
+    last = tables.levels[-1:] if memory_cycles is None else np.array(memory_cycles[:1])
     return core_model.run(
-        ran.pieces, ran.taken, encoded.first, encoded.table, encoded.operations, encoded.capacity,
-        encoded.core, encoded.slots, encoded.library, encoded.lengths, ran.late,
-        np.concatenate([encoded.levels, last]), 0.0 if memory_cycles is None else memory_cycles[1],
+        sequence.blocks, sequence.taken, tables.first, tables.table, tables.operations, tables.capacity,
+        tables.core, tables.slots, tables.library, tables.histories, sequence.misses,
+        np.concatenate([tables.levels, last]), 0.0 if memory_cycles is None else memory_cycles[1],
     )  # fmt: skip
 
 
-def _waiting_ns(law: CoreLaw, encoded: InstructionTables, ran: ExecutionSequence, took: Array) -> Array:
-    """What each piece takes longer because memory is slower than the last cache: at the core's greatest
-    frequency, where least of it is hidden.
+def _waiting_ns(law: CoreLaw, tables: InstructionTables, sequence: ExecutionSequence, cycles: Array) -> Array:
+    """Return the additional time of each machine block because memory is slower than the last cache, ns.
+
+    It is taken at the core's greatest frequency, where the least of it is hidden.
     """
-    if law.memory is None or not np.any(ran.late[:, core_model.LEVEL] == len(law.memory.caches)):
-        return np.zeros(len(took))
+    if law.memory is None or not np.any(sequence.misses[:, core_model.LEVEL] == len(law.memory.caches)):
+        return np.zeros(len(cycles))
     per_ns = law.greatest_mhz / 1000.0
     line = LINE_BYTES / law.memory.bytes_per_ns
-    slower, _ = execute(encoded, ran, (law.memory.latency_ns * per_ns, line * per_ns))
-    return (slower - took) / per_ns
+    slower, _ = execute(tables, sequence, (law.memory.latency_ns * per_ns, line * per_ns))
+    return (slower - cycles) / per_ns
 
 
-def blocks_of(machine: MachineCode, first: int) -> list[int]:
-    """The pieces of a block that follow its first one without another block's beginning."""
+def blocks_of(code: MachineCode, first: int) -> list[int]:
+    """Return the machine blocks of a basic block, from ``first`` to the beginning of another basic block."""
     own = [first]
     number = first
-    while machine.pieces[number].end in (End.FALLS, End.CALL):
+    while code.machine_blocks[number].end in (End.FALLS, End.CALL):
         number += 1
-        if number >= len(machine.pieces) or number in machine.block_of_piece:
+        if number >= len(code.machine_blocks) or number in code.block_of_first:
             break
         own.append(number)
     return own
 
 
+# -- costs kept in the user's cache
+
+
 def cache_folder() -> Path:
-    """Where costs are kept: ``VOLERY_CACHE``, or ``volery`` in the user's cache."""
+    """Return the folder of kept costs: ``$VOLERY_CACHE``, or ``volery`` in the user's cache."""
     named = os.environ.get("VOLERY_CACHE")
     if named:
         return Path(named)
@@ -160,7 +190,7 @@ def cache_folder() -> Path:
 
 
 def load_costs(key: str) -> BlockCosts | None:
-    """The costs kept for the code and core of that ``Program.key``, if there are any."""
+    """Return the costs kept under a ``Program.key``, or None."""
     try:
         with np.load(_file(key)) as kept:
             return BlockCosts(kept["cycles"], kept["instructions"], kept["memory"], kept["seen"])
@@ -169,7 +199,7 @@ def load_costs(key: str) -> BlockCosts | None:
 
 
 def save_costs(key: str, costs: BlockCosts) -> None:
-    """Keep costs; without a place to write, nothing is kept."""
+    """Keep costs under a ``Program.key``; do nothing where the folder cannot be written."""
     file = _file(key)
     new = file.with_suffix(f".{os.getpid()}.npz")
     try:
@@ -184,12 +214,20 @@ def _file(key: str) -> Path:
     return cache_folder() / "native" / f"{key}.npz"
 
 
+# -- for components
+
+
 @dataclass(frozen=True)
 class Instrumented:
-    """An object that exports ``uint64_t volery_counters[]`` and ``volery_counters_length``; costs by counter.
+    """An object file that exports ``uint64_t volery_counters[]`` and ``volery_counters_length``.
 
-    ``functions`` are the symbols of the functions that the counters are in; ``key`` is the program's.
-    ``estimated`` says what a report has to say, empty where the costs come from a trace of this very code.
+    Attributes:
+        object_file: The object file, for this machine.
+        costs: Costs by counter.
+        law: The core that the costs are for.
+        functions: Symbol of the function that each counter is in.
+        key: The program's key.
+        estimated: Warning for a report, empty where the costs come from a trace of this very code.
     """
 
     object_file: Path
@@ -201,11 +239,19 @@ class Instrumented:
 
 
 def instrument(sources: Sequence[Path], law: CoreLaw, out: Path, flags: Sequence[str] = ()) -> Instrumented:
-    """Compile *sources* for the core of *law*, write the counting object for this machine to *out*.
+    """Compile sources for a core and write the counting object for this machine.
 
-    Costs are those kept from an earlier trace of the same code, or else from the code alone, which
-    ``estimated`` says. ``cycles`` of a stretch are ``costs.total(counters_after - counters_before)``.
-    ``CompilerError`` has the compiler's words, ``UsageError`` says which package brings LLVM.
+    The costs are those kept from an earlier trace of the same code, else from the code alone.
+
+    Args:
+        sources: C and C++ files.
+        law: The core.
+        out: The object file to write.
+        flags: Options of the compiler's front end.
+
+    Raises:
+        CompilerError: The sources do not compile; the message is the compiler's.
+        UsageError: LLVM is missing.
     """
     program = compile_program(sources, law, flags)
     program.counted_object(out)
@@ -214,5 +260,5 @@ def instrument(sources: Sequence[Path], law: CoreLaw, out: Path, flags: Sequence
     if kept is not None:
         return Instrumented(out, kept, law, functions, program.key)
     names = ", ".join(source.name for source in sources)
-    said = f"the cost of {names} on {law.name} comes from its code alone; calibrate components learns it"
-    return Instrumented(out, static_costs(program), law, functions, program.key, said)
+    warning = f"the cost of {names} on {law.name} comes from its code alone; calibrate components learns it"
+    return Instrumented(out, static_costs(program), law, functions, program.key, warning)

@@ -1,8 +1,8 @@
-"""Where accesses that the first cache did not serve fall in the machine code that ran.
+"""Positions of cache misses in the machine code that ran.
 
-The trace has them by their number among the accesses of a block of intermediate code. The machine code of
-that block has as many loads and stores, or some less (two at once) or more (what did not fit in registers): a
-load falls on the load at the same share of the way through the block, a store on such a store.
+The trace has misses by the number of the access among those of its basic block in the intermediate code. The
+machine code of the block has as many loads and stores, or fewer (two at once) or more (spilled registers): a
+load is assigned to the load at the same share of the way through the block, a store to such a store.
 """
 
 from __future__ import annotations
@@ -19,46 +19,46 @@ from volery.cost.native.path_reconstruction import ExecutedPath
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-
 Row = tuple[int, int]
-"""Of the table of instructions, in a step of what ran: (step, row)."""
+"""(step of the path, row of the table of instructions)."""
 
 
-def cache_misses(walked: ExecutedPath, encoded: InstructionTables, accesses_of: Sequence[int]) -> Array:
-    """Rows of (step, row of the table of instructions, level, fetched ahead), in the order in which they run.
+def cache_misses(path: ExecutedPath, tables: InstructionTables, access_counts: Sequence[int]) -> Array:
+    """Return the misses as rows (step, row of the table of instructions, level, fetched ahead), in order.
 
-    *accesses_of*: how many each block has in the intermediate code.
+    Args:
+        path: What ran.
+        tables: The program's instructions.
+        access_counts: Accesses of each basic block in the intermediate code.
     """
     found: list[tuple[int, int, int, int]] = []
     steps = sorted(
-        (step for step, place in enumerate(walked.places) if place in walked.accesses),
-        key=lambda step: (walked.places[step], step),
+        (step for step, position in enumerate(path.positions) if position in path.accesses),
+        key=lambda step: (path.positions[step], step),
     )
-    for place, steps_of in groupby(steps, key=lambda step: walked.places[step]):
-        own = list(steps_of)
-        ran_rows = [
+    for position, steps_here in groupby(steps, key=lambda step: path.positions[step]):
+        own = list(steps_here)
+        rows = [
             (step, row)
             for step in own
-            for row in range(encoded.first[walked.pieces[step]], encoded.first[walked.pieces[step] + 1])
+            for row in range(tables.first[path.blocks[step]], tables.first[path.blocks[step] + 1])
         ]
-        loads, stores = (
-            _those(ran_rows, encoded, core_model.LOAD),
-            _those(ran_rows, encoded, core_model.STORE),
-        )
-        count = max(1, accesses_of[walked.owners[own[0]]])
-        for one in walked.accesses[place]:
-            rows = stores if one.store else loads
-            if rows:
-                step, row = rows[min(one.number * len(rows) // count, len(rows) - 1)]
-                found.append((step, row, one.level, int(one.ahead)))
+        loads = _rows_with(rows, tables, core_model.LOAD)
+        stores = _rows_with(rows, tables, core_model.STORE)
+        count = max(1, access_counts[path.owners[own[0]]])
+        for access in path.accesses[position]:
+            candidates = stores if access.store else loads
+            if candidates:
+                step, row = candidates[min(access.number * len(candidates) // count, len(candidates) - 1)]
+                found.append((step, row, access.level, int(access.ahead)))
     return np.array(sorted(found), dtype=np.int64).reshape(-1, 4)
 
 
-def _those(rows: Sequence[Row], encoded: InstructionTables, kind: int) -> list[Row]:
-    """The rows that load, or those that store."""
-    table = encoded.table
+def _rows_with(rows: Sequence[Row], tables: InstructionTables, column: int) -> list[Row]:
+    """Return the rows of ordinary instructions that load, or that store."""
+    table = tables.table
     return [
         (step, row)
         for step, row in rows
-        if table[row, kind] >= 0 and table[row, core_model.KIND] == core_model.PLAIN
+        if table[row, column] >= 0 and table[row, core_model.KIND] == core_model.PLAIN
     ]

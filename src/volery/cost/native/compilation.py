@@ -1,6 +1,7 @@
-"""The programs that compile: found by name, run with a limit, their complaints passed on as theirs.
+"""Compilation with LLVM: sources become one optimised module for a core.
 
-Sources become one optimised module for a core, and from it what runs here: counted, traced or plain.
+From the module come the core's machine code and the objects that run on this machine: counted, traced or
+plain. LLVM's programs are run as processes; bindings to its libraries would tie volery to one version.
 """
 
 from __future__ import annotations
@@ -20,19 +21,19 @@ from volery.cost.native.assembly import MachineBlock, machine_blocks
 from volery.cost.native.llvm_ir import BasicBlock, basic_blocks, retarget, with_counters, with_trace_calls
 
 VERSIONS = ("-19", "-18", "-17", "")
-"""Suffixes of LLVM's programs that are tried, best first; 19 is what Debian 12 brings and tests use."""
+"""Suffixes of LLVM's programs in the order of preference; Debian 12 and the tests use 19."""
 
 PACKAGES = {"clang++": "clang-19", "opt": "llvm-19", "llc": "llvm-19", "llvm-link": "llvm-19"}
 LIMIT_S = 300.0
 
 
 class CompilerError(UsageError):
-    """A compiler refused; the message is the compiler's own."""
+    """A compiler has failed; the message is the compiler's."""
 
 
 @dataclass(frozen=True)
 class LlvmToolchain:
-    """LLVM's front end, optimiser, code generator and linker of its intermediate code, of one version."""
+    """Programs of one version of LLVM: front end, optimiser, code generator, linker of intermediate code."""
 
     clang: str
     opt: str
@@ -42,7 +43,11 @@ class LlvmToolchain:
 
 @cache
 def llvm_toolchain() -> LlvmToolchain:
-    """The best version that is complete. ``UsageError`` names the Debian package of what is missing."""
+    """Return the preferred version that is complete.
+
+    Raises:
+        UsageError: There is none; the error names the Debian packages to install.
+    """
     names = tuple(PACKAGES)
     for suffix in VERSIONS:
         found = [shutil.which(name + suffix) for name in names]
@@ -57,7 +62,11 @@ def llvm_toolchain() -> LlvmToolchain:
 
 
 def run_tool(command: Sequence[str], text: str | None = None) -> str:
-    """What a program prints. ``CompilerError`` with its own words if it fails."""
+    """Run a program with ``text`` as its input and return its output.
+
+    Raises:
+        CompilerError: The program fails or takes longer than ``LIMIT_S``; the message is the program's.
+    """
     try:
         done = subprocess.run(
             command, input=text, capture_output=True, text=True, timeout=LIMIT_S, check=False
@@ -77,7 +86,7 @@ TARGETS = {
     "x86_64": HOST_TARGET,
     "aarch64": ("aarch64-unknown-linux-gnu", "e-m:e-i8:8:32-i16:16:32-i64:64-i128:128-n32:64-S128-Fn32"),
 }
-"""Triple and data layout of LLVM 19, by the instruction set."""
+"""Triple and data layout of LLVM 19 by instruction set."""
 
 FRONT_END_OPTIONS = (
     "-O2",
@@ -89,14 +98,13 @@ FRONT_END_OPTIONS = (
     "-emit-llvm",
 )
 OPTIMISE = "default<O2>,break-crit-edges"
-"""Ways from a branch to where other ways come in have a block of their own. It is empty: what is made of it
-is the same machine code, but how often the way was taken is counted.
-"""
+"""Passes of the optimiser. Critical edges become empty blocks: the machine code stays the same, and the
+counters tell how often an edge was taken."""
 PROMOTE = "function(loop-mssa(licm))"
-"""Counters of a loop live in registers while it runs; calls see them up to date."""
+"""Pass after the insertion of counters: those of a loop stay in registers while it runs."""
 
 METHOD = "3"
-"""Another one whenever costs are found in another way: what was kept before counts no more."""
+"""Version of the method that finds costs; a new version makes kept costs invalid."""
 
 C_SUFFIXES = {".c"}
 LANGUAGES = {".c", ".cc", ".cpp", ".cxx", ".C"}
@@ -104,7 +112,7 @@ LANGUAGES = {".c", ".cc", ".cpp", ".cxx", ".C"}
 
 @dataclass(frozen=True)
 class Program:
-    """Code optimised for a core: ``text`` is LLVM's intermediate code, with the numbering of its blocks."""
+    """Code optimised for a core: LLVM's intermediate code and its basic blocks, whose order numbers them."""
 
     text: str
     law: CoreLaw
@@ -112,24 +120,25 @@ class Program:
 
     @cached_property
     def key(self) -> str:
-        """The same for the same code on the same core."""
-        told = METHOD + self.text + self.law.model_dump_json()
-        return hashlib.sha256(told.encode()).hexdigest()[:24]
+        """Digest of the code and the core."""
+        text = METHOD + self.text + self.law.model_dump_json()
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     @cached_property
     def assembly(self) -> str:
-        """The target's assembly."""
+        """Assembly for the core."""
+        options = ["-O2", f"-mcpu={self.law.cpu}", "-relocation-model=pic"]
         notation = ["-x86-asm-syntax=intel"] if self.law.isa == "x86_64" else []
-        return run_tool([llvm_toolchain().llc, *generator(self.law), *notation, "-o", "-"], self.text)
+        return run_tool([llvm_toolchain().llc, *options, *notation, "-o", "-"], self.text)
 
     @cached_property
-    def pieces(self) -> tuple[MachineBlock, ...]:
-        """The target's machine code."""
+    def machine_blocks(self) -> tuple[MachineBlock, ...]:
+        """Machine code for the core."""
         return tuple(machine_blocks(self.assembly, 4 if self.law.isa == "aarch64" else 0))
 
     @cached_property
     def defined(self) -> frozenset[str]:
-        """The symbols of its functions."""
+        """Symbols of the functions."""
         return frozenset(block.function for block in self.blocks)
 
     def counted_object(self, out: Path) -> None:
@@ -153,27 +162,38 @@ class Program:
         )
 
 
-def generator(law: CoreLaw) -> tuple[str, ...]:
-    """The options of LLVM's code generator for a core."""
-    return ("-O2", f"-mcpu={law.cpu}", "-relocation-model=pic")
-
-
 def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] = ()) -> Program:
     """Compile C and C++ sources and optimise them for a core.
 
-    *flags* go to the front end. ``CompilerError`` has the compiler's words.
+    Args:
+        sources: C and C++ files.
+        law: The core.
+        flags: Options of the front end.
+
+    Raises:
+        CompilerError: The sources do not compile; the message is the compiler's.
+        UsageError: A file is missing, is neither C nor C++, or LLVM is missing.
     """
     for source in sources:
         if not source.is_file():
             raise UsageError(f"{source}: there is no such file")
         if source.suffix not in LANGUAGES:
-            raise UsageError(f"{source}: C or C++ is wanted ({', '.join(sorted(LANGUAGES))})")
+            raise UsageError(f"{source}: not a C or C++ file ({', '.join(sorted(LANGUAGES))})")
     tools = llvm_toolchain()
     with TemporaryDirectory(prefix="volery-native-") as folder:
         modules = []
         for number, source in enumerate(sources):
             plain = run_tool(
-                [tools.clang, *_language(source), *FRONT_END_OPTIONS, *flags, str(source), "-o", "-"]
+                [
+                    tools.clang,
+                    "-x",
+                    "c" if source.suffix in C_SUFFIXES else "c++",
+                    *FRONT_END_OPTIONS,
+                    *flags,
+                    str(source),
+                    "-o",
+                    "-",
+                ]
             )
             module = Path(folder, f"{number}.ll")
             retargeted = retarget(plain, *TARGETS[law.isa])
@@ -183,7 +203,3 @@ def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] 
             modules.append(str(module))
         text = run_tool([tools.link, "-S", "-o", "-", *modules])
     return Program(text, law, tuple(basic_blocks(text)))
-
-
-def _language(source: Path) -> tuple[str, ...]:
-    return ("-x", "c") if source.suffix in C_SUFFIXES else ("-x", "c++")

@@ -1,14 +1,15 @@
-"""A superscalar core with out-of-order execution, driven by what ran: when each piece of code is finished.
+"""Model of a superscalar core with out-of-order execution, driven by the machine blocks that ran.
 
-An instruction enters in order, ``width`` slots a cycle, while the window has room. It executes when its
-operands are there and a pipe is free, and leaves in order. A store is remembered by the text of its address
-and the versions of the registers in it: a load of the same place waits for it, and one of parts of several
-stores until they have left. Branches are predicted by their history (``prediction``), computed jumps by their
-last target with it; after a wrong prediction nothing enters until the branch is done and ``refill`` cycles
-have passed. A call of a library takes its time of the front end, and its result takes twice that.
+Instructions enter the reorder buffer in order, ``width`` slots a cycle. An instruction executes when its
+operands are available and a pipe is free, and retires in order. A store is identified by the text of its
+address and the versions of the registers in it: a load of the same address is forwarded from it, and a load
+of parts of several stores waits until they have retired. Branches are predicted by ``branch_prediction``,
+computed jumps by their last target with the same history. After a misprediction nothing enters until the
+branch is done and ``refill`` cycles have passed. A library call occupies the front end for its cycles, and
+its result is available after twice as many.
 
-An access hits the first cache, or is served by the level that the trace says. Memory gives a line at a time:
-one that was fetched ahead is there as soon as memory can give it, any other after its latency as well.
+An access hits the first cache, or is served by the level in the trace. Memory delivers one line at a time: a
+prefetched line is available as soon as memory can deliver it, any other after the latency as well.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ PLACES = 8192
 CHUNK = 4
 BLOCKED = 8.0
 
-# columns of the table of instructions
+# columns of the instruction table
 SIZE, LOAD, LOADS, OPERATION, TIMES, STORE, PLACE, KIND, DISPLACEMENT = range(9)
 FIRST_READ = 9
 FIRST_ADDRESS = FIRST_READ + READS
@@ -39,19 +40,19 @@ COLUMNS = FIRST_BUMP + BUMPS
 
 PLAIN, CONDITIONAL, COMPUTED, LIBRARY, JUMP = range(5)
 
-# columns of the table of operations
+# columns of the operation table
 LATENCY, KIND_OF, GROUP = range(3)
-# places in the vector of the core's own figures
+# entries of the vector of the core's figures
 WIDTH, WINDOW, REFILL, FORWARD = range(4)
-# columns of the accesses that the first cache does not serve
+# columns of the table of cache misses
 STEP, ROW, LEVEL, AHEAD = range(4)
 LINES_AHEAD = 4.0
-"""So many lines before they are asked for are they fetched."""
+"""Distance of the prefetcher, lines."""
 
 
 @njit(cache=True)
 def _issue(used: Array, capacity: Array, operation: Array, ready: float, times: float) -> float:
-    """The cycle in which an operation starts: when its own kind and its group of pipes have room."""
+    """Return the cycle in which an operation starts: its class and its group of pipes have capacity then."""
     own = _first_free(used, capacity, int(operation[KIND_OF]), ready, times)
     if operation[GROUP] == operation[KIND_OF]:
         return own
@@ -60,7 +61,7 @@ def _issue(used: Array, capacity: Array, operation: Array, ready: float, times: 
 
 @njit(cache=True)
 def _first_free(used: Array, capacity: Array, pipes: int, ready: float, need: float) -> float:
-    """Take *need* of what the pipes can start from *ready* on; the first cycle in which there was some."""
+    """Reserve ``need`` of the pipes' capacity from ``ready`` on; return the first cycle with some."""
     cycle = int(np.ceil(ready))
     started = -1
     last = cycle + SLOT_CYCLES - 2
@@ -81,10 +82,10 @@ def _first_free(used: Array, capacity: Array, pipes: int, ready: float, need: fl
 
 
 @njit(cache=True)
-def _remembered(
+def _record_store(
     keys: Array, times: Array, key: np.int64, one: Array, number: int, done: float, leaves: float
 ) -> None:
-    """Remember a store, in chunks of its memory: when its data are there, and when it has left the core."""
+    """Record a store by chunks of memory: when its data are available, and when it retires."""
     for chunk in range(one[DISPLACEMENT] // CHUNK, (one[DISPLACEMENT] + one[SIZE] - 1) // CHUNK + 1):
         mixed = key * 31 + chunk * 2654435761
         at = (mixed >> 9) % PLACES
@@ -95,8 +96,8 @@ def _remembered(
 
 
 @njit(cache=True)
-def _forwarded(keys: Array, times: Array, key: np.int64, one: Array, start: float, forward: float) -> float:
-    """When a load has what a store under way is to leave there; parts of several stores must leave first."""
+def _forward(keys: Array, times: Array, key: np.int64, one: Array, start: float, forward: float) -> float:
+    """Return when a load has the data of pending stores; parts of several stores must retire first."""
     ready, source, whole = 0.0, -1, True
     for chunk in range(one[DISPLACEMENT] // CHUNK, (one[DISPLACEMENT] + one[SIZE] - 1) // CHUNK + 1):
         mixed = key * 31 + chunk * 2654435761
@@ -115,8 +116,8 @@ def _forwarded(keys: Array, times: Array, key: np.int64, one: Array, start: floa
 
 
 @njit(cache=True)
-def _loaded(used: Array, capacity: Array, operation: Array, at: float, times: int) -> float:
-    """When the last of so many loads has what the first cache serves."""
+def _load(used: Array, capacity: Array, operation: Array, at: float, times: int) -> float:
+    """Return when the last of ``times`` loads has its value from the first cache."""
     started = at
     for _ in range(times):
         started = _issue(used, capacity, operation, at, 1.0)
@@ -124,8 +125,8 @@ def _loaded(used: Array, capacity: Array, operation: Array, at: float, times: in
 
 
 @njit(cache=True)
-def _there(registers: Array, ready: Array, start: float) -> float:
-    """When the last of these registers has its value."""
+def _available(registers: Array, ready: Array, start: float) -> float:
+    """Return when the last of these registers has its value."""
     at = start
     for register in registers:
         if register >= 0:
@@ -134,8 +135,8 @@ def _there(registers: Array, ready: Array, start: float) -> float:
 
 
 @njit(cache=True)
-def _place(one: Array, version: Array) -> np.int64:
-    """The name of a place in memory: the text of its address and the versions of the registers in it."""
+def _address(one: Array, version: Array) -> np.int64:
+    """Return the identity of an address: its text and the versions of the registers in it."""
     key = np.int64(one[PLACE]) * 1000003
     for register in one[FIRST_ADDRESS : FIRST_ADDRESS + ADDRESSES]:
         if register >= 0:
@@ -144,8 +145,8 @@ def _place(one: Array, version: Array) -> np.int64:
 
 
 @njit(cache=True)
-def _written(registers: Array, ready: Array, version: Array, done: float, changes: int) -> int:
-    """These registers have a new value at *done*; returns how many changes there have been."""
+def _write_registers(registers: Array, ready: Array, version: Array, done: float, changes: int) -> int:
+    """Give registers a new value at ``done``; return the number of changes so far."""
     for register in registers:
         if register >= 0:
             ready[register] = done
@@ -155,13 +156,13 @@ def _written(registers: Array, ready: Array, version: Array, done: float, change
 
 
 @njit(cache=True)
-def _fetched(
-    late: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
+def _fetch_lines(
+    misses: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
 ) -> tuple[float, float]:
-    """When the last of a load's late accesses arrives, and from when on memory is free again."""
+    """Return when the last of a load's missing lines arrives, and when memory is free again."""
     arrives = at
     for i in range(first, last):
-        level, ahead = late[i, LEVEL], late[i, AHEAD]
+        level, ahead = misses[i, LEVEL], misses[i, AHEAD]
         if level == len(levels) - 1 and line > 0.0:
             begins = max(free, at - LINES_AHEAD * line if ahead else at)
             free = begins + line
@@ -172,54 +173,69 @@ def _fetched(
 
 
 @njit(cache=True)
-def _sent(late: Array, first: int, last: int, levels: Array, line: float, at: float, free: float) -> float:
-    """From when on memory is free again after a store's late accesses, for which nobody waits."""
+def _send_lines(
+    misses: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
+) -> float:
+    """Return when memory is free again after a store's misses, which delay no instruction."""
     for i in range(first, last):
-        if late[i, LEVEL] == len(levels) - 1 and line > 0.0:
+        if misses[i, LEVEL] == len(levels) - 1 and line > 0.0:
             free = max(free, at) + line
     return free
 
 
 @njit(cache=True)
-def _of_this(late: Array, first: int, step: int, row: int) -> int:
-    """Where the late accesses end that belong to this instruction."""
+def _end_of_misses(misses: Array, first: int, step: int, row: int) -> int:
+    """Return the end of the misses that belong to an instruction."""
     last = first
-    while last < len(late) and late[last, STEP] == step and late[last, ROW] == row:
+    while last < len(misses) and misses[last, STEP] == step and misses[last, ROW] == row:
         last += 1
     return last
 
 
 @njit(cache=True)
-def _foreseen(
-    predictor: Any, lengths: Array, targets: Array, kind: int, row: int, taken: bool, target: int
+def _predict(
+    predictor: Any, histories: Array, targets: Array, kind: int, row: int, taken: bool, target: int
 ) -> bool:
-    """Whether the core enters the right piece after a branch; it learns from what was right."""
+    """Return whether the core predicts the next machine block; train the predictor."""
     right = True
     if kind == CONDITIONAL:
-        right = predict_branch(predictor, lengths, row, taken)
+        right = predict_branch(predictor, histories, row, taken)
     elif kind == COMPUTED:
-        seen = (row ^ predictor[3][len(lengths) // 2, 0]) % PLACES
+        seen = (row ^ predictor[3][len(histories) // 2, 0]) % PLACES
         right = targets[seen] == target
         targets[seen] = target
     if kind != CONDITIONAL or taken:
-        record_taken(predictor, lengths, row, target)
+        record_taken(predictor, histories, row, target)
     return right
 
 
 @njit(cache=True)
 def run(
-    pieces: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
-    slots: Array, library: Array, lengths: Array, late: Array, levels: Array, line: float,
+    blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
+    slots: Array, library: Array, histories: Array, misses: Array, levels: Array, line: float,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Cycles from the end of the piece before to the end of each piece, and how many of them nothing entered
-    because the branch before had been mispredicted.
+    """Execute machine blocks.
 
-    *first* has each piece's first row in *table*, and one more entry; *slots* an instruction's slots;
-    *library* the cycles of a call of a library, by the row. *late* has the accesses that the first cache does
-    not serve, in order; *levels* the latency of each level; *line* the cycles in which memory gives a line, 0
-    where it is a level like the others.
+    Args:
+        blocks: Numbers of the machine blocks in the order of execution.
+        taken: Whether the branch of each was taken.
+        first: First row of each machine block in ``table``, and one more.
+        table: Instructions.
+        operations: Classes of operations.
+        capacity: Capacity of the pipes per cycle.
+        core: Width, window, refill and forwarding.
+        slots: Slots of the front end by row.
+        library: Cycles of a library call by row.
+        histories: Lengths of the branch predictor's histories.
+        misses: Accesses that the first cache does not serve, in order.
+        levels: Latency of each level, cycles.
+        line: Cycles in which memory delivers a line, 0 where it is a level like the others.
+
+    Returns:
+        Cycles from the end of the block before to the end of each block, and how many of them nothing entered
+        because the branch before was mispredicted.
     """
-    count = len(pieces)
+    count = len(blocks)
     cost = np.zeros(count)
     stalled = np.zeros(count)
     ready = np.zeros(REGISTERS)
@@ -229,15 +245,15 @@ def run(
     leaves = np.zeros(window)
     stored_key = np.zeros((PLACES, 2), dtype=np.int64)
     stored = np.zeros((PLACES, 2))
-    predictor = new_predictor(len(lengths))
+    predictor = new_predictor(len(histories))
     targets = np.full(PLACES, -1, dtype=np.int64)
     enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
-    next_late, free = 0, 0.0
+    next_miss, free = 0, 0.0
     for step in range(count):
-        piece = pieces[step]
+        block = blocks[step]
         stalled[step] = max(0.0, resumes - clock)
         enters = max(enters, resumes)
-        for row in range(first[piece], first[piece + 1]):
+        for row in range(first[block], first[block + 1]):
             one = table[row]
             enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
             if one[KIND] == LIBRARY:
@@ -245,35 +261,35 @@ def run(
                 enters += library[row]
                 ready[0] = ready[1] = done
             else:
-                at = _there(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
-                done = _there(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
-                place = _place(one, version) if one[PLACE] != 0 else np.int64(0)
-                last_late = _of_this(late, next_late, step, row)
+                at = _available(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
+                done = _available(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
+                place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
+                last_miss = _end_of_misses(misses, next_miss, step, row)
                 if one[LOAD] >= 0:
-                    loaded = _loaded(used, capacity, operations[one[LOAD]], at, one[LOADS])
-                    arrives, free = _fetched(late, next_late, last_late, levels, line, at, free)
+                    loaded = _load(used, capacity, operations[one[LOAD]], at, one[LOADS])
+                    arrives, free = _fetch_lines(misses, next_miss, last_miss, levels, line, at, free)
                     done = max(done, loaded, arrives)
                     if one[PLACE] != 0:
-                        done = max(done, _forwarded(stored_key, stored, place, one, at, core[FORWARD]))
+                        done = max(done, _forward(stored_key, stored, place, one, at, core[FORWARD]))
                 else:
-                    free = _sent(late, next_late, last_late, levels, line, at, free)
-                next_late = last_late
+                    free = _send_lines(misses, next_miss, last_miss, levels, line, at, free)
+                next_miss = last_miss
                 if one[OPERATION] >= 0:
                     operation = operations[one[OPERATION]]
                     done = _issue(used, capacity, operation, done, float(one[TIMES])) + operation[LATENCY]
                 if one[STORE] >= 0:
                     done = max(done, _issue(used, capacity, operations[one[STORE]], at, 1.0))
                     if one[PLACE] != 0:
-                        _remembered(stored_key, stored, place, one, number, done, max(done, retired))
-                changes = _written(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
-                changes = _written(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
+                        _record_store(stored_key, stored, place, one, number, done, max(done, retired))
+                changes = _write_registers(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
+                changes = _write_registers(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
             retired = max(retired, done)
             leaves[number % window] = retired
             number += 1
             if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
                 continue
-            target = pieces[step + 1]
-            if not _foreseen(predictor, lengths, targets, one[KIND], row, taken[step] == 1, target):
+            target = blocks[step + 1]
+            if not _predict(predictor, histories, targets, one[KIND], row, taken[step] == 1, target):
                 resumes = done + core[REFILL]
         finished = max(retired, enters)
         cost[step] = finished - clock

@@ -1,4 +1,4 @@
-"""A program's machine code as the tables of numbers that the core model reads."""
+"""A program's machine code as the numeric tables that the core model reads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from volery.cost.native.branch_prediction import history_lengths
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_SHARED = {
+_PIPES = {
     "integer": ("alu", "move", "increment", "shift"),
     "branch": ("branch",),
     "multiply": ("multiply", "shifted_alu"),
@@ -28,8 +28,8 @@ _SHARED = {
     ),
     "slow": ("fp_divide32", "fp_divide64", "fp_root32", "fp_root64"),
 }  # fmt: skip
-GROUPS = {operation: group for group, operations in _SHARED.items() for operation in operations}
-"""Which pipes an operation shares with which others."""
+GROUPS = {operation: group for group, operations in _PIPES.items() for operation in operations}
+"""Group of pipes by class of operations: classes of one group share pipes."""
 
 EFFECTS: dict[str, Callable[[Instruction], Effect]] = {
     "x86_64": isa_x86_64.effect,
@@ -40,7 +40,19 @@ RESULTS = {"x86_64": ("rax", "xmm0"), "aarch64": ("x0", "v0")}
 
 @dataclass(frozen=True)
 class InstructionTables:
-    """``first``: each piece's first row and one more; the rest are the arguments of ``core_model.run``."""
+    """Arguments of ``core_model.run``.
+
+    Attributes:
+        first: First row of each machine block, and one more.
+        table: Instructions, one a row.
+        slots: Slots of the front end by instruction.
+        library: Cycles of a library call by instruction.
+        operations: Classes of operations: latency, own pipes, group's pipes.
+        capacity: Operations that pipes start per cycle.
+        core: Width, window, refill and forwarding of the core.
+        histories: Lengths of the branch predictor's histories.
+        levels: Latencies of the caches, from the first on.
+    """
 
     first: Array
     table: Array
@@ -49,30 +61,35 @@ class InstructionTables:
     operations: Array
     capacity: Array
     core: Array
-    lengths: Array
+    histories: Array
     levels: Array
-    """Latencies of the caches, from the first on."""
 
-    def instructions(self, piece: int) -> int:
-        """How many instructions a piece has."""
-        return int(self.first[piece + 1] - self.first[piece])
+    def instructions(self, block: int) -> int:
+        """Return the number of instructions of a machine block."""
+        return int(self.first[block + 1] - self.first[block])
 
 
 def instruction_tables(
-    pieces: Sequence[MachineBlock], law: CoreLaw, own: frozenset[str]
+    blocks: Sequence[MachineBlock], law: CoreLaw, defined: frozenset[str]
 ) -> InstructionTables:
-    """Encode a program; *own* are the symbols that it defines, all others belong to libraries."""
-    names: dict[str, int] = {}
+    """Encode a program.
+
+    Args:
+        blocks: The program's machine code.
+        law: The core.
+        defined: Symbols that the program defines; all others belong to libraries.
+    """
+    registers: dict[str, int] = {}
     for name in RESULTS[law.isa]:
-        names[name] = len(names)
+        registers[name] = len(registers)
     places: dict[str, int] = {}
     rows, slots, library, first = [], [], [], [0]
-    for piece in pieces:
+    for block in blocks:
         before: Effect | None = None
-        for number, one in enumerate(piece.instructions):
+        for number, one in enumerate(block.instructions):
             effect = EFFECTS[law.isa](one)
-            last = number == len(piece.instructions) - 1
-            rows.append(_row(effect, names, places))
+            last = number == len(block.instructions) - 1
+            rows.append(_row(effect, registers, places))
             fused = (
                 law.isa == "x86_64"
                 and one.mnemonic.startswith("j")
@@ -80,17 +97,17 @@ def instruction_tables(
                 and "flags" in before.writes
             )
             slots.append(0.0 if fused else effect.slots)
-            library.append(_call(piece, own, law, rows[-1]) if last else 0.0)
-            if last and piece.end is End.BRANCH:
+            library.append(_library_cycles(block, defined, law, rows[-1]) if last else 0.0)
+            if last and block.end is End.BRANCH:
                 rows[-1][core_model.KIND] = core_model.CONDITIONAL
-            elif last and piece.end is End.COMPUTED:
+            elif last and block.end is End.COMPUTED:
                 rows[-1][core_model.KIND] = core_model.COMPUTED
-            elif last and piece.end is not End.FALLS and rows[-1][core_model.KIND] == core_model.PLAIN:
+            elif last and block.end is not End.FALLS and rows[-1][core_model.KIND] == core_model.PLAIN:
                 rows[-1][core_model.KIND] = core_model.JUMP
             before = effect
         first.append(len(rows))
     table = np.array(rows, dtype=np.int64).reshape(-1, core_model.COLUMNS)
-    operations, capacity = _pipes(law)
+    operations, capacity = _operation_table(law)
     core = np.array([law.width, law.window, law.refill, law.forward], dtype=float)
     return InstructionTables(
         np.array(first),
@@ -105,41 +122,42 @@ def instruction_tables(
     )
 
 
-def _call(piece: MachineBlock, own: frozenset[str], law: CoreLaw, row: list[int]) -> float:
-    """The cycles of a call out of the program, entered into the last row of a piece."""
-    leaves = piece.end in (End.CALL, End.JUMP) and piece.target and not piece.target.startswith(".L")
-    if not leaves or piece.target in own:
+def _library_cycles(block: MachineBlock, defined: frozenset[str], law: CoreLaw, row: list[int]) -> float:
+    """Return the cycles of the library call that a block ends with, and mark its row; else 0."""
+    if not block.calls_library(defined):
         return 0.0
     row[core_model.KIND] = core_model.LIBRARY
-    return law.library.calls.get(piece.target, law.library.unknown)
+    return law.library.calls.get(block.target, law.library.unknown)
 
 
-def _row(effect: Effect, names: dict[str, int], places: dict[str, int]) -> list[int]:
+def _row(effect: Effect, known: dict[str, int], places: dict[str, int]) -> list[int]:
+    """Encode an instruction; new registers and places are numbered in order of appearance."""
+
     def operation(name: str) -> int:
         return OPERATION_CLASSES.index(name) if name else -1
 
-    def numbered(registers: tuple[str, ...], room: int) -> list[int]:
-        known = [names.setdefault(one, len(names)) for one in dict.fromkeys(registers)][:room]
-        return known + [-1] * (room - len(known))
+    def numbers(registers: tuple[str, ...], columns: int) -> list[int]:
+        found = [known.setdefault(one, len(known)) for one in dict.fromkeys(registers)][:columns]
+        return found + [-1] * (columns - len(found))
 
     memory = effect.memory
     place = places.setdefault(memory.place, len(places) + 1) if memory.place else 0
     return [
         memory.size, operation(effect.load), effect.loads, operation(effect.operation), effect.times,
         operation("store" if effect.store else ""), place, core_model.PLAIN, memory.displacement,
-        *numbered(effect.reads, core_model.READS), *numbered(memory.registers, core_model.ADDRESSES),
-        *numbered(effect.writes, core_model.WRITES), *numbered(effect.bumps, core_model.BUMPS),
+        *numbers(effect.reads, core_model.READS), *numbers(memory.registers, core_model.ADDRESSES),
+        *numbers(effect.writes, core_model.WRITES), *numbers(effect.bumps, core_model.BUMPS),
     ]  # fmt: skip
 
 
-def _pipes(law: CoreLaw) -> tuple[Array, Array]:
-    """Operations as (latency, their own pipes, their group's pipes), and how much pipes start per cycle."""
+def _operation_table(law: CoreLaw) -> tuple[Array, Array]:
+    """Return the classes of operations (latency, own pipes, group's pipes) and the pipes' capacity."""
     groups = sorted(set(GROUPS.values()))
     capacity = np.zeros(len(OPERATION_CLASSES) + len(groups))
     table = np.zeros((len(OPERATION_CLASSES), 3))
     for number, name in enumerate(OPERATION_CLASSES):
         operation = law.operations[name]
-        renamed = operation.latency < 0.5  # takes no pipe at all
+        renamed = operation.latency < 0.5  # eliminated by register renaming: it takes no pipe
         group = number if renamed else len(OPERATION_CLASSES) + groups.index(GROUPS[name])
         capacity[number] = operation.per_cycle
         capacity[group] = max(capacity[group], operation.per_cycle)

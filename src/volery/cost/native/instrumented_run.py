@@ -1,7 +1,7 @@
-"""What a traced program says of itself: the blocks that it entered, the values that its switches used, and
-the accesses to memory that the first cache did not serve.
+"""Runs of an instrumented program on this machine: counts of its blocks, and traces.
 
-Runs an instrumented program on this machine: what each block counted, which blocks were entered.
+A trace has the blocks that were entered, the values of switches, and the accesses to memory that the first
+cache did not serve. The runtime in ``runtime/`` is linked with the program and writes both.
 """
 
 from __future__ import annotations
@@ -28,8 +28,11 @@ _SWITCHED, _ACCESSED = 1 << 31, 1 << 30
 class Access(NamedTuple):
     """An access to memory that the first cache did not serve.
 
-    ``number`` of it in its block; ``level`` of what served it: 1 for the second cache; ``ahead``: it was
-    fetched before it was asked for.
+    Attributes:
+        number: Number of the access in its block.
+        store: Whether it is a store.
+        level: Level that served it: 1 for the second cache.
+        ahead: Whether it was prefetched.
     """
 
     number: int
@@ -40,9 +43,13 @@ class Access(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockTrace:
-    """``blocks`` by number, in the order in which they were entered; ``switches``: the value that a switch
-    used before the block of that place was entered; ``edges``: the block that was left out there;
-    ``accesses`` of the block of that place.
+    """Record of a run.
+
+    Attributes:
+        blocks: Numbers of the blocks in the order in which they were entered.
+        switches: Value of a switch before the block at a position was entered, by position.
+        edges: Edge block that ``only`` has removed before a position, by position.
+        accesses: Cache misses of the block at a position, by position.
     """
 
     blocks: list[int]
@@ -51,21 +58,23 @@ class BlockTrace:
     accesses: dict[int, list[Access]] = field(default_factory=dict)
 
     def then(self, other: BlockTrace) -> BlockTrace:
-        """Both, one after the other."""
+        """Return this trace followed by another."""
         first = len(self.blocks)
         return BlockTrace(
             self.blocks + other.blocks,
             self.switches | {first + place: value for place, value in other.switches.items()},
-            accesses=self.accesses | {first + place: told for place, told in other.accesses.items()},
+            accesses=self.accesses | {first + place: found for place, found in other.accesses.items()},
         )
 
     def until(self, length: int) -> BlockTrace:
-        """The first *length* blocks."""
+        """Return the first ``length`` blocks."""
         return replace(self, blocks=self.blocks[:length])
 
     def only(self, wanted: Container[int]) -> BlockTrace:
-        """Without the other blocks; of several left out in one place the first is an edge. Their accesses
-        count as made in the block before.
+        """Remove all but the ``wanted`` blocks.
+
+        The first block that is removed at a position becomes an edge. Accesses of removed blocks are assigned
+        to the block before.
         """
         kept: list[int] = []
         switches: dict[int, int] = {}
@@ -84,17 +93,17 @@ class BlockTrace:
 
 
 def read_trace(file: Path) -> BlockTrace:
-    """A trace that the runtime has written."""
+    """Read a trace that the runtime has written."""
     return trace_of(np.fromfile(file, dtype=np.uint32))
 
 
 def _access(word: int) -> Access:
-    """As ``caches.c`` puts it into a word."""
+    """Decode an access as ``caches.c`` encodes it."""
     return Access(word >> 5, bool(word >> 4 & 1), word & 7, bool(word & 8))
 
 
 def trace_of(words: np.ndarray[Any, np.dtype[np.uint32]]) -> BlockTrace:
-    """A trace as the runtime writes it; what stands before its first block is left out."""
+    """Decode a trace; records before the first block are dropped."""
     blocks: list[int] = []
     switches: dict[int, int] = {}
     accesses: dict[int, list[Access]] = {}
@@ -112,10 +121,10 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 RUN_LIMIT_S = 120.0
 WINDOW = 4096
-"""Blocks that are traced in a row; windows are spread over a program that enters more than are wanted."""
+"""Blocks that are traced in succession; a long run is sampled in windows."""
 
 RUNTIME = ("runtime.c", "caches.c")
-"""What is linked with an instrumented program."""
+"""Files that are linked with an instrumented program."""
 
 _CALL = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:\((.*)\))?\s*$")
 _DEFINE = re.compile(r"^define [^@]*?([\w*]+|ptr) @([\w.$]+)\(([^)]*)\)", re.MULTILINE)
@@ -125,9 +134,14 @@ _C_TYPES = {"void": "void", "i1": "_Bool", "i8": "signed char", "i16": "short", 
 
 @dataclass(frozen=True)
 class Invocation:
-    """What is to be run: ``entry``, a call such as ``kernel(3)``, after the calls of ``before``.
+    """A run of a program.
 
-    Without an entry the program's own ``main`` with ``arguments``. ``links`` are options of the linker.
+    Attributes:
+        entry: Call to measure, such as ``kernel(3)``; empty for the program's ``main``.
+        before: Calls before it, which are not measured.
+        arguments: Arguments of ``main``.
+        links: Options of the linker.
+        times: Number of calls of the entry.
     """
 
     entry: str = ""
@@ -137,51 +151,52 @@ class Invocation:
     times: int = 1
 
 
-def driver(program: Program, wanted: Invocation) -> str:
-    """The C text that calls what is wanted between ``volery_begin`` and ``volery_end``."""
+def driver(program: Program, invocation: Invocation) -> str:
+    """Return the C text that makes the calls between ``volery_begin`` and ``volery_end``."""
     declared = {"": "void volery_begin(void);\nvoid volery_end(void);\n"}
     calls = [
-        _call(program, text, declared) for text in (*wanted.before, *([wanted.entry] if wanted.entry else []))
+        _call(program, text, declared)
+        for text in (*invocation.before, *([invocation.entry] if invocation.entry else []))
     ]
-    if not wanted.entry:
+    if not invocation.entry:
         if "main" not in program.defined:
             raise UsageError("no main() in it: say with --entry NAME which function to cost")
         own = "__attribute__((constructor)) static void begin(void) { volery_begin(); }\n"
         return declared[""] + own + "__attribute__((destructor)) static void end(void) { volery_end(); }\n"
     *first, last = calls
     body = "".join(f"    {one};\n" for one in first)
-    loop = f"    for (int i = 0; i < {wanted.times}; ++i)\n        {last};\n"
+    loop = f"    for (int i = 0; i < {invocation.times}; ++i)\n        {last};\n"
     return (
         "".join(declared.values())
         + f"int main(void) {{\n{body}    volery_begin();\n{loop}    volery_end();\n}}\n"
     )
 
 
-def timing_driver(program: Program, wanted: Invocation) -> str:
-    """What stands before ``timing.c``: the activation, and what prepares it."""
-    if not wanted.entry:
-        raise UsageError("only a function can be timed again and again: say which, with an entry")
+def timing_driver(program: Program, invocation: Invocation) -> str:
+    """Return the C text before ``timing.c``: the activation, and the calls that prepare it."""
+    if not invocation.entry:
+        raise UsageError("only a function can be timed repeatedly: state one as the entry")
     declared: dict[str, str] = {}
-    before = "; ".join(_call(program, text, declared) for text in wanted.before) or "(void)0"
-    activation = _call(program, wanted.entry, declared)
+    before = "; ".join(_call(program, text, declared) for text in invocation.before) or "(void)0"
+    activation = _call(program, invocation.entry, declared)
     return "".join(declared.values()) + f"#define PREPARE() {before}\n#define ACTIVATE() {activation}\n"
 
 
-def build_executable(program: Program, wanted: Invocation, instrumented: Path, folder: Path) -> Path:
-    """Link an instrumented object with its driver; the executable in *folder*."""
+def build_executable(program: Program, invocation: Invocation, instrumented: Path, folder: Path) -> Path:
+    """Link an instrumented object with its driver and the runtime; return the executable in ``folder``."""
     source = folder / "driver.c"
-    source.write_text(driver(program, wanted), encoding="utf-8")
+    source.write_text(driver(program, invocation), encoding="utf-8")
     out = folder / "program"
     clang = llvm_toolchain().clang
     with as_file(files("volery.cost.native").joinpath("runtime")) as runtime:
         ours = [str(runtime / name) for name in RUNTIME]
         command = [clang, "-O2", "-x", "c", str(source), *ours, "-x", "none", str(instrumented)]
-        run_tool([*command, *_linked(program, wanted), "-o", str(out)])
+        run_tool([*command, *_link_options(program, invocation), "-o", str(out)])
     return out
 
 
 def runtime_objects(folder: Path) -> list[Path]:
-    """The runtime compiled in *folder*, for code that is loaded by another program."""
+    """Compile the runtime in ``folder``, for code that is loaded by another program."""
     with as_file(files("volery.cost.native").joinpath("runtime")) as runtime:
         for name in RUNTIME:
             compiled = ["-x", "c", "-c", str(runtime / name), "-o", str(folder / f"{name}.o")]
@@ -189,43 +204,51 @@ def runtime_objects(folder: Path) -> list[Path]:
     return [folder / f"{name}.o" for name in RUNTIME]
 
 
-def _linked(program: Program, wanted: Invocation) -> tuple[str, ...]:
-    """The linker's options; where a function is called, the driver's main comes before the program's own."""
-    first = ("-Wl,-z,muldefs",) if wanted.entry and "main" in program.defined else ()
-    return (*first, *wanted.links, "-lm")
+def _link_options(program: Program, invocation: Invocation) -> tuple[str, ...]:
+    """Return the linker's options; the driver's ``main`` takes precedence over the program's."""
+    first = ("-Wl,-z,muldefs",) if invocation.entry and "main" in program.defined else ()
+    return (*first, *invocation.links, "-lm")
 
 
-def build_timing(program: Program, wanted: Invocation, code: Path, folder: Path) -> Path:
-    """Link an object with what times its activations here; run it with how often."""
+def build_timing(program: Program, invocation: Invocation, code: Path, folder: Path) -> Path:
+    """Link an object with ``timing.c``; the executable takes the number of activations as its argument."""
     source = folder / "timing.c"
     timing = files("volery.cost.native").joinpath("runtime/timing.c").read_text(encoding="utf-8")
-    source.write_text(timing_driver(program, wanted) + timing, encoding="utf-8")
+    source.write_text(timing_driver(program, invocation) + timing, encoding="utf-8")
     out = folder / "timing"
     command = [llvm_toolchain().clang, "-O1", "-w", "-x", "c", str(source), "-x", "none", str(code)]
-    run_tool([*command, *_linked(program, wanted), "-o", str(out)])
+    run_tool([*command, *_link_options(program, invocation), "-o", str(out)])
     return out
 
 
 def time_activations(executable: Path, activations: int) -> list[float]:
-    """Cycles of this machine's core, of each activation."""
+    """Return the cycles of each activation on this machine's core."""
     return [float(line) for line in run_tool([str(executable), str(activations)]).split()]
 
 
-def block_counts(executable: Path, wanted: Invocation, folder: Path) -> Array:
-    """How often each block was entered."""
+def block_counts(executable: Path, invocation: Invocation, folder: Path) -> Array:
+    """Run a counting program and return the entries of each block."""
     out = folder / "counts"
-    _run(executable, wanted, {"VOLERY_COUNTS": str(out)})
+    _run(executable, invocation, {"VOLERY_COUNTS": str(out)})
     return np.fromfile(out, dtype=np.uint64)
 
 
 def trace_blocks(
-    executable: Path, wanted: Invocation, folder: Path, stride: int, memory: MemoryLaw | None = None
+    executable: Path, invocation: Invocation, folder: Path, stride: int, memory: MemoryLaw | None = None
 ) -> BlockTrace:
-    """What was entered, ``WINDOW`` of every ``stride`` blocks, and what *memory*'s caches did not serve."""
+    """Run a tracing program and return its trace.
+
+    Args:
+        executable: A program that was linked with a tracing object.
+        invocation: The run.
+        folder: Folder for the trace.
+        stride: ``WINDOW`` of every ``stride`` blocks are recorded.
+        memory: Caches whose misses are recorded.
+    """
     out = folder / "trace"
     _run(
         executable,
-        wanted,
+        invocation,
         {
             "VOLERY_TRACE": str(out),
             "VOLERY_WINDOW": str(WINDOW),
@@ -237,15 +260,16 @@ def trace_blocks(
 
 
 def cache_settings(memory: MemoryLaw | None) -> str:
-    """The caches as ``caches.c`` reads them."""
+    """Return the setting of ``caches.c``: bytes and ways of each cache."""
     return ",".join(f"{one.bytes}/{one.ways}" for one in memory.caches) if memory else ""
 
 
-def _run(executable: Path, wanted: Invocation, told: dict[str, str]) -> None:
-    command = [str(executable), *wanted.arguments]
+def _run(executable: Path, invocation: Invocation, settings: dict[str, str]) -> None:
+    """Run a program with environment variables, the first of which names the file that it must write."""
+    command = [str(executable), *invocation.arguments]
     try:
         done = subprocess.run(
-            command, env={**os.environ, **told}, capture_output=True, timeout=RUN_LIMIT_S, check=False
+            command, env={**os.environ, **settings}, capture_output=True, timeout=RUN_LIMIT_S, check=False
         )
     except subprocess.TimeoutExpired as error:
         raise UsageError(f"the program has not ended within {RUN_LIMIT_S:g} s") from error
@@ -253,16 +277,16 @@ def _run(executable: Path, wanted: Invocation, told: dict[str, str]) -> None:
         raise UsageError(
             f"the program was ended by {signal.Signals(-done.returncode).name}: it must run to its end"
         )
-    if not Path(next(iter(told.values()))).exists():
-        said = done.stderr.decode(errors="replace").strip()[-500:]
-        raise UsageError(f"the program ended with {done.returncode} before anything was counted: {said}")
+    if not Path(next(iter(settings.values()))).exists():
+        output = done.stderr.decode(errors="replace").strip()[-500:]
+        raise UsageError(f"the program ended with {done.returncode} before anything was counted: {output}")
 
 
 def _call(program: Program, text: str, declared: dict[str, str]) -> str:
-    """A C call of a function by its C++ name, its declaration added to *declared*."""
+    """Return the C call of a function by its C++ name and add its declaration to ``declared``."""
     parsed = _CALL.match(text)
     if parsed is None:
-        raise UsageError(f"{text!r}: a call such as step or step(3, 0.5) is wanted")
+        raise UsageError(f"{text!r} is not a call such as step or step(3, 0.5)")
     name, arguments = parsed[1], parsed[2] or ""
     symbol, returned, parameters = _function(program, name)
     given = [one.strip() for one in arguments.split(",")] if arguments.strip() else []
@@ -278,7 +302,7 @@ def _call(program: Program, text: str, declared: dict[str, str]) -> str:
 
 
 def _function(program: Program, name: str) -> tuple[str, str, list[str]]:
-    """The symbol of a function, what it returns and takes, in C."""
+    """Return the symbol of a function, its result type and its parameter types in C."""
     callable_here: dict[str, tuple[str, str, list[str]]] = {}
     for returned, symbol, parameters in _DEFINE.findall(program.text):
         took = [_C_TYPES.get(one.split()[0], "") for one in parameters.split(",") if one.strip()]
@@ -294,7 +318,7 @@ def _function(program: Program, name: str) -> tuple[str, str, list[str]]:
 
 
 def _plain(symbol: str) -> str:
-    """``step`` for ``_Z4stepid``: the name of a free function without its namespace's mark."""
+    """Return ``step`` for ``_Z4stepid``: the name of a free function without its mangling."""
     mangled = re.match(r"_Z(\d+)", symbol)
     if mangled is None:
         return symbol

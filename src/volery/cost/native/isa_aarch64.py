@@ -1,4 +1,4 @@
-"""Instructions of AArch64 (ARMv8-A with its vector unit)."""
+"""Effects of AArch64 instructions (ARMv8-A with its vector unit)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _SETS_FLAGS_TOO = {"adds", "subs", "ands", "bics", "negs", "adcs", "sbcs"}
 _READS_FLAGS = re.compile(
     r"(?:f?csel|cset|csetm|csinc|csinv|csneg|cinc|cinv|cneg|f?ccm[pn]|[as][db]c|ngc)s?$"
 )
-_KEEPS_PART = re.compile(r"(?:movk|bfi|bfxil|ins|fml[as]|[su]?ml[as]l?2?|bsl|bi[tf]|xtn2|fcvtn2|sqxtn2)$")
+_READS_TARGET = re.compile(r"(?:movk|bfi|bfxil|ins|fml[as]|[su]?ml[as]l?2?|bsl|bi[tf]|xtn2|fcvtn2|sqxtn2)$")
 _SHIFTED = re.compile(r"(?:lsl|lsr|asr|ror|[su]xt[bhwx])(?: #(\d+))?$")
 
 _BRANCHES = {"ret": "branch", "b": "branch", "bl": "branch", "nop": "", "brk": "", "hint": "", "dmb": ""}
-_WHOLE = (
+_INTEGER = (
     (re.compile(r"[su]div$"), "divide"),
     (re.compile(r"mul$|m(?:add|sub|neg)$|[su]mul[lh]$|[su]m(?:add|sub|neg)l$"), "multiply"),
     (re.compile(r"ls[lr]$|asr$|ror$|[us]bf|bfi$|bfxil$|extr$"), "shift"),
@@ -40,7 +40,7 @@ _VECTOR = (
 
 
 def effect(one: Instruction) -> Effect:
-    """What it does. A mnemonic that is not known counts as one simple operation on its operands."""
+    """Return the effect of an instruction; an unknown mnemonic is one simple operation on its operands."""
     name, operands = one.mnemonic, one.operands
     if name in _BRANCHES:
         return Effect(operation=_BRANCHES[name])
@@ -55,7 +55,7 @@ def effect(one: Instruction) -> Effect:
 
 
 def _access(name: str, operands: tuple[str, ...], at: int) -> Effect:
-    """A load or store, of one register or two, perhaps with a new value for the address register."""
+    """Return the effect of a load or store of one or two registers, with or without address write-back."""
     moved = operands[:at]
     pair = len(moved) == 2
     wide = any(one[:1] in "qv{" for one in moved)
@@ -93,7 +93,7 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
         reads, writes = _registers(operands), (FLAGS,)
     elif name in _SETS_FLAGS_TOO:
         writes = (*writes, FLAGS)
-    if _KEEPS_PART.match(name) or (name == "mov" and "[" in operands[0]):
+    if _READS_TARGET.match(name) or (name == "mov" and "[" in operands[0]):
         reads = (*reads, *_registers(operands[:1]))
     if _READS_FLAGS.match(name):
         reads = (*reads, FLAGS)
@@ -102,13 +102,13 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
 
 
 def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
-    """Its class, and how many of it: a packed quotient is as many as it has parts."""
+    """Return the class of the operation and their number: a packed quotient has as many as parts."""
     first = operands[0] if operands else ""
-    whole = [one[:1] in "wx" for one in operands if _REGISTER.fullmatch(one) or "." in one]
-    if any(whole) and not all(whole):
+    integer = [one[:1] in "wx" for one in operands if _REGISTER.fullmatch(one) or "." in one]
+    if any(integer) and not all(integer):
         return "transfer", 1
-    if all(whole):
-        return _on_whole(name, operands), 1
+    if all(integer):
+        return _integer_class(name, operands), 1
     kind = next((kind for pattern, kind in _VECTOR if pattern.match(name)), "vector")
     if kind == "quotient":
         bits = "32" if first[:1] in "sh" or first.endswith("s") else "64"
@@ -119,8 +119,8 @@ def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
     return kind, 1
 
 
-def _on_whole(name: str, operands: tuple[str, ...]) -> str:
-    kind = next((kind for pattern, kind in _WHOLE if pattern.match(name)), "")
+def _integer_class(name: str, operands: tuple[str, ...]) -> str:
+    kind = next((kind for pattern, kind in _INTEGER if pattern.match(name)), "")
     if kind == "divide":
         return "divide64" if operands[0][:1] == "x" else "divide32"
     if kind:
@@ -137,11 +137,11 @@ def _on_whole(name: str, operands: tuple[str, ...]) -> str:
 def _registers(operands: tuple[str, ...]) -> tuple[str, ...]:
     found = []
     for one in operands:
-        for whole in _REGISTER.finditer(one):
-            if whole[5]:
+        for register in _REGISTER.finditer(one):
+            if register[5]:
                 found.append("sp")
-            elif whole[1] and whole[2] != "zr":
-                found.append(f"x{whole[2]}")
-            elif whole[3]:
-                found.append(f"v{whole[4]}")
+            elif register[1] and register[2] != "zr":
+                found.append(f"x{register[2]}")
+            elif register[3]:
+                found.append(f"v{register[4]}")
     return tuple(found)

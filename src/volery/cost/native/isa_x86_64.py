@@ -1,4 +1,4 @@
-"""Instructions of x86-64, in Intel's notation: SSE2, and what AVX and BMI add in the same shapes."""
+"""Effects of x86-64 instructions in Intel's notation: SSE2, and AVX and BMI in the same forms."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _NAMED = (
 
 
 def effect(one: Instruction) -> Effect:
-    """What it does. A mnemonic that is not known counts as one simple operation on its operands."""
+    """Return the effect of an instruction; an unknown mnemonic is one simple operation on its operands."""
     name, operands = one.mnemonic, one.operands
     special = _SPECIAL.get(name)
     if special is not None:
@@ -60,10 +60,10 @@ def effect(one: Instruction) -> Effect:
         )
     if name.startswith("j"):
         return Effect(operation="branch", reads=_registers(operands) if name == "jmp" else (FLAGS,))
-    return _working(name, operands)
+    return _computing(name, operands)
 
 
-def _working(name: str, operands: tuple[str, ...]) -> Effect:
+def _computing(name: str, operands: tuple[str, ...]) -> Effect:
     if name in ("mul", "imul", "div", "idiv") and len(operands) == 1:
         return _implicit(name, operands[0])
     if name in ("mov", "movabs") or _VECTOR_MOVE.match(name):
@@ -86,7 +86,7 @@ _SPECIAL = {
 
 
 def _implicit(name: str, operand: str) -> Effect:
-    """Products and quotients with ``rdx:rax``."""
+    """Return the effect of a product or quotient in ``rdx:rax``."""
     wide = "qword" in operand or _REGISTERS.get(operand) == operand
     divides = "div" in name
     return Effect(
@@ -94,7 +94,7 @@ def _implicit(name: str, operand: str) -> Effect:
         load="load" if "[" in operand else "",
         operation=("divide64" if wide else "divide32") if divides else "multiply",
         memory=_memory(operand),
-        reads=("rax", "rdx", *_plain((operand,))),
+        reads=("rax", "rdx", *_register_operands((operand,))),
         writes=("rax", "rdx", FLAGS),
     )
 
@@ -126,11 +126,11 @@ def _move(name: str, operands: tuple[str, ...]) -> Effect:
 def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
     place = next((one for one in operands if "[" in one), "")
     operation, times = _operation(name, operands)
-    writes = () if _COMPARES.match(name) else _plain(operands[:1])
+    writes = () if _COMPARES.match(name) else _register_operands(operands[:1])
     if name == "lea":
         return Effect(operation=operation, reads=_registers((place,)), writes=writes)
     overwritten = bool(writes) and (_OVERWRITES.match(name) is not None or len(operands) == 3)
-    reads = _plain(operands[1:] if overwritten else operands)
+    reads = _register_operands(operands[1:] if overwritten else operands)
     if _CONDITIONAL.match(name):
         reads = (*reads, FLAGS)
     if not _KEEPS_FLAGS.match(name) or name.startswith(("ucomi", "comi")):
@@ -150,7 +150,7 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
 
 
 def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
-    """Its class, and how many of it: a packed quotient is as many as it has parts."""
+    """Return the class of the operation and their number: a packed quotient has half as many as parts."""
     if scalar := _SCALAR.match(name):
         kind, packed, width = scalar.groups()
         parts = (2 if width == "d" else 4) if packed == "p" else 1
@@ -163,10 +163,10 @@ def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
             return operation, 1
     if any(_REGISTERS.get(one, "").startswith("xmm") for one in operands):
         return "vector", 1
-    return _whole(name, operands)
+    return _integer_class(name, operands)
 
 
-def _whole(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
+def _integer_class(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
     if name == "imul":
         return "multiply", 1
     if name in ("inc", "dec") or (name in ("add", "sub") and operands[-1].lstrip("-").isdigit()):
@@ -182,8 +182,8 @@ def _registers(operands: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(_REGISTERS[word] for one in operands for word in _WORD.findall(one) if word in _REGISTERS)
 
 
-def _plain(operands: tuple[str, ...]) -> tuple[str, ...]:
-    """The registers that are operands themselves, not parts of an address."""
+def _register_operands(operands: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the registers that are operands themselves, not parts of an address."""
     return _registers(tuple(one for one in operands if "[" not in one))
 
 

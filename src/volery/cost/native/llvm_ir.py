@@ -1,9 +1,9 @@
-"""LLVM's intermediate code as text: retargeted, its blocks found, counters and traces inserted.
+"""LLVM's intermediate code as text: retargeting, basic blocks, insertion of counters and of trace calls.
 
-Only what is needed is understood: where functions and basic blocks begin, where a block's first ordinary
-instruction stands, whom it calls. Everything else passes through unread.
-
-Accesses to memory in LLVM's intermediate code: each is told before it is made.
+Only the beginnings of functions and basic blocks, a block's first ordinary instruction, switches and accesses
+to memory are parsed. Everything else is copied. A text transformation works with every LLVM from 17 on; a
+pass plug-in would have to be built for each version, and LLVM's coverage passes do not number blocks after
+optimisation.
 """
 
 from __future__ import annotations
@@ -14,23 +14,47 @@ from dataclasses import dataclass
 
 from volery.cost.native.assembly import split_operands
 
+COUNTERS = "volery_counters"
+LENGTH = "volery_counters_length"
+TRACE = "volery_trace"
+SWITCH = "volery_switch"
 ACCESS, RANGE = "volery_access", "volery_range"
 DECLARED = f"declare void @{ACCESS}(ptr, i32)\ndeclare void @{RANGE}(ptr, i64)\n"
 
+_DEFINE = re.compile(r'^define .*?@("[^"]+"|[-\w.$]+)\(')
+_LABEL = re.compile(r'^("[^"]+"|[-\w.$]+):')
+_TARGET_ATTRIBUTES = re.compile(r'\s*"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
+_BLOCK_HEAD = re.compile(r"^\s+(?:(?:%\S+|%\"[^\"]+\") = (?:phi|landingpad) |#dbg_|cleanup\b|catch |filter )")
+_TARGET = re.compile(r'\blabel %("[^"]+"|[-\w.$]+)')
+_SWITCH = re.compile(r"^\s+switch i(\d+) ([^,]+), label ")
 _LOAD = re.compile(r"^\s+%.+? = load ")
 _STORE = re.compile(r"^\s+store ")
-_BLOCK = re.compile(r"^\s+(?:tail |musttail |notail )?call void @llvm\.mem(?:cpy|move|set)\.[^(]*\((.*)\)")
+_BULK_ACCESS = re.compile(
+    r"^\s+(?:tail |musttail |notail )?call void @llvm\.mem(?:cpy|move|set)\.[^(]*\((.*)\)"
+)
 _EXPRESSION = re.compile(r"(?:getelementptr|inttoptr) .*\)")
 _NAME = re.compile(r'[%@](?:"[^"]*"|[-\w.$]+)|\bnull\b|\bpoison\b|\bundef\b')
 
 
+@dataclass(frozen=True)
+class BasicBlock:
+    """A basic block of the optimised code; ``entry``: it is the first one of its function."""
+
+    function: str
+    name: str
+    entry: bool = False
+
+
 def is_access(line: str) -> bool:
-    """Whether it loads or stores."""
+    """Return whether a line loads or stores."""
     return _LOAD.match(line) is not None or _STORE.match(line) is not None
 
 
 def with_access_calls(lines: Iterator[str], begins: Callable[[str], bool]) -> Iterator[str]:
-    """The lines, each access told before its own; accesses are numbered from where a block *begins*."""
+    """Yield the lines with a call of ``volery_access`` before each access to memory.
+
+    Accesses are numbered from the line for which ``begins`` is true, the beginning of a block.
+    """
     number = 0
     for line in lines:
         if begins(line):
@@ -39,19 +63,19 @@ def with_access_calls(lines: Iterator[str], begins: Callable[[str], bool]) -> It
             store = _STORE.match(line) is not None
             yield f"  call void @{ACCESS}(ptr {_address(line)}, i32 {2 * number + store})\n"
             number += 1
-        elif copied := _BLOCK.match(line):
-            yield from _ranges(copied[1])
+        elif bulk := _BULK_ACCESS.match(line):
+            yield from _range_calls(bulk[1])
         yield line
 
 
 def _address(line: str) -> str:
-    """What the access points to: the last operand that is a pointer, before its alignment."""
+    """Return the address of an access: the last operand that is a pointer."""
     pointers = [one for one in split_operands(line.strip()) if one.startswith("ptr ")]
     return _value(pointers[-1].removeprefix("ptr "))
 
 
-def _ranges(arguments: str) -> Iterator[str]:
-    """Of a copy the two, of a filling the one range that it touches."""
+def _range_calls(arguments: str) -> Iterator[str]:
+    """Yield a call of ``volery_range`` for each range of a copy (two) or of a fill (one)."""
     given = list(split_operands(arguments))
     length = given[2].split(" ", 1)
     if length[0] != "i64":
@@ -62,51 +86,25 @@ def _ranges(arguments: str) -> Iterator[str]:
 
 
 def _value(operand: str) -> str:
-    """A name, or a whole expression, among attributes and orderings."""
+    """Return the name or the constant expression in an operand, without its attributes."""
     expression = _EXPRESSION.search(operand)
     return expression[0] if expression else _NAME.findall(operand)[-1]
 
 
-COUNTERS = "volery_counters"
-LENGTH = "volery_counters_length"
-TRACE = "volery_trace"
-SWITCH = "volery_switch"
-
-_DEFINE = re.compile(r'^define .*?@("[^"]+"|[-\w.$]+)\(')
-_LABEL = re.compile(r'^("[^"]+"|[-\w.$]+):')
-_TARGET_ATTRIBUTES = re.compile(r'\s*"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
-_FIRST = re.compile(r"^\s+(?:(?:%\S+|%\"[^\"]+\") = (?:phi|landingpad) |#dbg_|cleanup\b|catch |filter )")
-
-
-_TARGET = re.compile(r'\blabel %("[^"]+"|[-\w.$]+)')
-_SWITCH = re.compile(r"^\s+switch i(\d+) ([^,]+), label ")
-
-
-@dataclass(frozen=True)
-class BasicBlock:
-    """A basic block of the optimised code: its function's symbol and its own name; ``entry``: the first."""
-
-    function: str
-    name: str
-    entry: bool = False
-
-
 def retarget(text: str, triple: str, layout: str) -> str:
-    """The same code for another machine: its triple and data layout, no leaning towards a processor."""
+    """Return the code for another machine: its triple and data layout, without attributes of a processor."""
     text = re.sub(r'^target datalayout = ".*"$', f'target datalayout = "{layout}"', text, flags=re.MULTILINE)
     text = re.sub(r'^target triple = ".*"$', f'target triple = "{triple}"', text, flags=re.MULTILINE)
     return re.sub(r"= \{\s*\}$", '= { "retargeted" }', _TARGET_ATTRIBUTES.sub("", text), flags=re.MULTILINE)
 
 
 def basic_blocks(text: str) -> list[BasicBlock]:
-    """All basic blocks, in the order of the text; a block's counter has its place in this list."""
+    """Return all basic blocks in the order of the text, which is the order of their counters."""
     return [block for _, block in _lines(text) if block is not None]
 
 
 def critical_edges(text: str) -> dict[int, int]:
-    """The blocks that stand on the way from one block to another (as LLVM's ``break-crit-edges`` makes and
-    names them), each with the one it comes from.
-    """
+    """Return {edge block: source block} for the blocks that LLVM's ``break-crit-edges`` has inserted."""
     numbers: dict[tuple[str, str], int] = {}
     heads: list[tuple[int, str, str]] = []
     here, number = BasicBlock("", ""), -1
@@ -124,7 +122,7 @@ def critical_edges(text: str) -> dict[int, int]:
 
 
 def access_counts(text: str) -> list[int]:
-    """How many accesses to memory each block has."""
+    """Return the number of accesses to memory of each block."""
     found: list[int] = []
     for line, block in _lines(text):
         if block is not None:
@@ -135,7 +133,7 @@ def access_counts(text: str) -> list[int]:
 
 
 def with_counters(text: str) -> str:
-    """The code with one counter of 64 bits per block, in an array that is exported as ``volery_counters``."""
+    """Insert one counter of 64 bits per block, in an array that is exported as ``volery_counters``."""
     size = len(basic_blocks(text))
 
     def count(number: int) -> str:
@@ -153,34 +151,37 @@ def with_counters(text: str) -> str:
 
 
 def with_trace_calls(text: str) -> str:
-    """The code with a call of ``volery_trace(number)`` at the beginning of each block, one of
-    ``volery_switch(value)`` before each switch, and those of ``accesses`` before each access to memory.
+    """Insert calls that record the path of a run.
+
+    These are ``volery_trace(number)`` at the beginning of each block, ``volery_switch(value)`` before each
+    switch and the calls of ``with_access_calls``.
     """
     entered = f"  call void @{TRACE}("
     lines = _instrumented(text, lambda number: f"{entered}i32 {number})\n").splitlines(keepends=True)
-    switches = (one for number, line in enumerate(lines) for one in (_told(number, line), line))
+    switches = (one for number, line in enumerate(lines) for one in (_switch_call(number, line), line))
     whole = "".join(with_access_calls(switches, lambda line: line.startswith(entered)))
     return whole + f"\ndeclare void @{TRACE}(i32)\ndeclare void @{SWITCH}(i32)\n{DECLARED}"
 
 
-def _told(number: int, line: str) -> str:
-    """What tells the value that a switch is about to use, as a number of 32 bits."""
+def _switch_call(number: int, line: str) -> str:
+    """Return the call that records the value of a switch as a number of 32 bits; empty for other lines."""
     switch = _SWITCH.match(line)
     if switch is None:
         return ""
     bits, value = int(switch[1]), switch[2]
     if bits == 32:
         return f"  call void @{SWITCH}(i32 {value})\n"
-    as_word, way = f"%volery.switch.{number}", "zext" if bits < 32 else "trunc"
-    return f"  {as_word} = {way} i{bits} {value} to i32\n  call void @{SWITCH}(i32 {as_word})\n"
+    as_word, conversion = f"%volery.switch.{number}", "zext" if bits < 32 else "trunc"
+    return f"  {as_word} = {conversion} i{bits} {value} to i32\n  call void @{SWITCH}(i32 {as_word})\n"
 
 
 def _instrumented(text: str, inserted: Callable[[int], str]) -> str:
+    """Insert a text before the first ordinary instruction of each block."""
     out: list[str] = []
     number = 0
     waiting = False
     for line, block in _lines(text):
-        if waiting and block is None and not _FIRST.match(line):
+        if waiting and block is None and not _BLOCK_HEAD.match(line):
             out.append(inserted(number - 1))
             waiting = False
         if block is not None:
@@ -191,7 +192,10 @@ def _instrumented(text: str, inserted: Callable[[int], str]) -> str:
 
 
 def _lines(text: str) -> Iterator[tuple[str, BasicBlock | None]]:
-    """Each line, with the block that it begins. A first block without a label begins with its function."""
+    """Yield each line with the block that it begins, or None.
+
+    A first block without a label begins with its function.
+    """
     function, first = "", False
     lines = text.splitlines()
     for number, line in enumerate(lines):

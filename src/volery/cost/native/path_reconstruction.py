@@ -1,9 +1,12 @@
-"""From a trace of blocks to the machine code that ran: which pieces, in which order, for which block.
+"""From a trace of basic blocks to the machine blocks that ran, in order, each with its basic block.
 
-The trace says which blocks of the intermediate code were entered. The walk follows the machine code's own
-jumps and calls and chooses, where there is a choice, the way on which the next block of the trace comes
-first; where several lead there, the values that switches used decide. So what the code generator merged,
-split, duplicated or moved is found where it went.
+The trace says which blocks of the intermediate code were entered. The reconstruction follows the machine
+code's own jumps and calls. At a branch it takes the successor on whose way the next block of the trace comes
+first; where several lead there, the values of traced switches decide. So code that the code generator has
+merged, split, duplicated or moved is found where it ran.
+
+Debug information was rejected as the link between the two codes: it has lines, not blocks, and optimisation
+loses it where it matters most.
 """
 
 from __future__ import annotations
@@ -21,209 +24,219 @@ _LOOK_AHEAD = 6
 _DEPTH = 24
 _LOST = 99
 _FOREIGN = 30
-"""For a block that the trace does not have: the code generator has merged equal ends of blocks."""
+"""Penalty for a block that the trace does not have: the code generator has merged equal ends of blocks."""
 
 
 @dataclass
 class ExecutedPath:
-    """What ran: pieces, the block each is charged to, the block that a wait before it is charged to (that of
-    the way by which it was reached), whether its branch was taken, the place of its block in the trace that
-    was followed; ``lost`` jumps, and ``accesses`` by the same place.
+    """What ran, one entry a machine block.
+
+    Attributes:
+        blocks: Number of the machine block.
+        owners: Basic block that it is charged to.
+        reached: Basic block that a stall before it is charged to: that of the edge by which it was reached.
+        taken: Whether its branch was taken.
+        positions: Position of its basic block in the trace.
+        lost: Jumps that could not be followed.
+        accesses: Cache misses by position.
     """
 
-    pieces: list[int] = field(default_factory=list)
+    blocks: list[int] = field(default_factory=list)
     owners: list[int] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     taken: list[int] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)
+    positions: list[int] = field(default_factory=list)
     lost: int = 0
     accesses: dict[int, list[Access]] = field(default_factory=dict)
 
 
 class MachineCode:
-    """The pieces of a program, and where its blocks begin in them."""
+    """The machine blocks of a program, and the machine block that each basic block begins with."""
 
-    def __init__(self, blocks: Sequence[BasicBlock], pieces: Sequence[MachineBlock]) -> None:
-        self.pieces = pieces
-        self.entry_piece: dict[str, int] = {}
+    def __init__(self, blocks: Sequence[BasicBlock], machine_blocks: Sequence[MachineBlock]) -> None:
+        self.machine_blocks = machine_blocks
+        self.entry_block: dict[str, int] = {}
         self.labels: dict[tuple[str, str], int] = {}
-        for number, piece in enumerate(pieces):
-            self.entry_piece.setdefault(piece.function, number)
-            if piece.label:
-                self.labels[piece.function, piece.label] = number
+        for number, machine_block in enumerate(machine_blocks):
+            self.entry_block.setdefault(machine_block.function, number)
+            if machine_block.label:
+                self.labels[machine_block.function, machine_block.label] = number
         self.blocks = blocks
         self.entries = {block.function: number for number, block in enumerate(blocks) if block.entry}
-        self.block_of_piece = self._primaries(blocks)
-        self.piece_of_block: dict[int, int] = {}
-        for number, block in sorted(self.block_of_piece.items()):
-            self.piece_of_block.setdefault(block, number)
+        self.block_of_first = self._first_blocks(blocks)
+        self.first_of_block: dict[int, int] = {}
+        for number, block in sorted(self.block_of_first.items()):
+            self.first_of_block.setdefault(block, number)
 
     def successors(self, number: int) -> list[int]:
-        """The pieces that may follow within the function, what falls through first."""
-        piece = self.pieces[number]
-        after = [number + 1] if number + 1 < len(self.pieces) else []
-        if piece.end in (End.FALLS, End.CALL):
+        """Return the possible successors of a machine block in its function, the fall-through first."""
+        machine_block = self.machine_blocks[number]
+        after = [number + 1] if number + 1 < len(self.machine_blocks) else []
+        if machine_block.end in (End.FALLS, End.CALL):
             return after
-        if piece.end in (End.BRANCH, End.JUMP):
-            there = self.labels.get((piece.function, piece.target))
-            onward = [there] if there is not None else []
-            return [*after, *onward] if piece.end is End.BRANCH else onward
+        if machine_block.end in (End.BRANCH, End.JUMP):
+            target = self.labels.get((machine_block.function, machine_block.target))
+            jump = [target] if target is not None else []
+            return [*after, *jump] if machine_block.end is End.BRANCH else jump
         return []
 
-    def _primaries(self, blocks: Sequence[BasicBlock]) -> dict[int, int]:
-        """The pieces with which blocks begin: those that are entered from elsewhere."""
+    def _first_blocks(self, blocks: Sequence[BasicBlock]) -> dict[int, int]:
+        """Return {machine block: basic block} for those that are entered from another basic block."""
         known = {(block.function, block.name): number for number, block in enumerate(blocks)}
-        entered: dict[int, set[int]] = {}
-        for number in range(len(self.pieces)):
+        predecessors: dict[int, set[int]] = {}
+        for number in range(len(self.machine_blocks)):
             for after in self.successors(number):
-                entered.setdefault(after, set()).add(number)
+                predecessors.setdefault(after, set()).add(number)
         candidates: dict[int, list[int]] = {}
-        for number, piece in enumerate(self.pieces):
-            if self.entry_piece[piece.function] == number:
-                candidates.setdefault(self.entries[piece.function], []).insert(0, number)
-            elif piece.came_from is not None and (starts := number == 0 or self._starts(number)):
-                block = known.get((piece.function, piece.came_from))
-                if block is not None and starts and not blocks[block].entry:
+        for number, machine_block in enumerate(self.machine_blocks):
+            if self.entry_block[machine_block.function] == number:
+                candidates.setdefault(self.entries[machine_block.function], []).insert(0, number)
+            elif machine_block.came_from is not None and (number == 0 or self._is_labelled(number)):
+                block = known.get((machine_block.function, machine_block.came_from))
+                if block is not None and not blocks[block].entry:
                     candidates.setdefault(block, []).append(number)
         chosen: dict[int, int] = {}
         for block, numbers in candidates.items():
-            outside = [one for one in numbers if self._entered_from_elsewhere(one, entered.get(one, set()))]
-            chosen.update(dict.fromkeys(outside or numbers[:1], block))
+            entered = [one for one in numbers if self._is_entered(one, predecessors.get(one, set()))]
+            chosen.update(dict.fromkeys(entered or numbers[:1], block))
         return chosen
 
-    def _entered_from_elsewhere(self, number: int, before: set[int]) -> bool:
-        came_from = self.pieces[number].came_from
-        return not before or any(self.pieces[one].came_from != came_from for one in before)
+    def _is_entered(self, number: int, predecessors: set[int]) -> bool:
+        """Return whether a machine block is entered from another basic block."""
+        came_from = self.machine_blocks[number].came_from
+        return not predecessors or any(
+            self.machine_blocks[one].came_from != came_from for one in predecessors
+        )
 
-    def _starts(self, number: int) -> bool:
-        """True if the piece begins a labelled block, not what is left of one after a call or branch."""
-        before, piece = self.pieces[number - 1], self.pieces[number]
-        return bool(piece.label) or before.function != piece.function or before.came_from != piece.came_from
+    def _is_labelled(self, number: int) -> bool:
+        """Return whether a machine block begins a labelled block (else it follows a call or branch)."""
+        before, here = self.machine_blocks[number - 1], self.machine_blocks[number]
+        return bool(here.label) or before.function != here.function or before.came_from != here.came_from
 
 
 class _PathSearch:
-    def __init__(self, machine: MachineCode, trace: BlockTrace, limit: int) -> None:
-        self.machine = machine
-        followed = trace.only(machine.piece_of_block)
+    def __init__(self, code: MachineCode, trace: BlockTrace, limit: int) -> None:
+        self.code = code
+        followed = trace.only(code.first_of_block)
         self.trace, self.values, self.edges = followed.blocks, followed.switches, followed.edges
         self.switch, self.switch_at = SwitchResolver(0), -1
         self.limit = limit
-        self.at = self.owner = self.place = 0
+        self.at = self.owner = self.position = 0
         self.edge: int | None = None
-        self.out = ExecutedPath(accesses=followed.accesses)
+        self.path = ExecutedPath(accesses=followed.accesses)
         self.frames: list[tuple[int, int, int]] = []
         self._costs: dict[tuple[int, int, tuple[int, ...]], int] = {}
 
     def run(self) -> ExecutedPath:
-        piece = self._found_again()
-        while piece is not None and len(self.out.pieces) < self.limit:
-            piece = self._step(piece)
-        return self.out
+        number = self._resume_at_next_record()
+        while number is not None and len(self.path.blocks) < self.limit:
+            number = self._step(number)
+        return self.path
 
-    def _found_again(self) -> int | None:
-        """Begin at the next record of the trace, wherever that is."""
+    def _next_record(self) -> int | None:
+        return self.trace[self.at] if self.at < len(self.trace) else None
+
+    def _resume_at_next_record(self) -> int | None:
+        """Continue at the next record of the trace, wherever that is; None at its end."""
         if self.at >= len(self.trace):
             return None
         self._take(1)
-        return self.machine.piece_of_block[self.owner]
+        return self.code.first_of_block[self.owner]
 
     def _take(self, count: int) -> None:
-        """The next *count* records: what runs now belongs to the last of them."""
+        """Consume ``count`` records; what runs now belongs to the last of them."""
         passed = range(self.at, self.at + count)
-        self.edge = next((self.edges[place] for place in passed if place in self.edges), None)
+        self.edge = next((self.edges[position] for position in passed if position in self.edges), None)
         self.at += count
-        self.place = self.at - 1
-        self.owner = self.trace[self.place]
+        self.position = self.at - 1
+        self.owner = self.trace[self.position]
 
     def _step(self, number: int) -> int | None:
-        piece = self.machine.pieces[number]
-        self.out.pieces.append(number)
-        self.out.owners.append(self.owner)
-        self.out.reached.append(self.owner if self.edge is None else self.edge)
+        """Append a machine block to the path; return the next one."""
+        here = self.code.machine_blocks[number]
+        self.path.blocks.append(number)
+        self.path.owners.append(self.owner)
+        self.path.reached.append(self.owner if self.edge is None else self.edge)
         self.edge = None
-        self.out.taken.append(0)
-        self.out.places.append(self.place)
-        switched = self._switched(piece)
-        if piece.end is End.CALL:
-            return self._call(number, piece)
-        if piece.end is End.RETURN:
+        self.path.taken.append(0)
+        self.path.positions.append(self.position)
+        switched = self._switch_branch(here)
+        if here.end is End.CALL:
+            return self._call(number, here)
+        if here.end is End.RETURN:
             return self._return()
-        ways = self.machine.successors(number)
-        if not ways and piece.end is End.JUMP:  # a call in the place of a return
-            entry = self.machine.entries.get(piece.target)
-            return self._found_again() if self._next() == entry and entry is not None else self._return()
-        if not ways:
-            self.out.taken[-1] = 1
-            return self._within(piece.function)
-        best = min(ways, key=self._distance)
+        successors = self.code.successors(number)
+        if not successors and here.end is End.JUMP:  # a tail call
+            entry = self.code.entries.get(here.target)
+            called = self._next_record() == entry and entry is not None
+            return self._resume_at_next_record() if called else self._return()
+        if not successors:
+            self.path.taken[-1] = 1
+            return self._computed_jump(here.function)
+        best = min(successors, key=self._distance)
         if self._distance(best) >= _LOST:
             return self._lost()
-        if switched is not None and len(ways) > 1 and self._distance(ways[switched]) < _LOST:
-            best = ways[switched]
-        self.out.taken[-1] = int(best != number + 1 or piece.end is End.JUMP)
-        return self._enter_piece(best)
+        if switched is not None and len(successors) > 1 and self._distance(successors[switched]) < _LOST:
+            best = successors[switched]
+        self.path.taken[-1] = int(best != number + 1 or here.end is End.JUMP)
+        return self._enter(best)
 
-    def _switched(self, piece: MachineBlock) -> bool | None:
-        """Whether the branch of the piece is taken, where it is one of a switch that is under way."""
+    def _switch_branch(self, here: MachineBlock) -> bool | None:
+        """Return whether the branch is taken, if it is one of a traced switch, else None."""
         value = self.values.get(self.at)
         if value is None:
             return None
         if self.switch_at != self.at:
             self.switch, self.switch_at = SwitchResolver(value), self.at
-        return self.switch.taken(piece)
+        return self.switch.taken(here)
 
-    def _call(self, number: int, piece: MachineBlock) -> int | None:
-        blocks = self.machine.blocks
+    def _call(self, number: int, here: MachineBlock) -> int | None:
+        blocks = self.code.blocks
         ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
-        skipped = next((place for place, block in enumerate(ahead) if blocks[block].entry), None)
-        if skipped is not None and self._calls(piece.target, blocks[ahead[skipped]].function, skipped):
-            self.frames.append((number + 1, self.owner, self.place))
+        skipped = next((position for position, block in enumerate(ahead) if blocks[block].entry), None)
+        # A direct call may skip records of blocks whose code was merged into one that has run; the callee of
+        # a computed call follows at once.
+        if skipped is not None and (
+            here.target == blocks[ahead[skipped]].function if here.target else skipped == 0
+        ):
+            self.frames.append((number + 1, self.owner, self.position))
             self._take(skipped + 1)
-            return self.machine.piece_of_block[self.owner]
-        return self._enter_piece(number + 1) if number + 1 < len(self.machine.pieces) else self._return()
-
-    def _calls(self, target: str, function: str, skipped: int) -> bool:
-        """Whether this call is of the next function that the trace enters, *skipped* records from here: those
-        of blocks whose code was merged into one that has run. Who is called by a computed call follows at
-        once.
-        """
-        return target == function if target else skipped == 0
+            return self.code.first_of_block[self.owner]
+        return self._enter(number + 1) if number + 1 < len(self.code.machine_blocks) else self._return()
 
     def _return(self) -> int | None:
         if not self.frames:
-            return self._found_again()
-        number, self.owner, self.place = self.frames.pop()
-        return self._enter_piece(number)
+            return self._resume_at_next_record()
+        number, self.owner, self.position = self.frames.pop()
+        return self._enter(number)
 
-    def _within(self, function: str) -> int | None:
-        """The target of a computed jump: the next record, if it is in this function."""
-        coming = self._next()
-        if coming is not None and self.machine.blocks[coming].function == function:
-            return self._found_again()
+    def _computed_jump(self, function: str) -> int | None:
+        """Return the target of a computed jump: the next record, if it is in this function."""
+        coming = self._next_record()
+        if coming is not None and self.code.blocks[coming].function == function:
+            return self._resume_at_next_record()
         return self._lost()
 
     def _lost(self) -> int | None:
-        """An exception, or a jump out of a library: take up the trace where it goes on."""
-        self.out.lost += 1
-        coming = self._next()
+        """Resume at the next record after an exception or a jump out of a library."""
+        self.path.lost += 1
+        coming = self._next_record()
         if coming is not None:
-            function = self.machine.blocks[coming].function
-            while self.frames and self.machine.pieces[self.frames[-1][0]].function != function:
+            function = self.code.blocks[coming].function
+            while self.frames and self.code.machine_blocks[self.frames[-1][0]].function != function:
                 self.frames.pop()
-            if self.frames and not self.machine.blocks[coming].entry:
+            if self.frames and not self.code.blocks[coming].entry:
                 self.frames.pop()
-        return self._found_again()
+        return self._resume_at_next_record()
 
-    def _enter_piece(self, number: int) -> int:
-        block = self.machine.block_of_piece.get(number)
+    def _enter(self, number: int) -> int:
+        """Consume the record of the basic block that begins with a machine block, if it is near."""
+        block = self.code.block_of_first.get(number)
         if block is not None:
             ahead = self.trace[self.at : self.at + _LOOK_AHEAD]
             if block in ahead:
                 self._take(ahead.index(block) + 1)
         return number
-
-    def _next(self) -> int | None:
-        return self.trace[self.at] if self.at < len(self.trace) else None
 
     def _distance(self, number: int) -> int:
         key = (number, self.owner, tuple(self.trace[self.at : self.at + _LOOK_AHEAD]))
@@ -233,27 +246,27 @@ class _PathSearch:
         return found
 
     def _search(self, number: int, ahead: tuple[int, ...], depth: int) -> int:
-        """How little fits a way by this piece: by records it skips, and by pieces that have none."""
-        machine = self.machine
-        piece = machine.pieces[number]
-        block = machine.block_of_piece.get(number)
+        """Return how badly a way by a machine block fits: records skipped, and blocks without a record."""
+        code = self.code
+        here = code.machine_blocks[number]
+        block = code.block_of_first.get(number)
         if block is not None and block in ahead:
             return 10 * ahead.index(block)
-        if piece.end is End.CALL and piece.target in machine.entries:
-            return 0 if ahead and machine.entries[piece.target] == ahead[0] else _LOST
-        if piece.end is End.RETURN:
-            leaves = not ahead or machine.blocks[ahead[0]].function != piece.function or bool(self.frames)
+        if here.end is End.CALL and here.target in code.entries:
+            return 0 if ahead and code.entries[here.target] == ahead[0] else _LOST
+        if here.end is End.RETURN:
+            leaves = not ahead or code.blocks[ahead[0]].function != here.function or bool(self.frames)
             return 9 if leaves else _LOST - 1
-        ways = machine.successors(number)
-        if not ways:
+        successors = code.successors(number)
+        if not successors:
             return 9
         if depth <= 0:
             return _LOST
         foreign = block is not None and block != self.owner
-        onward = min(self._search(way, ahead, depth - len(ways) ** 2) for way in ways)
+        onward = min(self._search(one, ahead, depth - len(successors) ** 2) for one in successors)
         return min(_LOST, onward + (_FOREIGN if foreign else 1))
 
 
-def reconstruct_path(machine: MachineCode, trace: BlockTrace, limit: int = 4_000_000) -> ExecutedPath:
-    """Follow a trace through the machine code, for at most *limit* pieces."""
-    return _PathSearch(machine, trace, limit).run()
+def reconstruct_path(code: MachineCode, trace: BlockTrace, limit: int = 4_000_000) -> ExecutedPath:
+    """Follow a trace through the machine code for at most ``limit`` machine blocks."""
+    return _PathSearch(code, trace, limit).run()

@@ -1,4 +1,4 @@
-"""One program, one core, one run: its cycles, its instructions, where they go, and what is left out."""
+"""Estimate of one run of a program on a core: cycles, instructions, cost by source line, what is left out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.cost.native.assembly import End
+from volery.cost.native.assembly import MachineBlock
 from volery.cost.native.block_costs import BlockCosts, blocks_of, save_costs, traced_costs
 from volery.cost.native.compilation import Program
 from volery.cost.native.instrumented_run import (
@@ -26,12 +26,12 @@ from volery.cost.native.path_reconstruction import MachineCode
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MOST_TRACED = 400_000
-"""Blocks that are traced at most; the rest of a longer program is sampled in windows."""
+"""Blocks that are traced at most; a longer run is sampled in windows."""
 
 
 @dataclass(frozen=True)
 class SourceLineCost:
-    """A line of source, ``file:line``: its share of all cycles, and how many blocks with it were entered."""
+    """A source line, ``file:line``: its share of all cycles, and the entries of blocks that contain it."""
 
     source: str
     share: float
@@ -40,8 +40,17 @@ class SourceLineCost:
 
 @dataclass(frozen=True)
 class ProgramEstimate:
-    """What one run costs: cycles of the core, and nanoseconds of waiting for ``memory``, whatever the core's
-    frequency. ``left_out`` says, in sentences, what a reader must know to judge the figure.
+    """Cost of one run.
+
+    Attributes:
+        cycles: Cycles of the core.
+        memory_ns: Waiting for memory, ns, at every frequency of the core.
+        instructions: Executed instructions.
+        counts: Entries of each basic block.
+        costs: Costs by basic block.
+        places: Cost by source line, the greatest first.
+        library_calls: Number of calls by library function.
+        left_out: Sentences on what limits the estimate.
     """
 
     cycles: float
@@ -54,103 +63,104 @@ class ProgramEstimate:
     left_out: tuple[str, ...]
 
     def seconds(self, mhz: float) -> float:
-        """How long it takes at that frequency."""
+        """Return the execution time at a frequency in MHz, s."""
         return self.cycles / (mhz * 1e6) + self.memory_ns * 1e-9
 
 
-def estimate_program(program: Program, wanted: Invocation) -> ProgramEstimate:
-    """Trace and count one run of *wanted*; costs are kept for the same code on the same core."""
+def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimate:
+    """Count and trace one run; keep the costs for the same code on the same core."""
     with TemporaryDirectory(prefix="volery-native-") as made:
         folder = Path(made)
         counting, tracing = folder / "counting", folder / "tracing"
         for one in (counting, tracing):
             one.mkdir()
         program.counted_object(counting / "code.o")
-        entered = block_counts(
-            build_executable(program, wanted, counting / "code.o", counting), wanted, counting
-        )
+        counted = build_executable(program, invocation, counting / "code.o", counting)
+        counts = block_counts(counted, invocation, counting)
         program.traced_object(tracing / "code.o")
-        stride = WINDOW * max(1, -(-int(entered.sum()) // MOST_TRACED))
-        traced = build_executable(program, wanted, tracing / "code.o", tracing)
-        run = trace_blocks(traced, wanted, tracing, stride, program.law.memory)
-    costs, walked = traced_costs(program, run)
+        stride = WINDOW * max(1, -(-int(counts.sum()) // MOST_TRACED))
+        traced = build_executable(program, invocation, tracing / "code.o", tracing)
+        trace = trace_blocks(traced, invocation, tracing, stride, program.law.memory)
+    costs, path = traced_costs(program, trace)
     save_costs(program.key, costs)
-    calls = library_calls(program, entered)
+    calls = library_calls(program, counts)
     return ProgramEstimate(
-        costs.total(entered),
-        costs.waiting(entered),
-        float(costs.instructions @ entered),
-        entered,
+        costs.total(counts),
+        costs.waiting(counts),
+        float(costs.instructions @ counts),
+        counts,
         costs,
-        costs_by_line(program, costs, entered),
+        costs_by_line(program, costs, counts),
         dict(calls),
-        _left_out(program, costs, entered, calls, walked.lost / max(len(run.blocks), 1)),
+        _left_out(program, costs, counts, calls, path.lost / max(len(trace.blocks), 1)),
     )
 
 
-def library_calls(program: Program, entered: Array) -> Counter[str]:
-    """How often each function of a library was called."""
-    machine = MachineCode(program.blocks, program.pieces)
+def library_calls(program: Program, counts: Array) -> Counter[str]:
+    """Return the number of calls of each library function."""
+    code = MachineCode(program.blocks, program.machine_blocks)
     calls: Counter[str] = Counter()
-    for block, first in machine.piece_of_block.items():
-        for number in blocks_of(machine, first):
-            piece = program.pieces[number]
-            leaves = piece.end in (End.CALL, End.JUMP) and piece.target and not piece.target.startswith(".L")
-            if leaves and piece.target not in program.defined and entered[block]:
-                calls[piece.target] += int(entered[block])
+    for block, first in code.first_of_block.items():
+        for number in blocks_of(code, first):
+            machine_block = program.machine_blocks[number]
+            if counts[block] and machine_block.calls_library(program.defined):
+                calls[machine_block.target] += int(counts[block])
     return calls
 
 
-def costs_by_line(program: Program, costs: BlockCosts, entered: Array) -> tuple[SourceLineCost, ...]:
-    """Lines of source by cost: a block's cycles spread evenly over its instructions. What ways between blocks
-    take, wrong predictions mostly, is the line's that they come from.
+def costs_by_line(program: Program, costs: BlockCosts, counts: Array) -> tuple[SourceLineCost, ...]:
+    """Return the cost of each source line, the greatest first.
+
+    A block's cycles are spread evenly over its instructions. The cost of an edge between blocks, mostly
+    mispredictions, is charged to the line that the edge comes from.
     """
-    machine = MachineCode(program.blocks, program.pieces)
+    code = MachineCode(program.blocks, program.machine_blocks)
     cycles: Counter[str] = Counter()
     entries: Counter[str] = Counter()
-    for block, first in machine.piece_of_block.items():
-        if not entered[block]:
+    for block, first in code.first_of_block.items():
+        if not counts[block]:
             continue
         lines = [
-            one.source for number in blocks_of(machine, first) for one in program.pieces[number].instructions
+            one.source
+            for number in blocks_of(code, first)
+            for one in program.machine_blocks[number].instructions
         ]
         for line in lines:
-            cycles[line] += costs.cycles[block] * float(entered[block]) / len(lines)
+            cycles[line] += costs.cycles[block] * float(counts[block]) / len(lines)
         for line in set(lines):
-            entries[line] += int(entered[block])
+            entries[line] += int(counts[block])
     for edge, block in critical_edges(program.text).items():
-        if edge not in machine.piece_of_block and entered[edge]:
-            line = _last_line(program, machine, block)
-            cycles[line] += costs.cycles[edge] * float(entered[edge])
+        if edge not in code.first_of_block and counts[edge]:
+            cycles[_last_line(code, block)] += costs.cycles[edge] * float(counts[edge])
     total = sum(cycles.values()) or 1.0
     return tuple(
         SourceLineCost(line, spent / total, entries[line]) for line, spent in cycles.most_common() if line
     )
 
 
-def _last_line(program: Program, machine: MachineCode, block: int) -> str:
-    """The line of a block's last instruction; empty where the block has none of its own."""
-    first = machine.piece_of_block.get(block)
+def _last_line(code: MachineCode, block: int) -> str:
+    """Return the line of a block's last instruction; empty where the block has no machine code of its own."""
+    first = code.first_of_block.get(block)
     if first is None:
         return ""
-    last = program.pieces[blocks_of(machine, first)[-1]].instructions
-    return last[-1].source if last else ""
+    last: MachineBlock = code.machine_blocks[blocks_of(code, first)[-1]]
+    return last.instructions[-1].source if last.instructions else ""
 
 
 def _left_out(
-    program: Program, costs: BlockCosts, entered: Array, calls: Counter[str], lost: float
+    program: Program, costs: BlockCosts, counts: Array, calls: Counter[str], lost: float
 ) -> tuple[str, ...]:
-    said = [] if program.law.memory else ["every access to memory is taken to hit the first cache"]
+    found = [] if program.law.memory else ["every access to memory is taken to hit the first cache"]
     law = program.law.library
     unknown = {name: count for name, count in calls.items() if name not in law.calls}
     if unknown:
         named = ", ".join(f"{name} ({count})" for name, count in Counter(unknown).most_common(4))
-        said.append(f"library calls without a figure are taken at {law.unknown:g} cycles each: {named}")
-    unseen = float((costs.cycles * entered)[~costs.seen].sum()) / max(costs.total(entered), 1.0)
+        found.append(f"library calls without a figure are taken at {law.unknown:g} cycles each: {named}")
+    unseen = float((costs.cycles * counts)[~costs.seen].sum()) / max(costs.total(counts), 1.0)
     if unseen > 0.01:
-        said.append(
+        found.append(
             f"{unseen:.0%} of the cycles are of blocks that the trace has not met: from their code alone"
         )
     if lost > 0.01:
-        said.append(f"at {lost:.1%} of the traced blocks the way through the machine code was not clear")
-    return tuple(said)
+        found.append(f"at {lost:.1%} of the traced blocks the way through the machine code was not clear")
+    return tuple(found)

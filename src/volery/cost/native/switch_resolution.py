@@ -1,6 +1,7 @@
-"""Where a switch goes: its value followed through the comparisons that the code generator made of it.
+"""Resolution of a switch: its value is followed through the comparisons that the code generator made of it.
 
-Several ways of such a chain lead to the same block, so that the blocks alone do not tell them apart.
+Several paths of such a chain lead to the same block, so the trace of blocks alone does not determine the
+path.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _COMPARES = {"cmp": 1, "cmn": -1}
 _OTHER_FLAGS = (
     "test", "tst", "ccm", "fcm", "fccm", "and", "or", "xor", "bt", "bic", "ucomi", "vucomi", "shr",
 )  # fmt: skip
-"""Beginnings of what compares otherwise."""
+"""Beginnings of other mnemonics that set flags."""
 
 _UNSIGNED: dict[str, Callable[[int, int], bool]] = {
     "e": eq, "ne": ne, "b": lt, "be": le, "a": gt, "ae": ge,
@@ -41,7 +42,7 @@ class _Register(NamedTuple):
 
 
 class _Compared(NamedTuple):
-    """A register that holds the value plus ``offset``, beside a number."""
+    """A comparison of a register that holds the value plus ``offset`` with a number."""
 
     offset: int
     amount: int
@@ -49,7 +50,7 @@ class _Compared(NamedTuple):
 
 
 class SwitchResolver:
-    """One execution of a switch over *value*. Show it the pieces in the order in which they run."""
+    """One execution of a switch over ``value``. Machine blocks must be given in the order of execution."""
 
     def __init__(self, value: int) -> None:
         self._value = value
@@ -59,34 +60,36 @@ class SwitchResolver:
         self._compared: _Compared | None = None
         self._passed: set[int] = set()
 
-    def taken(self, piece: MachineBlock) -> bool | None:
-        """Whether the branch at the end of the piece is taken; ``None`` if that does not depend on the value,
-        as far as can be seen. A chain of comparisons comes by a piece once.
-        """
-        if id(piece) in self._passed:
-            return None
-        self._passed.add(id(piece))
-        for one in piece.instructions:
-            self._see(one)
-        return self._decided(piece.instructions[-1]) if piece.instructions else None
+    def taken(self, block: MachineBlock) -> bool | None:
+        """Return whether the branch at the end of a machine block is taken.
 
-    def _see(self, one: Instruction) -> None:
+        None if that does not depend on the value, as far as the instructions show, or if the block has been
+        passed before: a chain of comparisons passes a block once.
+        """
+        if id(block) in self._passed:
+            return None
+        self._passed.add(id(block))
+        for one in block.instructions:
+            self._execute(one)
+        return self._decide(block.instructions[-1]) if block.instructions else None
+
+    def _execute(self, one: Instruction) -> None:
         name, operands = one.mnemonic, one.operands
         into = _register(operands[0]) if operands else None
         if into is None:
             return
         if name in _COMPARES or (name == "test" and operands[0] == operands[-1]):
             amount = 0 if name == "test" else _amount(operands[-1])
-            self._compared = self._beside(into, None if amount is None else _COMPARES.get(name, 1) * amount)
+            self._compared = self._compare(into, None if amount is None else _COMPARES.get(name, 1) * amount)
         elif name in ("cbz", "cbnz"):
-            self._compared = self._beside(into, 0)
+            self._compared = self._compare(into, 0)
         elif name.startswith(_OTHER_FLAGS):
             self._compared = None
         elif not name.startswith(("st", "b", "j", "tb", "push")):
-            self._moved(name, into, operands)
+            self._move(name, into, operands)
 
-    def _moved(self, name: str, into: _Register, operands: tuple[str, ...]) -> None:
-        """The value with something added or taken away is in another register now."""
+    def _move(self, name: str, into: _Register, operands: tuple[str, ...]) -> None:
+        """Track a register that receives the value plus a constant."""
         out, added = _sum(name, operands)
         offset = None if out is None else self._offsets.get(out)
         if name in ("adds", "subs") or (name in _ADDS and len(operands) == 2):
@@ -98,8 +101,8 @@ class SwitchResolver:
         elif out is not None and not self._found:
             self._perhaps[into.name] = (out, added)
 
-    def _beside(self, register: _Register, amount: int | None) -> _Compared | None:
-        """The first register that is compared with a number holds the value, or what was made of it."""
+    def _compare(self, register: _Register, amount: int | None) -> _Compared | None:
+        """Return a comparison with a number; the first register that is compared holds the value."""
         if amount is None:
             return None
         if not self._found:
@@ -109,7 +112,7 @@ class SwitchResolver:
         offset = self._offsets.get(register.name)
         return None if offset is None else _Compared(offset, amount, register.bits)
 
-    def _decided(self, last: Instruction) -> bool | None:
+    def _decide(self, last: Instruction) -> bool | None:
         if self._compared is None:
             return None
         name = {"cbz": "e", "cbnz": "ne"}.get(last.mnemonic) or re.sub(r"^(?:b\.|j)", "", last.mnemonic)
@@ -143,7 +146,7 @@ def _amount(operand: str) -> int | None:
 
 
 def _sum(name: str, operands: tuple[str, ...]) -> tuple[str | None, int]:
-    """The register, and the number added to it, that an instruction makes its result of."""
+    """Return the register and the constant whose sum is the result of an instruction."""
     if name in _COPIES and len(operands) == 2 and (out := _register(operands[1])):
         return out.name, 0
     if name == "lea" and (address := _ADDRESS.match(operands[1])) and (base := _register(address[1])):
