@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, choices, did_you_mean
 from volery.base.geoid import EGM96_NAME, parse_geoid

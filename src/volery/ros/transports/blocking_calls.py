@@ -15,7 +15,8 @@ from volery.kernel.waiting import Signal
 
 T = TypeVar("T")
 PATIENCE: Ns = 10 * S
-_waiting: WeakKeyDictionary[Kernel, int] = WeakKeyDictionary()
+_waiting: WeakKeyDictionary[Kernel, list[str]] = WeakKeyDictionary()
+"""Names of the tasks that wait for a thread."""
 POLL_S = 0.05
 """How long after each look one looks again for what the client library does not announce."""
 
@@ -26,7 +27,8 @@ def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns =
     In house code, which must not block, it is done on the spot. ``LinkSilent`` if it takes longer than
     *within*.
     """
-    if kernel.current() is None:
+    task = kernel.current()
+    if task is None:
         return work()
     ended = Signal(kernel, what)
     outcome: list[tuple[T | None, BaseException | None]] = []
@@ -44,21 +46,22 @@ def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns =
             kernel.post(partial(finish, value, None))
 
     threading.Thread(target=run, name=what, daemon=True).start()
-    _waiting[kernel] = _waiting.get(kernel, 0) + 1
+    waiting = _waiting.setdefault(kernel, [])
+    waiting.append(task.name)
     try:
         if not ended.wait_for(lambda: outcome, within):
             raise LinkSilent(f"{what}: no answer within {to_seconds(within):g} s")
     finally:
-        _waiting[kernel] -= 1
+        waiting.remove(task.name)
     value, error = outcome[0]
     if error is not None:
         raise error
     return cast("T", value)
 
 
-def pending_calls(kernel: Kernel) -> int:
-    """How many tasks of *kernel* wait for something that is done abroad."""
-    return _waiting.get(kernel, 0)
+def pending_calls(kernel: Kernel) -> tuple[str, ...]:
+    """Return the names of the tasks of *kernel* that wait for a thread."""
+    return tuple(_waiting.get(kernel, ()))
 
 
 def poll_in_thread(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:

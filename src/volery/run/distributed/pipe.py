@@ -1,4 +1,4 @@
-"""What the run's process and a component's say to each other: pickles over two pipes that nobody else has."""
+"""Messages between the run's process and a worker: pickles over two anonymous pipes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.model.system import System
 
 
 class WorkerOrder(NamedTuple):
-    """The first thing that a component's process hears: who it is, and on which graph."""
+    """First message to a worker: the model, its component, the graph and the seed."""
 
     system: System
     name: str
@@ -22,46 +22,46 @@ class WorkerOrder(NamedTuple):
 
 
 class Begin(NamedTuple):
-    """All are ready: begin."""
+    """To a worker: all processes are ready, start the component."""
 
 
 class Stop(NamedTuple):
-    """Come to an end, and bring down the vehicles that you command."""
+    """To a worker: end, and land the vehicles that the component commands."""
 
     why: str
 
 
 class TruthRequest(NamedTuple):
-    """Where is that vehicle really? For the judgement of an operation that has ended."""
+    """From a worker: request the true position of a vehicle, to judge a finished operation."""
 
     vehicle: str
 
 
 class TruthReply(NamedTuple):
-    """The answer."""
+    """To a worker: the requested true position."""
 
     position: Position
 
 
 class Ready(NamedTuple):
-    """It is on the graph and can be called."""
+    """From a worker: the component is on the graph and can be called."""
 
 
 class StartFailed(NamedTuple):
-    """It cannot begin."""
+    """From a worker: the component cannot start."""
 
     why: str
 
 
 class EndingBegun(NamedTuple):
-    """It has begun to end, by itself (``failed``) or since it was told so."""
+    """From a worker: the component has begun to end, by itself (``failed``) or after ``Stop``."""
 
     status: str
     why: str
 
 
 class Pipe:
-    """Two ends: what is said comes from any thread, what is heard goes to one."""
+    """One end of a connection. Any thread may send, one thread receives."""
 
     def __init__(self, inward: int, outward: int) -> None:
         self.ends = inward, outward
@@ -70,13 +70,13 @@ class Pipe:
 
     @classmethod
     def pair(cls) -> tuple[Self, tuple[int, int]]:
-        """This process's pipe, and the two descriptors (in, out) of the other's."""
+        """Return the pipe of this process and the descriptors (in, out) of the other."""
         there_in, here_out = os.pipe()
         here_in, there_out = os.pipe()
         return cls(here_in, here_out), (there_in, there_out)
 
-    def say(self, thing: object) -> bool:
-        """Tell the other side; False if there is nobody any more."""
+    def send(self, thing: object) -> bool:
+        """Send a message. Return False if the other process is gone."""
         data = pickle.dumps(thing, pickle.HIGHEST_PROTOCOL)
         with self._guard:
             try:
@@ -86,14 +86,14 @@ class Pipe:
                 return False
         return True
 
-    def hear(self) -> Any:
-        """The next thing. ``EOFError`` if the other side is gone."""
+    def receive(self) -> Any:
+        """Block until the next message. Raises ``EOFError`` if the other process is gone."""
         try:
             return pickle.load(self._in)
         except (pickle.UnpicklingError, OSError, ValueError) as error:
             raise EOFError from error
 
     def close(self) -> None:
-        """Say no more."""
-        with self._guard, suppress(OSError):  # what could not be said any more
+        """Close the sending side."""
+        with self._guard, suppress(OSError):  # unsent data is lost
             self._out.close()

@@ -1,4 +1,4 @@
-"""What of a model goes where when its components are processes on a real graph."""
+"""Which process runs which part of a model on a real graph, and what the model means there."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from volery.kernel.virtual import VirtualKernel
 
 NODE = "volery"
-"""The node of the run's own process, which tells the time and serves the components of the environment."""
+"""Node of the run's own process, which publishes the clock and serves the components of the environment."""
 
 LANGUAGES = ("python", "rospy", "rclpy")
 
@@ -35,13 +35,14 @@ COMPUTING = frozenset(
         "utilisation",
     )
 )
-"""Quantities of what the model's processors do."""
+"""Observables of the model's processors, which are not used here."""
 
 
 def worker_instances(system: System) -> tuple[Instance, ...]:
-    """The instances that are processes of their own: the application's.
+    """Return the instances of the application, which get their own processes.
 
-    Raises ``CapabilityError`` for a component in a language that cannot be one.
+    Raises:
+        CapabilityError: A component is in a language that is not supported there.
     """
     found = tuple(one for one in system.instances if not one.is_environment)
     for one in found:
@@ -55,7 +56,7 @@ def worker_instances(system: System) -> tuple[Instance, ...]:
 
 
 def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
-    """*system* on this machine, and the names of the requirements that cannot be judged there."""
+    """Return *system* without processors, and the names of the requirements that need them."""
     left_out = tuple(one.name for one in system.requirements if _is_about_computing(one))
     made = replace(
         system,
@@ -71,19 +72,19 @@ def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
 
 
 def unallocated(system: System) -> System:
-    """*system* as it is accounted for: no component computes on a processor."""
+    """Return *system* with no component on a processor, as it is accounted for."""
     return replace(system, instances=tuple(replace(one, processor=None) for one in system.instances))
 
 
 class HostPlatform(Platform):
-    """This machine: computing takes the time that it takes, and costs nothing beside."""
+    """Platform of this machine: computing takes real time and is not priced."""
 
     def __init__(self, system: System, kernel: Kernel, seed: int, fidelity: str) -> None:
-        virtual = cast("VirtualKernel", kernel)  # there is no processor that it would serve
+        virtual = cast("VirtualKernel", kernel)  # without processors only its clock is used
         super().__init__(system, virtual, seed, fidelity)
 
     def foresee(self) -> None:
-        """Nothing is priced."""
+        """Do nothing: nothing is priced."""
 
     def seat(self, instance: Instance) -> Allocation:
         """On no processor of the model's."""
@@ -102,16 +103,16 @@ def _is_about_computing(bound: Bound) -> bool:
 
 
 def node_label(instance: Instance) -> str:
-    """The name of its node, without the namespace."""
+    """Return the name of an instance's node, without the namespace."""
     return re.sub(r"\W", "_", instance.name)
 
 
 def service_name(callee: Instance, operation: str) -> str:
-    """The service that *operation* of *callee* is."""
+    """Return the name of the service for *operation* of *callee*."""
     return f"{names.node_name(node_label(callee), callee.namespace)}/{operation}"
 
 
 def operations(system: System, instance: Instance) -> tuple[str, ...]:
-    """The operations that it provides."""
+    """Return the operations that an instance provides."""
     interfaces = instance.component.provides.values()
     return tuple(name for interface in interfaces for name in system.interfaces[interface].operations)

@@ -1,4 +1,4 @@
-"""The processes of a run on a real graph, as the run's own process sees them."""
+"""The worker processes of a run on a real graph, as the run's own process controls them."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ from volery.run.ending import Ending
 if TYPE_CHECKING:
     from volery.run.assembly.simulated_fleet import SimulatedFleet
 
-READY_S, GONE_S, GLANCE_S = 60.0, 5.0, 0.05
+JOIN_WITHIN_S, EXIT_WITHIN_S, POLL_S = 60.0, 5.0, 0.05
+"""Wall seconds: deadlines for joining the graph and for leaving, and the period of polling."""
 STDERR = 2
-"""What a component prints goes there: the run's own output may be read by a program."""
+"""Components print to standard error: a program may read the standard output of the run."""
 
 
 class WorkerProcess:
-    """One component's process. What it says arrives in a thread and is handed to the kernel.
+    """Process of one component. A thread receives its messages and posts them to the kernel.
 
-    To the end of a run it is what a vehicle is: ``come_to_rest`` lets it bring down those that it commands.
+    At the end of a run it is ``Landable``: ``come_to_rest`` makes it land the vehicles that it commands.
     """
 
     def __init__(
@@ -47,7 +48,7 @@ class WorkerProcess:
     ) -> None:
         self.name = order.name
         self.ready = False
-        self.unfit = ""
+        self.start_error = ""
         self._kernel, self._ending, self._truth = kernel, ending, truth
         self._gone = Signal(kernel, f"the process of {order.name}")
         self._pipe, theirs = Pipe.pair()
@@ -56,18 +57,18 @@ class WorkerProcess:
             pass_fds=theirs,
             stdin=subprocess.DEVNULL,
             stdout=STDERR,
-            start_new_session=True,  # a Ctrl-C at the terminal is the run's, who tells it
+            start_new_session=True,  # the run receives Ctrl-C and forwards it
         )
         for descriptor in theirs:
             os.close(descriptor)
-        self._pipe.say(order)
-        self._reader = threading.Thread(target=self._read, name=f"hears {order.name}", daemon=True)
+        self._pipe.send(order)
+        self._reader = threading.Thread(target=self._read, name=f"reader of {order.name}", daemon=True)
         self._reader.start()
 
     def check(self) -> None:
-        """Raise ``ComponentError`` if it will never be ready."""
-        if self.unfit:
-            raise ComponentError(self.name, self.unfit.removeprefix(f"{self.name}: "))
+        """Raise ``ComponentError`` if the component cannot become ready."""
+        if self.start_error:
+            raise ComponentError(self.name, self.start_error.removeprefix(f"{self.name}: "))
         if self.over:
             raise ComponentError(
                 self.name, f"its process ({self.pid}) {_how(self._process.returncode)} before it was ready"
@@ -75,26 +76,26 @@ class WorkerProcess:
 
     @property
     def over(self) -> bool:
-        """Whether it has ended."""
+        """True if the process has ended."""
         return self._process.poll() is not None
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Id of the process."""
         return self._process.pid
 
     def _read(self) -> None:
         with suppress(EOFError):
             while True:
-                self._hear(self._pipe.hear())
+                self._handle(self._pipe.receive())
         self._process.wait()
         self._kernel.post(self._went)
 
-    def _hear(self, said: object) -> None:
+    def _handle(self, said: object) -> None:
         if isinstance(said, pipe.Ready):
             self.ready = True
         elif isinstance(said, pipe.StartFailed):
-            self.unfit = said.why
+            self.start_error = said.why
         elif isinstance(said, pipe.EndingBegun):
             self._kernel.post(partial(self._ends, said))
         elif isinstance(said, pipe.TruthRequest):
@@ -107,7 +108,7 @@ class WorkerProcess:
             self._fail(said.why.removeprefix(f"{self.name}: "))
 
     def _tell_truth(self, vehicle: str) -> None:
-        self._pipe.say(pipe.TruthReply(self._truth(vehicle)()))
+        self._pipe.send(pipe.TruthReply(self._truth(vehicle)()))
 
     def _went(self) -> None:
         self._gone.notify()
@@ -118,35 +119,35 @@ class WorkerProcess:
         self._ending.failed(self.name, ComponentError(self.name, why))
 
     def go(self) -> None:
-        """All are ready."""
-        self._pipe.say(pipe.Begin())
+        """Start the component; all processes are ready."""
+        self._pipe.send(pipe.Begin())
 
     def come_to_rest(self) -> None:
-        """Let it end, and wait until it has."""
-        self._pipe.say(pipe.Stop("its run has ended"))
+        """Stop the component and block until its process has ended."""
+        self._pipe.send(pipe.Stop("its run has ended"))
         self._gone.wait_for(lambda: self.over)
 
     def stop(self) -> bool:
-        """End it, hard if need be; False if it was still there."""
-        there = not self.over
-        if there:
+        """Close the pipe and kill the process if it still runs. Return False if it had to be killed."""
+        running = not self.over
+        if running:
             with suppress(ProcessLookupError):
                 self._process.kill()
             self._process.wait()
         self._pipe.close()
-        self._reader.join(GONE_S)
-        return not there
+        self._reader.join(EXIT_WITHIN_S)
+        return not running
 
 
 def _how(code: int) -> str:
-    """How a process ended, in words."""
+    """Describe the exit status of a process."""
     if code < 0:
         return f"was ended by {signal.Signals(-code).name}"
     return f"ended with status {code}"
 
 
 class GraphSettings(NamedTuple):
-    """On which graph components are to be, at which pace, with which seed."""
+    """Graph, pace and seed of the run."""
 
     graph: str
     pace: float
@@ -154,23 +155,25 @@ class GraphSettings(NamedTuple):
 
 
 class DistributedRun:
-    """A run's components on a real graph, each of the application's in a process of its own.
+    """Components of a run on a real graph, each component of the application in its own process.
 
-    Raises what ``open_graph`` raises; a ROS 1 master is started where none answers. ``build`` what stays in
-    this process, ``start``, and in any case ``close``.
+    Call ``build``, ``start``, ``go`` and in any case ``close``. A ROS 1 master is started if none answers.
+    Raises what ``open_graph`` raises.
     """
 
-    def __init__(self, system: System, kernel: VirtualKernel, ending: Ending, order: GraphSettings) -> None:
+    def __init__(
+        self, system: System, kernel: VirtualKernel, ending: Ending, settings: GraphSettings
+    ) -> None:
         self._apart = plan.worker_instances(system)
-        self._kernel, self._ending, self._system, self._order = kernel, ending, system, order
+        self._kernel, self._ending, self._system, self._settings = kernel, ending, system, settings
         self._processes: list[WorkerProcess] = []
         self._closed = False
         self._built: BuiltComponents
         self._truth: Callable[[str], Truth]
-        self.graph = open_graph(kernel, order.graph, start_master=True, epoch=0)
+        self.graph = open_graph(kernel, settings.graph, start_master=True, epoch=0)
 
     def build(self, platform: Platform, fleet: SimulatedFleet) -> BuiltComponents:
-        """The components of the environment. Raises what is wrong with them, or with the graph."""
+        """Build the components of the environment, which stay in this process."""
         kernel, system = self._kernel, self._system
         self._node = node = self.graph.node(plan.NODE)
         self._truth = fleet.truth
@@ -178,11 +181,11 @@ class DistributedRun:
         self._here = tuple(one for one in system.instances if one.is_environment)
         part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._values))
         builder = Builder(system, kernel, platform, fleet, self._ending, part=part)
-        self._built = builder.build("times", self._order.seed)
+        self._built = builder.build("times", self._settings.seed)
         return self._built
 
     def _beside(self, module: str) -> ModuleType | None:
-        """Of all components: what one sends, this process may not have loaded yet."""
+        """Load a module beside any component: a received value may be of a class that is not loaded yet."""
         files = [self._system.file_of(one.component) for one in self._system.instances if one.component.path]
         found = (self._built.loader.sibling(module, folder) for folder in {file.parent: 0 for file in files})
         return next((one for one in found if one is not None), None)
@@ -190,41 +193,52 @@ class DistributedRun:
     def start(self) -> None:
         """Start the processes and wait until all are ready.
 
-        Raises ``ComponentError`` for one that cannot begin, ``LinkSilent`` if they take too long.
+        Raises:
+            ComponentError: A component cannot be loaded, or its process has ended.
+            LinkSilent: Some components are not on the graph by the deadline.
         """
         desk = PortServer(self._kernel, self._node, self._values, self._kernel.root)
         for model in self._here:
             desk.serve(model, self._built.instances[model.name])
-        period = round(CLOCK_PERIOD * max(1.0, self._order.pace))  # on the wall as often, whatever the pace
+        period = round(CLOCK_PERIOD * max(1.0, self._settings.pace))  # the same rate in wall time at any pace
         self.graph.tell_clock(self._node, period)
         for model in self._apart:
-            order = pipe.WorkerOrder(self._system, model.name, self._order.graph, self._order.seed)
+            order = pipe.WorkerOrder(self._system, model.name, self._settings.graph, self._settings.seed)
             self._processes.append(WorkerProcess(self._kernel, self._ending, order, self._truth))
         self._ending.vehicles = self._processes
-        end = time.monotonic() + READY_S
+        end = time.monotonic() + JOIN_WITHIN_S
         while late := [one for one in self._processes if not one.ready]:
             for one in late:
                 one.check()
             if time.monotonic() > end:
                 names = choices([one.name for one in late])
-                raise LinkSilent(f"not on the graph within {READY_S:g} s: {names}")
-            time.sleep(GLANCE_S)
+                raise LinkSilent(f"not on the graph within {JOIN_WITHIN_S:g} s: {names}")
+            time.sleep(POLL_S)
 
     def go(self) -> None:
-        """Let the nodes of this process join while time stands still; then let the processes begin."""
-        end = time.monotonic() + READY_S
+        """Let the nodes of this process join the graph while time stands still, then start the processes.
+
+        Raises:
+            LinkSilent: Some nodes of this process have not joined the graph by the deadline.
+        """
+        end = time.monotonic() + JOIN_WITHIN_S
         self._kernel.run(0)
-        while pending_calls(self._kernel) and time.monotonic() < end:
-            time.sleep(GLANCE_S / 10)
+        while joining := pending_calls(self._kernel):
+            if time.monotonic() > end:
+                names, graph = ", ".join(dict.fromkeys(joining)), self._settings.graph
+                raise LinkSilent(
+                    f"not on the graph within {JOIN_WITHIN_S:g} s: {names}; check that {graph} answers"
+                )
+            time.sleep(POLL_S / 10)
             self._kernel.run(0)
         for process in self._processes:
             process.go()
 
     def close(self) -> list[str]:
-        """Leave nothing behind, once; returns the names of components that had to be ended hard."""
+        """End all processes and leave the graph. Return the names of components that had to be killed."""
         if self._closed:
             return []
         self._closed = True
-        stubborn = [one.name for one in self._processes if not one.stop()]
+        killed = [one.name for one in self._processes if not one.stop()]
         self.graph.close()
-        return stubborn
+        return killed

@@ -1,9 +1,7 @@
-"""What components say to each other through ports, as text: JSON, with the types that JSON does not have.
+"""Ports between processes: an operation is a service of the graph, its arguments and result are JSON.
 
-Numbers, text, lists, tuples, mappings, enumerations, and dataclasses of ``volery`` or of a module beside the
-component's file. Nothing else is made from what arrives.
-
-Ports whose other end is another process: an operation is a service of the graph.
+JSON is extended by tuples, mappings with any keys, enumerations, and dataclasses of ``volery`` or of a module
+beside the component's file. No other type is ever created from received text.
 """
 
 from __future__ import annotations
@@ -36,21 +34,21 @@ _TUPLE, _MAPPING = "tuple", "mapping"
 _VOLERY = "volery."
 
 Find = Callable[[str], ModuleType | None]
-"""The module of that name beside the components of this process, loaded if need be."""
+"""Returns the module of that name beside the components of this process, loaded if necessary."""
 
 
 class ValueCodec:
-    """Both ways, for one process."""
+    """Encoder and decoder of the values of one process."""
 
     def __init__(self, find: Find) -> None:
         self._find = find
 
     def to_text(self, value: object, what: str) -> str:
-        """*value* as JSON. ``UsageError``, naming *what* it is, if it cannot leave its process."""
+        """Encode *value*. Raises ``UsageError`` that names *what* if its type cannot be sent."""
         return json.dumps(_encode(value, what))
 
     def from_text(self, text: str) -> Any:
-        """What was written. ``UsageError`` if it is not what ``to_text`` writes."""
+        """Decode the text of ``to_text``. Raises ``UsageError`` for any other text."""
         try:
             return json.loads(text, object_hook=self._made)
         except (ValueError, TypeError, KeyError, AttributeError) as error:
@@ -102,7 +100,7 @@ def _encode(value: object, what: str) -> Any:
 
 def _tuple(value: tuple[Any, ...], what: str) -> Any:
     if type(value) is not tuple:
-        raise _unfit(value, what)  # its name and its own fields would be lost
+        raise _unfit(value, what)  # a named tuple would lose its type
     return {_KIND: _TUPLE, "value": [_encode(one, what) for one in value]}
 
 
@@ -147,9 +145,9 @@ CALL = "volery_msgs/srv/Call"
 
 
 class RemotePort(Port):
-    """``port.operation(...)`` calls a component of another process.
+    """Port to a component of another process.
 
-    Raises ``ComponentError``, naming the callee, for whatever goes wrong there; a process that is gone, too.
+    A call raises ``ComponentError`` that names the callee if the operation fails or its process is gone.
     """
 
     def __init__(
@@ -167,17 +165,17 @@ class RemotePort(Port):
         try:
             answer = self._clients[operation].call(asked)
         except ServiceError as error:
-            raise ComponentError(self.component, f"{operation} did not come back: {error.what}") from error
+            raise ComponentError(self.component, f"{operation} failed: {error.what}") from error
         if not answer.done:
             raise ComponentError(self.component, answer.result.removeprefix(f"{self.component}: "))
         return self._values.from_text(answer.result)
 
 
 class PortClients:
-    """Makes the ports of the components of one process to those of others.
+    """Creates the ports of the components of one process to those of others.
 
-    Clients are made with the port, long before a call: on ROS 2 an answer gets lost where its server has not
-    discovered yet who asked.
+    Clients are created with the port, long before the first call: on ROS 2 a response is lost if the server
+    has not discovered its client yet.
     """
 
     def __init__(self, kernel: Kernel, system: System, node: Node, values: ValueCodec) -> None:
@@ -185,7 +183,7 @@ class PortClients:
         self._clients: dict[str, Client] = {}
 
     def __call__(self, caller: InstanceModel, callee: InstanceModel) -> RemotePort:
-        """The port of *caller*, which is here, to *callee*, which is elsewhere."""
+        """Return the port of *caller* in this process to *callee* in another."""
         provided = operations(self._system, callee)
         far = Instance(self._kernel, callee.name, operations=provided)
         clients = {name: self._client(service_name(callee, name)) for name in provided}
@@ -199,14 +197,14 @@ class PortClients:
 
 
 class PortServer:
-    """Serves the operations of the components of one process to those of others, one task for each call."""
+    """Serves the operations of the components of one process to others, with one task for each call."""
 
     def __init__(self, kernel: Kernel, node: Node, values: ValueCodec, scope: Scope) -> None:
         self._kernel, self._node, self._values, self._scope = kernel, node, values, scope
         self._group = node.group(self._start)
 
     def serve(self, model: InstanceModel, instance: Instance) -> None:
-        """From now on *instance* can be called."""
+        """Advertise the operations of *instance*."""
         for operation in instance.operations:
             handler = partial(self._answer, instance, operation)
             self._node.serve(service_name(model, operation), CALL, handler, self._group)

@@ -1,8 +1,8 @@
-"""The process of one component: ``python -m volery.run.distributed.worker IN OUT``, two descriptors of pipes.
+"""The process of one component: ``python -m volery.run.distributed.worker IN OUT``, two pipe descriptors.
 
-It joins the graph as the component's node, follows ``/clock``, says that it is ready and, told to go, does
-what the component does until it is told to end. An end brings down the vehicles that it commands. Should the
-run's own process be gone, time stands still; then it ends as it is.
+It joins the graph as the component's node, follows ``/clock``, reports that it is ready, and runs the
+component after ``Begin`` until ``Stop``. At the end it lands the vehicles that the component commands. If the
+run's own process is gone, time stands still and the process exits after ``ORPHAN_S``.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from volery.run.ending import FOREVER, Ending
 from volery.trace.events import Activation, Charge, Event
 
 UNREPORTED = (Activation, Charge)
-"""Events about computing, which takes this machine's time and not that of the model's processors."""
+"""Events about computing. It takes the time of this machine, not that of the model's processors."""
 
 ORPHAN_S = 10.0
-"""On the wall: how long after the loss of its run a process is given to end."""
+"""Wall seconds between the loss of the run's process and the exit."""
 
 
 class _ReportedEnding(Ending):
-    """An end that the run hears of as soon as it begins."""
+    """Ending that is reported to the run as soon as it begins."""
 
     def __init__(self, kernel: FollowingKernel, run: Pipe) -> None:
         super().__init__(kernel)
@@ -45,7 +45,7 @@ class _ReportedEnding(Ending):
     def begin(self, status: Status, reason: str) -> None:
         """See ``Ending.begin``."""
         if not self.begun:
-            self._run.say(pipe.EndingBegun(status, reason))
+            self._run.send(pipe.EndingBegun(status, reason))
         super().begin(status, reason)
 
 
@@ -64,10 +64,10 @@ class Worker:
 
     def _record(self, event: Event) -> None:
         if not isinstance(event, UNREPORTED):
-            self._run.say(event)
+            self._run.send(event)
 
     def join(self) -> BuiltComponents:
-        """Onto the graph, loaded and ready to be called. Raises what is wrong with the component."""
+        """Join the graph and load the component, ready to be called."""
         model, kernel = self._model, self._kernel
         node = self.graph.node(plan.node_label(model), model.namespace, remaps=model.remap)
         self.graph.follow_clock(node)
@@ -82,28 +82,28 @@ class Worker:
         return built
 
     def _beside(self, module: str) -> ModuleType | None:
-        assert self._loader is not None, "values arrive when the component is loaded"
+        assert self._loader is not None, "values are received after the component is loaded"
         return self._loader.sibling(module, self._system.file_of(self._model.component).parent)
 
     def live(self, built: BuiltComponents) -> None:
-        """From the word to go to the end."""
+        """Run the component to its end."""
         threading.Thread(target=self._listen, name="run", daemon=True).start()
         built.start()
-        self._kernel.call_at(FOREVER, lambda: None)  # a component that is only called ends when it is told to
+        self._kernel.call_at(FOREVER, lambda: None)  # keeps a passive component running until Stop
         self._ending.pass_time()
         self.graph.close()
 
     def _truth(self, vehicle: str) -> Callable[[], Position]:
-        def look() -> Position:
-            self._run.say(pipe.TruthRequest(vehicle))
+        def position() -> Position:
+            self._run.send(pipe.TruthRequest(vehicle))
             return self._answers.get()
 
-        return look
+        return position
 
     def _listen(self) -> None:
         try:
             while True:
-                said = self._run.hear()
+                said = self._run.receive()
                 if isinstance(said, pipe.TruthReply):
                     self._answers.put(said.position)
                 else:
@@ -117,18 +117,18 @@ class Worker:
 
 
 def main() -> None:
-    """Do what the order says."""
+    """Run the component that the first message describes."""
     run = Pipe(int(sys.argv[1]), int(sys.argv[2]))
-    order = run.hear()
+    order = run.receive()
     try:
-        hosted = Worker(order, run)
-        built = hosted.join()
+        worker = Worker(order, run)
+        built = worker.join()
     except VoleryError as error:
-        run.say(pipe.StartFailed(str(error)))
+        run.send(pipe.StartFailed(str(error)))
         os._exit(1)  # threads of a client library may be left
-    run.say(pipe.Ready())
-    run.hear()
-    hosted.live(built)
+    run.send(pipe.Ready())
+    run.receive()
+    worker.live(built)
     run.close()
     os._exit(0)
 
