@@ -44,8 +44,8 @@ def delivery() -> System:
     return load(DELIVERY, vocabulary(), "pocket")
 
 
-def test_the_application_is_apart_and_what_surrounds_it_stays_with_the_world(delivery: System) -> None:
-    apart = [one.name for one in plan.apart(delivery)]
+def test_the_application_gets_processes_and_the_environment_stays_with_the_world(delivery: System) -> None:
+    apart = [one.name for one in plan.worker_instances(delivery)]
     assert {"central", "planner", "drone_control_1", "landing_2", "rover_control_east"} <= set(apart)
     assert not {"requesters", "provider", "beacon_1", "beacon_2"} & set(apart)
 
@@ -54,7 +54,7 @@ def test_a_language_that_cannot_be_a_process_yet_is_named(delivery: System) -> N
     first = delivery.instances[0]
     foreign = replace(first, component=replace(first.component, language="rclcpp"))
     with pytest.raises(CapabilityError, match=f"{first.name}: a component in rclcpp"):
-        plan.apart(replace(delivery, instances=(foreign, *delivery.instances[1:])))
+        plan.worker_instances(replace(delivery, instances=(foreign, *delivery.instances[1:])))
 
 
 def test_requirements_about_the_models_computers_are_not_judged(delivery: System) -> None:
@@ -132,14 +132,14 @@ def test_nothing_is_made_of_what_makes_no_sense(text: str, shared: tuple[ModuleT
         shared[1].from_text(text)
 
 
-def test_what_is_said_on_a_pipe_is_heard_in_order_until_the_end() -> None:
+def test_a_pipe_delivers_messages_in_order_until_its_end() -> None:
     ours, (theirs_in, theirs_out) = pipe.Pipe.pair()
     theirs = pipe.Pipe(theirs_in, theirs_out)
-    assert ours.say(pipe.Go())
-    assert ours.say(pipe.There(Position(1.0, 2.0, AMSL(3.0))))
-    assert theirs.hear() == pipe.Go()
-    assert theirs.hear() == pipe.There(Position(1.0, 2.0, AMSL(3.0)))
+    assert ours.send(pipe.Begin())
+    assert ours.send(pipe.TruthReply(Position(1.0, 2.0, AMSL(3.0))))
+    assert theirs.receive() == pipe.Begin()
+    assert theirs.receive() == pipe.TruthReply(Position(1.0, 2.0, AMSL(3.0)))
     os.write(theirs_out, b"half a pickle")
     theirs.close()
     with pytest.raises(EOFError):
-        ours.hear()
+        ours.receive()
