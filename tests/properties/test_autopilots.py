@@ -98,9 +98,9 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     return kernel, autopilot, ours
 
 
-COMMANDS = [*sorted(_vehicle()[1].face.firmware.commands.commands), 510, 511, 512, 520]
+COMMANDS = [*sorted(_vehicle()[1].endpoint.firmware.commands.commands), 510, 511, 512, 520]
 PARAMETERS = sorted(FIRMWARE.kinds["multirotor"].rules.parameters.supported)
-LISTENED = sorted(_vehicle()[1].face.listens_to)
+LISTENED = sorted(_vehicle()[1].endpoint.listens_to)
 
 
 @settings(max_examples=40, deadline=None)

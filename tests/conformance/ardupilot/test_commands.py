@@ -164,7 +164,7 @@ def test_modes_show_the_recorded_bits(kind: str, bench: Any, facts: Any) -> None
             rig.vehicle.armed = False
             rig.mode(number)
             rig.vehicle.armed = armed
-            rig.vehicle.outlet.announce("HEARTBEAT")
+            rig.vehicle.output.send_message("HEARTBEAT")
             rig.run(0.01)
             seen.add((rig.latest["HEARTBEAT"]["custom_mode"], rig.latest["HEARTBEAT"]["base_mode"]))
     rig.vehicle.armed = False

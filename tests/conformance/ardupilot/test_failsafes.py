@@ -31,7 +31,7 @@ def test_losing_the_station_returns_after_the_recorded_time(bench: Any, facts: A
     recorded = facts["failsafe"]
     rig = bench(parameters={"FS_GCS_ENABLE": 1})
     airborne_without_a_station(rig)
-    seen = rig.vehicle.station_seen / S
+    seen = rig.vehicle.failsafes.station_last_ns / S
     rig.run_until(lambda: rig.vehicle.mode.number == recorded["mode"])
     assert rig.now - seen == pytest.approx(recorded["silence"], abs=0.4)
     rig.run(1.5)

@@ -246,11 +246,11 @@ def test_a_condition_holds_the_action_after_it_not_the_leg(
         [HOME, item(TAKEOFF, height=5.0), condition, action, item(WAYPOINT, 40.0, height=5.0), item(LAND)],
     )
     start(rig)
-    rig.run_until(lambda: rig.vehicle.plan.current == 4)
-    assert rig.vehicle.yaw_target is None
+    rig.run_until(lambda: rig.vehicle.mission.current == 4)
+    assert rig.vehicle.commanded.yaw is None
     begun = rig.now
-    rig.run_until(lambda: rig.vehicle.yaw_target is not None)
-    assert rig.vehicle.plan.current == 4
+    rig.run_until(lambda: rig.vehicle.commanded.yaw is not None)
+    assert rig.vehicle.mission.current == 4
     assert earliest <= rig.now - begun < 12.0
     rig.run_until(lambda: not rig.vehicle.armed)
 
@@ -260,11 +260,11 @@ def test_a_mission_that_is_flown_is_not_cleared_but_may_be_replaced(bench: Any) 
     rig.run(0.5)
     upload(rig, [HOME, item(TAKEOFF, height=5.0), item(WAYPOINT, 30.0, height=5.0), item(LAND)])
     start(rig)
-    rig.run_until(lambda: rig.vehicle.plan.current == 2)
+    rig.run_until(lambda: rig.vehicle.mission.current == 2)
     rig.send("MISSION_CLEAR_ALL", target_system=1, target_component=1)
     rig.run(0.1)
     assert rig.latest["MISSION_ACK"]["type"] == ERROR
-    assert len(rig.vehicle.plan) == 4
+    assert len(rig.vehicle.mission) == 4
     upload(
         rig, [HOME, item(TAKEOFF), item(WAYPOINT, 5.0), item(WAYPOINT, 30.0, 20.0, height=5.0), item(LAND)]
     )
@@ -280,7 +280,7 @@ def test_after_the_last_waypoint_it_stays(bench: Any) -> None:
     start(rig)
     rig.run(40.0)
     assert rig.vehicle.armed
-    assert rig.vehicle.plan.complete
+    assert rig.vehicle.mission.complete
     assert rig.height == pytest.approx(5.0, abs=0.5)
     assert rig.vehicle.estimate.position[0] == pytest.approx(10.0, abs=1.5)
 
@@ -298,7 +298,7 @@ def test_another_item_can_be_chosen_in_flight(bench: Any) -> None:
         ],
     )
     start(rig)
-    rig.run_until(lambda: rig.vehicle.plan.current == 2)
+    rig.run_until(lambda: rig.vehicle.mission.current == 2)
     rig.send("MISSION_SET_CURRENT", target_system=1, target_component=1, seq=3)
     rig.run(0.2)
     assert rig.latest["MISSION_CURRENT"]["seq"] == 3
@@ -346,10 +346,10 @@ def test_turns_are_flown_about_their_centre(bench: Any) -> None:
     upload(rig, [HOME, item(TAKEOFF, height=6.0), item(18, 12.0, height=6.0, param1=1.0), item(LAND)])
     start(rig)
     rig.run_until(
-        lambda: 18 in [one.command for one in rig.vehicle.plan.items] and rig.vehicle.plan.current == 2
+        lambda: 18 in [one.command for one in rig.vehicle.mission.items] and rig.vehicle.mission.current == 2
     )
     farthest = 0.0
-    while rig.vehicle.plan.current == 2:
+    while rig.vehicle.mission.current == 2:
         rig.run(0.5)
         farthest = max(farthest, rig.vehicle.estimate.position[0])
         assert rig.now < 90.0

@@ -136,7 +136,7 @@ def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> 
     room = Path(volery.simulation.autopilots.__file__).parent
     source = "".join(
         path.read_text(encoding="utf-8")
-        for part in ("ardupilot", "simulated")
+        for part in ("ardupilot", "manoeuvres", "mavlink", ".")
         for path in sorted((room / part).rglob("*.py"))
         if path.name != "honoured.py"
     )

@@ -165,7 +165,7 @@ def test_links_have_their_own_streams_and_hear_the_same_words(bench: Any) -> Non
 def test_a_closed_link_leaves_the_vehicle_flying(bench: Any) -> None:
     rig = bench()
     rig.airborne(5.0)
-    link = rig.autopilot.face.channels[0].link
+    link = rig.autopilot.endpoint.channels[0].link
     rig.autopilot.disconnect(link)
     rig.run(10.0)
     assert rig.height == pytest.approx(5.0, abs=0.5)

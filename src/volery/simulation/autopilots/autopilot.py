@@ -2,8 +2,8 @@
 
 ```python
 world, flights = make_world(kernel.now, [Multirotor()], seed=7, frame=frame)
-autopilot = Autopilot(kernel, flights[0], dialects.load("ardupilot"), warm=True)
-ours, theirs = in_process(kernel, "drone_1")
+autopilot = Autopilot(kernel, flights[0], firmwares.load("ardupilot"), warm=True)
+ours, theirs = in_process_pair(kernel, 0, "drone_1", MAVLINK)
 autopilot.connect(theirs)
 ```
 """
@@ -28,15 +28,24 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import VehicleState
 
 WARM_UP = 300 * MS
-"""A warm vehicle has its position and its home this long after it was made."""
+"""Time after creation at which a warm vehicle has its position and its home."""
 
 
 class Autopilot:
-    """One vehicle's autopilot. *dialect* is a firmware's, or the firmware: then the kind of body chooses.
+    """One vehicle's autopilot.
 
-    ``warm``: booted, with a position, before the run begins. Cold, it boots when the first link is
-    connected, and takes as long as the firmware does. ``parameters`` replace the firmware's values. Raises
-    ``UsageError`` for a parameter or a kind of vehicle that the firmware does not know.
+    Args:
+        kernel: Clock and timers.
+        flight: The flight stack's handle.
+        firmware: A firmware, or a family: then the kind of body selects the firmware.
+        system: MAVLink system id.
+        parameters: Parameter values that replace the firmware's.
+        warm: Whether it is booted and has a position before the run begins. A cold autopilot boots when its
+            first link is connected, and takes as long as the firmware does.
+        name: Name in texts and traces; by default firmware and system id.
+
+    Raises:
+        UsageError: The firmware has no such parameter or no such kind of vehicle.
     """
 
     def __init__(
@@ -58,11 +67,11 @@ class Autopilot:
         self.vehicle = Vehicle(
             kernel, flight, chosen.rules, system=system, name=self.name, overrides=parameters
         )
-        self.face: ProtocolEndpoint = chosen.endpoint(self.vehicle)
-        self.vehicle.outlet = self.face
+        self.endpoint: ProtocolEndpoint = chosen.endpoint(self.vehicle)
+        self.vehicle.output = self.endpoint
         self.on_reboot: Action = _nothing
-        """Called when a station restarts the autopilot: whoever serves its links may close them."""
-        self._clocks: list[Handle] = []
+        """Called when a station restarts the autopilot, so that the server of its links can close them."""
+        self._timers: list[Handle] = []
         self._ticks = 0
         self._origin: tuple[Vector, Vector] | None = None
         self._booted = warm
@@ -74,13 +83,16 @@ class Autopilot:
 
     @property
     def banner(self) -> bytes:
-        """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
+        """Bytes that the autopilot writes to a new byte connection before any frame."""
         return self._on_links().banner
 
     def connect(self, link: Link, *, switch_on: bool = True, use: str = "") -> None:
-        """Serve this link, too. The first one switches a cold vehicle on, unless *switch_on* is False.
+        """Serve *link*, and boot if that has not happened yet.
 
-        *use* is what the firmware has the link for, such as ``station``; by default its usual one.
+        Args:
+            link: The autopilot's end of the link.
+            switch_on: Whether to boot a cold vehicle.
+            use: What the firmware uses the link for, such as ``station``; empty: its default.
         """
         self._on_links().connect(link, use)
         if switch_on:
@@ -89,40 +101,48 @@ class Autopilot:
     def join(
         self, graph: RosGraph, namespace: str, place: ExecutionContext, *, switch_on: bool = True
     ) -> None:
-        """Serve on *graph* under *namespace*; the node's computing is spent at *place*. A cold vehicle is
-        switched on, unless *switch_on* is False. Raises ``UsageError`` for a firmware that speaks on links.
+        """Serve on a ROS graph, and boot if that has not happened yet.
+
+        Args:
+            graph: The graph.
+            namespace: Prefix of all names.
+            place: Execution context that the node's computing is charged to.
+            switch_on: Whether to boot a cold vehicle.
+
+        Raises:
+            UsageError: The firmware is reached over links.
         """
-        if not isinstance(self.face, GraphEndpoint):
+        if not isinstance(self.endpoint, GraphEndpoint):
             raise UsageError(f"{self.name}: a simulated {self.firmware.name} is reached over links")
-        self.face.join(graph, namespace, place)
+        self.endpoint.join(graph, namespace, place)
         if switch_on:
             self.switch_on()
 
     def _on_links(self) -> LinkEndpoint:
-        if not isinstance(self.face, LinkEndpoint):
+        if not isinstance(self.endpoint, LinkEndpoint):
             raise UsageError(f"{self.name}: a simulated {self.firmware.name} is reached over a graph")
-        return self.face
+        return self.endpoint
 
     def switch_on(self) -> None:
-        """Boot now, if that has not happened yet: a firmware on TCP waits for its first client."""
+        """Boot, if that has not happened yet: a firmware on TCP waits for its first client."""
         if not self._booted:
             self._booted = True
             self._boot(0)
 
     def disconnect(self, link: Link) -> None:
-        """Stop serving it. The vehicle flies on."""
+        """Stop serving *link*. The vehicle flies on."""
         self._on_links().disconnect(link)
 
     def close(self) -> None:
-        """Stop all clocks and serve no link any more."""
+        """Stop all timers and close all links."""
         self._halt()
-        self.face.hang_up()
+        self.endpoint.close()
 
     def _halt(self) -> None:
-        for clock in self._clocks:
-            clock.cancel()
-        self._clocks.clear()
-        self.face.stop()
+        for timer in self._timers:
+            timer.cancel()
+        self._timers.clear()
+        self.endpoint.stop()
 
     def _restart(self) -> None:
         self._halt()
@@ -141,45 +161,45 @@ class Autopilot:
         else:
             for event in firmware.boot.events:
                 self._at(event.after, partial(event.act, vehicle))
-        self.face.start()
-        self._clocks.append(self._kernel.every(firmware.periodic.tick, self._tick))
+        self.endpoint.start()
+        self._timers.append(self._kernel.every(firmware.periodic.tick, self._tick))
         phase = (firmware.periodic.each_second_from - age) % S
         self._at(
             age + phase,
-            lambda: self._clocks.append(
+            lambda: self._timers.append(
                 self._kernel.every(S, lambda: firmware.periodic.each_second(vehicle))
             ),
         )
 
     def _at(self, uptime: Ns, action: Action) -> None:
-        self._clocks.append(self._kernel.call_at(self.vehicle.boot_at + uptime, action))
+        self._timers.append(self._kernel.call_at(self.vehicle.boot_at + uptime, action))
 
     def _tick(self) -> None:
         vehicle, firmware = self.vehicle, self.firmware
         self._ticks += 1
         if vehicle.armed:
-            vehicle.watch_ground()
-            vehicle.act()
+            vehicle.update_ground()
+            vehicle.run_manoeuvre()
         firmware.periodic.on_step(vehicle)
         if self._ticks % firmware.periodic.failsafe_ticks == 0:
-            self._watch()
+            self._check_failsafes()
 
-    def _watch(self) -> None:
-        """Look whether a failsafe begins or ends."""
+    def _check_failsafes(self) -> None:
+        """Begin and end failsafes whose condition has changed."""
         vehicle = self.vehicle
         for failsafe in self.firmware.failsafes:
-            tripped, was = failsafe.tripped(vehicle), failsafe.name in vehicle.failsafes
+            tripped, was = failsafe.tripped(vehicle), failsafe.name in vehicle.failsafes.active
             if tripped and not was:
-                vehicle.failsafes.add(failsafe.name)
+                vehicle.failsafes.active.add(failsafe.name)
                 failsafe.begins(vehicle)
             elif was and not tripped:
-                vehicle.failsafes.discard(failsafe.name)
+                vehicle.failsafes.active.discard(failsafe.name)
                 failsafe.ends(vehicle)
 
     # -- for recorders
 
     def state(self) -> VehicleState:
-        """The vehicle now, as it is and as its autopilot believes: for a trace."""
+        """Return true and estimated state of the vehicle now, for a trace."""
         truth, estimate = self._flight.truth(), self._flight.estimate()
         x, y, z = truth.position
         east, north, up = (nan, nan, nan)
@@ -204,7 +224,7 @@ class Autopilot:
         )
 
     def _about_world(self, origin: Vector, position: Vector) -> Vector:
-        """NED about the estimator's origin to ENU about the world's."""
+        """Convert NED about the estimator's origin to ENU about the world's."""
         if self._origin is None or self._origin[0] != origin:
             self._origin = origin, self._flight.frame.to_ned(*origin)
         offset = self._origin[1]
@@ -214,7 +234,7 @@ class Autopilot:
 def _of_kind(firmware: Firmware | FirmwareFamily, kind: str) -> Firmware:
     if isinstance(firmware, Firmware):
         if firmware.kind != kind:
-            raise UsageError(f"{firmware.name} flies a {firmware.kind}, but the body is a {kind}")
+            raise UsageError(f"{firmware.name} is for a {firmware.kind}, but the body is a {kind}")
         return firmware
     if kind not in firmware.kinds:
         raise UsageError(f"{firmware.name} has no {kind}; it has {choices(firmware.kinds)}")
@@ -222,4 +242,4 @@ def _of_kind(firmware: Firmware | FirmwareFamily, kind: str) -> Firmware:
 
 
 def _nothing() -> None:
-    """Nobody wants to know."""
+    """Do nothing."""

@@ -1,7 +1,6 @@
-"""What a vehicle speaks through: its outlet for words, and the way to those who command it.
+"""What a vehicle sends through, and how its protocol is reached.
 
-A face is one protocol. On links it serves any number of them; on a graph it is a node. The flight stack
-knows neither.
+An endpoint is one protocol of one vehicle: on any number of links, or as a node on a ROS graph.
 """
 
 from __future__ import annotations
@@ -15,41 +14,41 @@ from volery.ros.graph import RosGraph
 
 
 class VehicleOutput(Protocol):
-    """Through which a vehicle speaks to whoever listens."""
+    """What the parts of an autopilot send; each endpoint implements it in its protocol."""
 
-    def say(self, severity: int, text: str) -> None:
-        """Words for people; severity as in syslog."""
+    def send_text(self, severity: int, text: str) -> None:
+        """Send a status text; severity as in syslog."""
 
-    def parameter(self, name: str) -> None:
-        """A parameter has another value."""
+    def parameter_changed(self, name: str) -> None:
+        """Report the new value of a parameter."""
 
     def mode_changed(self) -> None:
-        """It flies another mode."""
+        """Report that another mode is in force."""
 
     def home_changed(self) -> None:
-        """Home is elsewhere."""
+        """Report the new home position."""
 
-    def announce(self, message: str) -> None:
-        """Send that message of the firmware's protocol now, to everyone."""
+    def send_message(self, message: str) -> None:
+        """Send that message of the firmware's protocol now, on all links."""
 
-    def tell(self, message: str, fields: dict[str, Any]) -> None:
-        """Send an event with these fields, to everyone."""
+    def send_event(self, message: str, fields: dict[str, Any]) -> None:
+        """Send an event with these fields, on all links."""
 
-    def after_answer(self, action: Action) -> None:
-        """Do it once the frame that is being handled has been answered; at once if none is."""
+    def after_reply(self, action: Action) -> None:
+        """Run *action* once the message in hand has been answered; at once if there is none."""
 
 
 class ProtocolEndpoint(VehicleOutput, Protocol):
     """One vehicle's protocol."""
 
     def start(self) -> None:
-        """The vehicle was switched on: what it sends regularly is sent from its boot on."""
+        """Start what is sent regularly, at the phase of the boot."""
 
     def stop(self) -> None:
-        """Fall silent: it was switched off."""
+        """Stop sending: the vehicle was switched off."""
 
-    def hang_up(self) -> None:
-        """Serve nobody any more."""
+    def close(self) -> None:
+        """Close all links or the node."""
 
 
 @runtime_checkable
@@ -58,18 +57,29 @@ class LinkEndpoint(ProtocolEndpoint, Protocol):
 
     @property
     def banner(self) -> bytes:
-        """The first bytes on a wire after the autopilot was switched on, if they are no frame."""
+        """Bytes that the autopilot writes to a new byte connection before any frame."""
 
     def connect(self, link: Link, use: str = "") -> None:
-        """Listen to and speak on this link, too. *use* is what the firmware has it for."""
+        """Serve *link*.
+
+        Args:
+            link: The autopilot's end of the link.
+            use: What the firmware uses the link for; empty: its default.
+        """
 
     def disconnect(self, link: Link) -> None:
-        """Nobody is there any more."""
+        """Stop serving *link*."""
 
 
 @runtime_checkable
 class GraphEndpoint(ProtocolEndpoint, Protocol):
-    """A protocol of topics and services on a graph."""
+    """A protocol of topics and services on a ROS graph."""
 
     def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
-        """Serve on that graph: all its names are under *namespace*, its computing is spent at *place*."""
+        """Serve on *graph*.
+
+        Args:
+            graph: The graph.
+            namespace: Prefix of all names.
+            place: Execution context that the node's computing is charged to.
+        """

@@ -1,9 +1,9 @@
-"""What a mode is: a number and a name on the wire, and a manoeuvre that flies it.
+"""Modes, manoeuvres and the state of one simulated vehicle as its autopilot software keeps it.
 
-A vehicle as its autopilot's software knows it: mode, arming, home, sticks, parameters, mission, failsafes.
-
-The one state that all parts of the flight stack share. It speaks through an ``VehicleOutput`` and knows no
-protocol; what differs between firmwares it asks its dialect.
+The three stand in one module because they need one another: a mode creates its manoeuvre, a manoeuvre reads
+and drives its vehicle, a vehicle runs its manoeuvre. All parts of an autopilot share the ``Vehicle``. It
+sends through a ``VehicleOutput`` and knows no protocol; what differs between firmwares it reads from its
+``VehicleRules``.
 """
 
 from __future__ import annotations
@@ -24,59 +24,61 @@ from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, Onb
 
 
 class Manoeuvre:
-    """One way of flying. ``enter`` once, then ``step`` at every tick and whenever the sticks moved.
+    """One way of flying or driving: ``enter`` once, then ``step`` at every tick and when the RC channels
+    move.
 
-    While the vehicle stands on the ground with its motors off or idling, the manoeuvre says whether it
-    wants to lift off (``wants_to_fly``); until the motors are up it gives no set-points that would lift it.
+    While the vehicle stands on the ground with its motors off or idling, ``takeoff_requested`` decides
+    whether they come up; until then the manoeuvre is not stepped.
+
+    Args:
+        vehicle: The vehicle that is flown.
     """
 
     landing: bool = False
-    """Whether it is on its way down to the ground."""
+    """Whether it descends to land."""
 
     taking_off: bool = False
-    """Whether it is climbing away from the ground to a stated height."""
+    """Whether it climbs from the ground to a commanded height."""
 
     slow_start: bool = False
     """Whether the motors come up slowly."""
 
     target: Vector | None = None
-    """Where it goes: north, east, down about the estimator's origin [m]; ``None`` where it has no such
-    point.
-    """
+    """Its destination, north, east, down about the estimator's origin [m]; ``None``: it has none."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
 
     def enter(self) -> None:
-        """It begins now."""
+        """Begin the manoeuvre."""
 
     def step(self) -> None:
-        """Look, decide, drive."""
+        """Read the estimate and give a set-point."""
         raise NotImplementedError
 
     def on_ground(self) -> None:
-        """Called at every tick while it stands on the ground with its motors running."""
+        """Do what is due at a tick while the vehicle stands on the ground with its motors running."""
 
     def item_chosen(self) -> None:
-        """Another mission item has become current."""
+        """Take over that another mission item has become current."""
 
-    def wants_to_fly(self) -> bool:
-        """Whether the motors should come up from idle while it stands on the ground."""
+    def takeoff_requested(self) -> bool:
+        """Return whether the motors should come up from idle on the ground."""
         return False
 
     def distance(self) -> float:
-        """Metres to the target in the plane; 0 without a target."""
+        """Return the horizontal distance to the target [m]; 0 without a target."""
         if self.target is None:
             return 0.0
         here = self.vehicle.estimate.position
         return hypot(self.target[0] - here[0], self.target[1] - here[1])
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Hand a set-point to the inner loops, unless they hold the same one already."""
+        """Pass a set-point to the inner loops, unless it is in force already."""
         self.vehicle.drive(setpoint)
 
     def idle(self) -> None:
-        """Motors turn slowly, nothing is held."""
+        """Let the motors turn slowly, without control."""
         self.vehicle.drive(IDLE)
 
 
@@ -88,9 +90,18 @@ IDLE = Setpoint(Control.IDLE)
 class Mode:
     """One mode of a firmware.
 
-    ``base_mode`` holds the heartbeat's bits while disarmed. ``controls`` are the bits of SYS_STATUS that
-    are enabled and healthy in this mode only. ``pilot`` says that the sticks fly it, ``manual_throttle``
-    that they command thrust. ``user_takeoff`` says that a take-off command is accepted.
+    Args:
+        number: Number on the wire.
+        name: Name in texts and traces.
+        base_mode: MAV_MODE_FLAG bits of the heartbeat while disarmed.
+        manoeuvre: Creates the manoeuvre that flies the mode.
+        controls: Bits of SYS_STATUS that are enabled and healthy in this mode only.
+        needs_position: Whether the mode needs a position estimate.
+        armable: Whether the vehicle may be armed in it.
+        pilot: Whether the RC channels fly it.
+        manual_throttle: Whether the throttle channel commands thrust.
+        user_takeoff: Whether a take-off command is accepted.
+        starts_high: Whether a ground station may arm with the throttle channel up.
     """
 
     number: int
@@ -104,7 +115,6 @@ class Mode:
     manual_throttle: bool = False
     user_takeoff: bool = False
     starts_high: bool = False
-    """May be armed by a ground station with the throttle stick up."""
 
 
 def do_nothing(_vehicle: Vehicle) -> None:
@@ -173,16 +183,137 @@ class VehicleRules:
 
 
 class Home(NamedTuple):
-    """Degrees and metres AMSL, and the same point north, east, down about the estimator's origin."""
+    """Home position.
+
+    Args:
+        latitude: Latitude [degrees].
+        longitude: Longitude [degrees].
+        amsl: Height above mean sea level [m].
+        ned: The same point north, east, down about the estimator's origin [m].
+        by_user: Whether a user has set a home since boot: arming then does not move it.
+    """
 
     latitude: float
     longitude: float
     amsl: float
     ned: Vector
+    by_user: bool = False
+
+
+@dataclass
+class ArmingState:
+    """Arming, changed by ``Vehicle.arm``, ``Vehicle.disarm`` and the firmware's checks. Times in ns."""
+
+    armed: bool = False
+    armed_at: Ns = NEVER
+    disarmed_at: Ns = NEVER
+    refused_at: Ns = NEVER
+    """Time at which arming was last refused."""
+    checks_passed: bool = False
+    """Result of the last arming checks, for firmwares that check regularly."""
+
+
+@dataclass
+class GroundState:
+    """Whether the vehicle stands on the ground, as its autopilot has found. Times in ns."""
+
+    landed: bool = False
+    landed_at: Ns = NEVER
+    idle_since: Ns = NEVER
+    """Since when an armed vehicle has stood on the ground without a request to take off."""
+    flight_time: Ns = 0
+    """Time in flight since boot, where the firmware counts it."""
+    lifted: bool = False
+    """Whether the landed detector has reported flight since the motors came up."""
+    takeoff_requested_at: Ns = NEVER
+    takeoff_last_requested_at: Ns = NEVER
+
+    def arm(self, now: Ns) -> None:
+        """Start to wait for a request to take off."""
+        self.idle_since = now
+        self.takeoff_requested_at = NEVER
+
+    def leave(self, now: Ns) -> None:
+        """Begin a flight: the motors come up now."""
+        self.landed = self.lifted = False
+        self.takeoff_last_requested_at = now
+
+    def update(self, now: Ns, on_ground: bool, takeoff_requested: bool, abandoned_after: Ns) -> None:
+        """Update the state of an armed vehicle in flight.
+
+        It has landed once the detector reports ground after flight, or once it has stood on the ground
+        without a request to take off for *abandoned_after*.
+
+        Args:
+            now: The time [ns].
+            on_ground: Report of the landed detector.
+            takeoff_requested: Whether the manoeuvre requests to take off, on the ground.
+            abandoned_after: Time after which a take-off that never left the ground ends [ns].
+        """
+        self.lifted = self.lifted or not on_ground
+        if not on_ground or takeoff_requested:
+            self.takeoff_last_requested_at = now
+        if on_ground and (self.lifted or now - self.takeoff_last_requested_at >= abandoned_after):
+            self.landed = True
+            self.landed_at = self.idle_since = now
+            self.takeoff_requested_at = NEVER
+
+
+@dataclass
+class CommandedLimits:
+    """Limits and heading that commands and mission items have set for the present mode; ``None``: not set."""
+
+    speed: float | None = None
+    """Horizontal speed [m/s]."""
+    speed_up: float | None = None
+    """Climb rate [m/s]."""
+    speed_down: float | None = None
+    """Descent rate [m/s]."""
+    yaw: float | None = None
+    """Heading, clockwise from north [rad]."""
+
+
+@dataclass
+class FailsafeState:
+    """Failsafes in force, and what the conditions of failsafes remember."""
+
+    active: set[str] = field(default_factory=set)
+    """Names of the failsafes whose condition is true."""
+    station_last_ns: Ns = NEVER
+    """Time of the last message of the ground station that controls the vehicle [ns]."""
+    low_voltage_since: dict[str, Ns] = field(default_factory=dict)
+    """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""
+
+
+@dataclass
+class ReportState:
+    """What a firmware has reported since boot."""
+
+    sent_once: set[str] = field(default_factory=set)
+    """Texts that are sent once after a boot."""
+    arming_checks_at: Ns = 0
+    """Uptime of the last report of failed arming checks [ns]."""
+    counters_at: Ns = 0
+    """Uptime at which operating hours were last stored [ns]."""
+    contacts: int = 0
+    """Number of touch-downs reported."""
 
 
 class Vehicle:
-    """The shared state. Its parts change it through its methods."""
+    """State of one simulated vehicle as its autopilot software keeps it, shared by all its parts.
+
+    The state is grouped by owner: ``arming``, ``ground``, ``commanded``, ``failsafes``, ``reports``, ``rc``,
+    ``mission``, ``parameters`` and the home position. All but the last three and ``rc`` are cleared by a
+    boot.
+
+    Args:
+        kernel: Clock and timers.
+        flight: The flight stack's handle.
+        rules: What the vehicle uses of its firmware.
+        system: MAVLink system id.
+        name: Name of the vehicle in texts and traces.
+        overrides: Parameter values that replace the firmware's.
+    """
 
     def __init__(
         self,
@@ -199,64 +330,42 @@ class Vehicle:
         self.rules = rules
         self.system = system
         self.name = name
-        self.outlet: VehicleOutput
+        self.output: VehicleOutput
         self.restart: Action
-        """Switch the autopilot off and on again."""
+        """Restart the autopilot."""
         self.parameters = Parameters(
             rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
         )
         self.tuning = rules.parameters.tuning(self.parameters)
-        self.sticks = RcChannels(rules.rc.transmitter)
-        self.plan = OnboardMission()
+        self.rc = RcChannels(rules.rc.transmitter)
+        self.mission = OnboardMission()
         self.firmware_state: Any = rules.firmware_state(self)
-        """What only its firmware knows of."""
+        """State that only the firmware uses."""
         self.boot_at: Ns = kernel.now()
         self.mode: Mode = rules.boot_mode
         self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
         self._reset()
 
     def _reset(self) -> None:
-        self.armed = False
-        self.armed_at: Ns = NEVER
-        self.disarmed_at: Ns = NEVER
-        self.refused_at: Ns = NEVER
-        """When arming was last refused."""
-        self.landed = False
-        self.landed_at: Ns = NEVER
-        self.idle_since: Ns = NEVER
+        self.arming = ArmingState()
+        self.ground = GroundState()
+        self.commanded = CommandedLimits()
+        self.failsafes = FailsafeState()
+        self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None
-        self.home_by_user = False
-        self.prearm_ok = False
-        self.failsafes: set[str] = set()
-        self.station_seen: Ns = NEVER
-        """When the ground station that counts was last heard."""
-        self._wanted_at: Ns = NEVER
-        self._lifted = False
-        self._resigned_at: Ns = NEVER
-        self.speed: float | None = None
-        """Speed in the plane that was commanded [m/s]; ``None``: the parameters'. Likewise up and down."""
-        self.speed_up: float | None = None
-        self.speed_down: float | None = None
-        self.yaw_target: float | None = None
-        """Heading that was commanded [rad]; ``None``: the mode's own."""
-        self.flight_time: Ns = 0
-        self.said: set[str] = set()
-        """Words that are said once after a boot."""
-        self.displayed_at: Ns = self.uptime()
-        """Uptime at which it was last said why it cannot be armed."""
-        self.counted_at: Ns = self.uptime()
-        """Uptime at which the counters of hours were last stored."""
-        self.sagging: dict[str, Ns] = {}
-        """Since when the battery has been below a voltage, by the parameter that holds it."""
-        self.contacts = 0
-        """How often it has hit the ground."""
         self._setpoint: Setpoint = OFF
         self.flight.drive(OFF)
 
-    # -- time and place
+    def boot(self, age: Ns) -> None:
+        """Boot, as if power had been switched on *age* [ns] ago. Mission and parameters persist."""
+        self.boot_at = self.kernel.now() - age
+        self._reset()
+        self.rc.release()
+        self.mode = self.rules.boot_mode
+        self.manoeuvre = self.mode.manoeuvre(self)
 
     def uptime(self) -> Ns:
-        """Nanoseconds since boot."""
+        """Return the time since boot [ns]."""
         return self.kernel.now() - self.boot_at
 
     @property
@@ -264,20 +373,21 @@ class Vehicle:
         """Whether the vehicle leaves the ground (multirotor), so that standing on the ground is a state."""
         return self.flight.flying
 
-    def boot(self, age: Ns) -> None:
-        """Start anew, as if switched on *age* ago.
+    @property
+    def armed(self) -> bool:
+        """Whether the motors may turn."""
+        return self.arming.armed
 
-        The mission and the parameters stay, as in memory that keeps.
-        """
-        self.boot_at = self.kernel.now() - age
-        self._reset()
-        self.sticks.release()
-        self.mode = self.rules.boot_mode
-        self.manoeuvre = self.mode.manoeuvre(self)
+    @property
+    def landed(self) -> bool:
+        """Whether the autopilot counts the vehicle as standing on the ground."""
+        return self.ground.landed
+
+    # -- position
 
     @property
     def estimate(self) -> Estimate:
-        """What the estimator believes now."""
+        """The estimate now."""
         return self.flight.estimate()
 
     @property
@@ -285,62 +395,80 @@ class Vehicle:
         """Whether modes that need a position may fly."""
         return self.uptime() >= self.rules.startup.position_after and self.estimate.position_ok
 
-    def set_home(self, latitude: float, longitude: float, amsl: float) -> None:
-        """From now on home is there. It lies as far below the origin as it lies lower, however far away."""
-        north, east, _ = self.flight.to_ned(latitude, longitude, amsl)
-        self.home = Home(latitude, longitude, amsl, (north, east, self.estimate.origin[2] - amsl))
-        self.outlet.home_changed()
+    @property
+    def height(self) -> float:
+        """Height above home [m]; above the estimator's origin while there is no home."""
+        down = self.estimate.position[2]
+        return (self.home.ned[2] if self.home else 0.0) - down
 
-    def home_is_here(self) -> None:
-        """Home is where the vehicle is."""
-        self.set_home(*self.estimate.geodetic)
+    def set_home(self, latitude: float, longitude: float, amsl: float, *, by_user: bool = False) -> None:
+        """Set the home position and report it.
+
+        Its distance below the estimator's origin is the difference of the heights AMSL, however far away.
+
+        Args:
+            latitude: Latitude [degrees].
+            longitude: Longitude [degrees].
+            amsl: Height above mean sea level [m].
+            by_user: Whether a user sets it; remembered until the next boot.
+        """
+        north, east, _ = self.flight.to_ned(latitude, longitude, amsl)
+        by_user = by_user or (self.home is not None and self.home.by_user)
+        self.home = Home(latitude, longitude, amsl, (north, east, self.estimate.origin[2] - amsl), by_user)
+        self.output.home_changed()
+
+    def set_home_here(self, *, by_user: bool = False) -> None:
+        """Set the home position to the estimated position."""
+        self.set_home(*self.estimate.geodetic, by_user=by_user)
 
     def point(self, frame: int, latitude: float, longitude: float, altitude: float) -> Vector:
-        """A point of a MAVLink frame as north, east, down about the estimator's origin.
+        """Convert a point in a MAVLink frame to north, east, down about the estimator's origin [m].
 
-        Altitudes above terrain are taken as above home: there is no terrain on board.
+        Heights above terrain are taken as above home: there is no terrain map on board.
+
+        Args:
+            frame: MAV_FRAME.
+            latitude: Latitude [degrees].
+            longitude: Longitude [degrees].
+            altitude: Height [m] above the frame's reference.
         """
         above_sea = frame in (GLOBAL, GLOBAL_INT)
         amsl = altitude if above_sea or self.home is None else self.home.amsl + altitude
         return self.flight.to_ned(latitude, longitude, amsl)
 
-    @property
-    def height(self) -> float:
-        """Metres above home; above the estimator's origin while there is no home."""
-        down = self.estimate.position[2]
-        return (self.home.ned[2] if self.home else 0.0) - down
+    # -- texts and parameters
 
-    # -- words
-
-    def say(self, severity: int, text: str) -> None:
-        """Words for people; severity as in syslog."""
-        self.outlet.say(severity, text)
+    def send_text(self, severity: int, text: str) -> None:
+        """Send a status text; severity as in syslog."""
+        self.output.send_text(severity, text)
 
     def set_parameter(self, name: str, value: float) -> bool:
-        """Set it and tell everyone; False if it cannot be."""
-        changed = self.parameters.set(name, value)
-        if changed is None:
+        """Set a parameter and report it; return False if it does not exist or does not take *value*."""
+        if self.parameters.set(name, value) is None:
             return False
         self.tuning = self.rules.parameters.tuning(self.parameters)
-        self.outlet.parameter(name)
+        self.output.parameter_changed(name)
         return True
 
-    # -- modes
+    def seconds_parameter(self, name: str) -> Ns:
+        """Return the value of a parameter in seconds as nanoseconds."""
+        return from_seconds(self.parameters[name])
 
-    def enter(self, mode: Mode) -> None:
-        """Fly *mode* from now on. Whether it may was decided before."""
+    # -- modes and mission
+
+    def enter_mode(self, mode: Mode) -> None:
+        """Enter *mode*. The caller has decided that the mode is permitted."""
         self.mode = mode
-        self.speed = self.speed_up = self.speed_down = None
-        self.yaw_target = None
+        self.commanded = CommandedLimits()
         self.manoeuvre = mode.manoeuvre(self)
         self.manoeuvre.enter()
         if self.armed:
-            self.act()
-        self.outlet.mode_changed()
+            self.run_manoeuvre()
+        self.output.mode_changed()
 
     def choose_item(self, index: int) -> bool:
-        """Fly that mission item next."""
-        chosen = self.plan.choose(index)
+        """Make mission item *index* the next one; return False if there is none."""
+        chosen = self.mission.choose(index)
         if chosen:
             self.manoeuvre.item_chosen()
         return chosen
@@ -348,87 +476,74 @@ class Vehicle:
     # -- arming
 
     def arm(self) -> None:
-        """Arm. Whether it may was decided before."""
-        self.armed = True
-        self.armed_at = self.idle_since = self.kernel.now()
-        self._wanted_at = NEVER
+        """Arm. The caller has decided that arming is permitted."""
+        now = self.kernel.now()
+        self.arming.armed = True
+        self.arming.armed_at = now
+        self.ground.arm(now)
         self.manoeuvre.enter()
 
     def disarm(self) -> None:
-        """Disarm and stop the motors, wherever it is."""
-        self.armed = False
-        self.disarmed_at = self.kernel.now()
+        """Disarm and stop the motors, also in flight."""
+        self.arming.armed = False
+        self.arming.disarmed_at = self.kernel.now()
         self.drive(OFF)
 
     # -- motors
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Hand a set-point to the inner loops, unless they hold the same one already."""
+        """Pass a set-point to the inner loops, unless it is in force already."""
         if setpoint != self._setpoint:
             self._setpoint = setpoint
             self.flight.drive(setpoint)
 
     @property
     def setpoint(self) -> Setpoint:
-        """What the inner loops hold."""
+        """Set-point in force."""
         return self._setpoint
 
-    def act(self) -> None:
-        """Let the manoeuvre decide what the motors do; called at every tick and when the sticks moved."""
+    def run_manoeuvre(self) -> None:
+        """Let the manoeuvre update the set-point; called at every tick and when the RC channels move."""
         if not self.armed:
             self.drive(OFF)
         elif self.flies and self.landed:
-            self._stand()
-        elif self.flies and not self._lifted and not self.manoeuvre.wants_to_fly():
-            self.drive(IDLE)  # the wish to fly went before it had left the ground
+            self._run_on_ground()
+        elif self.flies and not self.ground.lifted and not self.manoeuvre.takeoff_requested():
+            self.drive(IDLE)  # the request was withdrawn before the vehicle had left the ground
         else:
             self.manoeuvre.step()
 
-    def _stand(self) -> None:
-        """On the ground: motors rest, idle, and come up in the firmware's own time when the manoeuvre wants
-        to fly.
-        """
-        now, times = self.kernel.now(), self.rules.arming
-        if now - self.armed_at < times.motors_rest:
+    def _run_on_ground(self) -> None:
+        """Stop, idle or start the motors in the firmware's own time, as the manoeuvre requests a take-off."""
+        now, times, ground = self.kernel.now(), self.rules.arming, self.ground
+        if now - self.arming.armed_at < times.motors_rest:
             self.drive(OFF)
             return
         self.manoeuvre.on_ground()
         if not self.armed:
             return
-        if not self.manoeuvre.wants_to_fly():
-            self._wanted_at = NEVER
+        if not self.manoeuvre.takeoff_requested():
+            ground.takeoff_requested_at = NEVER
             self.drive(IDLE)
             return
-        if self._wanted_at == NEVER:
-            self._wanted_at = now
-        ready = self._wanted_at
+        if ground.takeoff_requested_at == NEVER:
+            ground.takeoff_requested_at = now
+        ready = ground.takeoff_requested_at
         if self.manoeuvre.slow_start:
-            idling = self.armed_at + times.motors_rest + times.spool_up
+            idling = self.arming.armed_at + times.motors_rest + times.spool_up
             ready = max(ready, idling) + times.takeoff_slew
         if now < ready:
             self.drive(IDLE)
             return
-        self.landed = self._lifted = False
-        self._resigned_at = now
+        ground.leave(now)
         self.manoeuvre.step()
 
-    def watch_ground(self) -> None:
-        """Notice that it has left the ground, come down, or given up the wish to fly."""
-        if not self.armed or self.landed or not self.flies:
-            return
-        now = self.kernel.now()
-        on_ground = self.estimate.landed
-        self._lifted = self._lifted or not on_ground
-        if not on_ground or self.manoeuvre.wants_to_fly():
-            self._resigned_at = now
-        if on_ground and (self._lifted or now - self._resigned_at >= self.rules.arming.abandoned_after):
-            self.landed = True
-            self.landed_at = self.idle_since = now
-            self._wanted_at = NEVER
-
-    def seconds_parameter(self, name: str) -> Ns:
-        """A parameter in seconds as nanoseconds."""
-        return from_seconds(self.parameters[name])
+    def update_ground(self) -> None:
+        """Update the ground state of a vehicle in flight; called at every tick."""
+        if self.armed and not self.landed and self.flies:
+            on_ground = self.estimate.landed
+            requested = on_ground and self.manoeuvre.takeoff_requested()
+            self.ground.update(self.kernel.now(), on_ground, requested, self.rules.arming.abandoned_after)
 
 
 VehicleAction = Callable[[Vehicle], None]

@@ -274,13 +274,13 @@ def test_the_mode_switch_takes_the_authority_and_gives_none(apron: Make) -> None
         yard.fly()
         yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         before = yard.seen["rc"].axes[4]
-        yard.autopilot.vehicle.sticks.transmitter[4] = 1000
+        yard.autopilot.vehicle.rc.transmitter[4] = 1000
         yard.wait(0.3)
         assert yard.seen["rc"].axes[4] != before
         yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         assert yard.mode == 6
         assert not yard.authority()
-        yard.autopilot.vehicle.sticks.transmitter[4] = 2000
+        yard.autopilot.vehicle.rc.transmitter[4] = 2000
         yard.wait(0.3)
         yard.keep_sending(0.5, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         assert yard.mode == 6  # it must be asked for again
@@ -492,7 +492,7 @@ def test_where_it_may_join_a_graph(apron: Make) -> None:
     with pytest.raises(UsageError, match="on a graph already"):
         yard.autopilot.join(yard.graph, "/other/dji_sdk", ExecutionContext("d"))
     other = apron()
-    other.autopilot.face.hang_up()
+    other.autopilot.endpoint.close()
     with pytest.raises(UsageError, match="dji_sdk or dji_osdk_ros"):
         other.autopilot.join(other.graph, "/d/mavros", ExecutionContext("d"))
     with pytest.raises(UsageError, match="over a graph"):

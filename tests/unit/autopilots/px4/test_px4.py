@@ -19,7 +19,7 @@ from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.px4 import FIRMWARE
 from volery.simulation.autopilots.px4.events import ArmingChecks, arming_report
-from volery.simulation.autopilots.px4.flight_modes import curve, interpolated
+from volery.simulation.autopilots.px4.flight_modes import apply_expo, interpolated
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
 from volery.simulation.autopilots.px4.offboard import OffboardTarget, SetpointStream, attitude_target
 from volery.simulation.autopilots.px4.pilot_input import Joystick, StickDeflection, deflection
@@ -48,19 +48,19 @@ def test_sticks_are_centred_at_500_and_stay_within_their_way(
 
 def test_sticks_that_come_back_have_not_moved() -> None:
     sticks = Joystick()
-    assert sticks.take(StickDeflection(pitch=0.9), S) == 0.0
+    assert sticks.receive(StickDeflection(pitch=0.9), S) == 0.0
     assert not sticks.moved(0.3)
     sticks.valid = False
-    assert sticks.take(StickDeflection(pitch=-0.9), 3 * S) == 2.0
+    assert sticks.receive(StickDeflection(pitch=-0.9), 3 * S) == 2.0
     assert not sticks.moved(0.3)
-    sticks.take(StickDeflection(pitch=0.0), 3 * S + 1)
+    sticks.receive(StickDeflection(pitch=0.0), 3 * S + 1)
     assert sticks.moved(0.3)
 
 
 def test_a_stream_lives_as_long_as_it_may() -> None:
     stream = SetpointStream()
     assert not stream.alive(0, S)
-    stream.take(OffboardTarget(position=(0.0, 0.0, -5.0)), S)
+    stream.receive(OffboardTarget(position=(0.0, 0.0, -5.0)), S)
     assert stream.alive(2 * S, S)
     assert not stream.alive(2 * S + 1, S)
 
@@ -93,10 +93,10 @@ def test_all_checks_passed_leaves_two_summaries() -> None:
 
 
 def test_curves() -> None:
-    assert curve(0.1, 0.1) == 0.0
-    assert curve(1.0, 0.1) == 1.0
-    assert curve(-1.0, 0.1) == -1.0
-    assert 0.0 < curve(0.3, 0.1) < 0.2
+    assert apply_expo(0.1, 0.1) == 0.0
+    assert apply_expo(1.0, 0.1) == 1.0
+    assert apply_expo(-1.0, 0.1) == -1.0
+    assert 0.0 < apply_expo(0.3, 0.1) < 0.2
     assert interpolated(7.5, (5.0, 0.7), (10.0, 1.5)) == pytest.approx(1.1)
     assert interpolated(20.0, (5.0, 0.7), (10.0, 1.5)) == 1.5
 

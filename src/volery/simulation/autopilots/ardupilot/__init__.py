@@ -1,5 +1,6 @@
-"""ArduPilot 4.5.6, Copter and Rover, as a dialect of the simulated flight stack: as recorded, not as we
-think it is.
+"""Simulated ArduPilot 4.5.6, Copter and Rover.
+
+The behaviour follows recordings of the firmware's own simulator.
 """
 
 from volery.simulation.autopilots.ardupilot.copter import COPTER
@@ -7,6 +8,6 @@ from volery.simulation.autopilots.ardupilot.rover import ROVER
 from volery.simulation.autopilots.firmware import FirmwareFamily
 
 FIRMWARE = FirmwareFamily("ardupilot", {"multirotor": COPTER, "rover": ROVER})
-"""The firmware, by kind of vehicle."""
+"""Entry point of the firmware, by kind of vehicle."""
 
 __all__ = ["FIRMWARE"]

@@ -1,8 +1,7 @@
-"""What ArduPilot 4.5.6 does by itself after it is switched on: the recorded timeline, as data.
+"""The boot of ArduPilot 4.5.6: the recorded timeline as data, and the work of each second after it.
 
-Times are seconds after boot. Parameters are announced with index 65535, with the value that they have then.
-
-What copter and rover do alike by themselves: once there is a position, and each second.
+Times are seconds after boot. Parameters are announced as PARAM_VALUE with index 65535 and with the value that
+they have at that time.
 """
 
 from __future__ import annotations
@@ -25,33 +24,33 @@ BANNER = (
 
 
 def banner(name: str) -> bytes:
-    """The text with which the firmware greets its console."""
+    """Return the text that the firmware prints on its console after power-on."""
     return BANNER.format(name=name).encode()
 
 
 def words(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
-    """Say these."""
+    """Return an event that sends these status texts."""
 
     def act(vehicle: Vehicle) -> None:
         for text in texts:
-            vehicle.say(severity, text)
+            vehicle.send_text(severity, text)
 
     return BootEvent(round(seconds * S), act)
 
 
 def announced(seconds: float, *names: str) -> BootEvent:
-    """Announce these parameters."""
+    """Return an event that announces these parameters."""
 
     def act(vehicle: Vehicle) -> None:
         for name in names:
             if name in vehicle.parameters:
-                vehicle.outlet.parameter(name)
+                vehicle.output.parameter_changed(name)
 
     return BootEvent(round(seconds * S), act)
 
 
 def measured(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
-    """Set these parameters to what was measured, and announce them."""
+    """Return an event that sets these parameters to measured values and announces them."""
 
     def act(vehicle: Vehicle) -> None:
         for name, value in values:
@@ -61,40 +60,40 @@ def measured(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
 
 
 def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
-    """Bytes on the wire that are no message."""
+    """Return raw bytes on the wire, as pairs of seconds after boot and data."""
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
 
 
 def at(seconds: float, act: VehicleAction) -> BootEvent:
-    """Do it then."""
+    """Return an event that executes an action."""
     return BootEvent(round(seconds * S), act)
 
 
 def origin_set(vehicle: Vehicle) -> None:
-    """The estimator has an origin; home is where the vehicle stands."""
+    """Set the estimator's origin where the vehicle is."""
     vehicle.flight.set_origin()
 
 
 def home_set(vehicle: Vehicle) -> None:
-    """A moment later the position is good enough for a home."""
+    """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.estimate.position_ok and vehicle.home is None:
-        vehicle.home_is_here()
+        vehicle.set_home_here()
 
 
 def field_elevation(vehicle: Vehicle) -> None:
-    """Said once home is known."""
+    """Report the altitude of the home position."""
     if vehicle.home is not None:
-        vehicle.say(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
+        vehicle.send_text(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
 
 
 def using_gps(vehicle: Vehicle, units: Sequence[int]) -> None:
-    """Said when the estimator uses satellites."""
+    """Report that these estimator units use GPS."""
     for unit in units:
-        vehicle.say(INFO, f"EKF3 IMU{unit} is using GPS")
+        vehicle.send_text(INFO, f"EKF3 IMU{unit} is using GPS")
 
 
 def both(text: str) -> tuple[str, str]:
-    """The same of both estimator units."""
+    """Return a text for each of the two estimator units."""
     return text.format(unit=0), text.format(unit=1)
 
 
@@ -132,13 +131,13 @@ ROVER_PRESSURE = (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25)
 
 
 def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
-    """Store what a boot measured, without a word."""
+    """Store measured values without an announcement."""
     for name, value in values:
         vehicle.parameters.set(name, value)
 
 
 def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
-    """A copter's. *ready* is done when the set-up has ended."""
+    """Return the boot timeline of a copter. ``ready`` is called at the end of the set-up."""
     return (
         announced(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
         announced(
@@ -168,7 +167,7 @@ def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
 
 
 def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
-    """A rover's."""
+    """Return the boot timeline of a rover. ``ready`` is called at the end of the set-up."""
     return (
         words(0.01, "Calibrating barometer"),
         announced(0.01, "BARO_ALT_OFFSET"),
@@ -202,22 +201,22 @@ def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
 STORE_COUNTERS_EVERY = 30 * S
 
 Problems = Callable[[Vehicle], list[str]]
-"""What speaks against arming, in the firmware's words."""
+"""Returns the texts of all checks that forbid arming, in the firmware's words."""
 
 
 def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
-    """There is a home, and nothing speaks against arming."""
+    """Set the home position and evaluate the pre-arm checks of a vehicle that starts warm."""
     home_set(vehicle)
-    vehicle.prearm_ok = not before_arming(vehicle)
+    vehicle.arming.checks_passed = not before_arming(vehicle)
 
 
 def each_second(vehicle: Vehicle, before_arming: Problems) -> None:
-    """Readiness, and the counters of hours."""
+    """Evaluate the pre-arm checks, and store the flight time and run time counters every 30 s."""
     if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return
     update_prearm_state(vehicle, before_arming)
-    if vehicle.uptime() - vehicle.counted_at >= STORE_COUNTERS_EVERY:
-        vehicle.counted_at = vehicle.uptime()
-        if vehicle.flight_time:
-            vehicle.set_parameter("STAT_FLTTIME", vehicle.flight_time // S)
+    if vehicle.uptime() - vehicle.reports.counters_at >= STORE_COUNTERS_EVERY:
+        vehicle.reports.counters_at = vehicle.uptime()
+        if vehicle.ground.flight_time:
+            vehicle.set_parameter("STAT_FLTTIME", vehicle.ground.flight_time // S)
         vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)

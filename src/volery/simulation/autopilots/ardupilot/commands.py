@@ -1,4 +1,4 @@
-"""ArduPilot's commands: what each does and with which MAV_RESULT it is acknowledged."""
+"""ArduPilot's commands: the action of each, and the MAV_RESULT that acknowledges it."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRE
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
-"""Metres up or down that a location can hold (LOCATION_ALT_MAX_M)."""
+"""Largest altitude that a location can hold [m] (LOCATION_ALT_MAX_M)."""
 
 Problems = Callable[[Vehicle], list[str]]
 
 SPEED_OVER_GROUND = (0, 1)
 CLIMB_SPEED, DESCENT_SPEED = 2, 3
-"""param1 of DO_CHANGE_SPEED."""
+"""Values of param1 of DO_CHANGE_SPEED."""
 
 
 def on_arm(vehicle: Vehicle, command: Command, problems: Problems, words: tuple[str, str]) -> int:
-    """COMPONENT_ARM_DISARM."""
+    """Handle COMPONENT_ARM_DISARM."""
     magic = round(command.param2)
     if command.param1 == 1.0:
         return arm(vehicle, problems, words[0], magic in (FORCE, SKIP_CHECKS))
@@ -57,12 +57,12 @@ def on_arm(vehicle: Vehicle, command: Command, problems: Problems, words: tuple[
 
 
 def on_set_mode(vehicle: Vehicle, command: Command) -> int:
-    """DO_SET_MODE."""
+    """Handle DO_SET_MODE."""
     return set_mode(vehicle, round(command.param1), round(command.param2))
 
 
 def to_mode(number: int) -> Handler:
-    """A command that is a mode."""
+    """Return the handler of a command that only enters a mode."""
 
     def handle(vehicle: Vehicle, _command: Command) -> int:
         return ACCEPTED if change_mode(vehicle, number) else FAILED
@@ -71,7 +71,7 @@ def to_mode(number: int) -> Handler:
 
 
 def on_takeoff(vehicle: Vehicle, command: Command) -> int:
-    """NAV_TAKEOFF: armed, standing, in a mode that takes off; refused without a word otherwise."""
+    """Handle NAV_TAKEOFF: requires an armed vehicle on the ground in a mode that supports a take-off."""
     if command.frame != GLOBAL_RELATIVE:
         return DENIED
     if (
@@ -89,7 +89,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
-    """MISSION_START: AUTO, and off the ground if it is armed."""
+    """Handle MISSION_START: enter AUTO and allow the take-off."""
     auto = next(number for number, mode in vehicle.rules.modes.items() if mode.name == "AUTO")
     if not vehicle.armed or not change_mode(vehicle, auto):
         return FAILED
@@ -100,27 +100,33 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
 
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
-    """DO_CHANGE_SPEED."""
+    """Handle DO_CHANGE_SPEED."""
     return ACCEPTED if change_speed(vehicle, round(command.param1), command.param2) else FAILED
 
 
 def change_speed(vehicle: Vehicle, kind: int, speed: float) -> bool:
-    """Fly at another speed until the mode changes."""
+    """Set a speed that holds until the mode changes, and return whether it is valid.
+
+    Args:
+        vehicle: The vehicle.
+        kind: param1 of DO_CHANGE_SPEED: 0 and 1 over ground, 2 climb, 3 descent.
+        speed: Speed [m/s], positive.
+    """
     if not isfinite(speed) or speed <= 0.0:
         return False
     if kind in SPEED_OVER_GROUND:
-        vehicle.speed = speed
+        vehicle.commanded.speed = speed
     elif kind == CLIMB_SPEED:
-        vehicle.speed_up = speed
+        vehicle.commanded.speed_up = speed
     elif kind == DESCENT_SPEED:
-        vehicle.speed_down = speed
+        vehicle.commanded.speed_down = speed
     else:
         return False
     return True
 
 
 def on_condition_yaw(vehicle: Vehicle, command: Command) -> int:
-    """CONDITION_YAW: to a heading, or by an angle."""
+    """Handle CONDITION_YAW: an absolute heading or a relative angle."""
     if not 0.0 <= command.param1 <= 360.0 or command.param4 not in (0.0, 1.0):
         return FAILED
     turn_to(vehicle, command.param1, command.param3, relative=command.param4 == 1.0)
@@ -128,27 +134,33 @@ def on_condition_yaw(vehicle: Vehicle, command: Command) -> int:
 
 
 def turn_to(vehicle: Vehicle, degrees: float, direction: float, relative: bool) -> None:
-    """Point the nose there, in modes that the autopilot flies. The shorter way round."""
+    """Set the heading for modes that the autopilot flies; the vehicle turns the shorter way.
+
+    Args:
+        vehicle: The vehicle.
+        degrees: Heading from north or angle to turn by [deg], clockwise.
+        direction: Negative turns a relative angle anticlockwise.
+        relative: Whether ``degrees`` counts from the present heading.
+    """
     angle = radians(degrees)
     if relative:
         now = vehicle.estimate.attitude[2]
         angle = now + (-angle if direction < 0.0 else angle)
-    vehicle.yaw_target = wrap(angle)
+    vehicle.commanded.yaw = wrap(angle)
 
 
 def on_set_home(vehicle: Vehicle, command: Command) -> int:
-    """DO_SET_HOME: here, or at a place whose altitude is AMSL (long form) or in the frame of the int form."""
+    """Handle DO_SET_HOME. The altitude is AMSL in COMMAND_LONG and follows the frame in COMMAND_INT."""
     if command.param1 == 1.0:
         if not vehicle.has_position:
             return FAILED
-        vehicle.home_is_here()
+        vehicle.set_home_here(by_user=True)
     else:
         if not _is_place(command) or (command.x == 0.0 and command.y == 0.0):
             return DENIED
         relative = command.is_int and command.frame not in (GLOBAL, 5)
         base = vehicle.home.amsl if relative and vehicle.home else 0.0
-        vehicle.set_home(command.x, command.y, base + command.z)
-    vehicle.home_by_user = True
+        vehicle.set_home(command.x, command.y, base + command.z, by_user=True)
     return ACCEPTED
 
 
@@ -157,7 +169,7 @@ def _is_place(command: Command) -> bool:
 
 
 def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
-    """DO_REPOSITION: only as COMMAND_INT; into GUIDED if the first flag says so."""
+    """Handle DO_REPOSITION (COMMAND_INT only); flag 1 allows a change to GUIDED."""
     if not command.is_int:
         return UNSUPPORTED
     if not _is_place(command):
@@ -168,13 +180,20 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
         if not change_mode(vehicle, guided):
             return FAILED
     if command.param1 > 0.0:
-        vehicle.speed = command.param1
+        vehicle.commanded.speed = command.param1
     yaw = None if isnan(command.param4) or not vehicle.flies else command.param4
     return ACCEPTED if go_to(vehicle, command.frame, (command.x, command.y, command.z), yaw) else FAILED
 
 
 def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: float | None = None) -> bool:
-    """In GUIDED: go to latitude, longitude [degrees] and altitude [m] in a MAVLink frame."""
+    """Send a vehicle in GUIDED to a point, and return whether that was possible.
+
+    Args:
+        vehicle: The vehicle.
+        frame: MAV_FRAME of the altitude.
+        place: Latitude and longitude [deg], altitude [m].
+        yaw: Heading [rad], or None to leave it to the firmware.
+    """
     point = vehicle.point(frame, *place)
     if not all_within(point, FARTHEST):
         return False
@@ -189,12 +208,12 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
 
 
 def go_to_item(vehicle: Vehicle, item: MissionItem) -> bool:
-    """A mission item with ``current`` 2: the old way to command GUIDED."""
+    """Fly to a mission item with ``current`` 2, the deprecated form of a guided target."""
     return item.has_place and go_to(vehicle, item.frame, (item.x / 1e7, item.y / 1e7, item.z))
 
 
 def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
-    """NAV_SET_YAW_SPEED of a rover: degrees (relative if param3), m/s."""
+    """Handle NAV_SET_YAW_SPEED of a rover: heading [deg], relative if param3 is positive, and speed [m/s]."""
     manoeuvre = vehicle.manoeuvre
     if not isinstance(manoeuvre, GuidedRover):
         return FAILED
@@ -206,42 +225,46 @@ def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_termination(vehicle: Vehicle, command: Command, words: str) -> int:
-    """DO_FLIGHTTERMINATION: motors off, wherever it is."""
+    """Handle DO_FLIGHTTERMINATION: stop the motors, also in flight."""
     return disarm(vehicle, words, force=True) if command.param1 > 0.5 else FAILED
 
 
 def on_set_current(vehicle: Vehicle, command: Command) -> int:
-    """DO_SET_MISSION_CURRENT."""
+    """Handle DO_SET_MISSION_CURRENT."""
     return ACCEPTED if vehicle.choose_item(round(command.param1)) else DENIED
 
 
 def on_calibration(vehicle: Vehicle, _command: Command) -> int:
-    """PREFLIGHT_CALIBRATION: nothing to calibrate, but not while armed."""
+    """Handle PREFLIGHT_CALIBRATION and PREFLIGHT_STORAGE: accepted without effect while disarmed."""
     return FAILED if vehicle.armed else ACCEPTED
 
 
 def on_reboot(vehicle: Vehicle, command: Command) -> int:
-    """PREFLIGHT_REBOOT_SHUTDOWN: 1 and 3 restart, in place, once the answer is out; not while armed without
-    force.
-    """
+    """Handle PREFLIGHT_REBOOT_SHUTDOWN: 1 and 3 restart after the answer; an armed vehicle needs force."""
     if round(command.param1) not in (1, 3):
         return UNSUPPORTED
     if vehicle.armed and round(command.y) != 20_190_226:
         return FAILED
-    vehicle.outlet.after_answer(vehicle.restart)
+    vehicle.output.after_reply(vehicle.restart)
     return ACCEPTED
 
 
 def on_get_home(vehicle: Vehicle, _command: Command) -> int:
-    """GET_HOME_POSITION."""
+    """Handle GET_HOME_POSITION."""
     if vehicle.home is None:
         return FAILED
-    vehicle.outlet.announce("HOME_POSITION")
+    vehicle.output.send_message("HOME_POSITION")
     return ACCEPTED
 
 
 def shared_commands(problems: Problems, words: tuple[str, str], guided: int) -> dict[int, Handler]:
-    """Commands that copter and rover have alike. *words* are said on arming and on disarming."""
+    """Return the commands that copter and rover share.
+
+    Args:
+        problems: Returns the texts that forbid arming.
+        words: Status texts of arming and disarming.
+        guided: Number of the mode GUIDED.
+    """
     return {
         ARM_DISARM: lambda vehicle, command: on_arm(vehicle, command, problems, words),
         DO_SET_MODE: on_set_mode,
@@ -261,7 +284,7 @@ def shared_commands(problems: Problems, words: tuple[str, str], guided: int) -> 
 def copter_commands(
     problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
 ) -> dict[int, Handler]:
-    """All of a copter's. *modes* gives the numbers of the modes that commands enter."""
+    """Return all commands of a copter. ``modes`` maps the names of modes to their numbers."""
     return {
         **shared_commands(problems, words, modes["GUIDED"]),
         TAKEOFF: on_takeoff,
@@ -275,7 +298,7 @@ def copter_commands(
 def rover_commands(
     problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
 ) -> dict[int, Handler]:
-    """All of a rover's."""
+    """Return all commands of a rover. ``modes`` maps the names of modes to their numbers."""
     return {
         **shared_commands(problems, words, modes["GUIDED"]),
         RETURN: to_mode(modes["RTL"]),

@@ -1,4 +1,4 @@
-"""ArduCopter 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+"""ArduCopter 4.5.6: modes, arming checks and boot, composed as a firmware."""
 
 from __future__ import annotations
 
@@ -77,9 +77,9 @@ EACH_SECOND = round(0.285 * S)
 
 ARMED_WORDS = ("Arming motors", "Disarming motors")
 LANDED_TO_DISARM = 200 * MS
-"""Recorded: disarmed 2.07 s after touch-down. The landed detector takes most of it."""
+"""Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
 ALIGNS_ABOVE = 2.5
-"""Height [m] at which the compass is trusted anew."""
+"""Height of the in-flight yaw alignment [m]."""
 
 MODES = {
     mode.number: mode
@@ -141,18 +141,18 @@ HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 
 
 
 def before_arming(vehicle: Vehicle) -> list[str]:
-    """What would show as not ready."""
+    """Return the texts of the pre-arm checks that fail."""
     return failing(vehicle, CHECKS)
 
 
 def problems(vehicle: Vehicle) -> list[str]:
-    """All that speaks against arming now: readiness first, then mode and sticks."""
+    """Return the texts of all checks that forbid arming now: pre-arm checks, then mode and throttle."""
     found = before_arming(vehicle)
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
     if not may_arm_auto:
         found += not_armable(vehicle)
     throttle = vehicle.tuning.sticks.throttle
-    if vehicle.parameters["FS_THR_ENABLE"] and vehicle.sticks[throttle] < vehicle.parameters["FS_THR_VALUE"]:
+    if vehicle.parameters["FS_THR_ENABLE"] and vehicle.rc[throttle] < vehicle.parameters["FS_THR_VALUE"]:
         found.append("Throttle below failsafe")
     elif not vehicle.mode.starts_high and _throttle_is_high(vehicle):
         found.append("Throttle too high")
@@ -166,27 +166,27 @@ def _throttle_is_high(vehicle: Vehicle) -> bool:
 
 
 def ready(vehicle: Vehicle) -> None:
-    """Set-up has ended: on the ground, in the mode that INITIAL_MODE names."""
-    vehicle.landed = True
+    """Finish the set-up: on the ground, in the mode that INITIAL_MODE names."""
+    vehicle.ground.landed = True
     initial = MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
     if initial is not vehicle.mode:
-        vehicle.enter(initial)
+        vehicle.enter_mode(initial)
 
 
 def warm(vehicle: Vehicle) -> None:
-    """As its boot leaves it, but for the position."""
+    """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.keep(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
     ready(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
-    """At each tick: sticks that expire, touch-down, disarming by itself."""
+    """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
     if not vehicle.armed:
         return
     if not vehicle.landed:
-        vehicle.idle_since = vehicle.kernel.now()
-        vehicle.flight_time += COPTER.periodic.tick
+        vehicle.ground.idle_since = vehicle.kernel.now()
+        vehicle.ground.flight_time += COPTER.periodic.tick
         _notice_flight(vehicle)
     else:
         _disarm_by_itself(vehicle)
@@ -194,47 +194,47 @@ def on_step(vehicle: Vehicle) -> None:
 
 def _notice_flight(vehicle: Vehicle) -> None:
     height = vehicle.height
-    if height > ALIGNS_ABOVE and "aligned" not in vehicle.said:
-        vehicle.said.add("aligned")
+    if height > ALIGNS_ABOVE and "aligned" not in vehicle.reports.sent_once:
+        vehicle.reports.sent_once.add("aligned")
         for text in boot.both("EKF3 IMU{unit} MAG0 in-flight yaw alignment complete"):
-            vehicle.say(INFO, text)
+            vehicle.send_text(INFO, text)
     if height < 1.0:
         truth = vehicle.flight.truth()
-        if truth.contacts != vehicle.contacts:
-            vehicle.contacts = truth.contacts
-            vehicle.say(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
+        if truth.contacts != vehicle.reports.contacts:
+            vehicle.reports.contacts = truth.contacts
+            vehicle.send_text(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
 
 
 def _disarm_by_itself(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
-    if finished and now - vehicle.landed_at >= LANDED_TO_DISARM:
+    if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:
         disarm(vehicle, ARMED_WORDS[1], force=True)
         return
     if ByPilot(vehicle).pilot.throttle > 0.0:
-        vehicle.idle_since = now
+        vehicle.ground.idle_since = now
     delay = vehicle.parameters["DISARM_DELAY"]
-    if delay > 0.0 and now - vehicle.idle_since >= from_seconds(delay):
+    if delay > 0.0 and now - vehicle.ground.idle_since >= from_seconds(delay):
         disarm(vehicle, ARMED_WORDS[1], force=True)
 
 
 def system_status(vehicle: Vehicle) -> int:
-    """MAV_STATE: a failsafe, standing, or flying."""
-    if vehicle.failsafes:
+    """Return the MAV_STATE: failsafe, on the ground or flying."""
+    if vehicle.failsafes.active:
         return CRITICAL
     return STANDBY if vehicle.landed else ACTIVE
 
 
 def greet(vehicle: Vehicle) -> None:
-    """Said to whoever lists the parameters."""
+    """Send the status texts that follow a parameter list request."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
     introduce(vehicle, "ArduCopter")
-    vehicle.say(INFO, f"Frame: QUAD/{shape}")
+    vehicle.send_text(INFO, f"Frame: QUAD/{shape}")
 
 
 @cache
 def parameters() -> tuple[Parameter, ...]:
-    """The recorded list."""
+    """Return the recorded parameters."""
     return load("volery.simulation.autopilots.ardupilot", "data/copter.parameters")
 
 

@@ -1,6 +1,6 @@
-"""ArduPilot's failsafes: ground station, radio, battery, estimator.
+"""ArduPilot's failsafes for ground station, radio, battery and estimator.
 
-What trips them and what they do is parameters.
+Parameters set triggers and actions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Switch = Callable[[Vehicle, int], bool]
-"""Changes the mode if it may; the failsafe's own way, without a station's answer."""
+"""Enters a mode if that is possible, and returns whether it was."""
 
 CONTINUE_MISSION_ON_RADIO, CONTINUE_MISSION_ON_STATION = 1 << 0, 1 << 1
 CONTINUE_GUIDED_ON_RADIO, CONTINUE_LANDING, CONTINUE_PILOT_ON_STATION = 1 << 2, 1 << 3, 1 << 4
@@ -23,18 +23,18 @@ CONTINUE_GUIDED_ON_RADIO, CONTINUE_LANDING, CONTINUE_PILOT_ON_STATION = 1 << 2, 
 
 
 def station_lost(vehicle: Vehicle) -> bool:
-    """A ground station was heard once, and has been silent for FS_GCS_TIMEOUT."""
-    if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or vehicle.station_seen == NEVER:
+    """Return whether a ground station that was received is silent for longer than FS_GCS_TIMEOUT."""
+    if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or vehicle.failsafes.station_last_ns == NEVER:
         return False
-    silence = vehicle.kernel.now() - vehicle.station_seen
+    silence = vehicle.kernel.now() - vehicle.failsafes.station_last_ns
     return silence > from_seconds(vehicle.parameters["FS_GCS_TIMEOUT"])
 
 
 def radio_lost(vehicle: Vehicle) -> bool:
-    """The throttle channel is below FS_THR_VALUE."""
+    """Return whether the throttle channel is below FS_THR_VALUE."""
     if vehicle.parameters["FS_THR_ENABLE"] == 0.0:
         return False
-    return vehicle.sticks[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
+    return vehicle.rc[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
 
 def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
@@ -44,32 +44,36 @@ def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
     left = parameters["BATT_CAPACITY"] - estimate.battery_used_mah
     sagged = parameters[volts] > 0.0 and estimate.battery_volts < parameters[volts]
     if not sagged:
-        vehicle.sagging.pop(volts, None)
+        vehicle.failsafes.low_voltage_since.pop(volts, None)
         return parameters[charge] > 0.0 and left < parameters[charge]
-    since = vehicle.sagging.setdefault(volts, vehicle.kernel.now())
+    since = vehicle.failsafes.low_voltage_since.setdefault(volts, vehicle.kernel.now())
     return vehicle.kernel.now() - since >= from_seconds(parameters["BATT_LOW_TIMER"])
 
 
 def battery_low(vehicle: Vehicle) -> bool:
-    """Below BATT_LOW_VOLT for BATT_LOW_TIMER, or less than BATT_LOW_MAH left; once low, low for good."""
-    return "battery low" in vehicle.failsafes or _battery_below(vehicle, "BATT_LOW_VOLT", "BATT_LOW_MAH")
+    """Return whether BATT_LOW_VOLT or BATT_LOW_MAH was crossed; the state does not clear."""
+    return "battery low" in vehicle.failsafes.active or _battery_below(
+        vehicle, "BATT_LOW_VOLT", "BATT_LOW_MAH"
+    )
 
 
 def battery_critical(vehicle: Vehicle) -> bool:
-    """Likewise for the critical level."""
-    return "battery critical" in vehicle.failsafes or _battery_below(vehicle, "BATT_CRT_VOLT", "BATT_CRT_MAH")
+    """Return whether BATT_CRT_VOLT or BATT_CRT_MAH was crossed; the state does not clear."""
+    return "battery critical" in vehicle.failsafes.active or _battery_below(
+        vehicle, "BATT_CRT_VOLT", "BATT_CRT_MAH"
+    )
 
 
 def estimator_lost(vehicle: Vehicle) -> bool:
-    """In the air, in a mode that needs a position, without one."""
+    """Return whether an armed vehicle in flight lost the position that its mode needs."""
     if vehicle.parameters["FS_EKF_THRESH"] <= 0.0 or not vehicle.armed or vehicle.landed:
         return False
     lost = not vehicle.estimate.position_ok
-    return lost and (vehicle.mode.needs_position or "estimator" in vehicle.failsafes)
+    return lost and (vehicle.mode.needs_position or "estimator" in vehicle.failsafes.active)
 
 
 class CopterFailsafes:
-    """What a copter does. *switch* changes its mode."""
+    """Failsafe actions of a copter. ``switch`` changes its mode."""
 
     RTL, LAND, BRAKE, AUTO, ALT_HOLD = 6, 9, 17, 3, 2
     RESPONSES: Mapping[int, tuple[int, ...]] = {
@@ -80,7 +84,7 @@ class CopterFailsafes:
         6: (RTL, LAND),
         7: (BRAKE, LAND),
     }
-    """FS_GCS_ENABLE to the modes that are tried. SmartRTL is not there: what it falls back to is."""
+    """FS_GCS_ENABLE to the modes that are tried in order. SmartRTL is represented by its fallback."""
     RADIO: Mapping[int, tuple[int, ...]] = {
         1: (RTL, LAND),
         2: (RTL, LAND),
@@ -101,7 +105,7 @@ class CopterFailsafes:
         self._disarmed = disarmed
 
     def watches(self) -> tuple[Failsafe, ...]:
-        """In the order in which they are looked at."""
+        """Return the failsafes in the order in which they are checked."""
         return (
             Failsafe(
                 "station", station_lost, self.on_station_lost, lambda vehicle: self._clear(vehicle, "GCS")
@@ -117,11 +121,11 @@ class CopterFailsafes:
         )
 
     def _clear(self, vehicle: Vehicle, what: str) -> None:
-        vehicle.say(WARNING, f"{what} Failsafe Cleared")
+        vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
 
     def on_station_lost(self, vehicle: Vehicle) -> None:
-        """The ground station is silent."""
-        vehicle.sticks.release()
+        """React to a lost ground station as FS_GCS_ENABLE and FS_OPTIONS demand."""
+        vehicle.rc.release()
         options = round(vehicle.parameters["FS_OPTIONS"])
         keeps = ""
         if options & CONTINUE_MISSION_ON_STATION and vehicle.mode.name == "AUTO":
@@ -133,7 +137,7 @@ class CopterFailsafes:
         )
 
     def on_radio_lost(self, vehicle: Vehicle) -> None:
-        """The transmitter is gone."""
+        """React to a lost transmitter as FS_THR_ENABLE and FS_OPTIONS demand."""
         options = round(vehicle.parameters["FS_OPTIONS"])
         keeps = ""
         if options & CONTINUE_MISSION_ON_RADIO and vehicle.mode.name == "AUTO":
@@ -143,10 +147,10 @@ class CopterFailsafes:
         self._respond(vehicle, "Radio", self.RADIO.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), keeps)
 
     def on_battery(self, vehicle: Vehicle, level: str) -> None:
-        """The battery is low or critical: it says so, and does what BATT_FS_*_ACT asks for."""
+        """Report a low or critical battery and execute BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
         estimate = vehicle.estimate
         used = estimate.battery_used_mah
-        vehicle.say(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
+        vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
         action = round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
         if action == 5:
             disarm(vehicle, self._disarmed, force=True)
@@ -155,40 +159,40 @@ class CopterFailsafes:
 
     def _respond(self, vehicle: Vehicle, what: str, modes: tuple[int, ...], keeps: str) -> None:
         if not vehicle.armed:
-            vehicle.say(WARNING, f"{what} Failsafe")
+            vehicle.send_text(WARNING, f"{what} Failsafe")
         elif self._on_ground(vehicle):
-            vehicle.say(WARNING, f"{what} Failsafe - Disarming")
+            vehicle.send_text(WARNING, f"{what} Failsafe - Disarming")
             disarm(vehicle, self._disarmed, force=True)
         elif vehicle.manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
-            vehicle.say(WARNING, f"{what} Failsafe - Continuing Landing")
+            vehicle.send_text(WARNING, f"{what} Failsafe - Continuing Landing")
         elif keeps:
-            vehicle.say(WARNING, f"{what} Failsafe - {keeps}")
+            vehicle.send_text(WARNING, f"{what} Failsafe - {keeps}")
         else:
             for mode in modes:
                 if self._switch(vehicle, mode):
                     break
-            vehicle.say(WARNING, f"{what} Failsafe")
+            vehicle.send_text(WARNING, f"{what} Failsafe")
 
     def _on_ground(self, vehicle: Vehicle) -> bool:
-        """Whether it may simply disarm: standing, and no mission waits to start."""
+        """Return whether the vehicle may simply disarm: on the ground, and no started mission."""
         manoeuvre = vehicle.manoeuvre
         return vehicle.landed and not (isinstance(manoeuvre, FlyMission) and manoeuvre.started)
 
     def on_estimator_lost(self, vehicle: Vehicle) -> None:
-        """No position any more: land level, or hold the height by hand."""
-        vehicle.say(CRITICAL, "EKF variance")
+        """React to a lost position: LAND or ALT_HOLD, as FS_EKF_ACTION demands."""
+        vehicle.send_text(CRITICAL, "EKF variance")
         action = round(vehicle.parameters["FS_EKF_ACTION"])
         mode = {1: self.LAND, 2: self.ALT_HOLD, 3: self.LAND}.get(action)
         if mode is not None and self._switch(vehicle, mode):
-            vehicle.say(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
+            vehicle.send_text(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
 
     def on_estimator_back(self, vehicle: Vehicle) -> None:
-        """The position is back; the mode stays."""
-        vehicle.say(CRITICAL, "EKF Failsafe Cleared")
+        """Report the position; the mode stays."""
+        vehicle.send_text(CRITICAL, "EKF Failsafe Cleared")
 
 
 class RoverFailsafes:
-    """What a rover does: FS_ACTION for station and radio."""
+    """Failsafe actions of a rover: FS_ACTION for ground station and radio."""
 
     HOLD, RTL = 4, 11
     ACTIONS: Mapping[int, tuple[int, ...]] = {
@@ -204,7 +208,7 @@ class RoverFailsafes:
         self._disarmed = disarmed
 
     def watches(self) -> tuple[Failsafe, ...]:
-        """In the order in which they are looked at."""
+        """Return the failsafes in the order in which they are checked."""
         return (
             Failsafe("station", station_lost, lambda v: self._begin(v, "GCS"), lambda v: self._end(v, "GCS")),
             Failsafe("radio", radio_lost, lambda v: self._begin(v, "Radio"), lambda v: self._end(v, "Radio")),
@@ -213,16 +217,16 @@ class RoverFailsafes:
         )
 
     def _begin(self, vehicle: Vehicle, what: str) -> None:
-        vehicle.say(WARNING, f"{what} Failsafe")
+        vehicle.send_text(WARNING, f"{what} Failsafe")
         self._act(vehicle, round(vehicle.parameters["FS_ACTION"]))
 
     def _end(self, vehicle: Vehicle, what: str) -> None:
-        vehicle.say(WARNING, f"{what} Failsafe Cleared")
+        vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
 
     def _battery(self, vehicle: Vehicle, level: str) -> None:
         estimate = vehicle.estimate
         used = estimate.battery_used_mah
-        vehicle.say(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
+        vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
         self._act(
             vehicle, round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
         )

@@ -1,7 +1,4 @@
-"""Tables that copter and rover share: messages and their builders, streams, and the order within a burst.
-
-What a dialect of ArduPilot 4.5.6 says of every vehicle, whatever its kind.
-"""
+"""Tables that ArduPilot's copter and rover share: messages, telemetry streams, common MAVLink rules."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
 
 
 def nothing(_vehicle: Vehicle) -> None:
-    """A message that the firmware knows and has no reason to send."""
+    """Return None: the firmware knows the message and has no reason to send it."""
     return
 
 
@@ -136,13 +133,15 @@ ORDER: Sequence[str] = (
     "ESC_TELEMETRY_1_TO_4",
     "EXTENDED_SYS_STATE",
 )
-"""Of the messages within one burst, as recorded."""
+"""Order of the messages within one burst, as recorded."""
 
 
 def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[str, ...]]:
-    """MAV_DATA_STREAM to messages.
+    """Return the messages of each MAV_DATA_STREAM.
 
-    *controller* and *extra* are what one kind of vehicle adds to the common ones.
+    Args:
+        controller: Messages that one kind of vehicle adds to RAW_CONTROLLER.
+        extra: Messages that one kind of vehicle adds to EXTRA3.
     """
     groups: dict[int, tuple[str, ...]] = {
         RAW_SENSORS: ("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3", "SCALED_PRESSURE", "SCALED_PRESSURE2"),
@@ -175,36 +174,41 @@ def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[
 
 
 def board(vehicle: Vehicle) -> str:
-    """The board's own number, different for each system id."""
+    """Return the board's serial number, which follows from the system id."""
     return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
 
 
 def introduce(vehicle: Vehicle, name: str) -> None:
-    """Version and board, said to whoever lists the parameters."""
-    vehicle.say(INFO, f"{name} V4.5.6 (7ce11b41)")
-    vehicle.say(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+    """Report firmware version and board, as after a parameter list request."""
+    vehicle.send_text(INFO, f"{name} V4.5.6 (7ce11b41)")
+    vehicle.send_text(INFO, f"{board(vehicle)}1f6d2a48adfda4")
 
 
 def own_parameters(system: int, flight: Flight) -> dict[str, float]:
-    """What follows from the vehicle."""
+    """Return the parameters that follow from the system id and the battery."""
     return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.spec.battery.capacity_ah * 1000.0}
 
 
 def refuse_interval(vehicle: Vehicle, number: int) -> int:
-    """SET_MESSAGE_INTERVAL of a message that the firmware does not know."""
-    vehicle.say(INFO, f"No ap_message for mavlink id ({number})")
+    """Refuse SET_MESSAGE_INTERVAL of a message that the firmware does not know."""
+    vehicle.send_text(INFO, f"No ap_message for mavlink id ({number})")
     return DENIED
 
 
 def ignore_stream_request(_vehicle: Vehicle, _link: int, _stream: int, _rate: int) -> None:
-    """Store no stream rates (copter)."""
+    """Ignore REQUEST_DATA_STREAM: a copter stores no stream rates."""
 
 
 def builders(
     kind: int, capabilities: int, health: Health, system_status: Callable[[Vehicle], int]
 ) -> Mapping[str, Builder]:
-    """What every vehicle sends of itself. *kind* is the MAV_TYPE, *capabilities* are bits of
-    MAV_PROTOCOL_CAPABILITY, and *system_status* gives the MAV_STATE.
+    """Return the builders of all common messages.
+
+    Args:
+        kind: MAV_TYPE.
+        capabilities: Bits of MAV_PROTOCOL_CAPABILITY.
+        health: Sensor bits of SYS_STATUS.
+        system_status: Returns the MAV_STATE.
     """
     return {
         **BUILDERS,
@@ -221,7 +225,7 @@ MESSAGE_HANDLERS = {
     "MANUAL_CONTROL": pilot_input.on_manual_control,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
-"""What every vehicle obeys of sticks and stations."""
+"""Messages that need no answer, for every kind of vehicle."""
 
 
 def ardupilot_mavlink(
@@ -235,7 +239,7 @@ def ardupilot_mavlink(
     on_stream_request: Callable[[Vehicle, int, int, int], None] = ignore_stream_request,
     least_period: Ns = 3 * MS,
 ) -> MavlinkFirmware:
-    """Return the MAVLink of one kind of vehicle: what copter and rover share, and the arguments."""
+    """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
     return MavlinkFirmware(
         start=start._replace(timesync_every=10 * S),
         telemetry=TelemetryPolicy(

@@ -1,7 +1,7 @@
-"""SET_POSITION_TARGET_LOCAL_NED, _GLOBAL_INT and SET_ATTITUDE_TARGET: masks, frames, and what GUIDED makes
-of them.
+"""Targets of GUIDED: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
 
-A group of three (position, velocity, acceleration) counts only whole. Outside GUIDED all of it is ignored.
+A group of three (position, velocity, acceleration) counts only as a whole. Outside GUIDED the messages are
+ignored.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from volery.simulation.autopilots.onboard_mission import (
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 POSITION, VELOCITY, ACCELERATION, YAW, YAW_RATE = 0b111, 0b111 << 3, 0b111 << 6, 1 << 10, 1 << 11
-"""Bits of ``type_mask``: set means ignore."""
+"""Bits of ``type_mask``: a set bit ignores its group."""
 LEVEL_POSITION, LEVEL_VELOCITY = 0b11, 0b11 << 3
-"""What a rover looks at."""
+"""The groups of ``type_mask`` that a rover reads."""
 FORCE = 1 << 9
 
 GLOBAL_FRAMES = (
@@ -49,7 +49,7 @@ ATTITUDE_IGNORED, THROTTLE_IGNORED, YAW_RATE_IGNORED = 1 << 7, 1 << 6, 1 << 2
 
 
 class Target(NamedTuple):
-    """What a message asks for, in the autopilot's frame; ``None``: not asked."""
+    """Target of one message, north-east-down about the estimator's origin; None: not given."""
 
     position: Vector | None
     velocity: Vector | None
@@ -63,7 +63,7 @@ def _given(mask: int, group: int) -> bool:
 
 
 def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
-    """Forward, right, down to north, east, down, by the heading alone."""
+    """Rotate forward-right-down to north-east-down by the heading alone."""
     heading = vehicle.estimate.attitude[2]
     c, s = cos(heading), sin(heading)
     return vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c, vector[2]
@@ -134,17 +134,17 @@ def _obey(vehicle: Vehicle, target: Target | None) -> None:
 
 
 def copter_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_LOCAL_NED to a copter."""
+    """Handle SET_POSITION_TARGET_LOCAL_NED of a copter."""
     _obey(vehicle, _of_local(vehicle, fields))
 
 
 def copter_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_GLOBAL_INT to a copter."""
+    """Handle SET_POSITION_TARGET_GLOBAL_INT of a copter."""
     _obey(vehicle, _of_global(vehicle, fields))
 
 
 def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_ATTITUDE_TARGET: attitude, turn rate, and thrust as a climb rate."""
+    """Handle SET_ATTITUDE_TARGET: attitude, yaw rate, and thrust as a climb rate."""
     guided, mask = vehicle.manoeuvre, fields["type_mask"]
     if not isinstance(guided, Guided) or mask & THROTTLE_IGNORED:
         return
@@ -158,19 +158,19 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
 
 
 def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_LOCAL_NED to a rover: only what lies in the plane counts."""
+    """Handle SET_POSITION_TARGET_LOCAL_NED of a rover, which reads the horizontal axes only."""
     _drive(
         vehicle, _of_local(vehicle, _level(fields)), fields["coordinate_frame"] in BODY_FRAMES, fields["vx"]
     )
 
 
 def rover_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_GLOBAL_INT to a rover."""
+    """Handle SET_POSITION_TARGET_GLOBAL_INT of a rover."""
     _drive(vehicle, _of_global(vehicle, _level(fields)), ahead_given=False, ahead=0.0)
 
 
 def _level(fields: dict[str, Any]) -> dict[str, Any]:
-    """The same with the vertical bits as the plane's: a rover takes two axes for three."""
+    """Return the fields with the vertical bits of the mask set like the horizontal ones."""
     mask = fields["type_mask"]
     for group, level in ((POSITION, LEVEL_POSITION), (VELOCITY, LEVEL_VELOCITY)):
         mask = mask & ~group if not mask & level else mask | group

@@ -1,4 +1,4 @@
-"""ArduPilot's missions: what is accepted, what is read back, and what is said on the way."""
+"""ArduPilot's missions: which items are accepted, how they are read back, and what is reported in flight."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ NAMES = {
     SET_HOME: "SetHome",
     JUMP: "Jump",
 }
-"""How the firmware calls items in its texts."""
+"""Names of the items in the firmware's status texts."""
 
 KEPT_ONLY = frozenset({189, 195, 197, 201, 203, 205, 206, 211, 181, 182, 183, 184, 207, 208, 212})
-"""Items that are stored and read back but do nothing here: cameras, servos, relays, grippers, fences,
-regions.
+"""Items that are stored and read back without effect: cameras, servos, relays, grippers, fences, regions of
+interest.
 """
 
 PLACED = frozenset(
@@ -79,7 +79,7 @@ PLACED = frozenset(
         SET_HOME,
     }
 )
-"""Items whose frame is kept; the others read back frame 0."""
+"""Items whose frame is stored; the others read back frame 0."""
 
 STORED_FRAMES = {
     GLOBAL: GLOBAL,
@@ -89,13 +89,13 @@ STORED_FRAMES = {
     GLOBAL_TERRAIN: GLOBAL_TERRAIN,
     GLOBAL_TERRAIN_INT: GLOBAL_TERRAIN,
 }
-"""The frame that is read back for the one that was sent."""
+"""The frame that is read back for the frame that was sent."""
 
 MISSION_FRAME = 2
 
 
 def stored_item(item: MissionItem) -> MissionItem | int:
-    """As it is kept: frames without their integer twins, numbers that are none as zero."""
+    """Return an item as stored (frames without their INT variants, NaN as 0), or the MAV_MISSION_RESULT."""
     if item.command not in NAMES and item.command not in KEPT_ONLY:
         return UNSUPPORTED
     if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
@@ -115,7 +115,10 @@ def stored_item(item: MissionItem) -> MissionItem | int:
 
 
 def _wrong_parameter(item: MissionItem) -> int:
-    """The result that names the parameter that is no number; a heading of three commands need not be one."""
+    """Return the result that names the first parameter that is not finite, or 0.
+
+    The heading (param4) of WAYPOINT, LAND and TAKEOFF may be NaN.
+    """
     for place, value in enumerate((item.param1, item.param2, item.param3, item.param4)):
         may_be_none = place == 3 and item.command in (WAYPOINT, LAND, TAKEOFF)
         if isinf(value) or (isnan(value) and not may_be_none):
@@ -132,7 +135,7 @@ def _wrong_place(item: MissionItem) -> int:
 
 
 def home_item(vehicle: Vehicle) -> MissionItem | None:
-    """Item 0 is home."""
+    """Return item 0, the home position."""
     home = vehicle.home
     if home is None:
         return None
@@ -142,49 +145,49 @@ def home_item(vehicle: Vehicle) -> MissionItem | None:
 
 
 def mission_grew(vehicle: Vehicle, count: int) -> None:
-    """MIS_TOTAL counts along."""
+    """Store the number of items in MIS_TOTAL."""
     vehicle.set_parameter("MIS_TOTAL", count)
 
 
 def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
-    """Another item is flown."""
-    vehicle.say(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
+    """Report the item that begins."""
+    vehicle.send_text(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
 
 
 def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
-    """MISSION_ITEM_REACHED, and words for what is not a take-off or the end."""
-    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": index})
+    """Send MISSION_ITEM_REACHED, and a status text for items that reach a place or wait."""
+    vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
     if item.command in (WAYPOINT, SPLINE_WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_TO_ALTITUDE, DELAY):
-        vehicle.say(INFO, f"Reached command #{index}")
+        vehicle.send_text(INFO, f"Reached command #{index}")
 
 
 def act(vehicle: Vehicle, item: MissionItem) -> None:
-    """Items that are done at once."""
+    """Execute an item that does not navigate."""
     if item.command == CHANGE_SPEED:
         change_speed(vehicle, round(item.param1), item.param2)
     elif item.command == CONDITION_YAW:
         turn_to(vehicle, item.param1, item.param3, relative=item.param4 == 1.0)
     elif item.command == SET_HOME:
         if item.param1 == 1.0 or not item.has_place:
-            vehicle.home_is_here()
+            vehicle.set_home_here()
         else:
             vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
 
 
 def leaves_ground(vehicle: Vehicle) -> bool:
-    """Whether AUTO takes off without a MISSION_START: the throttle is raised, or AUTO_OPTIONS allows it."""
-    raised = vehicle.tuning.sticks.read(vehicle.sticks).throttle > 0.0
+    """Return whether AUTO takes off without MISSION_START: raised throttle or bit 1 of AUTO_OPTIONS."""
+    raised = vehicle.tuning.sticks.read(vehicle.rc).throttle > 0.0
     return raised or bool(round(vehicle.parameters["AUTO_OPTIONS"]) & 2)
 
 
 def runs(vehicle: Vehicle) -> bool:
-    """Whether the mission is being flown."""
-    plan = vehicle.plan
+    """Return whether the mission is being flown."""
+    plan = vehicle.mission
     return vehicle.armed and vehicle.mode.name == "AUTO" and plan.current > 0 and not plan.complete
 
 
 def copter_ended(vehicle: Vehicle) -> None:
-    """On the ground it disarms; in the air it stays where it is."""
+    """Disarm on the ground; hold the position in the air."""
     if vehicle.landed and vehicle.armed:
         disarm(vehicle, "Disarming motors", force=True)
     elif vehicle.armed:
@@ -194,8 +197,8 @@ def copter_ended(vehicle: Vehicle) -> None:
 
 
 def rover_ended(vehicle: Vehicle) -> None:
-    """It holds."""
-    vehicle.say(INFO, "Mission Complete")
+    """Report the end; the rover stops."""
+    vehicle.send_text(INFO, "Mission Complete")
 
 
 COPTER_MISSION = MissionRules(item_begins=item_begins, item_done=item_done, act=act, ended=copter_ended)

@@ -1,9 +1,7 @@
-"""ArduPilot's arming: which checks fail, in which order and words, and what arming and disarming say and do.
+"""Arming and mode changes of ArduPilot, with the firmware's wording of refusals.
 
-The checks that fail only because the vehicle has just booted are data: from when to when. The rest look at
-the vehicle.
-
-ArduPilot's way of changing modes: who may enter which, and the words of a refusal.
+Arming checks that fail only while the vehicle boots are data: an interval of uptime. The others inspect the
+vehicle.
 """
 
 from __future__ import annotations
@@ -21,63 +19,63 @@ CRITICAL, WARNING, INFO = 2, 4, 6
 """MAV_SEVERITY."""
 
 FORCE, SKIP_CHECKS = 21_196, 2_989
-"""Values of param2 that overrule checks: both directions, and arming only."""
+"""Values of param2 that skip the checks: for both directions, and for arming only."""
 
 DISPLAY_EVERY: Ns = 30 * S
 
 
 class Check(NamedTuple):
-    """One arming check: what it says, and whether it fails now."""
+    """One arming check: its text, and whether it fails now."""
 
     text: str
     fails: Callable[[Vehicle], bool]
 
 
 def between(start: float, end: float) -> Callable[[Vehicle], bool]:
-    """Fails from *start* to *end* seconds after boot."""
+    """Return a check that fails between two uptimes [s]."""
     first, last = int(start * S), int(end * S)
     return lambda vehicle: first <= vehicle.uptime() < last
 
 
 def flies_by_position(start: float, end: float) -> Callable[[Vehicle], bool]:
-    """The same, in modes that need a position."""
+    """Return a check that fails between two uptimes [s] in modes that need a position."""
     within = between(start, end)
     return lambda vehicle: vehicle.mode.needs_position and within(vehicle)
 
 
 def needs_no_position(start: float, end: float) -> Callable[[Vehicle], bool]:
-    """The same, in modes that need none."""
+    """Return a check that fails between two uptimes [s] in modes that need no position."""
     within = between(start, end)
     return lambda vehicle: not vehicle.mode.needs_position and within(vehicle)
 
 
 def lost_position(vehicle: Vehicle) -> bool:
-    """The mode needs a position, home is set, but there is no position."""
+    """Return whether the mode needs a position, an origin is set, but there is no position."""
     settled = vehicle.uptime() >= vehicle.rules.startup.origin_after
     return vehicle.mode.needs_position and settled and not vehicle.has_position
 
 
 def no_mission(vehicle: Vehicle) -> bool:
-    """AUTO without anything to do."""
-    return vehicle.mode.name == "AUTO" and len(vehicle.plan) <= 1
+    """Return whether the mode is AUTO without a mission."""
+    return vehicle.mode.name == "AUTO" and len(vehicle.mission) <= 1
 
 
 def low_battery(vehicle: Vehicle) -> bool:
-    """Below the voltage or the charge that arming asks for, where it asks."""
+    """Return whether the battery is below BATT_ARM_VOLT or BATT_ARM_MAH."""
     volts, charge = vehicle.parameters["BATT_ARM_VOLT"], vehicle.parameters["BATT_ARM_MAH"]
     left = vehicle.parameters["BATT_CAPACITY"] - vehicle.estimate.battery_used_mah
     return 0.0 < vehicle.estimate.battery_volts < volts or left < charge
 
 
 def failing(vehicle: Vehicle, checks: Sequence[Check]) -> list[str]:
-    """The texts of the checks that fail, in the firmware's order."""
+    """Return the texts of the checks that fail, in the firmware's order."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:
         return []
     return [check.text for check in checks if check.fails(vehicle)]
 
 
 def not_armable(vehicle: Vehicle) -> list[str]:
-    """The text that refuses the mode itself; copter names it, rover does not."""
+    """Return the text that refuses the mode itself, if it does; a copter names the mode, a rover does not."""
     if vehicle.mode.armable:
         return []
     name = f"{vehicle.mode.name} mode not armable" if vehicle.flies else "Mode not armable"
@@ -85,47 +83,54 @@ def not_armable(vehicle: Vehicle) -> list[str]:
 
 
 def arm(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]], words: str, force: bool) -> int:
-    """Arm if nothing speaks against it; returns a MAV_RESULT."""
+    """Arm if no check forbids it, and return a MAV_RESULT.
+
+    Args:
+        vehicle: The vehicle.
+        problems: Returns the texts that forbid arming.
+        words: Status text of success.
+        force: Skip the checks.
+    """
     if vehicle.armed:
         return ACCEPTED
     found = [] if force else problems(vehicle)
     if found:
-        vehicle.refused_at = vehicle.kernel.now()
+        vehicle.arming.refused_at = vehicle.kernel.now()
         for text in found:
-            vehicle.say(CRITICAL, f"Arm: {text}")
+            vehicle.send_text(CRITICAL, f"Arm: {text}")
         return FAILED
-    if not vehicle.home_by_user and vehicle.has_position:
-        vehicle.home_is_here()
-    vehicle.prearm_ok = True
+    if not (vehicle.home and vehicle.home.by_user) and vehicle.has_position:
+        vehicle.set_home_here()
+    vehicle.arming.checks_passed = True
     vehicle.arm()
-    vehicle.say(INFO, words)
+    vehicle.send_text(INFO, words)
     return ACCEPTED
 
 
 def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
-    """Disarm, in the air only by force; returns a MAV_RESULT."""
+    """Disarm, in flight only by force, and return a MAV_RESULT. A copter stores its hover throttle."""
     if not vehicle.armed:
         return ACCEPTED
     if vehicle.flies and not vehicle.landed and not force:
         return FAILED
     vehicle.disarm()
-    vehicle.say(INFO, words)
+    vehicle.send_text(INFO, words)
     if vehicle.flies:
         vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
     return ACCEPTED
 
 
 def update_prearm_state(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]]) -> None:
-    """Once a second: whether it could be armed; each half minute it says why not."""
+    """Evaluate the pre-arm checks; report those that fail every 30 s."""
     if vehicle.armed:
-        vehicle.prearm_ok = True
+        vehicle.arming.checks_passed = True
         return
     found = problems(vehicle)
-    vehicle.prearm_ok = not found
-    if vehicle.uptime() - vehicle.displayed_at >= DISPLAY_EVERY:
-        vehicle.displayed_at = vehicle.uptime()
+    vehicle.arming.checks_passed = not found
+    if vehicle.uptime() - vehicle.reports.arming_checks_at >= DISPLAY_EVERY:
+        vehicle.reports.arming_checks_at = vehicle.uptime()
         for text in found:
-            vehicle.say(CRITICAL, f"PreArm: {text}")
+            vehicle.send_text(CRITICAL, f"PreArm: {text}")
 
 
 CUSTOM_MODE_ENABLED = 1
@@ -135,17 +140,17 @@ CUSTOM, GUIDED, STABILIZED, MANUAL = 1, 8, 16, 64
 
 
 def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
-    """SET_MODE and DO_SET_MODE; returns a MAV_RESULT."""
+    """Handle SET_MODE and DO_SET_MODE, and return a MAV_RESULT."""
     if not base_mode & CUSTOM_MODE_ENABLED:
         return DENIED
     return ACCEPTED if change_mode(vehicle, number) else FAILED
 
 
 def change_mode(vehicle: Vehicle, number: int) -> bool:
-    """Enter that mode if it may be; else say why not."""
+    """Enter a mode if that is possible; otherwise report the reason. Return whether the mode is flown."""
     mode = vehicle.rules.modes.get(number)
     if mode is None:
-        vehicle.say(WARNING, f"No such mode {number}")
+        vehicle.send_text(WARNING, f"No such mode {number}")
         return False
     if mode is vehicle.mode:
         return True
@@ -154,17 +159,17 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
         words = (
             f"Mode change to {mode.name} failed: {reason}" if vehicle.flies else "Flight mode change failed"
         )
-        vehicle.say(WARNING, words)
+        vehicle.send_text(WARNING, words)
         return False
-    vehicle.enter(mode)
+    vehicle.enter_mode(mode)
     return True
 
 
 def refusal(vehicle: Vehicle, mode: Mode) -> str:
-    """Why an armed vehicle may not enter that mode; empty if it may. Disarmed it may enter any."""
+    """Return why an armed vehicle may not enter a mode, or an empty text."""
     if mode.needs_position and not vehicle.has_position:
         return "requires position"
-    if mode.name == "AUTO" and len(vehicle.plan) <= 1:
+    if mode.name == "AUTO" and len(vehicle.mission) <= 1:
         return "init failed"
     if vehicle.flies and vehicle.landed:
         return _refusal_on_ground(vehicle, mode)
@@ -173,7 +178,7 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
 
 def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
     if mode.name == "AUTO" and not _takes_off_first(vehicle):
-        vehicle.say(CRITICAL, "Auto: Missing Takeoff Cmd")
+        vehicle.send_text(CRITICAL, "Auto: Missing Takeoff Cmd")
         return "init failed"
     if mode.manual_throttle and not vehicle.mode.manual_throttle and Stabilize(vehicle).pilot.throttle > 0.5:
         return "throttle too high"
@@ -181,8 +186,8 @@ def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
 
 
 def _takes_off_first(vehicle: Vehicle) -> bool:
-    """Whether the first item that navigates, but for waiting, is a take-off."""
-    plan = vehicle.plan
+    """Return whether the first item that navigates, except for delays, is a take-off."""
+    plan = vehicle.mission
     ahead = (item for item in plan.items[max(1, plan.current) :] if item.navigates and item.command != DELAY)
     first = next(ahead, None)
     return first is not None and first.command == TAKEOFF

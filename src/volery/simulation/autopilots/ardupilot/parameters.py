@@ -1,8 +1,6 @@
-"""The parameters that change what a simulated ArduPilot does. All others are kept, listed and read back.
+"""ArduPilot's parameters: which ones change the behaviour, and the tuning that follows from their values.
 
-From ArduPilot's parameters to the figures that manoeuvres fly by.
-
-Every parameter read here is honoured.
+All other parameters are only stored, listed and read back.
 """
 
 from __future__ import annotations
@@ -99,7 +97,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "WP_YAW_BEHAVIOR": "1 and 2 turn the nose along a mission's path",
     }
 )
-"""A copter's, and what each changes."""
+"""Parameters of a copter that have an effect, and what each changes."""
 
 ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
@@ -112,17 +110,17 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "WP_SPEED": "speed",
     }
 )
-"""A rover's, and what each changes."""
+"""Parameters of a rover that have an effect, and what each changes."""
 
 
 CHANNELS = 16
 FASTEST = 1000.0
 SLOWEST = 0.1
-"""Speed [m/s] where a parameter asks for less than none; the firmware's own least values are of that size."""
+"""Speed [m/s] used where a parameter is not positive, as large as the firmware's own lower limits."""
 
 
 def channel_range(parameters: Parameters, channel: int) -> ChannelRange:
-    """How channel *channel* moves."""
+    """Return the calibration of one RC channel."""
     return ChannelRange(
         parameters[f"RC{channel}_MIN"],
         parameters[f"RC{channel}_TRIM"],
@@ -133,13 +131,13 @@ def channel_range(parameters: Parameters, channel: int) -> ChannelRange:
 
 
 def _channel(parameters: Parameters, stick: str, usual: int) -> int:
-    """The channel of a stick; the usual one where RCMAP names none that exists."""
+    """Return the channel of a stick, or the usual one where RCMAP names none that exists."""
     channel = round(parameters[f"RCMAP_{stick}"])
     return channel if 1 <= channel <= CHANNELS else usual
 
 
 def stick_map(parameters: Parameters) -> StickMap:
-    """Which channel is which stick."""
+    """Return which channel is which stick."""
     roll, pitch, throttle, yaw = (
         _channel(parameters, name, usual)
         for usual, name in enumerate(("ROLL", "PITCH", "THROTTLE", "YAW"), start=1)
@@ -159,12 +157,12 @@ def stick_map(parameters: Parameters) -> StickMap:
 
 
 def _moving(value: float, instead: float = SLOWEST) -> float:
-    """A speed or an acceleration that moves; *instead* where it is none."""
+    """Return a positive speed or acceleration, limited above; ``instead`` where the value is not positive."""
     return min(value, FASTEST) if value > 0.0 else instead
 
 
 def copter_tuning(parameters: Parameters) -> Tuning:
-    """A copter's. Its parameters are centimetres and hundredths of a degree."""
+    """Return the tuning of a copter, whose parameters are in cm and 1/100 deg."""
     p = parameters
     speed_down = _moving(p["WPNAV_SPEED_DN"] / 100.0)
     pilot_up = _moving(p["PILOT_SPEED_UP"] / 100.0)
@@ -207,7 +205,7 @@ def copter_tuning(parameters: Parameters) -> Tuning:
 
 
 def rover_tuning(parameters: Parameters) -> Tuning:
-    """A rover's. Its parameters are metres and degrees."""
+    """Return the tuning of a rover, whose parameters are in m and deg."""
     p = parameters
     speed = _moving(p["WP_SPEED"], _moving(p["CRUISE_SPEED"]))
     return Tuning(

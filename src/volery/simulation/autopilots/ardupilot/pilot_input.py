@@ -1,4 +1,4 @@
-"""Sticks and heartbeats that come by link: only those of the ground station that SYSID_MYGCS names count."""
+"""Manual control and heartbeats received by link. Only the station that SYSID_MYGCS names counts."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ def _is_my_station(vehicle: Vehicle, sender: int) -> bool:
 
 
 def on_heartbeat(vehicle: Vehicle, _fields: dict[str, Any], sender: int) -> None:
-    """HEARTBEAT of somebody else."""
+    """Handle HEARTBEAT."""
     if _is_my_station(vehicle, sender):
-        vehicle.station_seen = vehicle.kernel.now()
+        vehicle.failsafes.station_last_ns = vehicle.kernel.now()
 
 
 def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
-    """RC_CHANNELS_OVERRIDE.
+    """Handle RC_CHANNELS_OVERRIDE.
 
-    Channels 1 to 8: 0 releases, 65535 leaves as it is. Above: 0 and 65535 leave as it is, 65534 releases.
+    Channels 1 to 8: 0 releases, 65535 is ignored. From channel 9: 0 and 65535 are ignored, 65534 releases.
     """
     if not _is_my_station(vehicle, sender) or vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
         return
     now = vehicle.kernel.now()
-    vehicle.station_seen = now
-    for channel in range(1, len(vehicle.sticks.transmitter) + 1):
+    vehicle.failsafes.station_last_ns = now
+    for channel in range(1, len(vehicle.rc.transmitter) + 1):
         pulse = fields[f"chan{channel}_raw"]
         if channel <= LAST_PLAIN_CHANNEL:
             if pulse != IGNORE:
-                vehicle.sticks.override(channel, pulse, now)
+                vehicle.rc.override(channel, pulse, now)
         elif pulse not in (0, IGNORE):
-            vehicle.sticks.override(channel, 0 if pulse == RELEASE else pulse, now)
+            vehicle.rc.override(channel, 0 if pulse == RELEASE else pulse, now)
     _moved(vehicle)
 
 
 def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
-    """MANUAL_CONTROL: axes -1000..1000 onto the whole travel of their channels, throttle 0..1000."""
+    """Handle MANUAL_CONTROL: axes -1000..1000 over the whole range of their channels, throttle 0..1000."""
     if not _is_my_station(vehicle, sender) or fields["target"] != vehicle.system:
         return
     now = vehicle.kernel.now()
-    vehicle.station_seen = now
+    vehicle.failsafes.station_last_ns = now
     sticks = vehicle.tuning.sticks
     roll, pitch, throttle, yaw = sticks.travels
     middle = vehicle.rules.rc.throttle_centred
@@ -67,7 +67,7 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
 
 
 def _share(axis: int) -> float | None:
-    """-1000..1000 as 0..1; ``None`` for an axis that is not given."""
+    """Return an axis -1000..1000 as 0..1, or None if the axis is not given."""
     if axis == INVALID_AXIS:
         return None
     return min(1.0, max(0.0, (axis + 1000) / 2000.0))
@@ -75,35 +75,31 @@ def _share(axis: int) -> float | None:
 
 def _give(vehicle: Vehicle, channel: int, travel: ChannelRange, share: float | None) -> None:
     pulse = 0 if share is None else max(0, travel.pulse(share))
-    vehicle.sticks.override(channel, pulse, vehicle.kernel.now())
+    vehicle.rc.override(channel, pulse, vehicle.kernel.now())
 
 
 def _moved(vehicle: Vehicle) -> None:
-    """A pilot's mode obeys at once; others at the next tick."""
+    """Let a mode that the pilot flies act at once; other modes act at the next tick."""
     if vehicle.armed and vehicle.mode.pilot:
-        vehicle.act()
+        vehicle.run_manoeuvre()
 
 
 def on_step(vehicle: Vehicle) -> None:
-    """At each tick: a transmitter that fails or comes back, overrides that expire."""
-    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.sticks.transmitter != list(vehicle.rules.rc.transmitter):
+    """Simulate a failing transmitter and expire overrides, at each tick."""
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.rc.transmitter != list(vehicle.rules.rc.transmitter):
         fail(vehicle)
     expire(vehicle)
 
 
 def expire(vehicle: Vehicle) -> None:
-    """Overrides fall back to the transmitter after RC_OVERRIDE_TIME; a negative time means never."""
+    """Release overrides that are older than RC_OVERRIDE_TIME; a negative time keeps them."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]
-    if seconds > 0.0 and vehicle.sticks.expire(vehicle.kernel.now(), from_seconds(seconds)):
+    if seconds > 0.0 and vehicle.rc.expire(vehicle.kernel.now(), from_seconds(seconds)):
         _moved(vehicle)
 
 
 def fail(vehicle: Vehicle) -> None:
-    """SIM_RC_FAIL: 2 brings the transmitter's throttle below the failsafe's value, 1 takes the transmitter
-    away.
-
-    Both look the same to the firmware: a throttle of 950.
-    """
+    """Simulate SIM_RC_FAIL, whose values 1 and 2 both read as a throttle of 950 us."""
     throttle = vehicle.tuning.sticks.throttle
     healthy = vehicle.rules.rc.transmitter[throttle - 1]
-    vehicle.sticks.transmitter[throttle - 1] = 950 if vehicle.parameters["SIM_RC_FAIL"] else healthy
+    vehicle.rc.transmitter[throttle - 1] = 950 if vehicle.parameters["SIM_RC_FAIL"] else healthy

@@ -1,4 +1,4 @@
-"""ArduRover 4.5.6: its modes, its checks and its habits, put together as a dialect."""
+"""ArduRover 4.5.6: modes, arming checks and boot, composed as a firmware."""
 
 from __future__ import annotations
 
@@ -82,13 +82,13 @@ ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
 
 
 def guided_arrived(vehicle: Vehicle) -> None:
-    """A rover says so as if it were a mission."""
-    vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": 0})
+    """Report a reached guided target as the firmware does, as mission item 0."""
+    vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": 0})
 
 
 def guided_stale(vehicle: Vehicle) -> None:
-    """No target for three seconds."""
-    vehicle.say(WARNING, "target not received last 3secs, stopping")
+    """Report that no target was received for three seconds."""
+    vehicle.send_text(WARNING, "target not received last 3secs, stopping")
 
 
 MODES = {
@@ -143,40 +143,40 @@ STREAM_PARAMETERS = {
     12: "EXTRA3",
     13: "ADSB",
 }
-"""Where a rover stores the rate of a stream."""
+"""Suffix of the parameter that stores the rate of each MAV_DATA_STREAM."""
 
 
 def before_arming(vehicle: Vehicle) -> list[str]:
-    """What would show as not ready."""
+    """Return the texts of the pre-arm checks that fail."""
     return failing(vehicle, CHECKS)
 
 
 def problems(vehicle: Vehicle) -> list[str]:
-    """All that speaks against arming now."""
+    """Return the texts of all checks that forbid arming now."""
     return before_arming(vehicle) + not_armable(vehicle)
 
 
 def ready(vehicle: Vehicle) -> None:
-    """Set-up has ended."""
-    vehicle.enter(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
+    """Finish the set-up: enter the mode that INITIAL_MODE names."""
+    vehicle.enter_mode(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
 
 
 def warm(vehicle: Vehicle) -> None:
-    """As its boot leaves it, but for the position."""
+    """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.keep(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
     ready(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
-    """At each tick: sticks that expire."""
+    """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     if vehicle.armed:
-        vehicle.flight_time += ROVER.periodic.tick
+        vehicle.ground.flight_time += ROVER.periodic.tick
 
 
 def system_status(vehicle: Vehicle) -> int:
-    """MAV_STATE: a failsafe, starting, holding, or driving."""
-    if vehicle.failsafes:
+    """Return the MAV_STATE: failsafe, starting, holding or driving."""
+    if vehicle.failsafes.active:
         return CRITICAL
     if vehicle.mode is INITIALISING:
         return CALIBRATING
@@ -184,25 +184,25 @@ def system_status(vehicle: Vehicle) -> int:
 
 
 def greet(vehicle: Vehicle) -> None:
-    """Said to whoever lists the parameters."""
+    """Send the status texts that follow a parameter list request."""
     introduce(vehicle, "ArduRover")
 
 
 def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
-    """A rover stores the rates that it was asked for."""
+    """Store the requested stream rates in parameters."""
     names = STREAM_PARAMETERS.values() if stream == ALL else [STREAM_PARAMETERS[stream]]
     for name in names:
         vehicle.set_parameter(f"SR{index}_{name}", rate)
 
 
 def navigation(vehicle: Vehicle) -> Fields | None:
-    """NAV_CONTROLLER_OUTPUT: only in modes that steer by themselves."""
+    """Return NAV_CONTROLLER_OUTPUT in modes that steer automatically."""
     return nav_controller(vehicle) if vehicle.mode.controls else None
 
 
 @cache
 def parameters() -> tuple[Parameter, ...]:
-    """What is recorded of them, and documented."""
+    """Return the recorded and documented parameters."""
     return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
 
 

@@ -1,8 +1,6 @@
-"""Telemetry of ArduPilot about where the vehicle is and how it moves.
+"""Fields of ArduPilot's telemetry messages. Units and signs are those of the messages.
 
-Units and signs are the messages' own.
-
-Telemetry of ArduPilot about itself: heartbeat, health, battery, channels, mission, estimator, version.
+A builder returns None while the firmware does not send its message.
 """
 
 from __future__ import annotations
@@ -26,12 +24,12 @@ from volery.simulation.autopilots.onboard_mission import OnboardMission
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 NO_FIX_AFTER = int(9.64 * S)
-"""From this uptime on the receiver is known."""
+"""Uptime [ns] from which the GPS receiver is detected."""
 FIX_AFTER = int(9.85 * S)
-"""From this uptime on it has a fix."""
+"""Uptime [ns] from which the GPS receiver has a fix."""
 GRAVITY_MILLI = 1000.0 / 9.80665
 ZERO_CELSIUS_RISE = 2850
-"""What the recorded boards' thermometers show in flight [cdegC]."""
+"""Temperature of the recorded boards in flight [cdegC]."""
 
 
 def _has_fix(vehicle: Vehicle) -> bool:
@@ -39,12 +37,12 @@ def _has_fix(vehicle: Vehicle) -> bool:
 
 
 def _cm(metres: float) -> int:
-    """Millimetres, as a firmware that reckons in centimetres gives them."""
+    """Return a length in mm, rounded to cm as in the firmware."""
     return round(metres * 100.0) * 10
 
 
 def global_position(vehicle: Vehicle) -> Fields:
-    """GLOBAL_POSITION_INT: sent with zeros while there is no fix."""
+    """Return GLOBAL_POSITION_INT, with zeros before the first fix."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "hdg": heading_cdeg(estimate.attitude[2])}
     if not _has_fix(vehicle):
@@ -58,7 +56,7 @@ def global_position(vehicle: Vehicle) -> Fields:
 
 
 def local_position(vehicle: Vehicle) -> Fields | None:
-    """LOCAL_POSITION_NED: only with a position."""
+    """Return LOCAL_POSITION_NED once there is a position."""
     if vehicle.uptime() < vehicle.rules.startup.local_position_after:
         return None
     estimate = vehicle.estimate
@@ -70,7 +68,7 @@ def local_position(vehicle: Vehicle) -> Fields | None:
 
 
 def vfr_hud(vehicle: Vehicle) -> Fields:
-    """VFR_HUD."""
+    """Return VFR_HUD."""
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
     ground = hypot(north, east)
@@ -106,22 +104,22 @@ def _compass(vehicle: Vehicle) -> Fields:
 
 
 def raw_imu(vehicle: Vehicle) -> Fields:
-    """RAW_IMU: milli-g, mrad/s, milligauss."""
+    """Return RAW_IMU (milli-g, mrad/s, milligauss)."""
     return {"time_usec": boot_us(vehicle), "id": 0, **_imu(vehicle)}
 
 
 def scaled_imu2(vehicle: Vehicle) -> Fields:
-    """SCALED_IMU2: the second unit reads as the first."""
+    """Return SCALED_IMU2: the second unit measures like the first."""
     return {"time_boot_ms": boot_ms(vehicle), **_imu(vehicle)}
 
 
 def scaled_imu3(vehicle: Vehicle) -> Fields:
-    """SCALED_IMU3: there is no third unit but a third compass."""
+    """Return SCALED_IMU3: there is no third unit but a third compass."""
     return {"time_boot_ms": boot_ms(vehicle), **_compass(vehicle)}
 
 
 def pressure(vehicle: Vehicle) -> Fields:
-    """SCALED_PRESSURE and SCALED_PRESSURE2."""
+    """Return SCALED_PRESSURE or SCALED_PRESSURE2."""
     return {
         "time_boot_ms": boot_ms(vehicle),
         "press_abs": vehicle.estimate.pressure,
@@ -131,7 +129,7 @@ def pressure(vehicle: Vehicle) -> Fields:
 
 
 def gps_raw(vehicle: Vehicle) -> Fields:
-    """GPS_RAW_INT."""
+    """Return GPS_RAW_INT."""
     if vehicle.uptime() < NO_FIX_AFTER:
         return {"eph": 65_535, "epv": 65_535}
     fix = vehicle.estimate.gps
@@ -164,13 +162,13 @@ def gps_raw(vehicle: Vehicle) -> Fields:
 
 
 def system_time(vehicle: Vehicle) -> Fields:
-    """SYSTEM_TIME: satellite time once there is a fix."""
+    """Return SYSTEM_TIME, with satellite time once there is a fix."""
     now = EPOCH_US + vehicle.kernel.now() // US
     return {"time_unix_usec": now if _has_fix(vehicle) else 0, "time_boot_ms": boot_ms(vehicle)}
 
 
 def simstate(vehicle: Vehicle) -> Fields:
-    """SIMSTATE: the truth, as ArduPilot's own simulator tells it."""
+    """Return SIMSTATE: the true state, as sent by ArduPilot's own simulator."""
     truth = vehicle.flight.truth()
     roll, pitch, yaw = quaternion_to_euler(attitude_enu_to_ned(truth.attitude))
     latitude, longitude, _ = vehicle.flight.frame.from_enu(truth.position)
@@ -192,12 +190,12 @@ def simstate(vehicle: Vehicle) -> Fields:
 
 
 def ahrs(vehicle: Vehicle) -> Fields:
-    """AHRS: the backup estimator's errors."""
+    """Return AHRS: errors of the backup estimator."""
     return {"error_rp": 0.0025, "error_yaw": abs(vehicle.estimate.heading_error)}
 
 
 def ahrs2(vehicle: Vehicle) -> Fields | None:
-    """AHRS2: the backup estimator, which here believes what the first one does."""
+    """Return AHRS2: the backup estimator, here equal to the first."""
     if vehicle.uptime() < 4 * S:
         return None
     estimate = vehicle.estimate
@@ -210,7 +208,7 @@ def ahrs2(vehicle: Vehicle) -> Fields | None:
 
 
 def nav_controller(vehicle: Vehicle) -> Fields:
-    """NAV_CONTROLLER_OUTPUT."""
+    """Return NAV_CONTROLLER_OUTPUT."""
     estimate, target = vehicle.estimate, vehicle.manoeuvre.target
     roll, pitch, yaw = estimate.target_attitude
     fields: Fields = {
@@ -227,7 +225,7 @@ def nav_controller(vehicle: Vehicle) -> Fields:
 
 
 def position_target(vehicle: Vehicle) -> Fields | None:
-    """POSITION_TARGET_GLOBAL_INT: only while there is a point to go to."""
+    """Return POSITION_TARGET_GLOBAL_INT while the vehicle flies to a point."""
     target = vehicle.manoeuvre.target
     if target is None or not vehicle.armed:
         return None
@@ -243,7 +241,7 @@ def position_target(vehicle: Vehicle) -> Fields | None:
 
 
 def local_target(vehicle: Vehicle) -> Fields | None:
-    """POSITION_TARGET_LOCAL_NED: the same point about the estimator's origin."""
+    """Return POSITION_TARGET_LOCAL_NED while the vehicle flies to a point."""
     target = vehicle.manoeuvre.target
     if target is None or not vehicle.armed:
         return None
@@ -259,7 +257,7 @@ def local_target(vehicle: Vehicle) -> Fields | None:
 
 
 def home_position(vehicle: Vehicle) -> Fields | None:
-    """HOME_POSITION: once there is a home."""
+    """Return HOME_POSITION once it is set."""
     home = vehicle.home
     if home is None:
         return None
@@ -277,7 +275,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
 
 
 def origin(vehicle: Vehicle) -> Fields | None:
-    """GPS_GLOBAL_ORIGIN: once the estimator has one."""
+    """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
     if vehicle.home is None or not vehicle.estimate.position_ok:
         return None
     latitude, longitude, amsl = vehicle.estimate.origin
@@ -290,13 +288,13 @@ def origin(vehicle: Vehicle) -> Fields | None:
 
 
 def rangefinder(vehicle: Vehicle) -> Fields | None:
-    """RANGEFINDER: where one is set up and sees the ground."""
+    """Return RANGEFINDER while a configured rangefinder measures."""
     distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
     return None if distance is None else {"distance": distance, "voltage": 0.0}
 
 
 def distance_sensor(vehicle: Vehicle) -> Fields | None:
-    """DISTANCE_SENSOR: the same, looking down."""
+    """Return DISTANCE_SENSOR (downwards) while a configured rangefinder measures."""
     distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
     if distance is None:
         return None
@@ -316,7 +314,7 @@ CALIBRATING, STANDBY, ACTIVE, CRITICAL = 2, 3, 4, 5
 """MAV_STATE."""
 
 MEASURED_AFTER = int(2.4 * S)
-"""From this uptime on battery and compass have been read, and the copter's terrain follower runs."""
+"""Uptime [ns] from which battery and compass are read and the copter's terrain follower runs."""
 
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 """MAV_LANDED_STATE."""
@@ -336,24 +334,26 @@ AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 
 
 
 class Health(NamedTuple):
-    """The three words of SYS_STATUS when all is well, disarmed, in a mode without controls of its own."""
+    """Sensor bits of SYS_STATUS of a healthy, disarmed vehicle in a mode without controls of its own."""
 
     present: int
     enabled: int
     healthy: int
     estimator_enabled_after: int
-    """Uptime from which the attitude estimator counts as enabled [ns], and as healthy."""
+    """Uptimes [ns] from which the attitude estimator is enabled and healthy."""
     estimator_healthy_after: int
 
 
 def logs(vehicle: Vehicle) -> bool:
-    """Whether the log is written: armed, and 15 s after that and after a refusal."""
+    """Return whether the log is written: armed, and for 15 s after disarming or a refusal to arm."""
     now = vehicle.kernel.now()
-    return vehicle.armed or now - vehicle.refused_at < 15 * S or now - vehicle.disarmed_at < 15 * S
+    return (
+        vehicle.armed or now - vehicle.arming.refused_at < 15 * S or now - vehicle.arming.disarmed_at < 15 * S
+    )
 
 
 def sys_status(vehicle: Vehicle, health: Health) -> Fields:
-    """SYS_STATUS."""
+    """Return SYS_STATUS."""
     age, controls = vehicle.uptime(), vehicle.mode.controls
     present, enabled, healthy = health.present, health.enabled | controls, health.healthy | controls
     missing = 0
@@ -368,7 +368,7 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         healthy &= ~AHRS
     if not logs(vehicle):
         enabled &= ~LOGGING
-    if not vehicle.prearm_ok:
+    if not vehicle.arming.checks_passed:
         healthy &= ~PREARM
     if age > FIX_AFTER and vehicle.estimate.gps.fix_type == 0:
         healthy &= ~GPS
@@ -385,7 +385,7 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
 
 
 def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
-    """Millivolts, hundredths of an ampere, percent."""
+    """Return voltage [mV], current [cA] and remaining charge [%]; -1 where unknown."""
     if vehicle.uptime() < MEASURED_AFTER:
         return 0, -1, -1
     estimate = vehicle.estimate
@@ -399,7 +399,7 @@ def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
 
 
 def battery_status(vehicle: Vehicle) -> Fields:
-    """BATTERY_STATUS."""
+    """Return BATTERY_STATUS."""
     volts, amps, left = _battery(vehicle)
     estimate = vehicle.estimate
     return {
@@ -415,7 +415,7 @@ def battery_status(vehicle: Vehicle) -> Fields:
 
 
 def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
-    """HEARTBEAT of a vehicle of MAV_TYPE *kind*."""
+    """Return HEARTBEAT of a vehicle of that MAV_TYPE and MAV_STATE."""
     return {
         "type": kind,
         "autopilot": 3,
@@ -427,7 +427,7 @@ def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
 
 
 def extended_sys_state(vehicle: Vehicle) -> Fields:
-    """EXTENDED_SYS_STATE."""
+    """Return EXTENDED_SYS_STATE."""
     if vehicle.landed:
         landed = ON_GROUND
     elif vehicle.manoeuvre.taking_off:
@@ -438,23 +438,23 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
 
 
 def rc_channels(vehicle: Vehicle) -> Fields:
-    """RC_CHANNELS: what the autopilot hears, overrides included."""
+    """Return RC_CHANNELS, including overrides."""
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "chancount": 16, "rssi": 255}
-    for number, pulse in enumerate(vehicle.sticks.pulses(), start=1):
+    for number, pulse in enumerate(vehicle.rc.pulses(), start=1):
         fields[f"chan{number}_raw"] = pulse
     return fields
 
 
 def rc_channels_raw(vehicle: Vehicle) -> Fields:
-    """RC_CHANNELS_RAW: the first eight."""
+    """Return RC_CHANNELS_RAW: the first eight channels."""
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "port": 0, "rssi": 255}
-    for number, pulse in enumerate(vehicle.sticks.pulses()[:8], start=1):
+    for number, pulse in enumerate(vehicle.rc.pulses()[:8], start=1):
         fields[f"chan{number}_raw"] = pulse
     return fields
 
 
 def rc_channels_scaled(vehicle: Vehicle) -> Fields:
-    """RC_CHANNELS_SCALED: steering and throttle outputs in 1/10000."""
+    """Return RC_CHANNELS_SCALED: steering and throttle outputs in 1/10000."""
     steering, throttle, _, _ = vehicle.estimate.motors
     return {
         "time_boot_ms": boot_ms(vehicle),
@@ -465,7 +465,7 @@ def rc_channels_scaled(vehicle: Vehicle) -> Fields:
 
 
 def servo_output(vehicle: Vehicle) -> Fields:
-    """SERVO_OUTPUT_RAW."""
+    """Return SERVO_OUTPUT_RAW."""
     first, second, third, fourth = vehicle.estimate.motor_pwm
     return {
         "time_usec": boot_us(vehicle),
@@ -490,8 +490,8 @@ def _mission_state(plan: OnboardMission) -> int:
 
 
 def mission_current(vehicle: Vehicle) -> Fields:
-    """MISSION_CURRENT: home is not counted among the items."""
-    plan = vehicle.plan
+    """Return MISSION_CURRENT; the home position is not counted as an item."""
+    plan = vehicle.mission
     return {
         "seq": plan.current,
         "total": max(0, len(plan) - 1),
@@ -501,13 +501,13 @@ def mission_current(vehicle: Vehicle) -> Fields:
 
 
 WITHOUT_POSITION, WITH_POSITION, STARTING = 167, 831, 1024
-"""EKF_STATUS_FLAGS as recorded: attitude and height only; with positions; not initialised."""
+"""EKF_STATUS_FLAGS as recorded: attitude and height only, with a position, not initialised."""
 
 EKF_REPORTS_AFTER, EKF_STARTS_AFTER, EKF_ALIGNED_AFTER = int(3.3 * S), int(5.3 * S), int(5.75 * S)
 
 
 def ekf_status(vehicle: Vehicle) -> Fields | None:
-    """EKF_STATUS_REPORT."""
+    """Return EKF_STATUS_REPORT."""
     age = vehicle.uptime()
     if age < EKF_REPORTS_AFTER:
         return None
@@ -524,17 +524,17 @@ def ekf_status(vehicle: Vehicle) -> Fields | None:
 
 
 def vibration(vehicle: Vehicle) -> Fields:
-    """VIBRATION: the law of the body has none."""
+    """Return VIBRATION: the body model has none."""
     return {"time_usec": boot_us(vehicle), "vibration_x": 0.003, "vibration_y": 0.003, "vibration_z": 0.003}
 
 
 def wind(vehicle: Vehicle) -> Fields | None:
-    """WIND: without an airspeed sensor the firmware estimates none."""
+    """Return WIND: without an airspeed sensor the firmware estimates none."""
     return {"direction": -180.0, "speed": 0.0, "speed_z": 0.0} if vehicle.has_position else None
 
 
 def terrain_report(vehicle: Vehicle) -> Fields:
-    """TERRAIN_REPORT: no data on board."""
+    """Return TERRAIN_REPORT: there is no terrain data on board."""
     if vehicle.uptime() < FIX_AFTER:
         return {"spacing": 100, "pending": 56}
     latitude, longitude, amsl = vehicle.estimate.geodetic
@@ -547,7 +547,7 @@ def terrain_report(vehicle: Vehicle) -> Fields:
 
 
 def esc_telemetry(vehicle: Vehicle) -> Fields | None:
-    """ESC_TELEMETRY_1_TO_4: as the firmware's simulator makes it up."""
+    """Return ESC_TELEMETRY_1_TO_4 with the constants of the firmware's simulator."""
     age = vehicle.uptime()
     if age < 6 * S:
         return None
@@ -563,23 +563,23 @@ def esc_telemetry(vehicle: Vehicle) -> Fields | None:
 
 
 def power_status(_vehicle: Vehicle) -> Fields:
-    """POWER_STATUS."""
+    """Return POWER_STATUS."""
     return {"Vcc": 5000}
 
 
 def meminfo(_vehicle: Vehicle) -> Fields:
-    """MEMINFO."""
+    """Return MEMINFO."""
     return {"brkval": 0, "freemem": 65_535, "freemem32": 131_072}
 
 
 FLIGHT_SW_VERSION = 67_438_335
-"""4.5.6, an official release, as recorded."""
+"""4.5.6, official release, as recorded."""
 
 GIT_HASH = tuple(b"7ce11b41")
 
 
 def autopilot_version(_vehicle: Vehicle, capabilities: int, board: bytes) -> Fields:
-    """AUTOPILOT_VERSION; *board* is the board's own number, as text."""
+    """Return AUTOPILOT_VERSION with the board's serial number."""
     return {
         "capabilities": capabilities,
         "flight_sw_version": FLIGHT_SW_VERSION,

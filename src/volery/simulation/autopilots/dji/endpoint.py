@@ -143,7 +143,7 @@ def _height(controller: FlightController, _stamp: Ns) -> Any:
 
 def _rc(controller: FlightController, stamp: Ns) -> Any:
     """Roll, pitch, yaw, throttle in -1..1, mode switch, gear."""
-    pulses = controller.vehicle.sticks.pulses()
+    pulses = controller.vehicle.rc.pulses()
     roll, pitch, throttle, yaw, switch = ((pulse - 1500) / 500.0 for pulse in pulses[:5])
     axes = [roll, pitch, yaw, throttle, switch * 500.0 * SWITCH_SCALE, 0.0]
     return message_class("sensor_msgs/msg/Joy")(_header(stamp, ""), axes, [])
@@ -330,17 +330,17 @@ class DjiEndpoint:
             clock.cancel()
         self._clocks.clear()
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         """Leave the graph."""
         if self._node is not None:
             self._node.close()
             self._node = None
 
-    def say(self, severity: int, text: str) -> None:
+    def send_text(self, severity: int, text: str) -> None:
         """There is no topic for words: they go to the trace."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
 
-    def parameter(self, name: str) -> None:
+    def parameter_changed(self, name: str) -> None:
         """Nobody is told."""
 
     def mode_changed(self) -> None:
@@ -349,12 +349,12 @@ class DjiEndpoint:
     def home_changed(self) -> None:
         """Nobody is told."""
 
-    def announce(self, message: str) -> None:
+    def send_message(self, message: str) -> None:
         """There is nothing to announce."""
 
-    def tell(self, message: str, fields: dict[str, Any]) -> None:
+    def send_event(self, message: str, fields: dict[str, Any]) -> None:
         """There are no such events."""
 
-    def after_answer(self, action: Action) -> None:
+    def after_reply(self, action: Action) -> None:
         """At once."""
         action()

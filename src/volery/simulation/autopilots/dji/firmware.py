@@ -91,9 +91,9 @@ MODES = {
 
 def ready(vehicle: Vehicle) -> None:
     """It stands, and speaks from now on."""
-    vehicle.landed = True
+    vehicle.ground.landed = True
     controller_of(vehicle).reset()
-    vehicle.enter(MODES[DisplayMode.P_GPS])
+    vehicle.enter_mode(MODES[DisplayMode.P_GPS])
 
 
 def _below(percent: str) -> Failsafe:

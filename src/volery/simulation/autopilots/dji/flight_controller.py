@@ -126,7 +126,9 @@ class FlightController:
     def mode(self) -> int:
         """The display mode."""
         vehicle = self.vehicle
-        starting = vehicle.armed and vehicle.landed and vehicle.kernel.now() - vehicle.armed_at < STARTING
+        starting = (
+            vehicle.armed and vehicle.landed and vehicle.kernel.now() - vehicle.arming.armed_at < STARTING
+        )
         return DisplayMode.ENGINE_START if starting else vehicle.mode.number
 
     @property
@@ -144,7 +146,10 @@ class FlightController:
         if not vehicle.armed or vehicle.landed:
             if vehicle.armed and self._is(DisplayMode.AUTO_TAKEOFF):
                 return M100Status.TAKING_OFF
-            landed = vehicle.landed_at != NEVER and vehicle.kernel.now() - vehicle.landed_at < FINISHED
+            landed = (
+                vehicle.ground.landed_at != NEVER
+                and vehicle.kernel.now() - vehicle.ground.landed_at < FINISHED
+            )
             return M100Status.FINISHED_LANDING if landed else M100Status.ON_GROUND
         if self._is(DisplayMode.AUTO_TAKEOFF):
             return M100Status.TAKING_OFF
@@ -202,9 +207,9 @@ class FlightController:
         if not vehicle.landed or not self.activated:
             return False
         if vehicle.has_position:
-            vehicle.home_is_here()
+            vehicle.set_home_here()
         vehicle.arm()
-        vehicle.say(INFO, "motors started")
+        vehicle.send_text(INFO, "motors started")
         return True
 
     def take_off(self) -> bool:
@@ -279,12 +284,12 @@ class FlightController:
             self._enter(DisplayMode.NAVI_SDK_CTRL, by_sdk=True)
         if isinstance(vehicle.manoeuvre, SdkControl):
             vehicle.manoeuvre.command = command
-            vehicle.act()
+            vehicle.run_manoeuvre()
 
     def _once(self, text: str) -> None:
-        if text not in self.vehicle.said:
-            self.vehicle.said.add(text)
-            self.vehicle.say(WARNING, text)
+        if text not in self.vehicle.reports.sent_once:
+            self.vehicle.reports.sent_once.add(text)
+            self.vehicle.send_text(WARNING, text)
 
     # -- missions
 
@@ -292,10 +297,10 @@ class FlightController:
         """Replace the mission on board, if it makes sense."""
         found = mission_refusal(task)
         if found:
-            self.vehicle.say(WARNING, f"mission refused: {found}")
+            self.vehicle.send_text(WARNING, f"mission refused: {found}")
             return False
         self.task = task
-        self.vehicle.plan.replace(mission_items(task))
+        self.vehicle.mission.replace(mission_items(task))
         return True
 
     def start_mission(self, *, anew: bool) -> bool:
@@ -304,13 +309,13 @@ class FlightController:
         if self.task is None or vehicle.landed or not vehicle.has_position:
             return False
         if anew:
-            vehicle.plan.restart()
-        elif vehicle.plan.complete:
+            vehicle.mission.restart()
+        elif vehicle.mission.complete:
             return False
         self._enter(DisplayMode.NAVI_MISSION, by_sdk=True)
-        vehicle.speed = self.task.idle_velocity
+        vehicle.commanded.speed = self.task.idle_velocity
         if self.task.yaw_mode == YAW_LOCKED:
-            vehicle.yaw_target = vehicle.estimate.attitude[2]
+            vehicle.commanded.yaw = vehicle.estimate.attitude[2]
         return True
 
     def leave_mission(self) -> bool:
@@ -326,14 +331,14 @@ class FlightController:
             return False
         self.task.idle_velocity = metres_per_second
         if self._is(DisplayMode.NAVI_MISSION):
-            self.vehicle.speed = metres_per_second
+            self.vehicle.commanded.speed = metres_per_second
         return True
 
     def item_begins(self, number: int, _item: MissionItem) -> None:
         """Turn to the waypoint's heading, where the mission says so."""
         if self.task is not None and self.task.yaw_mode == YAW_BY_WAYPOINT:
             point = self.task.mission_waypoint[number % len(self.task.mission_waypoint)]
-            self.vehicle.yaw_target = radians(point.target_yaw)
+            self.vehicle.commanded.yaw = radians(point.target_yaw)
 
     def mission_ended(self) -> None:
         """What the mission says is to follow."""
@@ -359,13 +364,13 @@ class FlightController:
 
     def _look_at_switch(self) -> None:
         """The pilot always wins: with the switch out of F the program has lost."""
-        pulse = self.vehicle.sticks[SWITCH]
+        pulse = self.vehicle.rc[SWITCH]
         now = "F" if pulse > F_ABOVE else "P" if pulse < P_BELOW else "A"
         if now == self._switch:
             return
         self._switch = now
         self.sdk = False
-        self.vehicle.say(INFO, f"the mode switch is at {now}")
+        self.vehicle.send_text(INFO, f"the mode switch is at {now}")
         if self.vehicle.armed and not self.vehicle.landed:
             self.hover()
 
@@ -383,7 +388,7 @@ class FlightController:
             if manoeuvre.landing:
                 self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._asked_by_sdk)
         elif number == DisplayMode.P_GPS and not vehicle.has_position:
-            vehicle.say(WARNING, "position lost")
+            vehicle.send_text(WARNING, "position lost")
             self.hover()
         elif number == DisplayMode.ATTITUDE and vehicle.has_position and self._switch != "A":
             self.hover()
@@ -392,34 +397,36 @@ class FlightController:
         vehicle = self.vehicle
         now, parameters = vehicle.kernel.now(), vehicle.parameters
         number = vehicle.mode.number
-        if number in COMING_DOWN and now - vehicle.landed_at >= from_seconds(parameters["LANDED_STOP"]):
+        if number in COMING_DOWN and now - vehicle.ground.landed_at >= from_seconds(
+            parameters["LANDED_STOP"]
+        ):
             self.kill()
             return
-        if vehicle.manoeuvre.wants_to_fly():
-            vehicle.idle_since = now
-        elif now - vehicle.idle_since >= from_seconds(parameters["IDLE_STOP"]):
+        if vehicle.manoeuvre.takeoff_requested():
+            vehicle.ground.idle_since = now
+        elif now - vehicle.ground.idle_since >= from_seconds(parameters["IDLE_STOP"]):
             self.kill()
 
     def low_battery(self) -> None:
         """Go home."""
-        self.vehicle.say(WARNING, "battery low")
+        self.vehicle.send_text(WARNING, "battery low")
         if self.vehicle.armed and self.vehicle.mode.number not in COMING_DOWN:
             self.go_home(by_sdk=False)
 
     def critical_battery(self) -> None:
         """Land where it is."""
-        self.vehicle.say(WARNING, "battery critical")
+        self.vehicle.send_text(WARNING, "battery critical")
         if self.vehicle.armed and not self.vehicle.landed:
             self._enter(DisplayMode.FORCE_AUTO_LANDING)
 
     def _rest(self) -> None:
         """The motors stand."""
-        self.vehicle.say(INFO, "motors stopped")
+        self.vehicle.send_text(INFO, "motors stopped")
         self.hover()
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
         self._asked_by_sdk = by_sdk
-        self.vehicle.enter(self.vehicle.rules.modes[mode])
+        self.vehicle.enter_mode(self.vehicle.rules.modes[mode])
 
 
 def controller_of(vehicle: Vehicle) -> FlightController:

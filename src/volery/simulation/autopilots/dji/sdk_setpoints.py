@@ -83,7 +83,7 @@ class SdkControl(Manoeuvre):
         super().__init__(vehicle)
         self.command: SdkCommand | None = None
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """If the command lifts it."""
         return self.command is not None and self.command.lifts
 

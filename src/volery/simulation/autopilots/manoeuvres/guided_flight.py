@@ -46,9 +46,9 @@ class FollowVelocity(Manoeuvre):
                 velocity=(0.0, 0.0, 0.0) if stale else self._after(to_seconds(age)),
                 yaw=turn.yaw if turn.rate is None else None,
                 yaw_rate=turn.rate,
-                speed=vehicle.speed or tuning.speed,
-                speed_up=vehicle.speed_up or tuning.speed_up,
-                speed_down=vehicle.speed_down or tuning.speed_down,
+                speed=vehicle.commanded.speed or tuning.speed,
+                speed_up=vehicle.commanded.speed_up or tuning.speed_up,
+                speed_down=vehicle.commanded.speed_down or tuning.speed_down,
                 accel=tuning.accel,
                 accel_z=tuning.accel_z,
                 tilt=tuning.tilt,
@@ -115,7 +115,7 @@ class Guided(Manoeuvre):
         if self.vehicle.armed and not self.vehicle.landed:
             doing.step()
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """Only for a take-off."""
         return self._doing.taking_off
 

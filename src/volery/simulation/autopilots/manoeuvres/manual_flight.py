@@ -20,7 +20,7 @@ class ByPilot(Manoeuvre):
     @property
     def pilot(self) -> StickPositions:
         """The sticks now."""
-        return self.vehicle.tuning.sticks.read(self.vehicle.sticks)
+        return self.vehicle.tuning.sticks.read(self.vehicle.rc)
 
     def climb(self, throttle: float) -> float:
         """Metres per second up that the throttle stick asks for; 0 within its dead zone."""
@@ -40,7 +40,7 @@ class Stabilize(ByPilot):
     With the throttle closed the motors idle, wherever it is.
     """
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """As soon as the throttle is open."""
         return self.pilot.throttle > 0.0
 
@@ -78,7 +78,7 @@ class Stabilize(ByPilot):
 class AltitudeHold(ByPilot):
     """Sticks are lean angles, turn rate and climb rate; in the throttle's dead zone the height is held."""
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """When the pilot asks to climb."""
         return self.climb(self.pilot.throttle) > 0.0
 
@@ -122,7 +122,7 @@ class Loiter(ByPilot):
         self._last = self._centred_at = self.vehicle.kernel.now()
         self._held = None
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """When the pilot asks to climb, or a take-off was commanded."""
         return self.taking_off or self.climb(self.pilot.throttle) > 0.0
 

@@ -105,13 +105,13 @@ class FlyMission(Manoeuvre):
         if self.vehicle.armed and self._leg is None:
             self._begin_current()
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """If its leg does and it may."""
         if not self.started and self._leaves_ground is not None:
             self.started = self._leaves_ground(self.vehicle)
         if self._leg is None:
             self._begin_current()
-        return self.started and self._leg is not None and self._leg.manoeuvre.wants_to_fly()
+        return self.started and self._leg is not None and self._leg.manoeuvre.takeoff_requested()
 
     def step(self) -> None:
         """Go on with the leg; when it is done, to the next."""
@@ -146,7 +146,7 @@ class FlyMission(Manoeuvre):
     # -- from item to item
 
     def _begin_current(self) -> None:
-        plan = self.vehicle.plan
+        plan = self.vehicle.mission
         if len(plan) and not plan.complete:
             self._advance_to(max(self._rules.first_item, plan.current))
 
@@ -156,7 +156,7 @@ class FlyMission(Manoeuvre):
         self._advance_to(index + 1)
 
     def _advance_to(self, index: int) -> None:
-        vehicle, plan = self.vehicle, self.vehicle.plan
+        vehicle, plan = self.vehicle, self.vehicle.mission
         self._leg = None
         self._held.clear()
         for _ in range(len(plan) + 100):  # jumps may go in circles: without a leg between them, for ever
@@ -173,7 +173,7 @@ class FlyMission(Manoeuvre):
 
     def _begin(self, index: int, item: MissionItem) -> None:
         vehicle = self.vehicle
-        vehicle.plan.current = index
+        vehicle.mission.current = index
         self._rules.item_begins(vehicle, index, item)
         self._flown = index, item
         self._leg = self._make_leg(vehicle, item, self._goes_on(index))
@@ -183,7 +183,7 @@ class FlyMission(Manoeuvre):
 
     def _goes_on(self, index: int) -> bool:
         """Whether the next item that navigates is a waypoint and this one asks for no stop."""
-        plan = self.vehicle.plan
+        plan = self.vehicle.mission
         following = next((item for item in plan.items[index + 1 :] if item.navigates), None)
         stops = plan[index].param1 > 0.0
         return following is not None and following.command in (WAYPOINT, SPLINE_WAYPOINT) and not stops
@@ -270,8 +270,8 @@ class Circle(Manoeuvre):
                 Control.VELOCITY_HEIGHT,
                 position=self._centre,
                 velocity=velocity,
-                yaw=(angle + pi) if vehicle.yaw_target is None else vehicle.yaw_target,
-                speed=vehicle.speed or tuning.speed,
+                yaw=(angle + pi) if vehicle.commanded.yaw is None else vehicle.commanded.yaw,
+                speed=vehicle.commanded.speed or tuning.speed,
                 accel=tuning.accel,
                 accel_z=tuning.accel_z,
                 tilt=tuning.tilt,

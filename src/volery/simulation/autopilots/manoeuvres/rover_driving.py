@@ -30,7 +30,7 @@ class Manual(Manoeuvre):
 
     def step(self) -> None:
         """Pass them on."""
-        sticks, channels = self.vehicle.tuning.sticks, self.vehicle.sticks
+        sticks, channels = self.vehicle.tuning.sticks, self.vehicle.rc
         steering = sticks.travels[0].deflection(channels[sticks.roll])
         throttle = sticks.travels[2].deflection(channels[sticks.throttle])
         self.vehicle.drive(Setpoint(Control.STEER, steering=steering, throttle=throttle))
@@ -58,7 +58,7 @@ class DriveTo(Manoeuvre):
             Setpoint(
                 Control.POSITION,
                 position=self.point,
-                speed=self.vehicle.speed or tuning.speed,
+                speed=self.vehicle.commanded.speed or tuning.speed,
                 accel=tuning.accel,
             )
         )
@@ -157,7 +157,7 @@ class ReturnRover(Manoeuvre):
     def enter(self) -> None:
         """At the speed of the return."""
         self.target = self._driving.point
-        self.vehicle.speed = self.vehicle.tuning.return_speed
+        self.vehicle.commanded.speed = self.vehicle.tuning.return_speed
 
     def step(self) -> None:
         """Drive."""

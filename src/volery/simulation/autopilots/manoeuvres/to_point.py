@@ -81,10 +81,10 @@ class ToPoint(Manoeuvre):
         return Setpoint(
             Control.POSITION,
             position=point,
-            yaw=self.yaw if vehicle.yaw_target is None else vehicle.yaw_target,
-            speed=self.speed or vehicle.speed or tuning.speed,
-            speed_up=vehicle.speed_up or tuning.speed_up,
-            speed_down=vehicle.speed_down or tuning.speed_down,
+            yaw=self.yaw if vehicle.commanded.yaw is None else vehicle.commanded.yaw,
+            speed=self.speed or vehicle.commanded.speed or tuning.speed,
+            speed_up=vehicle.commanded.speed_up or tuning.speed_up,
+            speed_down=vehicle.commanded.speed_down or tuning.speed_down,
             accel=tuning.accel,
             accel_z=tuning.accel_z,
             tilt=tuning.tilt,
@@ -115,7 +115,7 @@ class TakeOff(ToPoint):
         home = self.vehicle.home
         self.point = (north, east, (home.ned[2] if home else 0.0) - self.height)
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """That is what it is for."""
         return True
 
@@ -157,7 +157,7 @@ class Land(Manoeuvre):
                 Control.POSITION_CLIMB,
                 position=self.point,
                 climb=-sink,
-                yaw=vehicle.yaw_target,
+                yaw=vehicle.commanded.yaw,
                 speed=tuning.speed,
                 speed_down=max(tuning.land_speed_high, sink),
                 accel=tuning.accel,

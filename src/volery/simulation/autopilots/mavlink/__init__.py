@@ -1,1 +1,1 @@
-"""The MAVLink face of a simulated autopilot. Message definitions are those of ``volery.links.mavlink_messages``."""
+"""MAVLink endpoint of a simulated autopilot: links, streams, microservices, and what differs by firmware."""

@@ -115,7 +115,7 @@ class MavlinkChannel:
         if self.open and isinstance(self.link, ByteLink):
             self.link.send_bytes(data)
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         """Neither speak nor listen any more."""
         self.open = False
         self.streams.stop()

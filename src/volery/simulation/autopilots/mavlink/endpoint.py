@@ -99,13 +99,13 @@ class MavlinkEndpoint:
     def disconnect(self, link: Link) -> None:
         """Nobody is there any more."""
         for channel in [channel for channel in self.channels if channel.link is link]:
-            channel.hang_up()
+            channel.close()
             self.channels.remove(channel)
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         """Stop serving all of them."""
         for channel in self.channels:
-            channel.hang_up()
+            channel.close()
         self.channels.clear()
 
     @property
@@ -136,8 +136,8 @@ class MavlinkEndpoint:
             self._at_uptime(words.after, partial(self._send_bytes, words.data))
         for after in firmware.start.heartbeat_first:
             if after >= age:
-                self._at_uptime(after, lambda: self.announce("HEARTBEAT"))
-        self._regularly(firmware.start.heartbeat_from, S, lambda: self.announce("HEARTBEAT"))
+                self._at_uptime(after, lambda: self.send_message("HEARTBEAT"))
+        self._regularly(firmware.start.heartbeat_from, S, lambda: self.send_message("HEARTBEAT"))
         if firmware.start.timesync_every:
             self._regularly(firmware.start.timesync_every, firmware.start.timesync_every, self._ask_time)
         if age >= vehicle.rules.startup.ready_after:
@@ -175,7 +175,7 @@ class MavlinkEndpoint:
 
     # -- speaking
 
-    def say(self, severity: int, text: str) -> None:
+    def send_text(self, severity: int, text: str) -> None:
         """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text.strip()))
         numbered = self.firmware.texts.numbered or len(status_text_chunks(severity, text, 0)) > 1
@@ -187,9 +187,9 @@ class MavlinkEndpoint:
             for channel in self.channels:
                 channel.texts.put(pieces)
 
-        self.after_answer(tell)
+        self.after_reply(tell)
 
-    def parameter(self, name: str) -> None:
+    def parameter_changed(self, name: str) -> None:
         """PARAM_VALUE to everyone."""
         fields = self._parameters.unlisted(name)
         if fields is not None:
@@ -198,20 +198,20 @@ class MavlinkEndpoint:
     def mode_changed(self) -> None:
         """What a change of mode sends, to everyone."""
         for message in self.firmware.telemetry.on_mode_change:
-            self.announce(message)
+            self.send_message(message)
 
     def home_changed(self) -> None:
         """What a change of home sends, to everyone."""
         for message in self.firmware.telemetry.on_home_change:
-            self.announce(message)
+            self.send_message(message)
 
-    def announce(self, message: str) -> None:
+    def send_message(self, message: str) -> None:
         """That message to everyone."""
         fields = self.firmware.telemetry.messages[message](self._vehicle)
         if fields is not None:
             self._tell_all(message, fields)
 
-    def tell(self, message: str, fields: dict[str, Any]) -> None:
+    def send_event(self, message: str, fields: dict[str, Any]) -> None:
         """A message that is no state, such as an event, to everyone."""
         self._tell_all(message, fields)
 
@@ -220,9 +220,9 @@ class MavlinkEndpoint:
             for channel in self.channels:
                 channel.send(name, fields)
 
-        self.after_answer(tell)
+        self.after_reply(tell)
 
-    def after_answer(self, action: Action) -> None:
+    def after_reply(self, action: Action) -> None:
         """Once the frame in hand has been answered; at once if there is none, or the autopilot is still
         booting.
         """

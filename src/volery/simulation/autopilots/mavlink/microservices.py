@@ -111,7 +111,7 @@ class CommandService:
             if fields is not None:
                 peer.channel.send(name, fields)
 
-        self._vehicle.outlet.after_answer(send)
+        self._vehicle.output.after_reply(send)
         return ACCEPTED
 
     def _name(self, number: int) -> str | None:
@@ -254,11 +254,11 @@ class MissionService:
         elif fields["count"] > MOST_ITEMS:
             self._acknowledge(peer, NO_SPACE)
         elif fields["count"] == 0:
-            self._vehicle.plan.clear()
+            self._vehicle.mission.clear()
             self._acknowledge(peer, MISSION_ACCEPTED)
         else:
             if not self._firmware.missions.upload.keeps_old:
-                self._vehicle.plan.clear()
+                self._vehicle.mission.clear()
             self._upload = _Upload(peer, fields["count"], self._kernel.now())
             self._ask()
 
@@ -267,7 +267,7 @@ class MissionService:
         if upload is None:
             return
         if self._kernel.now() - upload.latest >= GIVE_UP:
-            self._vehicle.say(4, "Mission upload timeout")
+            self._vehicle.send_text(4, "Mission upload timeout")
             self._acknowledge(upload.peer, CANCELLED)
             self._upload = None
             return
@@ -330,10 +330,10 @@ class MissionService:
             self._ask()
         else:
             self._upload = None
-            self._vehicle.plan.replace(upload.items)
+            self._vehicle.mission.replace(upload.items)
             self._acknowledge(upload.peer, MISSION_ACCEPTED)
             if self._firmware.missions.upload.received:
-                self._vehicle.say(6, self._firmware.missions.upload.received)
+                self._vehicle.send_text(6, self._firmware.missions.upload.received)
         self._firmware.missions.grew(self._vehicle, len(upload.items))
 
     # -- download
@@ -341,7 +341,7 @@ class MissionService:
     def on_request_list(self, peer: Peer, fields: dict[str, Any]) -> None:
         """MISSION_REQUEST_LIST."""
         kind = fields["mission_type"]
-        count = len(self._vehicle.plan) if kind == MISSION else 0
+        count = len(self._vehicle.mission) if kind == MISSION else 0
         peer.answer("MISSION_COUNT", count=count, mission_type=kind)
 
     def on_request_int(self, peer: Peer, fields: dict[str, Any]) -> None:
@@ -357,7 +357,7 @@ class MissionService:
             self._send_item(peer, "MISSION_ITEM", fields["seq"], item, (item.x / 1e7, item.y / 1e7))
 
     def _requested(self, peer: Peer, fields: dict[str, Any]) -> MissionItem | None:
-        sequence, plan = fields["seq"], self._vehicle.plan
+        sequence, plan = fields["seq"], self._vehicle.mission
         if fields["mission_type"] == MISSION:
             home = self._firmware.missions.home_item(self._vehicle)
             if sequence == 0 and home is not None:
@@ -377,7 +377,7 @@ class MissionService:
             seq=sequence,
             frame=item.frame,
             command=item.command,
-            current=int(sequence == self._vehicle.plan.current and sequence > 0),
+            current=int(sequence == self._vehicle.mission.current and sequence > 0),
             autocontinue=item.autocontinue,
             param1=item.param1,
             param2=item.param2,
@@ -398,7 +398,7 @@ class MissionService:
             return
         if fields["mission_type"] in (MISSION, 255):
             self._drop_upload()
-            self._vehicle.plan.clear()
+            self._vehicle.mission.clear()
         self._acknowledge(peer, MISSION_ACCEPTED, fields["mission_type"])
         self._firmware.missions.grew(self._vehicle, 0)
 

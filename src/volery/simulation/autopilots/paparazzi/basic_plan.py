@@ -49,7 +49,7 @@ def set_ground_reference(nav: Navigation) -> None:
     """NavSetGroundReferenceHere: the local origin, and home, are where it stands. Not in the air."""
     if not in_flight(nav.vehicle):
         nav.vehicle.flight.set_origin()
-        nav.vehicle.home_is_here()
+        nav.vehicle.set_home_here()
 
 
 def on_ground(nav: Navigation) -> bool:

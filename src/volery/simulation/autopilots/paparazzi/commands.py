@@ -34,21 +34,21 @@ MANUAL_BELOW, AUTO2_ABOVE = -FULL // 2, FULL // 2
 
 def on_ping(vehicle: Vehicle, _fields: Fields) -> None:
     """PING."""
-    vehicle.outlet.tell("PONG", {})
+    vehicle.output.send_event("PONG", {})
 
 
 def on_setting(vehicle: Vehicle, fields: Fields) -> None:
     """SETTING: write, and say what it is now."""
     value = parameters.write_setting(vehicle, fields["index"], fields["value"])
     if value is not None:
-        vehicle.outlet.tell("DL_VALUE", {"index": fields["index"], "value": value})
+        vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_get_setting(vehicle: Vehicle, fields: Fields) -> None:
     """GET_SETTING."""
     value = parameters.read_setting(vehicle, fields["index"])
     if value is not None:
-        vehicle.outlet.tell("DL_VALUE", {"index": fields["index"], "value": value})
+        vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_block(vehicle: Vehicle, fields: Fields) -> None:
@@ -62,7 +62,7 @@ def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
         return
     place = vehicle.flight.to_ned(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
     if state_of(vehicle).navigation.move(fields["wp_id"], ned_to_enu(place)):
-        vehicle.outlet.tell("WP_MOVED_ENU", waypoint(vehicle, fields["wp_id"]))
+        vehicle.output.send_event("WP_MOVED_ENU", waypoint(vehicle, fields["wp_id"]))
 
 
 def on_guided(vehicle: Vehicle, fields: Fields) -> None:
@@ -122,7 +122,7 @@ def _hear(vehicle: Vehicle, frame: StickFrame) -> None:
     state_of(vehicle).radio.hear(vehicle, frame)
     _switch(vehicle, frame.mode)
     if vehicle.armed and vehicle.mode.pilot:
-        vehicle.act()
+        vehicle.run_manoeuvre()
 
 
 def _switch(vehicle: Vehicle, position: int) -> None:

@@ -47,7 +47,7 @@ class PaparazziEndpoint:
         """Nobody is there any more."""
         self._links = [other for other in self._links if other is not link]
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         """Serve nobody any more."""
         self._links.clear()
 
@@ -77,7 +77,7 @@ class PaparazziEndpoint:
         if self._links:
             fields = regular.build(self._vehicle)
             if fields is not None:
-                self.tell(regular.name, fields)
+                self.send_event(regular.name, fields)
 
     def stop(self) -> None:
         """Fall silent and deaf."""
@@ -88,35 +88,35 @@ class PaparazziEndpoint:
 
     # -- speaking
 
-    def say(self, severity: int, text: str) -> None:
+    def send_text(self, severity: int, text: str) -> None:
         """INFO_MSG to everyone, and to the trace."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
-        self.tell("INFO_MSG", {"msg": text})
+        self.send_event("INFO_MSG", {"msg": text})
 
-    def parameter(self, name: str) -> None:
+    def parameter_changed(self, name: str) -> None:
         """A setting answers for itself."""
 
     def mode_changed(self) -> None:
         """ROTORCRAFT_STATUS at once."""
         if self._listens:
-            self.tell("ROTORCRAFT_STATUS", rotorcraft_status(self._vehicle))
+            self.send_event("ROTORCRAFT_STATUS", rotorcraft_status(self._vehicle))
 
     def home_changed(self) -> None:
         """INS_REF comes in its turn."""
 
-    def announce(self, message: str) -> None:
+    def send_message(self, message: str) -> None:
         """Send that regular message now."""
         for regular in REGULAR:
             if regular.name == message:
                 self._send_regular(regular)
 
-    def tell(self, message: str, fields: dict[str, Any]) -> None:
+    def send_event(self, message: str, fields: dict[str, Any]) -> None:
         """That message to everyone."""
         state_of(self._vehicle).downlink_messages += 1
         for link in self._links:
             link.send(Frame(message, fields, self._vehicle.system, AUTOPILOT))
 
-    def after_answer(self, action: Action) -> None:
+    def after_reply(self, action: Action) -> None:
         """Nothing is answered: at once."""
         action()
 

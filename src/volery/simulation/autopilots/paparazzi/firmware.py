@@ -78,7 +78,7 @@ def rotorcraft_state(vehicle: Vehicle) -> RotorcraftState:
 
 def ready(vehicle: Vehicle) -> None:
     """The firmware is up, on the ground, in its start-up mode."""
-    vehicle.landed = True
+    vehicle.ground.landed = True
     set_mode(vehicle, round(vehicle.parameters["MODE_STARTUP"]))
 
 
@@ -97,9 +97,9 @@ def on_step(vehicle: Vehicle) -> None:
     elif vehicle.uptime() >= READY:
         navigation.step()
     if in_flight(vehicle):
-        vehicle.flight_time += TICK
+        vehicle.ground.flight_time += TICK
     elif not vehicle.armed and vehicle.estimate.landed:
-        vehicle.landed = True
+        vehicle.ground.landed = True
 
 
 ROTORCRAFT = Firmware(
@@ -119,7 +119,7 @@ ROTORCRAFT = Firmware(
         rc=RcDefaults((1500, 1500, 1000, 1500)),
         firmware_state=rotorcraft_state,
     ),
-    boot=BootSequence((BootEvent(READY, ready),), warm, Vehicle.home_is_here),
+    boot=BootSequence((BootEvent(READY, ready),), warm, Vehicle.set_home_here),
     periodic=PeriodicWork(tick=TICK, on_step=on_step, failsafe_ticks=1),
     failsafes=WATCHES,
     endpoint=PaparazziEndpoint,

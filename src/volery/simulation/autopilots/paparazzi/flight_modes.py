@@ -51,7 +51,7 @@ class FlyPlan(Manoeuvre):
         """What is to be flown now."""
         return state_of(self.vehicle).navigation.demand
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """When it is to climb, or to be above where it stands."""
         demand = self.demand
         if demand.vertical is Vertical.CLIMB:
@@ -184,7 +184,7 @@ class Guided(Manoeuvre):
     def _position(self) -> Vector:
         return self.vehicle.estimate.position
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """When it is asked to be above where it stands, or to climb."""
         setpoint = self._setpoint
         if setpoint.height_is_velocity:
@@ -201,7 +201,7 @@ class Guided(Manoeuvre):
         setpoint = self._height(setpoint, flags, values[2])
         self._hold(self._turned(setpoint, flags, yaw))
         if self.vehicle.armed:
-            self.vehicle.act()
+            self.vehicle.run_manoeuvre()
 
     def _plane(self, flags: int, x: float, y: float) -> GuidedSetpoint:
         now = self._setpoint

@@ -51,7 +51,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     if mode is not vehicle.mode:
         if number == KILL:
             vehicle.disarm()
-        vehicle.enter(mode)
+        vehicle.enter_mode(mode)
     return True
 
 

@@ -66,7 +66,7 @@ class RadioControl:
             (sticks.throttle, throttle, frame.throttle / FULL),
             (sticks.yaw, yaw, 0.5 + 0.5 * frame.yaw / FULL),
         ):
-            vehicle.sticks.override(channel, travel.pulse(share), now)
+            vehicle.rc.override(channel, travel.pulse(share), now)
 
 
 @dataclass

@@ -69,7 +69,7 @@ def rotorcraft_fp(vehicle: Vehicle) -> Fields:
         fields[f"carrot_{axis}"] = counts(metres, POSITION)
     fields["carrot_psi"] = counts(heading, ANGLE)
     fields["thrust"] = round(estimate.throttle * FULL) if vehicle.armed else 0
-    fields["flight_time"] = whole(to_seconds(vehicle.flight_time))
+    fields["flight_time"] = whole(to_seconds(vehicle.ground.flight_time))
     return fields
 
 

@@ -40,35 +40,30 @@ CHANGE_MODE = 1
 SPEED_OVER_GROUND = (0, 1)
 
 
-def whole(value: float) -> int:
+def to_integer(value: float) -> int:
     """The nearest integer; -1 for what is no number."""
     return round(value) if isfinite(value) else -1
 
 
 def on_set_mode(vehicle: Vehicle, command: Command) -> int:
     """DO_SET_MODE: main and sub-mode. On the ground everything is accepted; nonsense changes nothing."""
-    if not whole(command.param1) & CUSTOM_MODE_ENABLED:
+    if not to_integer(command.param1) & CUSTOM_MODE_ENABLED:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
-    main, sub = whole(command.param2), whole(command.param3)
+    main, sub = to_integer(command.param2), to_integer(command.param3)
     if not 0 <= main <= 255 or not 0 <= sub <= 255:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
-    return switch(vehicle, modes.custom_mode(main, sub))
+    return commander_of(vehicle).request_mode(modes.custom_mode(main, sub))
 
 
 def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
     """SET_MODE."""
     main, sub = modes.main_and_sub(number)
-    return switch(vehicle, modes.custom_mode(main, sub))
-
-
-def switch(vehicle: Vehicle, number: int) -> int:
-    """To a mode, as the user's wish."""
-    return commander_of(vehicle).wish(number)
+    return commander_of(vehicle).request_mode(modes.custom_mode(main, sub))
 
 
 def on_arm(vehicle: Vehicle, command: Command) -> int:
     """COMPONENT_ARM_DISARM."""
-    force = whole(command.param2) == FORCE
+    force = to_integer(command.param2) == FORCE
     if command.param1 == 1.0:
         return commander_of(vehicle).arm(force)
     if command.param1 == 0.0:
@@ -82,17 +77,17 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
     if vehicle.armed and not commander.can_fly(modes.TAKEOFF):
         return TEMPORARILY_REJECTED
     commander.takeoff_amsl = command.z if isfinite(command.z) and command.z != 0.0 else None
-    commander.wish_anew(modes.TAKEOFF)
+    commander.restart_mode(modes.TAKEOFF)
     return ACCEPTED
 
 
 def on_land(vehicle: Vehicle, _command: Command) -> int:
     """NAV_LAND: here."""
     commander = commander_of(vehicle)
-    if commander.wish(modes.LAND) != ACCEPTED:
+    if commander.request_mode(modes.LAND) != ACCEPTED:
         return TEMPORARILY_REJECTED
-    vehicle.say(INFO, "Landing at current position\t")
-    commander.log.tell(events.LANDING_HERE)
+    vehicle.send_text(INFO, "Landing at current position\t")
+    commander.log.send(events.LANDING_HERE)
     return ACCEPTED
 
 
@@ -100,14 +95,14 @@ def on_return(vehicle: Vehicle, _command: Command) -> int:
     """NAV_RETURN_TO_LAUNCH."""
     commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.RTL):
-        vehicle.say(CRITICAL, "Return to launch denied\t")
+        vehicle.send_text(CRITICAL, "Return to launch denied\t")
         return TEMPORARILY_REJECTED
-    vehicle.say(INFO, "Returning to launch\t")
-    commander.log.tell(events.RETURNING)
-    return commander.wish(modes.RTL)
+    vehicle.send_text(INFO, "Returning to launch\t")
+    commander.log.send(events.RETURNING)
+    return commander.request_mode(modes.RTL)
 
 
-def place_of(vehicle: Vehicle, command: Command) -> Vector | None:
+def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
     """The point that a command names, AMSL; what it leaves out is the vehicle's own. ``None``: nowhere."""
     latitude, longitude, amsl = vehicle.estimate.geodetic
     if isfinite(command.x) and isfinite(command.y) and (command.x or command.y):
@@ -123,21 +118,21 @@ def place_of(vehicle: Vehicle, command: Command) -> Vector | None:
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
     """DO_REPOSITION: without its flag it is refused, and in AUTO.LOITER flown all the same."""
     commander = commander_of(vehicle)
-    point = place_of(vehicle, command)
+    point = commanded_point(vehicle, command)
     if point is None or not vehicle.has_position:
         return DENIED
     heading = None if isnan(command.param4) else command.param4
-    flagged = whole(command.param2) == CHANGE_MODE
+    flagged = to_integer(command.param2) == CHANGE_MODE
     if not flagged:
         holding = vehicle.manoeuvre
         if vehicle.mode.number == modes.LOITER and vehicle.armed and isinstance(holding, Hold):
             _move_hold(holding, point, heading, command.param1)
         return UNSUPPORTED
-    speed = vehicle.speed
-    commander.wish_anew(modes.LOITER)
+    speed = vehicle.commanded.speed
+    commander.restart_mode(modes.LOITER)
     holding = vehicle.manoeuvre
     if isinstance(holding, Hold):
-        vehicle.speed = speed
+        vehicle.commanded.speed = speed
         _move_hold(holding, point, heading, command.param1)
     return ACCEPTED
 
@@ -151,8 +146,8 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
     """DO_CHANGE_SPEED: over the ground."""
-    if whole(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
-        vehicle.speed = command.param2
+    if to_integer(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
+        vehicle.commanded.speed = command.param2
     return ACCEPTED
 
 
@@ -161,34 +156,32 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
     if command.param1 == 1.0:
         if not vehicle.has_position:
             return TEMPORARILY_REJECTED
-        vehicle.home_is_here()
-        vehicle.home_by_user = True
+        vehicle.set_home_here(by_user=True)
         return ACCEPTED
     given = (command.x, command.y, command.z)
     if not all_within(given) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
         return DENIED
-    vehicle.set_home(*given)
-    vehicle.home_by_user = True
+    vehicle.set_home(*given, by_user=True)
     return ACCEPTED
 
 
 def on_orbit(vehicle: Vehicle, command: Command) -> int:
     """DO_ORBIT: radius, speed; about the place or here."""
     commander = commander_of(vehicle)
-    centre = place_of(vehicle, command)
+    centre = commanded_point(vehicle, command)
     if centre is None or not vehicle.has_position or not vehicle.armed:
         return TEMPORARILY_REJECTED
     radius = command.param1 if isfinite(command.param1) and abs(command.param1) >= 1.0 else 5.0
     speed = command.param2 if isfinite(command.param2) and command.param2 else 1.0
     commander.orbit = (centre, radius, speed)
-    commander.wish_anew(modes.ORBIT)
+    commander.restart_mode(modes.ORBIT)
     return ACCEPTED
 
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """MISSION_START: the mode, and arming."""
     commander = commander_of(vehicle)
-    if len(vehicle.plan) == 0 or commander.wish(modes.MISSION) != ACCEPTED:
+    if len(vehicle.mission) == 0 or commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED
     return ACCEPTED if commander.arm(force=False) == ACCEPTED else DENIED
 
@@ -198,16 +191,16 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     if not isfinite(command.param1) or command.param1 <= 0.5:
         return TEMPORARILY_REJECTED
     if vehicle.armed:
-        commander_of(vehicle).disarmed("termination", events.BY_COMMAND)
+        commander_of(vehicle).finish_disarming("termination", events.BY_COMMAND)
     return ACCEPTED
 
 
-def refused(_vehicle: Vehicle, _command: Command) -> int:
+def deny(_vehicle: Vehicle, _command: Command) -> int:
     """PREFLIGHT_REBOOT_SHUTDOWN on a simulator."""
     return DENIED
 
 
-def accepted(_vehicle: Vehicle, _command: Command) -> int:
+def accept(_vehicle: Vehicle, _command: Command) -> int:
     """Acknowledged, and that is all."""
     return ACCEPTED
 
@@ -219,10 +212,10 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     SET_HOME: on_set_home,
     FLIGHT_TERMINATION: on_terminate,
     REPOSITION: on_reposition,
-    REBOOT: refused,
+    REBOOT: deny,
     MISSION_START: on_mission_start,
     ARM_DISARM: on_arm,
-    REQUEST_PROTOCOL: accepted,
+    REQUEST_PROTOCOL: accept,
 }
 
 COPTER_COMMANDS: Mapping[int, Handler] = {
@@ -239,10 +232,10 @@ FROM_JOYSTICK = (1, 2, 3)
 
 
 @runtime_checkable
-class Follower(Protocol):
+class OffboardManoeuvre(Protocol):
     """A manoeuvre of OFFBOARD."""
 
-    def take(self, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
+    def receive(self, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
         """A set-point came."""
 
 
@@ -263,14 +256,14 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
     if given is None or not enabled or fields["target"] not in (0, vehicle.system):
         return
     commander = commander_of(vehicle)
-    away = commander.joystick.take(given, vehicle.kernel.now())
-    if away:
-        commander.log.tell(events.STICKS_BACK, events.real(away))
+    lost_for = commander.joystick.receive(given, vehicle.kernel.now())
+    if lost_for:
+        commander.log.send(events.STICKS_BACK, events.float_argument(lost_for))
     set_rc_channels(vehicle, given)
     if vehicle.armed:
         _override(commander)
         if vehicle.mode.pilot:
-            vehicle.act()
+            vehicle.run_manoeuvre()
 
 
 def _override(commander: Commander) -> None:
@@ -291,13 +284,13 @@ def _take(vehicle: Vehicle, target: offboard.OffboardTarget | offboard.AttitudeT
     if target is None:
         return
     commander = commander_of(vehicle)
-    commander.stream.take(target, vehicle.kernel.now())
+    commander.stream.receive(target, vehicle.kernel.now())
     if commander.failsafe == OFFBOARD_LOST and vehicle.armed:
-        commander.give_back()
-    if isinstance(vehicle.manoeuvre, Follower):
-        vehicle.manoeuvre.take(target)
+        commander.resume_requested()
+    if isinstance(vehicle.manoeuvre, OffboardManoeuvre):
+        vehicle.manoeuvre.receive(target)
         if vehicle.armed and not (vehicle.flies and vehicle.landed):
-            vehicle.act()
+            vehicle.run_manoeuvre()
 
 
 def on_local_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:

@@ -36,23 +36,23 @@ def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float)
     figures = struct.pack("<iB", int(amsl), max(0, min(255, int(above))))
     heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
     if stage == "climb":
-        vehicle.say(INFO, "RTL HOME activated\t")
-        log.tell(events.RETURN_ACTIVATED)
+        vehicle.send_text(INFO, "RTL HOME activated\t")
+        log.send(events.RETURN_ACTIVATED)
         if not vehicle.armed:
             return
-        vehicle.say(INFO, "RTL: landing at home position.\t")
-        vehicle.say(INFO, f"RTL: climb to {heights}")
-        log.tell(events.RETURN_HOME)
-        log.tell(events.RETURN_CLIMB, figures)
+        vehicle.send_text(INFO, "RTL: landing at home position.\t")
+        vehicle.send_text(INFO, f"RTL: climb to {heights}")
+        log.send(events.RETURN_HOME)
+        log.send(events.RETURN_CLIMB, figures)
     elif stage == "return":
-        vehicle.say(INFO, f"RTL: return at {heights}")
-        log.tell(events.RETURN_FLY, figures)
+        vehicle.send_text(INFO, f"RTL: return at {heights}")
+        log.send(events.RETURN_FLY, figures)
     elif stage == "descend":
-        vehicle.say(INFO, f"RTL: descend to {heights}")
-        log.tell(events.RETURN_DESCEND, figures)
+        vehicle.send_text(INFO, f"RTL: descend to {heights}")
+        log.send(events.RETURN_DESCEND, figures)
     else:
-        vehicle.say(INFO, "RTL: land at destination\t")
-        log.tell(events.RETURN_LAND)
+        vehicle.send_text(INFO, "RTL: land at destination\t")
+        log.send(events.RETURN_LAND)
 
 
 QUADROTOR = 2
@@ -67,9 +67,9 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
     amsl = commander.takeoff_amsl
     if amsl is None or amsl < here + least:
         amsl = here + least
-        commander.least_height = least
+        commander.minimum_height = least
         if vehicle.armed:
-            commander.tell_least_height()
+            commander.report_minimum_height()
     return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
 
 
@@ -122,7 +122,7 @@ def _on_step(vehicle: Vehicle) -> None:
 def _stay_here(vehicle: Vehicle) -> None:
     """The take-off has ended: it stays at the height at which that was noticed."""
     here = vehicle.estimate.position
-    commander_of(vehicle).follow_up(modes.LOITER)
+    commander_of(vehicle).continue_with(modes.LOITER)
     if isinstance(vehicle.manoeuvre, Hold):
         vehicle.manoeuvre.point = here
 

@@ -36,7 +36,7 @@ RETURN_FLY = Event(0x01F62F50, 0x66)
 RETURN_DESCEND = Event(0x01B911E0, 0x66)
 RETURN_LAND = Event(0x0102D3AA, 0x66)
 MISSION_TAKEOFF = Event(0x01E7315E, 0x66)
-LEAST_TAKEOFF = Event(0x01DBF722, 0x66)
+MINIMUM_TAKEOFF = Event(0x01DBF722, 0x66)
 FAILSAFE = Event(0x01DEDBD0, 0x42)
 FAILSAFE_HOLD = Event(0x01D11DF6, 0x42)
 FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
@@ -74,7 +74,7 @@ class EventLog:
         self._vehicle = vehicle
         self.latest = FIRST_SEQUENCE
 
-    def tell(self, event: Event, arguments: bytes = b"") -> None:
+    def send(self, event: Event, arguments: bytes = b"") -> None:
         """Send it to everyone."""
         self.latest = (self.latest + 1) % 65_536
         fields = {
@@ -84,7 +84,7 @@ class EventLog:
             "log_levels": event.levels,
             "arguments": tuple(arguments),
         }
-        self._vehicle.outlet.tell("EVENT", fields)
+        self._vehicle.output.send_event("EVENT", fields)
 
 
 class ArmingChecks(NamedTuple):
@@ -145,6 +145,6 @@ def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
     return found
 
 
-def real(value: float) -> bytes:
+def float_argument(value: float) -> bytes:
     """A number as an argument."""
     return struct.pack("<f", value)

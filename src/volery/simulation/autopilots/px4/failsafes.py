@@ -41,7 +41,7 @@ OUTRANKS = {
 }
 """A failsafe replaces only a lesser one."""
 
-NOTICED_LATER = 145 * MS
+LOSS_DETECTION_DELAY = 145 * MS
 """Sticks silent for COM_RC_LOSS_T = 0.5 s were missed 0.63 to 0.65 s after the last sample."""
 
 RECOVERY = 0.25
@@ -54,10 +54,10 @@ def on_step(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     passed = 0.0 if commander.last_step == NEVER else to_seconds(now - commander.last_step)
     commander.last_step = now
-    _notice_silence(commander, now)
-    _notice_ground(commander, now)
+    _detect_stick_loss(commander, now)
+    _detect_ground(commander, now)
     if vehicle.armed:
-        _watch(commander, passed)
+        _check_failsafes(commander, passed)
     if vehicle.armed:
         _disarm_by_itself(commander, now)
     commander.report()
@@ -66,35 +66,35 @@ def on_step(vehicle: Vehicle) -> None:
 # --- sticks ------------------------------------------------------------------------------------------------
 
 
-def _notice_silence(commander: Commander, now: Ns) -> None:
+def _detect_stick_loss(commander: Commander, now: Ns) -> None:
     vehicle, sticks = commander.vehicle, commander.joystick
-    patience = vehicle.seconds_parameter("COM_RC_LOSS_T") + NOTICED_LATER
-    if sticks.valid and now - sticks.heard_at > patience:
+    patience = vehicle.seconds_parameter("COM_RC_LOSS_T") + LOSS_DETECTION_DELAY
+    if sticks.valid and now - sticks.last_received_ns > patience:
         sticks.valid = False
-        vehicle.sticks.release()
-        commander.log.tell(events.STICKS_LOST)
+        vehicle.rc.release()
+        commander.log.send(events.STICKS_LOST)
 
 
 # --- ground ------------------------------------------------------------------------------------------------
 
 
-def _notice_ground(commander: Commander, now: Ns) -> None:
+def _detect_ground(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies:
         return
     flying = not vehicle.estimate.landed and not vehicle.landed
     if flying and not commander.flying:
         commander.took_off, commander.lifted_at = True, now
-        vehicle.say(INFO, "Takeoff detected\t")
-        commander.log.tell(events.TAKEOFF_DETECTED)
+        vehicle.send_text(INFO, "Takeoff detected\t")
+        commander.log.send(events.TAKEOFF_DETECTED)
     elif commander.flying and not vehicle.armed and vehicle.estimate.landed:
         flying = False  # it fell: nothing is said
-        vehicle.landed = True
+        vehicle.ground.landed = True
     elif commander.flying and vehicle.landed:
         flying = False
         commander.landed_at = now
-        vehicle.say(INFO, "Landing detected\t")
-        commander.log.tell(events.LANDING_DETECTED)
+        vehicle.send_text(INFO, "Landing detected\t")
+        commander.log.send(events.LANDING_DETECTED)
     else:
         flying = commander.flying
     commander.flying = flying
@@ -108,87 +108,87 @@ def _disarm_by_itself(commander: Commander, now: Ns) -> None:
     waiting = vehicle.parameters["COM_DISARM_PRFLT"]
     if commander.took_off:
         if after_landing > 0.0 and now - commander.landed_at >= from_seconds(after_landing):
-            commander.disarmed("landing", events.BY_LANDING)
-    elif waiting > 0.0 and now - vehicle.armed_at >= from_seconds(waiting):
-        commander.disarmed("auto preflight disarming", events.BY_WAITING)
+            commander.finish_disarming("landing", events.BY_LANDING)
+    elif waiting > 0.0 and now - vehicle.arming.armed_at >= from_seconds(waiting):
+        commander.finish_disarming("auto preflight disarming", events.BY_WAITING)
 
 
 # --- failsafes ---------------------------------------------------------------------------------------------
 
 
-def _watch(commander: Commander, passed: float) -> None:
+def _check_failsafes(commander: Commander, passed: float) -> None:
     vehicle = commander.vehicle
-    _recover(commander, passed)
+    _update_hold_delay(commander, passed)
     if vehicle.flies and vehicle.landed:
         _end_of_offboard_on_ground(commander)
         return
-    _hold_ends(commander)
-    _watch_position(commander)
-    _watch_battery(commander)
-    _watch_sticks(commander)
-    _watch_offboard(commander)
-    _watch_link(commander)
+    _end_hold(commander)
+    _check_position(commander)
+    _check_battery(commander)
+    _check_sticks(commander)
+    _check_offboard(commander)
+    _check_link(commander)
 
 
-def _recover(commander: Commander, passed: float) -> None:
+def _update_hold_delay(commander: Commander, passed: float) -> None:
     full = commander.vehicle.parameters["COM_FAIL_ACT_T"]
-    if commander.delay_left < 0.0 or commander.delay_left > full:
-        commander.delay_left = full
+    if commander.hold_delay_left < 0.0 or commander.hold_delay_left > full:
+        commander.hold_delay_left = full
     if not commander.failsafe:
-        commander.delay_left = min(full, commander.delay_left + RECOVERY * passed)
+        commander.hold_delay_left = min(full, commander.hold_delay_left + RECOVERY * passed)
     elif commander.hold_until != NEVER:
-        commander.delay_left = max(0.0, commander.delay_left - passed)
+        commander.hold_delay_left = max(0.0, commander.hold_delay_left - passed)
 
 
 def _end_of_offboard_on_ground(commander: Commander) -> None:
     if commander.failsafe == OFFBOARD_LOST and commander.stream_alive():
-        commander.give_back()
+        commander.resume_requested()
 
 
 def _outranked(commander: Commander, name: str) -> bool:
     return OUTRANKS[commander.failsafe] >= OUTRANKS[name]
 
 
-def _hold_ends(commander: Commander) -> None:
+def _end_hold(commander: Commander) -> None:
     """The time to react has passed: now the action itself."""
     if commander.hold_until == NEVER or commander.vehicle.kernel.now() < commander.hold_until:
         return
     commander.hold_until = NEVER
-    commander.vehicle.say(CRITICAL, "Failsafe activated\t")
-    commander.log.tell(events.FAILSAFE_AFTER_HOLD, struct.pack("<HHBB", 0, 3, 6, 1))
+    commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
+    commander.log.send(events.FAILSAFE_AFTER_HOLD, struct.pack("<HHBB", 0, 3, 6, 1))
     commander.begin_failsafe(commander.failsafe, commander.after_hold)
 
 
 def _hold_first(commander: Commander, name: str, number: int) -> None:
     """Hold for what is left of COM_FAIL_ACT_T, so that the pilot may react; then *number*."""
-    vehicle, left = commander.vehicle, commander.delay_left
+    vehicle, left = commander.vehicle, commander.hold_delay_left
     if left <= 0.0:
-        vehicle.say(CRITICAL, "Failsafe activated\t")
+        vehicle.send_text(CRITICAL, "Failsafe activated\t")
         commander.begin_failsafe(name, number)
         return
     seconds = max(1, round(left))
-    vehicle.say(CRITICAL, f"Failsafe activated, entering Hold for {seconds} seconds\t")
-    commander.log.tell(events.FAILSAFE_HOLD, struct.pack("<HHBBBB", 0, 3, 6, seconds, 0, 1))
+    vehicle.send_text(CRITICAL, f"Failsafe activated, entering Hold for {seconds} seconds\t")
+    commander.log.send(events.FAILSAFE_HOLD, struct.pack("<HHBBBB", 0, 3, 6, seconds, 0, 1))
     commander.begin_failsafe(name, modes.LOITER)
     commander.hold_until = vehicle.kernel.now() + from_seconds(left)
     commander.after_hold = number
 
 
-def _watch_offboard(commander: Commander) -> None:
+def _check_offboard(commander: Commander) -> None:
     vehicle = commander.vehicle
-    if commander.wished != modes.OFFBOARD:
+    if commander.requested != modes.OFFBOARD:
         return
     alive = commander.stream_alive()
     if commander.failsafe == OFFBOARD_LOST and alive:
-        commander.give_back()
+        commander.resume_requested()
     elif not alive and not _outranked(commander, OFFBOARD_LOST):
         number, action = OFFBOARD_ACTIONS.get(
             round(vehicle.parameters["COM_OBL_RC_ACT"]), OFFBOARD_ACTIONS[0]
         )
         if number == modes.RTL and not commander.can_fly(modes.RTL):
             number = modes.LAND
-        vehicle.say(CRITICAL, "Failsafe activated\t")
-        commander.log.tell(events.FAILSAFE, bytes((0, 0, 6, 0, action)))
+        vehicle.send_text(CRITICAL, "Failsafe activated\t")
+        commander.log.send(events.FAILSAFE, bytes((0, 0, 6, 0, action)))
         commander.begin_failsafe(OFFBOARD_LOST, number)
 
 
@@ -196,36 +196,41 @@ STICK_EXCEPTIONS = {modes.MISSION: 1, modes.LOITER: 2, modes.OFFBOARD: 4}
 """Bits of COM_RCL_EXCEPT."""
 
 
-def _watch_sticks(commander: Commander) -> None:
+def _check_sticks(commander: Commander) -> None:
     vehicle, sticks = commander.vehicle, commander.joystick
     action = round(vehicle.parameters["NAV_RCL_ACT"])
-    if sticks.valid or not sticks.known or sticks.lost_when_armed or _outranked(commander, STICKS_LOST):
+    if (
+        sticks.valid
+        or not sticks.ever_received
+        or sticks.lost_when_armed
+        or _outranked(commander, STICKS_LOST)
+    ):
         return
-    excepted = round(vehicle.parameters["COM_RCL_EXCEPT"]) & STICK_EXCEPTIONS.get(commander.wished, 0)
-    if not action or excepted or commander.wished in (modes.RTL, modes.LAND):
+    excepted = round(vehicle.parameters["COM_RCL_EXCEPT"]) & STICK_EXCEPTIONS.get(commander.requested, 0)
+    if not action or excepted or commander.requested in (modes.RTL, modes.LAND):
         return
     _act(commander, STICKS_LOST, action)
 
 
-def _watch_link(commander: Commander) -> None:
+def _check_link(commander: Commander) -> None:
     vehicle = commander.vehicle
     action = round(vehicle.parameters["NAV_DLL_ACT"])
     if not action or commander.station_seen == NEVER:
         return
     lost = vehicle.kernel.now() - commander.station_seen > vehicle.seconds_parameter("COM_DL_LOSS_T")
-    if lost and not _outranked(commander, LINK_LOST) and commander.wished not in (modes.RTL, modes.LAND):
-        vehicle.say(INFO, "Data link lost\t")
+    if lost and not _outranked(commander, LINK_LOST) and commander.requested not in (modes.RTL, modes.LAND):
+        vehicle.send_text(INFO, "Data link lost\t")
         _act(commander, LINK_LOST, action)
 
 
 def _act(commander: Commander, name: str, action: int) -> None:
     if action in (TERMINATE, DISARM):
-        commander.vehicle.say(CRITICAL, "Failsafe activated\t")
-        commander.disarmed("failsafe", events.BY_COMMAND)
+        commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
+        commander.finish_disarming("failsafe", events.BY_COMMAND)
         return
     number = ACTIONS.get(action, modes.RTL)
     if number == modes.LOITER:
-        commander.vehicle.say(CRITICAL, "Failsafe activated\t")
+        commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
         commander.begin_failsafe(name, number)
     else:
         _hold_first(commander, name, number)
@@ -234,23 +239,23 @@ def _act(commander: Commander, name: str, action: int) -> None:
 LOW, CRITICALLY_LOW, EMERGENCY = "BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"
 
 
-def _watch_battery(commander: Commander) -> None:
+def _check_battery(commander: Commander) -> None:
     vehicle, left = commander.vehicle, commander.vehicle.estimate.battery_left
     action = round(vehicle.parameters["COM_LOW_BAT_ACT"])
     if left < vehicle.parameters[EMERGENCY]:
         _say_once(vehicle, CRITICAL, "Emergency battery level\t")
         if action and not _outranked(commander, BATTERY_EMERGENCY):
-            _battery_acts(commander, BATTERY_EMERGENCY, modes.LAND)
+            _react_to_battery(commander, BATTERY_EMERGENCY, modes.LAND)
     elif left < vehicle.parameters[CRITICALLY_LOW]:
         _say_once(vehicle, CRITICAL, "Critical battery level\t")
         if action and not _outranked(commander, BATTERY_CRITICAL):
-            _battery_acts(commander, BATTERY_CRITICAL, modes.LAND if action == 2 else modes.RTL)
+            _react_to_battery(commander, BATTERY_CRITICAL, modes.LAND if action == 2 else modes.RTL)
     elif left < vehicle.parameters[LOW]:
         _say_once(vehicle, WARNING, "Low battery level\t")
 
 
-def _battery_acts(commander: Commander, name: str, number: int) -> None:
-    if commander.wished in (modes.LAND, number):
+def _react_to_battery(commander: Commander, name: str, number: int) -> None:
+    if commander.requested in (modes.LAND, number):
         return
     if not commander.can_fly(number):
         number = modes.LAND
@@ -258,25 +263,25 @@ def _battery_acts(commander: Commander, name: str, number: int) -> None:
 
 
 def _say_once(vehicle: Vehicle, severity: int, text: str) -> None:
-    if text not in vehicle.said:
-        vehicle.said.add(text)
-        vehicle.say(severity, text)
+    if text not in vehicle.reports.sent_once:
+        vehicle.reports.sent_once.add(text)
+        vehicle.send_text(severity, text)
 
 
-def _watch_position(commander: Commander) -> None:
+def _check_position(commander: Commander) -> None:
     """Without a position: the pilot gets the height, or nobody does and it sinks level."""
     vehicle = commander.vehicle
-    flown = commander.acting or commander.wished
+    flown = commander.failsafe_mode or commander.requested
     lost = not vehicle.has_position
     if commander.failsafe == POSITION_LOST:
         if not lost and not commander.descending:
-            commander.give_back()
+            commander.resume_requested()
         return
     needs = vehicle.rules.modes[flown].needs_position or flown == modes.LAND
     if not lost or not needs:
         return
-    vehicle.say(CRITICAL, "Failsafe activated\t")
-    if commander.joystick.valid and commander.wished == modes.POSCTL:
+    vehicle.send_text(CRITICAL, "Failsafe activated\t")
+    if commander.joystick.valid and commander.requested == modes.POSCTL:
         commander.begin_failsafe(POSITION_LOST, modes.ALTCTL)
     else:
         commander.descending = True

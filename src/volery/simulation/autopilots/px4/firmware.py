@@ -59,28 +59,28 @@ def _origin_set(vehicle: Vehicle) -> None:
     vehicle.flight.set_origin()
 
 
-def home_set(vehicle: Vehicle) -> None:
+def set_home_position(vehicle: Vehicle) -> None:
     """The position is good enough for a home."""
     if vehicle.estimate.position_ok and vehicle.home is None:
-        vehicle.home_is_here()
+        vehicle.set_home_here()
 
 
-def stand(vehicle: Vehicle) -> None:
+def stand_on_ground(vehicle: Vehicle) -> None:
     """On the ground, disarmed."""
-    vehicle.landed = True
+    vehicle.ground.landed = True
 
 
 EVENTS = (
-    BootEvent(0, stand),
+    BootEvent(0, stand_on_ground),
     BootEvent(ORIGIN, _origin_set),
-    BootEvent(HOME, home_set),
-    BootEvent(READY_AFTER - 50 * MS, home_set),
+    BootEvent(HOME, set_home_position),
+    BootEvent(READY_AFTER - 50 * MS, set_home_position),
 )
 
 
 def on_position(vehicle: Vehicle) -> None:
     """A warm vehicle has found its place."""
-    home_set(vehicle)
+    set_home_position(vehicle)
     commander_of(vehicle).reported = commander_of(vehicle).checks()
 
 
@@ -229,12 +229,12 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
         ),
         missions=MissionPolicy(
             upload=MissionUploadPolicy(
-                mission.asks_with, received="", turns_to_integers=True, keeps_old=True
+                mission.request_message, received="", turns_to_integers=True, keeps_old=True
             ),
             runs=mission.runs,
             stored_item=mission.stored_item,
             home_item=mission.no_home_item,
-            go_to_item=mission.goes_nowhere,
+            go_to_item=mission.refuse_guided_item,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,
@@ -266,7 +266,7 @@ def px4_firmware(
             rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
             firmware_state=Commander,
         ),
-        boot=BootSequence(EVENTS, stand, on_position),
+        boot=BootSequence(EVENTS, stand_on_ground, on_position),
         periodic=PeriodicWork(on_step=on_step, failsafe_ticks=1),
         endpoint=endpoint,
     )

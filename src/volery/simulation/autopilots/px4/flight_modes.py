@@ -66,7 +66,7 @@ class Hold(ToPoint):
         return Setpoint(
             Control.POSITION,
             position=point,
-            yaw=self.yaw if vehicle.yaw_target is None else vehicle.yaw_target,
+            yaw=self.yaw if vehicle.commanded.yaw is None else vehicle.commanded.yaw,
             speed=self._cruise(),
             speed_up=tuning.speed_up,
             speed_down=tuning.speed_down,
@@ -79,7 +79,7 @@ class Hold(ToPoint):
     def _cruise(self) -> float:
         """Speed in the plane; slow until the nose points along the leg."""
         vehicle = self.vehicle
-        speed = CRUISE_SHARE * (self.speed or vehicle.speed or vehicle.parameters["MPC_XY_CRUISE"])
+        speed = CRUISE_SHARE * (self.speed or vehicle.commanded.speed or vehicle.parameters["MPC_XY_CRUISE"])
         if self.yaw is None or abs(wrap(self.yaw - vehicle.estimate.attitude[2])) < ALIGNED:
             return speed
         return min(speed, SPEED_ASIDE)
@@ -107,7 +107,7 @@ class TakeOff(Hold):
         north, east, _ = self.vehicle.estimate.position
         self.point = self.target = (north, east, self.down)
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """That is what it is for."""
         return True
 
@@ -143,9 +143,9 @@ class Return(Manoeuvre):
 
     def __init__(self, vehicle: Vehicle, told: Callable[[Vehicle, str, float, float], None]) -> None:
         super().__init__(vehicle)
-        self._told = told
+        self._report = told
         self._stage = ""
-        self._doing: Manoeuvre = Hold(vehicle)
+        self._active: Manoeuvre = Hold(vehicle)
 
     def enter(self) -> None:
         """Straight up first."""
@@ -173,25 +173,25 @@ class Return(Manoeuvre):
 
     def _next(self, stage: str, point: Vector) -> None:
         self._stage = stage
-        self._doing = Descent(self.vehicle, point) if stage == "land" else Hold(self.vehicle, point)
-        self._doing.enter()
-        self.target, self.landing = self._doing.target, self._doing.landing
+        self._active = Descent(self.vehicle, point) if stage == "land" else Hold(self.vehicle, point)
+        self._active.enter()
+        self.target, self.landing = self._active.target, self._active.landing
         above = self._home[2] - point[2]
         amsl = (self.vehicle.home.amsl if self.vehicle.home else 0.0) + above
-        self._told(self.vehicle, stage, amsl, above)
+        self._report(self.vehicle, stage, amsl, above)
 
     def step(self) -> None:
         """On to the next stage when one is done."""
-        doing, home = self._doing, self._home
+        active, home = self._active, self._home
         p = self.vehicle.parameters
-        if isinstance(doing, Hold):
-            if self._stage == "climb" and doing.near(1e9, p["NAV_MC_ALT_RAD"]):
+        if isinstance(active, Hold):
+            if self._stage == "climb" and active.near(1e9, p["NAV_MC_ALT_RAD"]):
                 self._next("return", (home[0], home[1], home[2] - self._height))
-            elif self._stage == "return" and doing.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
+            elif self._stage == "return" and active.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
                 self._next("descend", (home[0], home[1], home[2] - min(self._height, p["RTL_DESCEND_ALT"])))
-            elif self._stage == "descend" and doing.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
+            elif self._stage == "descend" and active.near(p["NAV_ACC_RAD"], p["NAV_MC_ALT_RAD"]):
                 self._next("land", home)
-        self._doing.step()
+        self._active.step()
 
 
 class Orbit(Manoeuvre):
@@ -240,7 +240,7 @@ STICK_SPEED_SHARE = 0.78
 """Of MPC_VEL_MANUAL: what a stick held for long came to in the recordings."""
 
 
-def curve(stick: float, dead: float) -> float:
+def apply_expo(stick: float, dead: float) -> float:
     """-1..1: nothing within the dead zone, gently beyond."""
     size = abs(stick)
     if size <= dead:
@@ -298,7 +298,7 @@ class PositionControl(ByPilot):
         self._velocity, self._held, self._blind = (north, east), None, None
         self._last = self.vehicle.kernel.now()
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """When the pilot asks to climb."""
         return self._sticks and self._climb() > 0.0
 
@@ -309,7 +309,7 @@ class PositionControl(ByPilot):
 
     def _climb(self) -> float:
         p = self.vehicle.parameters
-        asked = curve(self.vehicle.firmware_state.joystick.now.throttle, p["MPC_HOLD_DZ"])
+        asked = apply_expo(self.vehicle.firmware_state.joystick.now.throttle, p["MPC_HOLD_DZ"])
         return asked * (p["MPC_Z_VEL_MAX_UP"] if asked > 0.0 else p["MPC_Z_VEL_MAX_DN"])
 
     def step(self) -> None:
@@ -329,7 +329,7 @@ class PositionControl(ByPilot):
         now = vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
         sticks, dead = vehicle.firmware_state.joystick.now, p["MPC_HOLD_DZ"]
-        forward, right = curve(sticks.pitch, dead), curve(sticks.roll, dead)
+        forward, right = apply_expo(sticks.pitch, dead), apply_expo(sticks.roll, dead)
         self._move(forward, right, passed)
         climb = self._climb()
         north, east = self._velocity
@@ -339,7 +339,7 @@ class PositionControl(ByPilot):
                 position=self._held or (0.0, 0.0, 0.0),
                 velocity=(north, east, -climb),
                 climb=min(climb, climb_share(vehicle) * tuning.speed_up),
-                yaw_rate=curve(sticks.yaw, dead) * tuning.pilot_yaw_rate,
+                yaw_rate=apply_expo(sticks.yaw, dead) * tuning.pilot_yaw_rate,
                 speed=tuning.speed,
                 speed_up=climb_share(vehicle) * tuning.speed_up,
                 speed_down=tuning.speed_down,

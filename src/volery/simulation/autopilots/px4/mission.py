@@ -55,7 +55,7 @@ REACHED_EVERY: Ns = 100 * MS
 """and so far apart."""
 
 
-def asks_with(number: int) -> str:
+def request_message(number: int) -> str:
     """The first item is asked for by the old message, the rest by the new one."""
     return "MISSION_REQUEST" if number == 0 else "MISSION_REQUEST_INT"
 
@@ -77,7 +77,7 @@ def runs(_vehicle: Vehicle) -> bool:
     return False
 
 
-def goes_nowhere(_vehicle: Vehicle, _item: MissionItem) -> bool:
+def refuse_guided_item(_vehicle: Vehicle, _item: MissionItem) -> bool:
     """An item that is no part of a mission is refused."""
     return False
 
@@ -86,7 +86,7 @@ def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """MISSION_ITEM_REACHED, again and again."""
 
     def tell() -> None:
-        vehicle.outlet.tell("MISSION_ITEM_REACHED", {"seq": index})
+        vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
 
     tell()
     for again in range(1, REACHED_AGAIN + 1):
@@ -97,8 +97,8 @@ def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
     """A take-off says how high; a return is the mode of that name."""
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
-        vehicle.say(INFO, f"Takeoff to {above:.1f} meters above home\t")
-        commander_of(vehicle).log.tell(events.MISSION_TAKEOFF, events.real(above))
+        vehicle.send_text(INFO, f"Takeoff to {above:.1f} meters above home\t")
+        commander_of(vehicle).log.send(events.MISSION_TAKEOFF, events.float_argument(above))
 
 
 def ended(vehicle: Vehicle) -> None:
@@ -108,13 +108,13 @@ def ended(vehicle: Vehicle) -> None:
 
 def _loiter(vehicle: Vehicle) -> None:
     if vehicle.armed and not vehicle.landed and vehicle.mode.number == modes.MISSION:
-        commander_of(vehicle).follow_up(modes.LOITER)
+        commander_of(vehicle).continue_with(modes.LOITER)
 
 
 def act(vehicle: Vehicle, item: MissionItem) -> None:
     """Items that are done at once."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
-        vehicle.speed = item.param2
+        vehicle.commanded.speed = item.param2
 
 
 MISSION_RULES = MissionRules(
@@ -161,7 +161,7 @@ class LandAt(Manoeuvre):
         (self._going or self._landing).step()
 
 
-class Going(Hold):
+class FlyToItem(Hold):
     """To an item's place; from the ground straight up to its height first."""
 
     slow_start = True
@@ -176,7 +176,7 @@ class Going(Hold):
         if self._climbing is not None:
             self._climbing.enter()
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """A mission does."""
         return True
 
@@ -208,7 +208,7 @@ def _go(vehicle: Vehicle, item: MissionItem) -> Leg:
     p = vehicle.parameters
     point = vehicle.estimate.position if item.command == DELAY else item_point(vehicle, item)
     far = not Hold(vehicle, point).near(p["NAV_ACC_RAD"], 1e9)
-    going = Going(vehicle, point, bearing(vehicle.estimate.position, point) if far else None)
+    going = FlyToItem(vehicle, point, bearing(vehicle.estimate.position, point) if far else None)
     reach = item.param2 if item.command == WAYPOINT and item.param2 > 0.0 else p["NAV_ACC_RAD"]
     stay = from_seconds(max(0.0, item.param1)) if item.command in (WAYPOINT, LOITER_TIME, DELAY) else 0
     if item.command == LOITER_UNLIMITED:

@@ -116,22 +116,22 @@ class Commander:
         self.joystick = Joystick()
         self.stream = SetpointStream()
         self.log = events.EventLog(self.vehicle)
-        self.wished = LOITER
+        self.requested = LOITER
         """The mode that the user wants."""
         self.after_disarming = LOITER
         self.failsafe = ""
         """What replaces the wished mode now: its name, or nothing."""
-        self.acting: int | None = None
+        self.failsafe_mode: int | None = None
         """The mode that the failsafe flies; ``None``: the wished one."""
         self.descending = False
         """Whether AUTO.LAND stands for the blind descent without a position."""
         self.takeoff_amsl: float | None = None
         """Altitude of the next take-off, where one was commanded."""
-        self.least_height = 0.0
+        self.minimum_height = 0.0
         """Of the next take-off, where that was raised to the least one; 0: it was not."""
         self.orbit: tuple[Vector, float, float] | None = None
         """Centre, radius, speed of a circle."""
-        self.delay_left = -1.0
+        self.hold_delay_left = -1.0
         """Seconds of Hold that a failsafe may still take; below 0: all of COM_FAIL_ACT_T."""
         self.hold_until: Ns = NEVER
         self.after_hold = 0
@@ -174,9 +174,9 @@ class Commander:
             attitude=age >= ATTITUDE_AFTER,
             position=self.ready,
             sticks=self.joystick.valid,
-            mission=len(vehicle.plan) > 0,
+            mission=len(vehicle.mission) > 0,
             offboard=self.stream_alive(),
-            mode=vehicle.armed or vehicle.rules.modes[self.wished].armable,
+            mode=vehicle.armed or vehicle.rules.modes[self.requested].armable,
         )
 
     def can_fly(self, number: int) -> bool:
@@ -189,78 +189,78 @@ class Commander:
             return False
         if number == OFFBOARD and not self.stream_alive():
             return False
-        return number != MISSION or len(vehicle.plan) > 0
+        return number != MISSION or len(vehicle.mission) > 0
 
     # -- modes
 
-    def wish(self, number: int) -> int:
+    def request_mode(self, number: int) -> int:
         """The user asks for a mode; returns a MAV_RESULT. Disarmed every mode is accepted."""
         vehicle = self.vehicle
         if number not in vehicle.rules.modes:
             return ACCEPTED if not vehicle.armed else UNSUPPORTED
         if vehicle.armed and not self.can_fly(number):
-            vehicle.say(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
+            vehicle.send_text(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
             group = OFFBOARD_IN_EVENTS if number == OFFBOARD else POSITION_IN_EVENTS
-            self.log.tell(events.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
+            self.log.send(events.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
             return TEMPORARILY_REJECTED
-        self._take_wish(number)
+        self._accept_mode(number)
         return ACCEPTED
 
-    def _take_wish(self, number: int) -> None:
+    def _accept_mode(self, number: int) -> None:
         vehicle = self.vehicle
-        self.wished = number
+        self.requested = number
         if vehicle.rules.modes[number].armable:
             self.after_disarming = number
         self.end_failsafe()
-        self.joystick.rest()
+        self.joystick.set_reference()
         self._fly(number)
 
     def _fly(self, number: int, anew: bool = False) -> None:
         mode = self.vehicle.rules.modes[number]
         if mode is not self.vehicle.mode or anew:
-            self.vehicle.enter(mode)
+            self.vehicle.enter_mode(mode)
 
-    def wish_anew(self, number: int) -> None:
+    def restart_mode(self, number: int) -> None:
         """Fly that mode from its start, although it may be flown already: its aim has changed."""
-        again = self.vehicle.mode.number == number and self.acting is None
-        self._take_wish(number)
+        again = self.vehicle.mode.number == number and self.failsafe_mode is None
+        self._accept_mode(number)
         if again:
             self._fly(number, anew=True)
 
-    def follow_up(self, number: int) -> None:
+    def continue_with(self, number: int) -> None:
         """A mode has ended; another one follows by itself."""
-        self.wished = number
+        self.requested = number
         if self.vehicle.rules.modes[number].armable:
             self.after_disarming = number
-        self.joystick.rest()
+        self.joystick.set_reference()
         self._fly(number)
 
     # -- failsafes
 
     def begin_failsafe(self, name: str, number: int) -> None:
         """Fly that mode instead of the wished one."""
-        self.failsafe, self.acting = name, number
-        self.joystick.rest()
+        self.failsafe, self.failsafe_mode = name, number
+        self.joystick.set_reference()
         self._fly(number)
 
     def end_failsafe(self) -> None:
         """Its cause is gone, or somebody took over."""
-        self.failsafe, self.acting, self.hold_until = "", None, NEVER
+        self.failsafe, self.failsafe_mode, self.hold_until = "", None, NEVER
         self.descending = False
 
-    def give_back(self) -> None:
+    def resume_requested(self) -> None:
         """Fly the wished mode again."""
         self.end_failsafe()
-        self.joystick.rest()
-        self._fly(self.wished)
+        self.joystick.set_reference()
+        self._fly(self.requested)
 
     def pilot_takes_over(self) -> None:
         """The sticks moved in a mode that flies by itself."""
         if self.failsafe:
-            self.log.tell(events.PILOT_TOOK_OVER)
+            self.log.send(events.PILOT_TOOK_OVER)
         else:
-            self.vehicle.say(INFO, "Pilot took over using sticks\t")
-        self._take_wish(POSCTL)
+            self.vehicle.send_text(INFO, "Pilot took over using sticks\t")
+        self._accept_mode(POSCTL)
 
     # -- arming
 
@@ -271,39 +271,41 @@ class Commander:
             return ACCEPTED
         if not force:
             if self._throttle_is_high():
-                vehicle.say(CRITICAL, "Arming denied: throttle above center\t")
-                self.log.tell(events.THROTTLE_HIGH)
+                vehicle.send_text(CRITICAL, "Arming denied: throttle above center\t")
+                self.log.send(events.THROTTLE_HIGH)
                 return TEMPORARILY_REJECTED
             if not self.armable:
-                vehicle.refused_at = vehicle.kernel.now()
+                vehicle.arming.refused_at = vehicle.kernel.now()
                 return TEMPORARILY_REJECTED
-        if vehicle.has_position and not vehicle.home_by_user:
-            vehicle.home_is_here()
+        if vehicle.has_position and not (vehicle.home and vehicle.home.by_user):
+            vehicle.set_home_here()
         self.joystick.lost_when_armed = not self.joystick.valid
-        self.joystick.rest()
+        self.joystick.set_reference()
         self.took_off = False
         self.lifted_at = NEVER
         self.ground = vehicle.estimate.position[2]
         vehicle.arm()
-        vehicle.say(INFO, "Armed by external command\t")
-        self.log.tell(events.ARMED, events.BY_COMMAND)
-        self.tell_least_height()
+        vehicle.send_text(INFO, "Armed by external command\t")
+        self.log.send(events.ARMED, events.BY_COMMAND)
+        self.report_minimum_height()
         return ACCEPTED
 
-    def tell_least_height(self) -> None:
+    def report_minimum_height(self) -> None:
         """Once, if the take-off that begins was raised to the least height."""
-        if self.least_height and self.wished == TAKEOFF:
-            self.vehicle.say(INFO, f"Using minimum takeoff altitude: {self.least_height:.2f} m\t")
-            self.log.tell(events.LEAST_TAKEOFF, events.real(self.least_height))
-        self.least_height = 0.0
+        if self.minimum_height and self.requested == TAKEOFF:
+            self.vehicle.send_text(INFO, f"Using minimum takeoff altitude: {self.minimum_height:.2f} m\t")
+            self.log.send(events.MINIMUM_TAKEOFF, events.float_argument(self.minimum_height))
+        self.minimum_height = 0.0
 
     @property
     def armable(self) -> bool:
         """Whether the checks let it arm in the wished mode."""
-        mode = self.vehicle.rules.modes[self.wished]
-        return self._fit(mode.needs_position) and mode.armable and self.can_fly(self.wished)
+        mode = self.vehicle.rules.modes[self.requested]
+        return (
+            self._position_checks_pass(mode.needs_position) and mode.armable and self.can_fly(self.requested)
+        )
 
-    def _fit(self, to_go_by_position: bool) -> bool:
+    def _position_checks_pass(self, to_go_by_position: bool) -> bool:
         """COM_ARM_WO_GPS: by sticks it also arms without a position."""
         if self.ready:
             return True
@@ -311,9 +313,9 @@ class Commander:
         return not to_go_by_position and allowed and self.checks().attitude
 
     def _throttle_is_high(self) -> bool:
-        if not self.joystick.valid or self.wished not in NEEDS_STICKS:
+        if not self.joystick.valid or self.requested not in NEEDS_STICKS:
             return False
-        by_thrust = self.vehicle.flies and self.wished in (
+        by_thrust = self.vehicle.flies and self.requested in (
             MANUAL,
             STABILIZE,
             ACRO,
@@ -326,22 +328,22 @@ class Commander:
         if not vehicle.armed:
             return ACCEPTED
         if vehicle.flies and not vehicle.landed and not force:
-            vehicle.say(CRITICAL, "Disarming denied! Not landed\t")
-            self.log.tell(events.DISARM_REFUSED)
+            vehicle.send_text(CRITICAL, "Disarming denied! Not landed\t")
+            self.log.send(events.DISARM_REFUSED)
             return TEMPORARILY_REJECTED
-        self.disarmed("external command", events.BY_COMMAND)
+        self.finish_disarming("external command", events.BY_COMMAND)
         return ACCEPTED
 
-    def disarmed(self, words: str, reason: bytes) -> None:
+    def finish_disarming(self, words: str, reason: bytes) -> None:
         """Disarm, say by what, and go back to a mode that may be armed."""
         vehicle = self.vehicle
         vehicle.disarm()
-        vehicle.say(INFO, f"Disarmed by {words}\t")
-        self.log.tell(events.DISARMED, reason)
+        vehicle.send_text(INFO, f"Disarmed by {words}\t")
+        self.log.send(events.DISARMED, reason)
         self.end_failsafe()
         self.takeoff_amsl = None
-        self.wished = self.after_disarming
-        self._fly(self.wished)
+        self.requested = self.after_disarming
+        self._fly(self.requested)
 
     # -- reports
 
@@ -355,7 +357,7 @@ class Commander:
         if found != self.reported:
             self.reported, self.reported_at = found, now
             for event, arguments in events.arming_report(found):
-                self.log.tell(event, arguments)
+                self.log.send(event, arguments)
 
 
 OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3

@@ -73,16 +73,16 @@ class SetpointStream:
     """The set-points of one vehicle."""
 
     def __init__(self) -> None:
-        self.heard_at: Ns = NEVER
+        self.last_received_ns: Ns = NEVER
         self.target: OffboardTarget | AttitudeTarget | None = None
 
-    def take(self, target: OffboardTarget | AttitudeTarget, now: Ns) -> None:
+    def receive(self, target: OffboardTarget | AttitudeTarget, now: Ns) -> None:
         """A set-point came."""
-        self.heard_at, self.target = now, target
+        self.last_received_ns, self.target = now, target
 
     def alive(self, now: Ns, within: Ns) -> bool:
         """Whether the last one is not older than that."""
-        return self.heard_at != NEVER and now - self.heard_at <= within
+        return self.last_received_ns != NEVER and now - self.last_received_ns <= within
 
 
 def _masked(values: Vector, mask: int, shift: int) -> Vector:
@@ -125,14 +125,14 @@ def local_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Off
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_LOCAL_NED"
     if frame not in (LOCAL_NED, BODY_NED):
-        vehicle.say(CRITICAL, f"{message} coordinate frame {frame} unsupported\t")
-        log.tell(FRAME_UNSUPPORTED)
+        vehicle.send_text(CRITICAL, f"{message} coordinate frame {frame} unsupported\t")
+        log.send(FRAME_UNSUPPORTED)
         return None
     place = _masked((fields["x"], fields["y"], fields["z"]), mask, 0)
     target = _target(fields, ABSENT if frame == BODY_NED else place)
     if target is None:
-        vehicle.say(CRITICAL, f"{message} invalid\t")
-        log.tell(SETPOINT_INVALID)
+        vehicle.send_text(CRITICAL, f"{message} invalid\t")
+        log.send(SETPOINT_INVALID)
         return None
     if frame == BODY_NED:
         target = target._replace(
@@ -146,15 +146,15 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Of
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_GLOBAL_INT"
     if frame not in GLOBAL_FRAMES:
-        vehicle.say(CRITICAL, f"{message} invalid coordinate frame {frame}\t")
-        log.tell(FRAME_UNSUPPORTED)
+        vehicle.send_text(CRITICAL, f"{message} invalid coordinate frame {frame}\t")
+        log.send(FRAME_UNSUPPORTED)
         return None
     altitude = fields["alt"] if isfinite(fields["alt"]) else 0.0
     place = vehicle.point(frame, fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, altitude)
     target = _target(fields, _masked(place, mask, 0))
     if target is None:
-        vehicle.say(CRITICAL, f"{message} invalid\t")
-        log.tell(SETPOINT_INVALID)
+        vehicle.send_text(CRITICAL, f"{message} invalid\t")
+        log.send(SETPOINT_INVALID)
     return target
 
 
@@ -192,12 +192,12 @@ SUBSTEP = 0.02
 """In which the reference velocity is reckoned [s]."""
 
 
-class Pursue(Manoeuvre):
+class FollowTarget(Manoeuvre):
     """Chase a ``OffboardTarget`` axis by axis; without one, stay."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._aim: OffboardTarget | None = None
+        self._setpoint: OffboardTarget | None = None
         self._velocity: Vector = (0.0, 0.0, 0.0)
         self._integral = (0.0, 0.0)
         self._last: Ns = 0
@@ -207,35 +207,35 @@ class Pursue(Manoeuvre):
         self._velocity = self.vehicle.estimate.velocity
         self._integral = (DRAG * self._velocity[0], DRAG * self._velocity[1])
         self._last = self.vehicle.kernel.now()
-        self._aim = None
+        self._setpoint = None
 
-    def aim(self, target: OffboardTarget) -> None:
+    def follow(self, target: OffboardTarget) -> None:
         """Chase that from now on."""
-        self._aim = target
+        self._setpoint = target
         north, east, down = target.position
         here = self.vehicle.estimate.position
         known = isfinite(north) and isfinite(east)
         self.target = (north, east, down if isfinite(down) else here[2]) if known else None
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """If what it chases is above."""
-        return self._aim is not None and self._aim.lifts(self.vehicle.estimate.position[2])
+        return self._setpoint is not None and self._setpoint.lifts(self.vehicle.estimate.position[2])
 
     def step(self) -> None:
         """Go on chasing."""
         vehicle = self.vehicle
         now = vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
-        if self._aim is None:
-            self._aim = OffboardTarget(position=vehicle.estimate.position)
-        self._velocity = self._chased(self._aim, passed)
+        if self._setpoint is None:
+            self._setpoint = OffboardTarget(position=vehicle.estimate.position)
+        self._velocity = self._reference_velocity(self._setpoint, passed)
         tuning = vehicle.tuning
-        rate = self._aim.yaw_rate
+        rate = self._setpoint.yaw_rate
         vehicle.drive(
             Setpoint(
                 Control.VELOCITY,
                 velocity=self._velocity,
-                yaw=self._aim.yaw if rate is None else None,
+                yaw=self._setpoint.yaw if rate is None else None,
                 yaw_rate=rate,
                 speed=tuning.speed,
                 speed_up=climb_share(vehicle) * tuning.speed_up,
@@ -247,17 +247,17 @@ class Pursue(Manoeuvre):
             )
         )
 
-    def _chased(self, aim: OffboardTarget, passed: float) -> Vector:
+    def _reference_velocity(self, setpoint: OffboardTarget, passed: float) -> Vector:
         """The velocity to fly now: what the recorded airframe would have come to."""
-        north, east = self._wanted(aim, 0), self._wanted(aim, 1)
+        north, east = self._axis_velocity(setpoint, 0), self._axis_velocity(setpoint, 1)
         speed, most = hypot(north, east), self.vehicle.tuning.speed
         if speed > most:
             north, east = north * most / speed, east * most / speed
         for _ in range(max(1, round(passed / SUBSTEP))):
-            self._follow(north, east)
-        return self._velocity[0], self._velocity[1], self._wanted(aim, 2)
+            self._integrate(north, east)
+        return self._velocity[0], self._velocity[1], self._axis_velocity(setpoint, 2)
 
-    def _follow(self, north: float, east: float) -> None:
+    def _integrate(self, north: float, east: float) -> None:
         """One substep of velocity loop and drag."""
         vn, ve, _ = self._velocity
         gn, ge = self._integral
@@ -269,8 +269,8 @@ class Pursue(Manoeuvre):
         self._velocity = (vn + an * share * SUBSTEP, ve + ae * share * SUBSTEP, 0.0)
         self._integral = (gn + VELOCITY_INTEGRAL * dn * SUBSTEP, ge + VELOCITY_INTEGRAL * de * SUBSTEP)
 
-    def _wanted(self, aim: OffboardTarget, axis: int) -> float:
-        place, speed, push = aim.position[axis], aim.velocity[axis], aim.acceleration[axis]
+    def _axis_velocity(self, setpoint: OffboardTarget, axis: int) -> float:
+        place, speed, push = setpoint.position[axis], setpoint.velocity[axis], setpoint.acceleration[axis]
         wanted = speed if isfinite(speed) else 0.0
         if isfinite(place):
             gain = 0.95 if axis < 2 else 1.0  # MPC_XY_P, MPC_Z_P
@@ -288,33 +288,33 @@ class Offboard(Manoeuvre):
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._pursuit = Pursue(vehicle)
+        self._follower = FollowTarget(vehicle)
         self._attitude: AttitudeTarget | None = None
 
     def enter(self) -> None:
         """Stay until told."""
-        self._pursuit.enter()
-        self.take(self.vehicle.firmware_state.stream.target)
+        self._follower.enter()
+        self.receive(self.vehicle.firmware_state.stream.target)
 
-    def take(self, target: OffboardTarget | AttitudeTarget | None) -> None:
+    def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
         """A set-point came."""
         self._attitude = target if isinstance(target, AttitudeTarget) else None
         if isinstance(target, OffboardTarget):
-            self._pursuit.aim(target)
-        self.target = None if self._attitude else self._pursuit.target
+            self._follower.follow(target)
+        self.target = None if self._attitude else self._follower.target
 
-    def wants_to_fly(self) -> bool:
+    def takeoff_requested(self) -> bool:
         """If it is asked to climb, or given much thrust."""
         if self._attitude is not None:
             return self._attitude.thrust > 0.3
-        return self._pursuit.wants_to_fly()
+        return self._follower.takeoff_requested()
 
     def step(self) -> None:
         """Fly it."""
         if self._attitude is None:
-            self._pursuit.step()
+            self._follower.step()
             return
-        self._pursuit.enter()
+        self._follower.enter()
         roll, pitch, yaw = quaternion_to_euler(self._attitude.attitude)
         rate = self._attitude.yaw_rate
         share = self._attitude.thrust / self.vehicle.parameters["MPC_THR_HOVER"]

@@ -41,37 +41,37 @@ class Joystick:
 
     def __init__(self) -> None:
         self.now = StickDeflection()
-        self.heard_at: Ns = NEVER
+        self.last_received_ns: Ns = NEVER
         self.valid = False
         self.lost_when_armed = True
         """Whether they were missing when it was armed and have not come since: then their absence is no
         failsafe.
         """
-        self._rested = StickDeflection()
+        self._reference = StickDeflection()
         self._moved = False
 
     @property
-    def known(self) -> bool:
+    def ever_received(self) -> bool:
         """Whether they have ever been heard."""
-        return self.heard_at != NEVER
+        return self.last_received_ns != NEVER
 
-    def rest(self) -> None:
+    def set_reference(self) -> None:
         """From now on movement is counted from here."""
-        self._rested = self.now
+        self._reference = self.now
         self._moved = False
 
-    def take(self, given: StickDeflection, now: Ns) -> float:
+    def receive(self, given: StickDeflection, now: Ns) -> float:
         """A sample came. Returns the seconds for which they had been lost; 0 if they had not."""
-        away = to_seconds(now - self.heard_at) if self.known and not self.valid else 0.0
+        lost_for = to_seconds(now - self.last_received_ns) if self.ever_received and not self.valid else 0.0
         if not self.valid:
-            self._rested = given
-        self.now, self.heard_at, self.valid = given, now, True
+            self._reference = given
+        self.now, self.last_received_ns, self.valid = given, now, True
         self.lost_when_armed = False
-        return away
+        return lost_for
 
     def moved(self, share: float) -> bool:
         """Whether any stick has moved by more than that share of its way since it rested."""
-        pairs = zip(self.now, self._rested, strict=True)
+        pairs = zip(self.now, self._reference, strict=True)
         return self.valid and any(abs(value - rested) > share for value, rested in pairs)
 
 
@@ -80,4 +80,4 @@ def set_rc_channels(vehicle: Vehicle, given: StickDeflection) -> None:
     now = vehicle.kernel.now()
     axes = {ROLL: given.roll, PITCH: -given.pitch, THROTTLE: given.throttle, YAW: given.yaw}
     for channel, value in axes.items():
-        vehicle.sticks.override(channel, round(1500.0 + 500.0 * value), now)
+        vehicle.rc.override(channel, round(1500.0 + 500.0 * value), now)

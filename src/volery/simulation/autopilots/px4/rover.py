@@ -42,18 +42,18 @@ class HoldRover(Manoeuvre):
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._doing: Manoeuvre = Stand(vehicle)
+        self._active: Manoeuvre = Stand(vehicle)
 
     def send_to(self, point: Vector) -> None:
         """Drive there and stand."""
-        self._doing = DriveTo(self.vehicle, point)
+        self._active = DriveTo(self.vehicle, point)
         self.target = point
 
     def step(self) -> None:
         """Go on."""
-        if isinstance(self._doing, DriveTo) and self._doing.arrived():
-            self._doing = Stand(self.vehicle)
-        self._doing.step()
+        if isinstance(self._active, DriveTo) and self._active.arrived():
+            self._active = Stand(self.vehicle)
+        self._active.step()
 
 
 class OffboardRover(Manoeuvre):
@@ -61,13 +61,13 @@ class OffboardRover(Manoeuvre):
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._doing: Manoeuvre = Stand(vehicle)
+        self._active: Manoeuvre = Stand(vehicle)
 
     def enter(self) -> None:
         """Stand until told."""
-        self.take(commander_of(self.vehicle).stream.target)
+        self.receive(commander_of(self.vehicle).stream.target)
 
-    def take(self, target: OffboardTarget | AttitudeTarget | None) -> None:
+    def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
         """A set-point came; attitudes mean nothing to wheels."""
         if not isinstance(target, OffboardTarget):
             return
@@ -80,24 +80,24 @@ class OffboardRover(Manoeuvre):
         turn = Turn(target.yaw, target.yaw_rate)
         self.target = None
         if speed < 0.05 and turn.rate is None:
-            self._doing = Stand(self.vehicle)
+            self._active = Stand(self.vehicle)
         else:
             if turn == Turn():
                 turn = Turn(_course(north, east, self.vehicle.estimate.attitude[2]))
-            self._doing = FollowSpeed(self.vehicle, speed, turn)
+            self._active = FollowSpeed(self.vehicle, speed, turn)
 
     def _drive_to(self, point: Vector) -> None:
-        if not isinstance(self._doing, DriveTo) or self._doing.point != point:
-            self._doing = DriveTo(self.vehicle, point)
+        if not isinstance(self._active, DriveTo) or self._active.point != point:
+            self._active = DriveTo(self.vehicle, point)
         self.target = point
 
     def step(self) -> None:
         """Go on; on a point it stands."""
-        doing = self._doing
-        if isinstance(doing, DriveTo) and doing.arrived():
+        active = self._active
+        if isinstance(active, DriveTo) and active.arrived():
             Stand(self.vehicle).step()
         else:
-            doing.step()
+            active.step()
 
 
 def _course(north: float, east: float, otherwise: float) -> float:
@@ -118,12 +118,12 @@ class StickDrive(Manual):
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
     """DO_REPOSITION, with its flag."""
-    point = commands.place_of(vehicle, command)
+    point = commands.commanded_point(vehicle, command)
     if point is None or not vehicle.has_position:
         return DENIED
-    if commands.whole(command.param2) != commands.CHANGE_MODE:
+    if commands.to_integer(command.param2) != commands.CHANGE_MODE:
         return UNSUPPORTED
-    commander_of(vehicle).wish_anew(modes.LOITER)
+    commander_of(vehicle).restart_mode(modes.LOITER)
     if isinstance(vehicle.manoeuvre, HoldRover):
         vehicle.manoeuvre.send_to(point)
     return ACCEPTED

@@ -443,7 +443,7 @@ def vibration(vehicle: Vehicle) -> Fields:
 
 def mission_current(vehicle: Vehicle) -> Fields | None:
     """MISSION_CURRENT: only while there is a mission."""
-    plan = vehicle.plan
+    plan = vehicle.mission
     return {"seq": plan.current} if len(plan) else None
 
 
