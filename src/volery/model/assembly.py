@@ -62,6 +62,8 @@ def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> 
     """Change *root* in place; a path that leads nowhere is a problem."""
     for change in changes:
         complaint = _apply(root, change)
+        if change.path[0] == "run":  # a scenario's own `duration` and `until` are copied there
+            problems.copied(change.path, change.said_at or None)
         if complaint:
             problems.add(change.said_at or change.path, complaint, change.where)
 

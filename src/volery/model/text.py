@@ -51,15 +51,29 @@ class Problems:
         self._locate = locate
         self._found: list[ModelError] = []
         self._warnings: dict[str, None] = {}  # an ordered set
+        self._origins: dict[Path, Path] = {}
 
     def __bool__(self) -> bool:
         return bool(self._found)
 
     def add(self, path: Path, what: str, where: Location | None = None) -> None:
         """Note that *what* is wrong at *path* (or *where*, if known better); once if it comes twice."""
-        error = ModelError(what, written(path), where or self._locate(path))
+        where = where or self._locate(path)
+        for copy, origin in self._origins.items():
+            if path[: len(copy)] == copy:
+                path = origin + path[len(copy) :]
+        error = ModelError(what, written(path), where)
         if str(error) not in {str(known) for known in self._found}:
             self._found.append(error)
+
+    def copied(self, path: Path, origin: Path | None) -> None:
+        """Report problems at *path* as problems at *origin*, from which its value was copied.
+
+        None ends that: the value at *path* has been replaced.
+        """
+        self._origins.pop(path, None)
+        if origin is not None:
+            self._origins[path] = origin
 
     def unknown(self, path: Path, name: object, noun: str, valid: Iterable[str]) -> None:
         """Note a *name* that nothing goes by; *valid* are the names there are."""

@@ -551,3 +551,11 @@ def test_an_option_is_named_when_it_is_wrong(workshop, option, complaint):
 def test_an_option_without_a_path_or_a_value(workshop, option):
     with pytest.raises(UsageError, match="a path and a value are expected"):
         workshop.load(None, None, option)
+
+
+def test_a_wrong_end_of_a_scenario_is_reported_once_where_it_is_written(workshop):
+    workshop.change("until: {observe: application.delivered, min: 1}", "until: 5 s")
+    with pytest.raises(ModelError) as caught:
+        workshop.load("pocket", None)
+    assert not isinstance(caught.value, CollectedModelError)
+    assert caught.value.path == "scenarios.pocket.until"
