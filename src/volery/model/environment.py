@@ -1,7 +1,7 @@
 """The surroundings of the system in one run: places, ways, zones, air, vehicles, workload, faults.
 
-Frozen data. Every point is given twice, as WGS-84 degrees with metres AMSL and as metres east and north of the
-origin, so that no other package converts frames. Most classes declare how they are written in a model;
+Frozen data. Every point is given twice, as WGS-84 degrees with metres AMSL and as metres east and north of
+the origin, so that no other package converts frames. Most classes declare how they are written in a model;
 points, ways and prisms are written differently from what they become, so each has a text form beside it.
 """
 

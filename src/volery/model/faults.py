@@ -24,6 +24,7 @@ from volery.model.fields import (
     TIME,
     VEHICLE,
     Record,
+    Reference,
     Schema,
     Syntax,
     Whole,
@@ -115,12 +116,25 @@ def fault(kind: str, *, trials_only: bool = False) -> Callable[[C], C]:
 # -- the airframe
 
 
+def _multirotors(reading: Reading) -> list[str]:
+    vehicles = reading.root.at(("environment", "vehicles"))
+    return [
+        name
+        for name, node in (vehicles.items if vehicles else {}).items()
+        if (kind := node.child("kind")) is not None and kind.value == "multirotor"
+    ]
+
+
+MULTIROTOR = Reference("multirotor", _multirotors)
+
+
 @fault("motor-dead")
 @dataclass(frozen=True, kw_only=True)
 class MotorDead(VehicleFault):
     """A motor of a multirotor gives no thrust, or only a share of it."""
 
-    motor: Annotated[int, Whole(least=1, most=4), "Number of the motor, in the autopilot's order."] = 1
+    vehicle: Annotated[str, MULTIROTOR, "The vehicle that it happens to."]
+    motor: Annotated[int, Whole(least=1, most=4), "Number of the motor."] = 1
     thrust: Annotated[float, SHARE, "Share of its thrust that is left."] = 0.0
 
 

@@ -20,9 +20,12 @@ from itertools import pairwise
 from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.task import Cancelled, ExecutionContext
+from volery.model.faults import OtherStation, ProgramKilled
+from volery.run.assembly.faults import NO_WIRE_FAULTS
 from volery.testing.checks import CheckFailedError, demand
 from volery.testing.driver_checks.manual_control_checks import fly_by_hand
-from volery.testing.faults import FAULTS, NO_WIRE_FAULTS, Fault
+from volery.testing.faults import FAULTS
+from volery.testing.faults import strike as strike_now
 from volery.testing.simulated_stage import SimulatedStage
 from volery.testing.stage import Stage
 from volery.trace.events import VehicleState
@@ -173,7 +176,9 @@ class _Trying:
 
     def __init__(self, autopilot: str, fault: str, phase: str, seed: int) -> None:
         self._names = autopilot, fault, phase
-        self._fault: Fault = FAULTS[fault]
+        self._fault = FAULTS[fault]
+        self._killed = isinstance(self._fault, ProgramKilled)
+        self._taken_over = isinstance(self._fault, OtherStation)
         self._program = PHASES[phase]
         self._stage = SimulatedStage(parse(f"sim:{autopilot}?wire=bytes"), Drone, seed)
         self._name = self._stage.name_of_vehicle
@@ -235,15 +240,15 @@ class _Trying:
         kernel = self._stage.kernel
         self._struck = True
         self._look()
-        if self._fault.deadly:
-            self._fault.begins(self._stage)
+        if self._killed:
+            strike_now(self._fault, self._stage)
             kernel.call_at(kernel.now(), partial(kernel.cancel, self._scope, "killed"))
             return
         kernel.spawn(self._begin, "fate", ExecutionContext("fate"))
 
     def _begin(self) -> None:
         try:
-            self._fault.begins(self._stage)
+            strike_now(self._fault, self._stage)
         except VoleryError:
             return  # the other station's refusals are its own concern
 
@@ -261,7 +266,7 @@ class _Trying:
             self._demand_done()
         stage.set_faults(NO_WIRE_FAULTS)
         program = stage.drone
-        if self._fault.deadly:
+        if self._killed:
             stage.sleep(LOST_S)
             program = stage.another_program()
             program.wait_connected()
@@ -288,10 +293,10 @@ class _Trying:
 
     def _judge_aircraft(self) -> None:
         demand(not self._seen.armed[-1], f"it is still armed in {self._seen.modes[-1]} ({self._ended})")
-        demand(self._seen.armings <= 1 or self._fault.brings_down, f"it was armed {self._seen.armings} times")
+        demand(self._seen.armings <= 1 or self._taken_over, f"it was armed {self._seen.armings} times")
         height = self._seen.states[-1].z
         demand(height < 1.0, f"it is disarmed at {height:.1f} m")
-        if self._fault.brings_down:
+        if self._taken_over:
             self._demand_not_fought()
 
     def _demand_not_fought(self) -> None:

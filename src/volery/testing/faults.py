@@ -1,73 +1,97 @@
-"""What goes wrong in a fault trial: of the wire, with other people, with the aircraft, in the air."""
+"""The faults of fault trials, by name: kinds of the catalogue (``volery.model.faults``) with arguments.
+
+The effects are those of a model's faults. Only here are the two kinds that a model cannot state: another
+station that takes over, and the death of the program.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
+from volery.base.time import from_seconds, to_seconds
 from volery.links.wire_faults import WireFaults
-from volery.simulation.world.environment_models import Wind
+from volery.model.faults import (
+    BatteryLow,
+    Fault,
+    GpsLost,
+    LinkCut,
+    LinkDegraded,
+    OtherStation,
+    ProgramKilled,
+    VehicleFault,
+    WindChange,
+)
+from volery.run.assembly.faults import Affected, apply_fault
 from volery.testing.simulated_stage import SimulatedStage
 
-NO_WIRE_FAULTS = WireFaults()
-
-GALE = Wind(east=12.0, gust=1.5)
-"""The strongest in which this airframe still goes against it: at 30 degrees of tilt its drag holds 13 m/s."""
+F = TypeVar("F", bound=Fault)
 
 
-@dataclass(frozen=True)
-class Fault:
-    """``begins`` makes it happen. ``deadly``: it ends the program. ``brings_down``: somebody else commands
-    the vehicle from then on; our program must not.
-    """
-
-    words: str
-    begins: Callable[[SimulatedStage], None]
-    deadly: bool = False
-    brings_down: bool = False
+def _trial(kind: type[F], seconds: float | None = None, **arguments: Any) -> F:
+    """Return a fault that happens when the trial is ready for it, to the vehicle of the trial."""
+    if issubclass(kind, VehicleFault):
+        arguments["vehicle"] = ""
+    return kind(at_ns=0, duration_ns=None if seconds is None else from_seconds(seconds), **arguments)
 
 
-def _cut(seconds: float) -> Callable[[SimulatedStage], None]:
-    def begins(stage: SimulatedStage) -> None:
-        stage.tap.cut()
-        stage.later(seconds, stage.tap.mend)
-
-    return begins
-
-
-def _suffers(faults: WireFaults) -> Callable[[SimulatedStage], None]:
-    return lambda stage: stage.set_faults(faults)
-
-
-def _another_station(stage: SimulatedStage) -> None:
-    other = stage.other()
-    if stage.driver.telemetry.flying:
-        other.lands_it()
-    else:
-        other.disarms_it()
-
-
-def _dies(stage: SimulatedStage) -> None:
-    """As a killed process: no farewell, the link is silent."""
-    stage.tap.cut()
-
-
-FAULTS: Mapping[str, Fault] = {
-    "none": Fault("nothing goes wrong", lambda stage: None),
-    "cut-0.5": Fault("the link is cut for 0.5 s", _cut(0.5)),
-    "cut-2": Fault("the link is cut for 2 s", _cut(2.0)),
-    "cut-10": Fault("the link is cut for 10 s", _cut(10.0)),
-    "duplicated": Fault("from then on each frame arrives twice", _suffers(WireFaults(duplicate=1.0))),
-    "reordered": Fault("from then on 30 % of the frames are overtaken", _suffers(WireFaults(reorder=0.3))),
-    "corrupted": Fault("from then on 1 % of the bytes have a bit turned", _suffers(WireFaults(flip=0.01))),
-    "truncated": Fault("from then on 20 % of the frames end too early", _suffers(WireFaults(truncate=0.2))),
-    "other-station": Fault(
-        "another station lands it (on the ground: disarms it); where programs share a node, the pilot does",
-        _another_station,
-        brings_down=True,
-    ),
-    "killed": Fault("the program is killed", _dies, deadly=True),
-    "battery-low": Fault("8 % are left in the battery", lambda stage: stage.flight.drain_battery(0.08)),
-    "gps-lost": Fault("no satellites are seen any more", lambda stage: stage.flight.block_gps()),
-    "wind": Fault("wind of 12 m/s from the west, with gusts", lambda stage: stage.fleet.world.set_wind(GALE)),
+FAULTS: Mapping[str, Fault | None] = {
+    "none": None,
+    "cut-0.5": _trial(LinkCut, 0.5),
+    "cut-2": _trial(LinkCut, 2.0),
+    "cut-10": _trial(LinkCut, 10.0),
+    "duplicated": _trial(LinkDegraded, duplicate=1.0),
+    "reordered": _trial(LinkDegraded, reorder=0.3),
+    "corrupted": _trial(LinkDegraded, corrupt=0.01),
+    "truncated": _trial(LinkDegraded, truncate=0.2),
+    "other-station": _trial(OtherStation),
+    "killed": _trial(ProgramKilled),
+    "battery-low": _trial(BatteryLow, charge=0.08),
+    "gps-lost": _trial(GpsLost),
+    "wind": _trial(WindChange, speed_m_s=12.0, direction_deg=270.0, gusts_m_s=1.5),
 }
+"""12 m/s is the strongest wind against which this airframe still makes way: at 30 degrees of tilt its drag
+holds 13 m/s.
+"""
+
+
+@dataclass
+class _StageLinks:
+    """Control of the link of the program under test."""
+
+    stage: SimulatedStage
+
+    def cut(self, vehicle: str, active: bool) -> None:
+        """See ``volery.run.assembly.faults.LinkControl``."""
+        if active:
+            self.stage.tap.cut()
+        else:
+            self.stage.tap.mend()
+
+    def set_faults(self, vehicle: str, faults: WireFaults) -> None:
+        """See ``volery.run.assembly.faults.LinkControl``."""
+        self.stage.set_faults(faults)
+
+
+def strike(fault: Fault | None, stage: SimulatedStage) -> None:
+    """Make a fault of a trial happen now, to the vehicle of *stage*; it ends after its duration, if any."""
+    if fault is None:
+        return
+    if isinstance(fault, ProgramKilled):  # as a killed process: the link is silent
+        stage.tap.cut()
+        return
+    if isinstance(fault, OtherStation):
+        other = stage.other()
+        if stage.driver.telemetry.flying:
+            other.lands_it()
+        else:
+            other.disarms_it()
+        return
+    if isinstance(fault, VehicleFault):
+        fault = replace(fault, vehicle=stage.name_of_vehicle)
+    affected = Affected(stage.kernel, stage.fleet, _StageLinks(stage))
+    apply_fault(fault, affected)
+    if fault.duration_ns is not None:
+        ending = fault
+        stage.later(to_seconds(fault.duration_ns), lambda: apply_fault(ending, affected, active=False))

@@ -172,7 +172,7 @@ class Platform:
 
     # -- what components are given
 
-    def seat(self, instance: Instance) -> Allocation:
+    def allocation(self, instance: Instance) -> Allocation:
         """Where *instance* computes."""
         activity = instance.activity
         priority = activity.priority if activity else None
@@ -204,12 +204,11 @@ class Platform:
 
     # -- what the graph is given
 
-    def price(self, node: NodeId, call: str, x: float) -> Price:
-        """What a call into ROS costs *node*."""
+    def tariff(self, node: NodeId) -> Tariff | None:
+        """Return the prices of a node's calls into ROS; None if no processor executes it."""
         if not node.processor:
-            return NO_COST
-        language = self._languages.get(node.component, VEHICLE_NODE_LANGUAGE)
-        return self._tariff(node.processor, language)(call, x)
+            return None
+        return self._tariff(node.processor, self._languages.get(node.component, VEHICLE_NODE_LANGUAGE))
 
     def _tariff(self, processor: str, language: str) -> Tariff:
         known = self._tariffs.get((processor, language))
@@ -230,7 +229,7 @@ class Platform:
             if vehicle.processor is not None:
                 self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Route | None:
+    def route(self, sender: NodeId, receiver: NodeId) -> Route | None:
         """How messages get from node to node: over the network between their processors, if there is one."""
         network = self._network_between(sender.processor, receiver.processor)
         if network is None:

@@ -42,7 +42,8 @@ class Layout:
     """
 
     def __init__(self, after: Layout | None = None) -> None:
-        self.start = self.end = after.end if after else 0
+        self.start: int = after.end if after else 0
+        self.end: int = self.start
         self.fields: list[Field] = []
 
     def add(self, name: str, unit: str, meaning: str, width: int = 1, axes: str = "") -> int:
