@@ -1,6 +1,6 @@
-"""How questions of C++ code and their answers are written: what ``<volery/border.h>`` reads and writes.
+"""Encoding of requests of C++ code and of their replies, as ``<volery/abi.h>`` reads and writes them.
 
-Numbers take eight bytes, little endian; texts and bytes their length and themselves.
+A number takes eight bytes, little endian; a text or a byte string takes its length and its bytes.
 """
 
 from __future__ import annotations
@@ -14,36 +14,36 @@ _REAL = struct.Struct("<d")
 
 
 class Reader:
-    """Takes values from the front."""
+    """Reads values in their order."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._at = 0
 
     def integer(self) -> int:
-        """A signed number of 64 bits."""
+        """Read a signed integer of 64 bits."""
         value: int = _INTEGER.unpack_from(self._data, self._at)[0]
         self._at += 8
         return value
 
     def flag(self) -> bool:
-        """True or false."""
+        """Read a boolean."""
         return self.integer() != 0
 
     def real(self) -> float:
-        """A floating-point number."""
+        """Read a floating-point number."""
         value: float = _REAL.unpack_from(self._data, self._at)[0]
         self._at += 8
         return value
 
     def raw(self) -> bytes:
-        """Bytes."""
+        """Read a byte string."""
         start = self._at + 8
         self._at = start + self.integer()
         return self._data[start : self._at]
 
     def text(self) -> str:
-        """Text; what is no UTF-8 in it is shown as such."""
+        """Read a text; bytes that are not UTF-8 become replacement characters."""
         return self.raw().decode(errors="replace")
 
 
@@ -54,45 +54,45 @@ class Writer:
         self.data = bytearray()
 
     def integer(self, value: int) -> Self:
-        """A signed number of 64 bits."""
+        """Append a signed integer of 64 bits."""
         self.data += _INTEGER.pack(value)
         return self
 
     def flag(self, value: bool) -> Self:
-        """True or false."""
+        """Append a boolean."""
         return self.integer(value)
 
     def real(self, value: float) -> Self:
-        """A floating-point number."""
+        """Append a floating-point number."""
         self.data += _REAL.pack(value)
         return self
 
     def raw(self, value: bytes) -> Self:
-        """Bytes."""
+        """Append a byte string."""
         self.data += _INTEGER.pack(len(value)) + value
         return self
 
     def text(self, value: str) -> Self:
-        """Text."""
+        """Append a text."""
         return self.raw(value.encode())
 
     def done(self) -> bytes:
-        """All of it."""
+        """Return all appended values."""
         return bytes(self.data)
 
 
 class CppFiber(Protocol):
-    """A flow of control of C++ code that has asked something and waits for the answer."""
+    """A fiber of C++ code that has made a request and waits for the reply."""
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:
-        """Run one of its callables on its own stack, below what asked; returns what it returned.
+        """Run a callable of the code on the stack of the fiber and return its result.
 
-        Raises what the code raised.
+        Raises the error that the callable raised.
         """
 
 
 RequestHandler = Callable[[CppFiber, Reader], bytes]
-"""Does what is asked, as the task that asks; it may block and it may ``call`` back."""
+"""Handles a request in the requesting task; it may block and may ``call`` the fiber."""
 
 RequestHandlers = Mapping[str, RequestHandler]
-"""By the question's name."""
+"""Request handlers by the name of the request."""

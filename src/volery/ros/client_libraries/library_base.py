@@ -27,7 +27,7 @@ class Launch(NamedTuple):
 
 
 AtEnd = Callable[[ExecutionContext, Callable[[], object]], None]
-"""Registers a function that is run in a context at the end of the run, when components have been cancelled."""
+"""Registers a function that runs in a context at the end of the run, after the components were cancelled."""
 
 
 def ignore_end(context: ExecutionContext, last: Callable[[], object]) -> None:
@@ -129,7 +129,7 @@ class Rosout:
         """Publish a message that *fill* completes, if there is a subscriber. Then an interaction point."""
         if self._closed or self._node.closed:
             return
-        if isinstance(self._graph, EmbeddedGraph) and not self._graph.heard(ROSOUT):
+        if isinstance(self._graph, EmbeddedGraph) and not self._graph.has_subscribers(ROSOUT):
             return
         try:
             if self._publisher is None:

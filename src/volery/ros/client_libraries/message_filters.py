@@ -1,13 +1,7 @@
-"""``message_filters`` over the faces: messages of several topics that belong together, by their stamps.
+"""``message_filters``: messages of several topics that belong together by their stamps.
 
-Made of what the faces offer, as the real one is of rospy and rclpy: without a node it is rospy's, with one
-rclpy's. There are ``Subscriber``, ``Cache``, ``TimeSynchronizer`` and ``ApproximateTimeSynchronizer``.
-
-Where messages come from: ``SimpleFilter``, ``Subscriber``, and a ``Cache`` of the last ones.
-
-Messages of several topics that belong together: of the same stamp, or of nearly the same.
-
-The module ``message_filters`` of one run.
+Built on the client libraries, as the real one is: without a node on rospy, with a node on rclpy. There are
+``Subscriber``, ``Cache``, ``TimeSynchronizer`` and ``ApproximateTimeSynchronizer``.
 """
 
 from __future__ import annotations
@@ -26,7 +20,7 @@ Callback = Callable[..., Any]
 
 
 class SimpleFilter:
-    """Hands messages on to whoever has registered. ``node`` is rclpy's, ``None`` for rospy."""
+    """Passes messages on to registered callbacks. ``node`` is a node of rclpy, or None with rospy."""
 
     rospy: ClassVar[Any]
     rclpy_time: ClassVar[Any]
@@ -36,47 +30,48 @@ class SimpleFilter:
         self.callbacks: dict[int, tuple[Callback, tuple[Any, ...]]] = {}
 
     def registerCallback(self, cb: Callback, *args: Any) -> int:
-        """Call *cb* with each message and *args*; returns the connection's number."""
+        """Call *cb* with each message and *args*; return the number of the connection."""
         number = len(self.callbacks)
         self.callbacks[number] = cb, args
         return number
 
     def signalMessage(self, *msg: Any) -> None:
-        """Hand it on."""
+        """Pass a message to all callbacks."""
         for callback, args in list(self.callbacks.values()):
             callback(*msg, *args)
 
     def stamp_of(self, message: Any, allow_headerless: bool) -> Ns | None:
-        """When it is of, in ns: by its header, or now; ``None``, with a warning, if neither may be had."""
+        """Return the stamp of a message in ns, or None and log a warning if the message has no header.
+
+        Args:
+            message: A message.
+            allow_headerless: Whether a message without a header has the current time as its stamp.
+        """
         header = getattr(message, "header", None)
         if header is not None:
             return nanoseconds(header.stamp)
         if allow_headerless:
-            return self._now()
-        say = self.rospy.logwarn if self.node is None else self.node.get_logger().warning
-        say("Cannot use message filters with messages without a 'header'; 'allow_headerless' would let them")
+            clock = self.rospy.Time if self.node is None else self.node.get_clock()
+            return nanoseconds(clock.now())
+        warn = self.rospy.logwarn if self.node is None else self.node.get_logger().warning
+        warn("Cannot use message filters with messages without a 'header'; 'allow_headerless' would let them")
         return None
 
-    def _now(self) -> Ns:
-        if self.node is None:
-            return nanoseconds(self.rospy.Time.now())
-        return nanoseconds(self.node.get_clock().now())
-
     def as_time(self, stamp: Ns) -> Any:
-        """A time of the client library."""
+        """Return *stamp* as a time of the client library."""
         if self.node is None:
             return self.rospy.Time(stamp // 1_000_000_000, stamp % 1_000_000_000)
         return self.rclpy_time(nanoseconds=stamp)
 
 
 def nanoseconds(time: Any) -> Ns:
-    """Of a stamp, or of a time of rospy or rclpy."""
+    """Return a stamp, or a time of rospy or rclpy, in ns."""
     whole = getattr(time, "nanoseconds", None)
     return int(time.to_nsec() if whole is None else whole)
 
 
 class Subscriber(SimpleFilter):
-    """A topic: what ``rospy.Subscriber`` takes or, with a node first, (node, type, topic, ...) of rclpy."""
+    """Messages of a topic. Arguments as of ``rospy.Subscriber``, or (node, type, topic, ...) with rclpy."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__()
@@ -89,16 +84,16 @@ class Subscriber(SimpleFilter):
             self.sub = self.rospy.Subscriber(*args, **kwargs, callback=self.callback)
 
     def callback(self, msg: Any) -> None:
-        """A message is there."""
+        """Pass a received message on."""
         self.signalMessage(msg)
 
     def getTopic(self) -> str:
-        """Its name, as it was given."""
+        """Return the topic name as it was given."""
         return str(self.topic)
 
 
 class Cache(SimpleFilter):
-    """Keeps the last messages by their stamps, and hands them on. Times are the client library's."""
+    """Keeps the last messages by their stamps and passes them on. Times are those of the client library."""
 
     def __init__(
         self, f: SimpleFilter | None = None, cache_size: int = 1, allow_headerless: bool = False
@@ -111,12 +106,12 @@ class Cache(SimpleFilter):
             self.connectInput(f)
 
     def connectInput(self, f: SimpleFilter) -> None:
-        """Keep what comes from there."""
+        """Keep the messages of another filter."""
         self.node = f.node
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: Any) -> None:
-        """Keep it; the oldest goes if there are too many."""
+        """Keep a message and drop the oldest ones beyond the size of the cache."""
         stamp = self.stamp_of(msg, self.allow_headerless)
         if stamp is None:
             return
@@ -125,41 +120,41 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Any, to_stamp: Any) -> list[Any]:
-        """What is kept between two times, both of them included."""
+        """Return the messages between two times, both included."""
         first, last = nanoseconds(from_stamp), nanoseconds(to_stamp)
         return [message for stamp, message in self._kept if first <= stamp <= last]
 
     def getElemAfterTime(self, stamp: Any) -> Any:
-        """The first one at or after that time; ``None`` if there is none."""
+        """Return the first message at or after a time, or None."""
         wanted = nanoseconds(stamp)
         return next((message for at, message in self._kept if at >= wanted), None)
 
     def getElemBeforeTime(self, stamp: Any) -> Any:
-        """The last one at or before that time; ``None`` if there is none."""
+        """Return the last message at or before a time, or None."""
         wanted = nanoseconds(stamp)
         return next((message for at, message in reversed(self._kept) if at <= wanted), None)
 
     def getLastestTime(self) -> Any:
-        """When the last one is of (the name is theirs); ``None`` if there is none."""
+        """Return the stamp of the last message, or None. The misspelt name is message_filters' own."""
         return self.as_time(self._kept[-1][0]) if self._kept else None
 
     getLatestTime = getLastestTime
 
     def getOldestTime(self) -> Any:
-        """When the first one is of; ``None`` if there is none."""
+        """Return the stamp of the first message, or None."""
         return self.as_time(self._kept[0][0]) if self._kept else None
 
     def getLast(self) -> Any:
-        """The last one; ``None`` if there is none."""
+        """Return the last message, or None."""
         return self._kept[-1][1] if self._kept else None
 
 
 Queue = dict[Ns, Any]
-"""Messages that wait, by their stamps."""
+"""Waiting messages by their stamps."""
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Hands on one message of each input once all of the same stamp are there."""
+    """Passes on one message of each input when messages with equal stamps have arrived at all inputs."""
 
     def __init__(self, fs: Sequence[SimpleFilter], queue_size: int) -> None:
         super().__init__()
@@ -168,7 +163,7 @@ class TimeSynchronizer(SimpleFilter):
         self.connectInput(fs)
 
     def connectInput(self, fs: Sequence[SimpleFilter]) -> None:
-        """Synchronise these."""
+        """Synchronise the messages of *fs*."""
         self.node = next((one.node for one in fs if one.node is not None), None)
         self.queues: list[Queue] = [{} for _ in fs]
         self.input_connections = [
@@ -177,7 +172,7 @@ class TimeSynchronizer(SimpleFilter):
         ]
 
     def add(self, msg: Any, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """A message of one input is there."""
+        """Queue a message of one input and pass on what has become complete."""
         stamp = self.stamp_of(msg, self.allow_headerless)
         if stamp is None:
             return
@@ -188,18 +183,18 @@ class TimeSynchronizer(SimpleFilter):
 
     def _match(self, stamp: Ns, new: Queue) -> None:
         if all(stamp in queue for queue in self.queues):
-            self._hand_on([stamp] * len(self.queues))
+            self._pass_on([stamp] * len(self.queues))
 
-    def _hand_on(self, stamps: Sequence[Ns]) -> None:
-        """The messages of these stamps, one of each input, which wait no longer."""
+    def _pass_on(self, stamps: Sequence[Ns]) -> None:
+        """Pass on and remove the messages with these stamps, one of each input."""
         self.signalMessage(*[queue.pop(stamp) for queue, stamp in zip(self.queues, stamps, strict=True)])
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """Hands on one message of each input whose stamps are less than *slop* seconds apart.
+    """Passes on one message of each input whose stamps differ by less than *slop* seconds.
 
-    With a new message it looks at those of the other inputs that are at most *slop* from it, the nearest
-    first; the first set that is near enough as a whole it is.
+    A new message is combined with the messages of the other inputs that differ from it by at most *slop*, the
+    nearest first. The first combination that is close enough as a whole is passed on.
     """
 
     def __init__(
@@ -214,27 +209,26 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         self.allow_headerless = allow_headerless
 
     def _match(self, stamp: Ns, new: Queue) -> None:
-        near = [
-            [stamp] if queue is new else sorted(self._near(queue, stamp), key=lambda at: abs(at - stamp))
-            for queue in self.queues
-        ]
-        for stamps in product(*near):
-            if max(stamps) - min(stamps) < self.slop or len(set(stamps)) == 1:
-                self._hand_on(stamps)
-                return
+        def near(queue: Queue) -> list[Ns]:
+            candidates = [at for at in queue if abs(at - stamp) <= self.slop]
+            return sorted(candidates, key=lambda at: abs(at - stamp))
 
-    def _near(self, queue: Queue, stamp: Ns) -> list[Ns]:
-        return [at for at in queue if abs(at - stamp) <= self.slop]
+        for stamps in product(*([stamp] if queue is new else near(queue) for queue in self.queues)):
+            if max(stamps) - min(stamps) < self.slop or len(set(stamps)) == 1:
+                self._pass_on(stamps)
+                return
 
 
 _FILTERS = (SimpleFilter, Subscriber, Cache, TimeSynchronizer, ApproximateTimeSynchronizer)
 
 
 def modules(rospy: ModuleType, times: ModuleType) -> dict[str, ModuleType]:
-    """By name. They talk through *rospy* where no node is given; *times* is ``rclpy.time``."""
+    """Return the module ``message_filters`` of one run by its name.
+
+    Args:
+        rospy: Module that filters without a node use.
+        times: The module ``rclpy.time``.
+    """
     members = {"rospy": rospy, "rclpy_time": times.Time}
     names = {kind.__name__: type(kind.__name__, (kind,), members) for kind in _FILTERS}
     return {"message_filters": library_module("message_filters", names)}
-
-
-__all__ = ["modules"]

@@ -1,14 +1,14 @@
 """``rospy`` on the embedded graph: ``modules(graph)`` gives the modules that a component's file imports.
 
-Whose node a call belongs to follows the component that the current task computes for, so one set of modules
-serves all components of a run. As a launch file does, the component's name names the node, whatever
-``init_node`` says.
+A call belongs to the node of the component of the current task, so that one set of modules serves all
+components of a run. As in a launch file, the name of the component names the node, whatever name
+``init_node`` gets.
 
-Differences from the real one, on purpose: an attribute that is not there yet says so; a topic has one thread
-a subscription and a service one a request, as there, but they never run at the same instant as each other's
-Python code; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternion`` starts as no rotation
-(ROS 2) and not as zero; a node joins ``/rosout`` with its first line that somebody listens for; when the run
-ends, shutdown hooks are called, but what a file does behind ``spin`` is not.
+Intended differences from the real library: a missing attribute is reported with the available ones; there is
+one thread per subscription and per service request, as in rospy, but two threads never execute Python code at
+the same instant; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternion`` is initially the
+identity (as in ROS 2), not zero; a node joins ``/rosout`` when it logs its first line that has a subscriber;
+at the end of a run shutdown hooks are called, but the code after ``spin`` is not executed.
 """
 
 from volery.ros.client_libraries.library_base import Launch

@@ -1,4 +1,4 @@
-"""rospy's log functions: a line goes into the trace under the component's name."""
+"""rospy's log functions. A line is recorded in the trace under the name of the component."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.base.time import Ns, S, from_seconds
-from volery.kernel.waiting import current_task
 from volery.ros.client_libraries.library_base import Caller, caller
 from volery.ros.client_libraries.rospy.session import Sessions
 from volery.trace.events import Text
@@ -20,7 +19,7 @@ _FUNCTIONS = {
     "error": (8, 3),
     "fatal": (16, 2),
 }
-"""By their names, the level in ROS 1 and the severity in syslog."""
+"""Level in ROS 1 and severity in syslog by the name of the function."""
 
 
 class _Log:
@@ -28,19 +27,16 @@ class _Log:
 
     def __init__(self, sessions: Sessions, level: int, severity: int) -> None:
         self._sessions, self._level, self._severity = sessions, level, severity
-        self._said: dict[tuple[str, str], Ns] = {}
+        self._last: dict[tuple[str, str], Ns] = {}
 
-    def _component(self) -> str:
-        return current_task(self._sessions.kernel).context.component
-
-    def say(self, msg: Any, *args: Any, **options: Any) -> None:
+    def log(self, msg: Any, *args: Any, **options: Any) -> None:
         """Log ``msg % args``."""
-        self._say(msg, args, caller(1))
+        self._log(msg, args, caller(1))
 
-    def _say(self, msg: Any, args: tuple[Any, ...], where: Caller) -> None:
+    def _log(self, msg: Any, args: tuple[Any, ...], where: Caller) -> None:
         text = str(msg) % args if args else str(msg)
         with self._sessions.kernel as kernel:
-            kernel.record(Text(kernel.now(), self._component(), self._severity, text))
+            kernel.record(Text(kernel.now(), self._sessions.component, self._severity, text))
         session = self._sessions.find()
         if session is None or self._level < LEVELS["INFO"]:
             return
@@ -52,36 +48,36 @@ class _Log:
             message.level, message.name, message.msg = self._level, node.name, text
             message.file, message.function, message.line = where
 
-        session.rosout.tell(fill)
+        session.rosout.publish(fill)
 
     def throttle(self, period: float, msg: Any, *args: Any) -> None:
         """Log the same *msg* at most once each *period* seconds."""
         with self._sessions.kernel as kernel:
-            key = (self._component(), str(msg))
-            last = self._said.get(key)
+            key = (self._sessions.component, str(msg))
+            last = self._last.get(key)
             if last is not None and kernel.now() - last < from_seconds(period):
                 return
-            self._said[key] = kernel.now()
-        self._say(msg, args, caller(1))
+            self._last[key] = kernel.now()
+        self._log(msg, args, caller(1))
 
     def once(self, msg: Any, *args: Any) -> None:
         """Log the same *msg* once."""
-        key = (self._component(), str(msg))
-        if key not in self._said:
-            self._said[key] = 0
-            self._say(msg, args, caller(1))
+        key = (self._sessions.component, str(msg))
+        if key not in self._last:
+            self._last[key] = 0
+            self._log(msg, args, caller(1))
 
     def throttle_identical(self, period: float, msg: Any, *args: Any) -> None:
-        """``throttle``, by the text that comes out."""
+        """Log the same text at most once each *period* seconds."""
         self.throttle(period, str(msg) % args if args else msg)
 
 
 def loggers(sessions: Sessions) -> dict[str, Callable[..., None]]:
-    """``loginfo``, ``logwarn_throttle`` and so on."""
+    """Return ``loginfo``, ``logwarn_throttle`` and so on by name."""
     found: dict[str, Callable[..., None]] = {}
     for name, (level, severity) in _FUNCTIONS.items():
         log = _Log(sessions, level, severity)
-        found[f"log{name}"] = log.say
+        found[f"log{name}"] = log.log
         found[f"log{name}_throttle"] = log.throttle
         found[f"log{name}_throttle_identical"] = log.throttle_identical
         found[f"log{name}_once"] = log.once

@@ -1,6 +1,6 @@
-"""rospy's functions of parameters. They work before ``init_node``, as there.
+"""The modules of ``rospy`` for one run, rospy's functions, and the message packages.
 
-The ``rospy`` module of one run, and the message packages beside it.
+The functions of parameters work before ``init_node``, as in rospy.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _NO_DEFAULT = object()
 
 
 def get_param(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
-    """A parameter; ``KeyError`` if there is none and no default."""
-    node = sessions.early().node
+    """Return a parameter; raise ``KeyError`` if there is neither the parameter nor a default."""
+    node = sessions.joined().node
     if default is not _NO_DEFAULT:
         return node.get_parameter(param_name, default)
     try:
@@ -34,30 +34,30 @@ def get_param(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -
 
 
 def get_param_cached(sessions: Sessions, param_name: str, default: Any = _NO_DEFAULT) -> Any:
-    """``get_param``: what was asked for before is not older here."""
+    """Return a parameter, as ``get_param``: the embedded graph needs no cache."""
     return get_param(sessions, param_name, default)
 
 
 def set_param(sessions: Sessions, param_name: str, param_value: Any) -> None:
     """Set a parameter."""
-    sessions.early().node.set_parameter(param_name, param_value)
+    sessions.joined().node.set_parameter(param_name, param_value)
 
 
 def has_param(sessions: Sessions, param_name: str) -> bool:
-    """Whether there is such a parameter."""
-    return sessions.early().node.has_parameter(param_name)
+    """Return whether a parameter exists."""
+    return sessions.joined().node.has_parameter(param_name)
 
 
 def delete_param(sessions: Sessions, param_name: str) -> None:
-    """Remove a parameter; ``KeyError`` if there is none."""
+    """Remove a parameter; raise ``KeyError`` if there is none."""
     try:
-        sessions.early().node.delete_parameter(param_name)
+        sessions.joined().node.delete_parameter(param_name)
     except UsageError as error:
         raise KeyError(str(error)) from error
 
 
 def get_param_names(sessions: Sessions) -> list[str]:
-    """All parameters, where the graph is embedded: what others keep is not listed."""
+    """Return the names of all parameters. Works on the embedded graph only."""
     graph = sessions.graph
     if not isinstance(graph, EmbeddedGraph):
         raise UsageError("rospy.get_param_names() works on the embedded graph only")
@@ -66,11 +66,12 @@ def get_param_names(sessions: Sessions) -> list[str]:
 
 
 def search_param(sessions: Sessions, param_name: str) -> str | None:
-    """The full name of the nearest parameter so called: of this node, of its namespace, of those above.
+    """Return the full name of the nearest parameter called *param_name*, or None.
 
-    Of a name with several parts, only the first is looked for. ``None`` if there is none.
+    The search begins below this node and continues in its namespace and those above. Of a name with several
+    parts, only the first is searched for.
     """
-    node = sessions.early().node
+    node = sessions.joined().node
     if param_name.startswith(("/", "~")):
         full = node.resolve(param_name)
         return full if node.has_parameter(full) else None
@@ -106,11 +107,13 @@ def modules(
     nodes: Mapping[str, Node] | None = None,
     at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
-    """What the files of a run import: ``rospy``, ``rospy.exceptions``, ``std_msgs.msg`` and so on, by name.
+    """Return the modules that files of a run import, by name: ``rospy``, ``std_msgs.msg`` and so on.
 
-    *launched* says for each component what a launch file would (by the component's name, which names its
-    node then). *nodes* holds, by component, nodes that are there already: ``init_node`` finds its own there.
-    *at_end* has shutdown hooks called when the run ends.
+    Args:
+        graph: The graph of the run.
+        launched: Launch settings by component; the name of a launched component names its node.
+        nodes: Existing nodes by component, which ``init_node`` uses.
+        at_end: Registers shutdown hooks for the end of the run.
     """
     sessions = Sessions(graph, launched, nodes, at_end)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
@@ -133,12 +136,12 @@ def modules(
 
 
 def numpy_msg(msg_type: Any) -> Any:
-    """Messages whose arrays are numpy's: as they are here anyway."""
+    """Return *msg_type* unchanged: arrays of all messages are numpy arrays."""
     return msg_type
 
 
 def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
-    """The functions of rospy, bound to the sessions of one run."""
+    """Return the functions of rospy, bound to the sessions of one run."""
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
         get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics,
@@ -156,12 +159,12 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
 def init_node(
     sessions: Sessions, name: str, argv: Any = None, anonymous: bool = False, **options: Any
 ) -> None:
-    """Join the graph. Options about signals, logging and ports are accepted and mean nothing here."""
+    """Join the graph. Options about signals, logging and ports are accepted without effect."""
     sessions.join(name, anonymous)
 
 
 def is_shutdown(sessions: Sessions) -> bool:
-    """Whether this node is shutting down. An interaction point, as every call is."""
+    """Return whether this node is shutting down. An interaction point, as every call is."""
     with sessions.kernel:
         session = sessions.find()
         return session is not None and bool(session.shutdown)
@@ -169,22 +172,22 @@ def is_shutdown(sessions: Sessions) -> bool:
 
 def signal_shutdown(sessions: Sessions, reason: str = "") -> None:
     """Shut this node down."""
-    sessions.here().end(reason)
+    sessions.initialised().end(reason)
 
 
 def on_shutdown(sessions: Sessions, h: Callable[[], Any]) -> None:
     """Call *h* when this node shuts down, or the run ends."""
-    sessions.early().on_shutdown(h)
+    sessions.joined().on_shutdown(h)
 
 
 def spin(sessions: Sessions) -> None:
     """Block until this node shuts down."""
-    services.spin(sessions.here())
+    sessions.initialised().wait_for_end()
 
 
 def sleep(sessions: Sessions, duration: Any) -> None:
     """Block for a number of seconds or a ``Duration``."""
-    time.sleep(sessions.here(), duration)
+    time.sleep(sessions.initialised(), duration)
 
 
 def _within(timeout: Any) -> int | None:
@@ -192,42 +195,42 @@ def _within(timeout: Any) -> int | None:
 
 
 def wait_for_message(sessions: Sessions, topic: str, topic_type: Any, timeout: Any = None) -> Any:
-    """The next message of a topic."""
-    return topics.wait_for_message(sessions.early(), topic, topic_type, _within(timeout))
+    """Return the next message of a topic."""
+    return topics.wait_for_message(sessions.joined(), topic, topic_type, _within(timeout))
 
 
 def wait_for_service(sessions: Sessions, service: str, timeout: Any = None) -> None:
-    """Block until somebody serves it."""
-    services.wait_for_service(sessions.early(), service, _within(timeout))
+    """Block until a service is available."""
+    services.wait_for_service(sessions.joined(), service, _within(timeout))
 
 
 def get_name(sessions: Sessions) -> str:
-    """The full name of this node."""
-    return sessions.early().node.name
+    """Return the full name of this node."""
+    return sessions.joined().node.name
 
 
 def get_namespace(sessions: Sessions) -> str:
-    """This node's namespace, with a slash at its end."""
-    return f"{sessions.early().node.namespace.rstrip('/')}/"
+    """Return the namespace of this node with a trailing slash."""
+    return f"{sessions.joined().node.namespace.rstrip('/')}/"
 
 
 def get_time(sessions: Sessions) -> float:
-    """ROS time in seconds."""
+    """Return ROS time in seconds."""
     return float(get_rostime(sessions).to_sec())
 
 
 def get_rostime(sessions: Sessions) -> time.Time:
-    """ROS time."""
+    """Return ROS time."""
     return time.Time(0, sessions.now())
 
 
 def resolve_name(sessions: Sessions, name: str) -> str:
-    """The absolute name, remappings applied."""
-    return sessions.early().node.resolve(name)
+    """Return the absolute name with remappings applied."""
+    return sessions.joined().node.resolve(name)
 
 
 def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:
-    """Topics that somebody publishes below *namespace*, with their types in ROS 1's spelling."""
+    """Return the published topics below *namespace* with their types as spelled in ROS 1."""
     with sessions.kernel:
         states = [one for one in sessions.graph.topics() if one.publishers]
     below = namespace.rstrip("/") + "/"
@@ -235,5 +238,5 @@ def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[
 
 
 def myargv(argv: list[str] | None = None) -> list[str]:
-    """The command line without ROS's own arguments; components have none."""
+    """Return the command line without the arguments of ROS; components have none."""
     return [one for one in argv or [] if ":=" not in one]

@@ -1,7 +1,4 @@
-"""rospy's exceptions, under its own names.
-
-What one component is to rospy: its node, its helping tasks, whether it is shutting down.
-"""
+"""State of a component that uses rospy: its node, its helper tasks, and its shutdown; rospy's exceptions."""
 
 from __future__ import annotations
 
@@ -19,9 +16,12 @@ from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComp
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.trace.events import Failure, Text
 
+ERROR = 3
+"""Severity as in syslog."""
+
 
 class ROSException(Exception):  # noqa: N818 - rospy's name
-    """What rospy raises for time-outs and misuse."""
+    """A time-out or a wrong call."""
 
 
 class ROSInitException(ROSException):
@@ -29,19 +29,19 @@ class ROSInitException(ROSException):
 
 
 class ROSSerializationException(ROSException):
-    """A value that does not fit its message's field."""
+    """A value does not fit the field of its message."""
 
 
 class ROSInterruptException(ROSException, KeyboardInterrupt):
-    """The node is shutting down while it sleeps."""
+    """The node shuts down while it sleeps."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
-    """Never raised: time does not move backwards here."""
+    """Never raised: simulated time does not move backwards."""
 
 
 class ServiceException(Exception):  # noqa: N818 - rospy's name
-    """A service call did not succeed."""
+    """A service call has failed."""
 
 
 EXCEPTIONS = {
@@ -57,13 +57,9 @@ EXCEPTIONS = {
 }
 
 
-ERROR = 3
-"""Severity, as in syslog."""
-
-
 @dataclass(eq=False)
 class Session:
-    """One component's node."""
+    """The node of one component and what rospy keeps for it."""
 
     graph: RosGraph
     node: Node
@@ -73,80 +69,87 @@ class Session:
     rosout: Rosout
     at_end: AtEnd
     shutdown: str = ""
+    """Reason of the shutdown; empty while the node is not shut down."""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
     failures: set[str] = field(default_factory=set)
     initialised: bool = False
 
-    def say(self, severity: int, text: str) -> None:
+    def log(self, severity: int, text: str) -> None:
         """Record a log line of this node. An interaction point."""
         with self.kernel as kernel:
             kernel.record(Text(kernel.now(), self.node.context.component, severity, text))
 
     def check(self) -> None:
-        """``ROSInterruptException`` if it is shutting down."""
+        """Raise ``ROSInterruptException`` if the node is shutting down."""
         if self.shutdown:
             raise ROSInterruptException(f"rospy shutdown: {self.shutdown}")
 
     def on_shutdown(self, hook: Callable[[], Any]) -> None:
-        """Call it when the node shuts down, by itself or with the run."""
+        """Call *hook* when the node shuts down or the run ends."""
         if not self.hooks:
             self.at_end(self.node.context, lambda: self.end("the run has ended"))
         self.hooks.append(hook)
 
-    def end(self, why: str) -> None:
-        """Shut down: hooks first, then leave the graph."""
+    def end(self, reason: str) -> None:
+        """Shut down: call the hooks, then leave the graph."""
         if not self.shutdown:
-            self.shutdown = why or "signal_shutdown"
+            self.shutdown = reason or "signal_shutdown"
             for hook in self.hooks:
                 self._guarded(hook, "shutdown hook")
             self.node.close()
             self.ended.notify()
 
-    def spin_beside(self, label: str, what: str) -> Group:
-        """A new group that a task of its own spins, as a thread of rospy would."""
+    def wait_for_end(self) -> None:
+        """Block until the node shuts down."""
+        self.ended.wait_for(lambda: self.shutdown, ends_activation=True)
+
+    def spinning_group(self, label: str, what: str) -> Group:
+        """Return a new group that a helper task spins, as a thread of rospy would.
+
+        Args:
+            label: Name of the task.
+            what: Description of a callback in reports of failures.
+        """
         group = self.node.group()
 
         def body() -> None:
             while not self.node.closed:
                 self._guarded(group.spin_once, what)
 
-        self._start(body, label)
+        self._spawn(body, label)
         return group
 
-    def beside(self, body: Callable[[], None], label: str) -> None:
-        """Have a task of its own do something, as a thread of rospy would."""
-        self._start(lambda: self._guarded(body, label), label)
+    def spawn(self, body: Callable[[], None], label: str) -> None:
+        """Run *body* in a helper task, as a thread of rospy would."""
+        self._spawn(lambda: self._guarded(body, label), label)
 
-    def spawn_each(self, label: str, what: str) -> Group:
-        """A new group of which each piece of work gets a task of its own."""
+    def spawning_group(self, label: str, what: str) -> Group:
+        """Return a new group that runs each piece of work in a task of its own."""
 
         def start(work: Work) -> None:
-            self._start(lambda: self._guarded(work.run, what), label)
+            self._spawn(lambda: self._guarded(work.run, what), label)
 
         return self.node.group(start)
 
-    def _start(self, body: Callable[[], None], label: str) -> None:
-        place = replace(self.node.context, deadline=None, on_release=None)
-        self.kernel.spawn(body, f"{place.component} ({label})", place, self.scope)
+    def _spawn(self, body: Callable[[], None], label: str) -> None:
+        context = replace(self.node.context, deadline=None, on_release=None)
+        self.kernel.spawn(body, f"{context.component} ({label})", context, self.scope)
 
     def _guarded(self, run: Callable[[], object], what: str) -> None:
-        """rospy's threads log what a callback raises and go on.
-
-        Here it is a failure of the component, too.
-        """
+        """Run a callback. An exception is logged, as in rospy, and is a failure of the component."""
         try:
             run()
         except ROSInterruptException:
             pass
         except Exception as error:
-            text = f"{what} raised {_in_words(error)}"
-            self.say(ERROR, f"bad callback: {text}")
+            text = f"{what} raised {_description(error)}"
+            self.log(ERROR, f"bad callback: {text}")
             if text not in self.failures:
                 self.failures.add(text)
                 self.kernel.record(Failure(self.kernel.now(), self.node.context.component, text))
 
 
-def _in_words(error: Exception) -> str:
+def _description(error: Exception) -> str:
     if isinstance(error, VoleryError):
         return str(error)
     traceback = error.__traceback__
@@ -158,16 +161,16 @@ def _in_words(error: Exception) -> str:
 
 @dataclass(eq=False)
 class Sessions(LaunchedComponents):
-    """All components of one run that are nodes."""
+    """Sessions of all components of one run that use rospy."""
 
     _open: dict[str, Session] = field(default_factory=dict, init=False)
 
     def join(self, name: str, anonymous: bool) -> None:
-        """``init_node``: a second call of the same component changes nothing."""
-        session = self._open.get(self.component) or self._joined(name, anonymous)
+        """Execute ``init_node``; a second call of the same component changes nothing."""
+        session = self._open.get(self.component) or self._open_session(name, anonymous)
         session.initialised = True
 
-    def _joined(self, name: str, anonymous: bool) -> Session:
+    def _open_session(self, name: str, anonymous: bool) -> Session:
         component = self.component
         task = current_task(self.kernel)
         launch = self.launch_of(component)
@@ -186,21 +189,24 @@ class Sessions(LaunchedComponents):
         )
         return made
 
-    def here(self) -> Session:
-        """The session of the component that the current task computes for."""
+    def initialised(self) -> Session:
+        """Return the session of the current component; raise ``ROSInitException`` before ``init_node``."""
         session = self.find()
         if session is None or not session.initialised:
             raise ROSInitException(f"{self.component}: call rospy.init_node() first")
         return session
 
-    def early(self) -> Session:
-        """``here``, for what rospy does before ``init_node`` as well: the component joins the graph now."""
-        return self.find() or self._joined(self.component, anonymous=False)
+    def joined(self) -> Session:
+        """Return the session of the current task's component, joining the graph if it has not yet.
+
+        For the functions that rospy allows before ``init_node``.
+        """
+        return self.find() or self._open_session(self.component, anonymous=False)
 
     def find(self) -> Session | None:
-        """``here``, or ``None`` before the component has joined the graph."""
+        """Return the session of the current task's component, or None before it has joined the graph."""
         return self._open.get(self.component)
 
     def now(self) -> Ns:
-        """ROS time; an interaction point."""
-        return self.here().node.now()
+        """Return ROS time. An interaction point."""
+        return self.initialised().node.now()

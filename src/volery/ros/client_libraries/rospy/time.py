@@ -16,25 +16,25 @@ _DurationMessage: Any = message_class("builtin_interfaces/msg/Duration")
 
 
 def as_ns(value: Any) -> Ns:
-    """A duration given as rospy takes it: a number of seconds or a ``Duration``."""
+    """Return a number of seconds, or a ``Duration``, in ns."""
     if isinstance(value, (int, float)):
         return from_seconds(value)
     return nanoseconds(value)
 
 
 def _parts(secs: float, nsecs: int) -> tuple[int, int]:
-    whole = _cut(secs) if isinstance(secs, float) else secs * S
+    whole = _truncated(secs) if isinstance(secs, float) else secs * S
     return divmod(whole + nsecs, S)
 
 
-def _cut(seconds: float) -> Ns:
-    """Seconds as genpy takes them: what is behind the nanosecond is cut off, seconds and the rest apart."""
+def _truncated(seconds: float) -> Ns:
+    """Return seconds in ns, truncated as by genpy: integer and fractional part separately."""
     whole = int(seconds)
     return whole * S + int((seconds - whole) * S)
 
 
 class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this module is loaded
-    """A point in ROS time. ``Time(secs, nsecs)``; ``Time.now()``, ``Time.from_sec(float)``."""
+    """A point in ROS time: ``Time(secs, nsecs)``, ``Time.now()``, ``Time.from_sec(float)``."""
 
     __slots__ = ()
     sessions: ClassVar[Sessions]
@@ -44,19 +44,19 @@ class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this m
 
     @classmethod
     def now(cls) -> Self:
-        """The time it is."""
+        """Return the current time."""
         return cls(0, cls.sessions.now())
 
     @classmethod
     def from_sec(cls, seconds: float) -> Self:
-        """From seconds, as genpy cuts them."""
-        return cls(0, _cut(seconds))
+        """Return the value of seconds, truncated as by genpy."""
+        return cls(0, _truncated(seconds))
 
     from_seconds = from_sec
 
 
 class Duration(_DurationMessage):  # type: ignore[misc]  # the class is made when this module is loaded
-    """A span of time. ``Duration(secs, nsecs)``; ``Duration.from_sec(float)``."""
+    """A duration: ``Duration(secs, nsecs)``, ``Duration.from_sec(float)``."""
 
     __slots__ = ()
 
@@ -65,38 +65,38 @@ class Duration(_DurationMessage):  # type: ignore[misc]  # the class is made whe
 
     @classmethod
     def from_sec(cls, seconds: float) -> Self:
-        """From seconds, as genpy cuts them."""
-        return cls(0, _cut(seconds))
+        """Return the value of seconds, truncated as by genpy."""
+        return cls(0, _truncated(seconds))
 
     from_seconds = from_sec
 
 
 class Rate:
-    """Keeps a loop at *hz*."""
+    """Keeps a loop at a frequency of *hz*."""
 
     sessions: ClassVar[Sessions]
 
     def __init__(self, hz: float, reset: bool = False) -> None:
         if hz <= 0:
             raise UsageError(f"rospy.Rate({hz}): give a frequency above 0 Hz")
-        self._session = self.sessions.here()
-        period = int(S / hz)  # cut off, as rospy does
+        self._session = self.sessions.initialised()
+        period = int(S / hz)  # truncated, as by rospy
         self.sleep_dur = Duration(0, period)
         self._rate = self._session.node.rate(period)
 
     def remaining(self) -> Duration:
-        """Until the next release."""
+        """Return the time until the next release."""
         return Duration(0, self._rate.remaining())
 
     def sleep(self) -> None:
-        """Block until the next release; ``ROSInterruptException`` at shutdown."""
+        """Block until the next release; raise ``ROSInterruptException`` at shutdown."""
         self._session.check()
         self._rate.sleep()
         self._session.check()
 
 
 class TimerEvent(NamedTuple):
-    """What a ``Timer`` calls back with."""
+    """Argument of the callback of a ``Timer``."""
 
     last_expected: Time | None
     last_real: Time | None
@@ -106,14 +106,14 @@ class TimerEvent(NamedTuple):
 
 
 class Timer:
-    """Calls back each *period* in a thread of its own."""
+    """Calls *callback* each *period* in a thread of its own."""
 
     sessions: ClassVar[Sessions]
 
     def __init__(
         self, period: Any, callback: Callable[[TimerEvent], Any], oneshot: bool = False, reset: bool = False
     ) -> None:
-        self._session = self.sessions.here()
+        self._session = self.sessions.initialised()
         self._period = as_ns(period)
         self._callback = callback
         self._oneshot = oneshot
@@ -121,7 +121,7 @@ class Timer:
         self._last: TimerEvent | None = None
         self._took: float | None = None
         name = getattr(callback, "__name__", "callback")
-        group = self._session.spin_beside("timer", f"timer {name}")
+        group = self._session.spinning_group("timer", f"timer {name}")
         self._timer = self._session.node.timer(self._period, self._fire, group)
 
     def _fire(self) -> None:
@@ -142,12 +142,12 @@ class Timer:
         self._took = (self._session.node.now() - now) / S
 
     def shutdown(self) -> None:
-        """Call back no longer."""
+        """Stop the timer."""
         self._timer.cancel()
 
 
 def sleep(session: Session, duration: Any) -> None:
-    """``rospy.sleep``."""
+    """Block for a number of seconds or a ``Duration``; raise ``ROSInterruptException`` at shutdown."""
     session.check()
     session.node.sleep(as_ns(duration))
     session.check()

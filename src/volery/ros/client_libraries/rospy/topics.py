@@ -1,7 +1,4 @@
-"""``rospy.AnyMsg``: messages of whatever type a topic carries, as ROS 1's bytes.
-
-rospy's ``Publisher``, ``Subscriber`` and ``wait_for_message``.
-"""
+"""rospy's ``Publisher``, ``Subscriber``, ``wait_for_message`` and ``AnyMsg``."""
 
 from __future__ import annotations
 
@@ -20,12 +17,12 @@ from volery.ros.client_libraries.rospy.session import (
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, Subscription
 from volery.ros.messages import Message, ros1_type, to_ros1
 
-_LOOK: Ns = 100 * MS
-"""How often a topic is looked for that nobody publishes yet."""
+_TYPE_POLL: Ns = 100 * MS
+"""Period at which an ``AnyMsg`` subscription looks for the type of its topic."""
 
 
 class AnyMsg:
-    """A message as its bytes, ``_buff``; ``_connection_header`` says of which type and topic."""
+    """A message of any type as its ROS 1 bytes, ``_buff``; ``_connection_header`` holds type and topic."""
 
     _type = "*"
     _md5sum = "*"
@@ -39,56 +36,58 @@ class AnyMsg:
 
 
 class AnySubscription:
-    """Subscribes once the type of *topic* is known: at once, or when somebody else has stated it."""
+    """Subscribes as soon as the type of *topic* is known from another publisher or subscriber."""
 
     def __init__(self, session: Session, topic: str, callback: Callable[[Any], None], qos: QoS) -> None:
         self._session, self.topic, self._qos = session, topic, qos
         self._callback = callback
         self._made: Subscription | None = None
         self._open = True
-        session.beside(self._look, f"type of {topic}")
+        session.spawn(self._subscribe_when_known, f"type of {topic}")
 
-    def _look(self) -> None:
+    def _subscribe_when_known(self) -> None:
         node = self._session.node
         while self._open and not node.closed:
             kind = next((one.type for one in self._session.graph.topics() if one.name == self.topic), "")
             if kind:
-                group = self._session.spin_beside(self.topic, f"callback of {self.topic}")
-                self._made = node.subscribe(self.topic, kind, self._hear, self._qos, group)
+                group = self._session.spinning_group(self.topic, f"callback of {self.topic}")
+                self._made = node.subscribe(self.topic, kind, self._call, self._qos, group)
                 return
-            node.sleep(_LOOK)
+            node.sleep(_TYPE_POLL)
 
-    def _hear(self, message: Any) -> None:
+    def _call(self, message: Any) -> None:
         self._callback(AnyMsg(message, self.topic))
 
     def publishers(self) -> int:
-        """How many publishers it is connected to."""
+        """Return the number of connected publishers."""
         return 0 if self._made is None else self._made.publishers()
 
     def close(self) -> None:
-        """Receive no longer."""
+        """Remove the subscription from the graph."""
         self._open = False
         if self._made is not None:
             self._made.close()
 
 
-def type_name(what: str, data_class: Any) -> str:
-    """The name of a message type that is given as its class."""
+def type_name(caller: str, data_class: Any) -> str:
+    """Return the name of a message class; raise ``UsageError`` in the name of *caller* for anything else."""
     name = getattr(data_class, "__msgtype__", "")
     if not name:
-        raise UsageError(f"rospy.{what}: {data_class!r} is no message class; import one, as in std_msgs.msg")
+        raise UsageError(
+            f"rospy.{caller}: {data_class!r} is no message class; import one, as in std_msgs.msg"
+        )
     return str(name)
 
 
-def _listening(depth: int | None) -> QoS:
-    """ROS 1 knows no QoS: a subscriber takes what is offered."""
+def _subscriber_qos(depth: int | None) -> QoS:
+    """Return a QoS that matches every publisher, because ROS 1 has no QoS."""
     return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
 
 
 class Publisher:
     """Publishes to a topic.
 
-    Connections are ready at once; ``queue_size`` is accepted, sending never waits.
+    Connections are ready at once. Publishing never blocks, whatever ``queue_size`` is.
     """
 
     sessions: ClassVar[Sessions]
@@ -108,7 +107,7 @@ class Publisher:
             raise NotImplementedError(
                 "rospy.Publisher: subscriber_listener is not there on the embedded graph"
             )
-        session = self._session = self.sessions.early()
+        session = self._session = self.sessions.joined()
         qos = LATCHED if latch else QoS(queue_size or None)
         self.data_class = data_class
         self.type = type_name("Publisher", data_class)
@@ -116,28 +115,28 @@ class Publisher:
         self.name = self.resolved_name = self._publisher.topic
 
     def publish(self, *args: Any, **fields: Any) -> None:
-        """Publish a message, or one made of these fields; ``ROSException`` before ``init_node``."""
+        """Publish a message, or one made of these fields; raise ``ROSException`` before ``init_node``."""
         if not self._session.initialised:
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
         if len(args) == 1 and not fields and isinstance(args[0], Message):
             message = args[0]
         else:
-            message = _made(self.data_class, args, fields)
+            message = _message(self.data_class, args, fields)
         try:
             self._publisher.publish(message)
         except UsageError as error:
             raise ROSSerializationException(str(error)) from error
 
     def get_num_connections(self) -> int:
-        """How many subscribers it is connected to."""
+        """Return the number of connected subscribers."""
         return self._publisher.subscribers()
 
     def unregister(self) -> None:
-        """Publish no longer."""
+        """Remove the publisher from the graph."""
         self._publisher.close()
 
 
-def _made(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+def _message(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
     try:
         return data_class(*args, **fields)
     except TypeError as error:
@@ -145,7 +144,7 @@ def _made(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any
 
 
 class Subscriber:
-    """Calls back with each message, in a thread of its own."""
+    """Calls *callback* with each message, in a thread of its own."""
 
     sessions: ClassVar[Sessions]
 
@@ -160,19 +159,19 @@ class Subscriber:
         *,
         tcp_nodelay: bool = False,
     ) -> None:
-        session = self.sessions.early()
+        session = self.sessions.joined()
         self.data_class = data_class
         self.callback = callback
         self._args = callback_args
         topic = self.name = self.resolved_name = session.node.resolve(name)
-        qos = _listening(queue_size)
+        qos = _subscriber_qos(queue_size)
         self._subscription: AnySubscription | Subscription
         if data_class is AnyMsg:
             self.type = AnyMsg._type
             self._subscription = AnySubscription(session, topic, self._call, qos)
             return
         self.type = type_name("Subscriber", data_class)
-        group = session.spin_beside(topic, f"callback of {topic}")
+        group = session.spinning_group(topic, f"callback of {topic}")
         self._subscription = session.node.subscribe(name, self.type, self._call, qos, group)
 
     def _call(self, message: Any) -> None:
@@ -184,16 +183,16 @@ class Subscriber:
             self.callback(message, self._args)
 
     def get_num_connections(self) -> int:
-        """How many publishers it is connected to."""
+        """Return the number of connected publishers."""
         return self._subscription.publishers()
 
     def unregister(self) -> None:
-        """Receive no longer."""
+        """Remove the subscription from the graph."""
         self._subscription.close()
 
 
 def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns | None) -> Any:
-    """The next message of a topic; ``ROSException`` if none comes in time."""
+    """Return the next message of a topic; raise ``ROSException`` after a time-out."""
     received: list[Any] = []
     arrived = Signal(session.kernel, f"{topic} (a message)")
 
@@ -203,7 +202,7 @@ def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns 
 
     group = session.node.group()
     kind = type_name("wait_for_message", data_class)
-    subscription = session.node.subscribe(topic, kind, keep, _listening(1), group)
+    subscription = session.node.subscribe(topic, kind, keep, _subscriber_qos(1), group)
     try:
         group.spin_once(timeout)
     finally:
