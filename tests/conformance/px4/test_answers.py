@@ -201,11 +201,9 @@ def test_integers_travel_as_bytes_and_types_must_match(bench: Any) -> None:
     assert rig.vehicle.parameters["COM_OBL_RC_ACT"] == 4.0
 
 
-def test_parameters_that_are_honoured_exist_and_are_read_and_no_others_are() -> None:
+def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     room = Path(volery.simulation.autopilots.__file__).parent / "px4"
-    source = "".join(
-        path.read_text(encoding="utf-8") for path in sorted(room.glob("*.py")) if path.name != "honoured.py"
-    )
+    source = "".join(path.read_text(encoding="utf-8") for path in sorted(room.glob("*.py")))
     read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
     read |= set(re.findall(r'seconds_parameter\("([A-Z0-9_]+)"', source))
     read |= {"BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"}

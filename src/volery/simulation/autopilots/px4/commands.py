@@ -1,6 +1,6 @@
-"""PX4's commands: what each does and with which MAV_RESULT it is acknowledged.
+"""PX4's commands with the MAV_RESULT that acknowledges each, and the messages that need no acknowledgement.
 
-Messages that PX4 takes without an answer: heartbeats, sticks, set-points.
+The latter are heartbeats, manual control and set-points.
 """
 
 from __future__ import annotations
@@ -41,12 +41,15 @@ SPEED_OVER_GROUND = (0, 1)
 
 
 def to_integer(value: float) -> int:
-    """The nearest integer; -1 for what is no number."""
+    """Return the nearest integer, or -1 for a value that is not finite."""
     return round(value) if isfinite(value) else -1
 
 
 def on_set_mode(vehicle: Vehicle, command: Command) -> int:
-    """DO_SET_MODE: main and sub-mode. On the ground everything is accepted; nonsense changes nothing."""
+    """Handle DO_SET_MODE (main and sub-mode).
+
+    A disarmed vehicle accepts everything; invalid modes have no effect.
+    """
     if not to_integer(command.param1) & CUSTOM_MODE_ENABLED:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
     main, sub = to_integer(command.param2), to_integer(command.param3)
@@ -56,13 +59,13 @@ def on_set_mode(vehicle: Vehicle, command: Command) -> int:
 
 
 def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
-    """SET_MODE."""
+    """Handle SET_MODE."""
     main, sub = modes.main_and_sub(number)
     return commander_of(vehicle).request_mode(modes.custom_mode(main, sub))
 
 
 def on_arm(vehicle: Vehicle, command: Command) -> int:
-    """COMPONENT_ARM_DISARM."""
+    """Handle COMPONENT_ARM_DISARM."""
     force = to_integer(command.param2) == FORCE
     if command.param1 == 1.0:
         return commander_of(vehicle).arm(force)
@@ -72,7 +75,7 @@ def on_arm(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_takeoff(vehicle: Vehicle, command: Command) -> int:
-    """NAV_TAKEOFF: AMSL; accepted while disarmed, too: then arming takes off."""
+    """Handle NAV_TAKEOFF (altitude AMSL). A disarmed vehicle accepts it and takes off when armed."""
     commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.TAKEOFF):
         return TEMPORARILY_REJECTED
@@ -82,7 +85,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_land(vehicle: Vehicle, _command: Command) -> int:
-    """NAV_LAND: here."""
+    """Handle NAV_LAND: land at the present position."""
     commander = commander_of(vehicle)
     if commander.request_mode(modes.LAND) != ACCEPTED:
         return TEMPORARILY_REJECTED
@@ -92,7 +95,7 @@ def on_land(vehicle: Vehicle, _command: Command) -> int:
 
 
 def on_return(vehicle: Vehicle, _command: Command) -> int:
-    """NAV_RETURN_TO_LAUNCH."""
+    """Handle NAV_RETURN_TO_LAUNCH."""
     commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.RTL):
         vehicle.send_text(CRITICAL, "Return to launch denied\t")
@@ -103,7 +106,7 @@ def on_return(vehicle: Vehicle, _command: Command) -> int:
 
 
 def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
-    """The point that a command names, AMSL; what it leaves out is the vehicle's own. ``None``: nowhere."""
+    """Return the point of a command, with the vehicle's own values where it gives none; None if invalid."""
     latitude, longitude, amsl = vehicle.estimate.geodetic
     if isfinite(command.x) and isfinite(command.y) and (command.x or command.y):
         latitude, longitude = command.x, command.y
@@ -116,7 +119,10 @@ def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
 
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
-    """DO_REPOSITION: without its flag it is refused, and in AUTO.LOITER flown all the same."""
+    """Handle DO_REPOSITION.
+
+    Without its flag the command is refused, and in AUTO.LOITER flown nevertheless, as recorded.
+    """
     commander = commander_of(vehicle)
     point = commanded_point(vehicle, command)
     if point is None or not vehicle.has_position:
@@ -145,14 +151,14 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
 
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
-    """DO_CHANGE_SPEED: over the ground."""
+    """Handle DO_CHANGE_SPEED: speed over ground."""
     if to_integer(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
         vehicle.commanded.speed = command.param2
     return ACCEPTED
 
 
 def on_set_home(vehicle: Vehicle, command: Command) -> int:
-    """DO_SET_HOME."""
+    """Handle DO_SET_HOME."""
     if command.param1 == 1.0:
         if not vehicle.has_position:
             return TEMPORARILY_REJECTED
@@ -166,7 +172,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_orbit(vehicle: Vehicle, command: Command) -> int:
-    """DO_ORBIT: radius, speed; about the place or here."""
+    """Handle DO_ORBIT: radius and speed, about the given point or the present position."""
     commander = commander_of(vehicle)
     centre = commanded_point(vehicle, command)
     if centre is None or not vehicle.has_position or not vehicle.armed:
@@ -179,7 +185,7 @@ def on_orbit(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
-    """MISSION_START: the mode, and arming."""
+    """Handle MISSION_START: enter AUTO.MISSION and arm."""
     commander = commander_of(vehicle)
     if len(vehicle.mission) == 0 or commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED
@@ -187,7 +193,7 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
 
 
 def on_terminate(vehicle: Vehicle, command: Command) -> int:
-    """DO_FLIGHTTERMINATION: the motors stop."""
+    """Handle DO_FLIGHTTERMINATION: stop the motors."""
     if not isfinite(command.param1) or command.param1 <= 0.5:
         return TEMPORARILY_REJECTED
     if vehicle.armed:
@@ -196,12 +202,12 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
 
 
 def deny(_vehicle: Vehicle, _command: Command) -> int:
-    """PREFLIGHT_REBOOT_SHUTDOWN on a simulator."""
+    """Refuse PREFLIGHT_REBOOT_SHUTDOWN, as the firmware's simulator does."""
     return DENIED
 
 
 def accept(_vehicle: Vehicle, _command: Command) -> int:
-    """Acknowledged, and that is all."""
+    """Accept a command that has no effect."""
     return ACCEPTED
 
 
@@ -224,7 +230,7 @@ COPTER_COMMANDS: Mapping[int, Handler] = {
     TAKEOFF: on_takeoff,
     ORBIT: on_orbit,
 }
-"""A multirotor's. All others are unsupported, among them NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
+"""Commands of a multirotor. Unsupported are among others NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
 
 
 FROM_JOYSTICK = (1, 2, 3)
@@ -233,10 +239,10 @@ FROM_JOYSTICK = (1, 2, 3)
 
 @runtime_checkable
 class OffboardManoeuvre(Protocol):
-    """A manoeuvre of OFFBOARD."""
+    """A manoeuvre of the mode OFFBOARD."""
 
     def receive(self, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
-        """A set-point came."""
+        """Follow a new set-point."""
 
 
 OVERRIDE_AUTOMATIC, OVERRIDE_OFFBOARD = 1, 2
@@ -244,13 +250,13 @@ OVERRIDE_AUTOMATIC, OVERRIDE_OFFBOARD = 1, 2
 
 
 def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """HEARTBEAT of somebody else."""
+    """Handle HEARTBEAT of a ground station."""
     if fields["type"] == GROUND_STATION:
         commander_of(vehicle).station_seen = vehicle.kernel.now()
 
 
 def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """MANUAL_CONTROL."""
+    """Handle MANUAL_CONTROL."""
     given = deflection(fields)
     enabled = round(vehicle.parameters["COM_RC_IN_MODE"]) in FROM_JOYSTICK
     if given is None or not enabled or fields["target"] not in (0, vehicle.system):
@@ -267,7 +273,7 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
 
 
 def _override(commander: Commander) -> None:
-    """Moving the sticks takes an automatic mode over, in the air."""
+    """Let moved sticks take over an automatic mode in flight, as COM_RC_OVERRIDE allows."""
     vehicle = commander.vehicle
     may = round(vehicle.parameters["COM_RC_OVERRIDE"])
     number = vehicle.mode.number
@@ -294,18 +300,18 @@ def _take(vehicle: Vehicle, target: offboard.OffboardTarget | offboard.AttitudeT
 
 
 def on_local_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_LOCAL_NED."""
+    """Handle SET_POSITION_TARGET_LOCAL_NED."""
     _take(vehicle, offboard.local_target(vehicle, fields, commander_of(vehicle).log))
 
 
 def on_global_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_POSITION_TARGET_GLOBAL_INT: counts only with a position."""
+    """Handle SET_POSITION_TARGET_GLOBAL_INT, which counts only while there is a position."""
     if vehicle.has_position:
         _take(vehicle, offboard.global_target(vehicle, fields, commander_of(vehicle).log))
 
 
 def on_attitude_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """SET_ATTITUDE_TARGET."""
+    """Handle SET_ATTITUDE_TARGET."""
     _take(vehicle, offboard.attitude_target(fields))
 
 
@@ -316,4 +322,4 @@ MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
     "SET_POSITION_TARGET_GLOBAL_INT": on_global_target,
     "SET_POSITION_TARGET_LOCAL_NED": on_local_target,
 }
-"""What a multirotor hears."""
+"""Messages that need no answer, for every kind of vehicle."""

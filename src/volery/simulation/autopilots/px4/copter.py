@@ -1,7 +1,4 @@
-"""PX4 1.14.0 on a multirotor: its modes and its habits, put together as a dialect.
-
-What PX4 says while it returns.
-"""
+"""PX4 1.14.0 on a multirotor: modes, take-off and return, composed as a firmware."""
 
 from __future__ import annotations
 
@@ -31,7 +28,14 @@ from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, M
 
 
 def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
-    """The words and the event of a stage; *amsl* is its altitude, *above* that above the destination."""
+    """Report a stage of AUTO.RTL as status text and event.
+
+    Args:
+        vehicle: The vehicle.
+        stage: ``climb``, ``return``, ``descend`` or ``land``.
+        amsl: Altitude of the stage [m AMSL].
+        above: The same above the destination [m].
+    """
     log = commander_of(vehicle).log
     figures = struct.pack("<iB", int(amsl), max(0, min(255, int(above))))
     heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
@@ -60,7 +64,7 @@ QUADROTOR = 2
 
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
-    """To the altitude of the command; at least MIS_TAKEOFF_ALT above where it stands."""
+    """Create the take-off to the commanded altitude, at least MIS_TAKEOFF_ALT above the vehicle."""
     commander = commander_of(vehicle)
     here = vehicle.estimate.geodetic[2]
     least = vehicle.parameters["MIS_TAKEOFF_ALT"]
@@ -120,7 +124,7 @@ def _on_step(vehicle: Vehicle) -> None:
 
 
 def _stay_here(vehicle: Vehicle) -> None:
-    """The take-off has ended: it stays at the height at which that was noticed."""
+    """End the take-off: hold the position at which the end was detected."""
     here = vehicle.estimate.position
     commander_of(vehicle).continue_with(modes.LOITER)
     if isinstance(vehicle.manoeuvre, Hold):
@@ -129,7 +133,7 @@ def _stay_here(vehicle: Vehicle) -> None:
 
 @cache
 def parameters() -> tuple[Parameter, ...]:
-    """The recorded list."""
+    """Return the recorded parameters."""
     return load("volery.simulation.autopilots.px4", "data/copter.parameters")
 
 

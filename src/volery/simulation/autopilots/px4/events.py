@@ -1,8 +1,8 @@
-"""PX4's events: what it says to machines. Numbers, levels and arguments as recorded.
+"""PX4's event interface. Numbers, levels and arguments are as recorded.
 
-An event's number is a hash of its name; the names here say what was seen to cause it. Some things are said in
-events alone, above all why arming is refused: a report of all checks goes out when it changes, at most every
-two seconds, as a summary, the checks that fail, and a summary of the sensors.
+The number of an event is a hash of its name; the names here state the observed cause. The reasons of a
+refusal to arm appear in events only: a report of all checks is sent when it changes, at most every two
+seconds, as a summary, the checks that fail, and a summary of the sensors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
 class Event(NamedTuple):
-    """``levels``: internal and external severity."""
+    """One event; ``levels`` holds internal and external severity."""
 
     id: int
     levels: int
@@ -59,23 +59,23 @@ STILL_STARTING = Event(0x0167C97B, 0x66)
 SENSORS_SUMMARY = Event(0x011D3727, 0x88)
 
 BY_COMMAND, BY_LANDING, BY_WAITING = b"\x04", b"\x06", b"\x07"
-"""Why it was armed or disarmed."""
+"""Reasons of arming and disarming, as arguments."""
 
 FIRST_SEQUENCE = 65_526
-"""Of the first event after a boot."""
+"""Sequence number before the first event after a boot."""
 
 _EVENTS_OF_OFFBOARD, _EVENTS_OF_STICKS = 1 << 20, 1 << 7
 
 
 class EventLog:
-    """The events of one vehicle, counted."""
+    """Numbered events of one vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
         self.latest = FIRST_SEQUENCE
 
     def send(self, event: Event, arguments: bytes = b"") -> None:
-        """Send it to everyone."""
+        """Send an event on all links."""
         self.latest = (self.latest + 1) % 65_536
         fields = {
             "id": event.id,
@@ -88,7 +88,7 @@ class EventLog:
 
 
 class ArmingChecks(NamedTuple):
-    """What speaks for and against arming."""
+    """Results of the arming checks."""
 
     started: bool
     attitude: bool
@@ -97,11 +97,11 @@ class ArmingChecks(NamedTuple):
     mission: bool
     offboard: bool
     mode: bool
-    """Whether the wished mode is one that may be armed."""
+    """Whether the requested mode may be armed."""
 
 
 def _modes(checks: ArmingChecks) -> int:
-    """A bit for each mode that could be flown now, by its navigation state."""
+    """Return the modes that could be flown now, as one bit for each navigation state."""
     missing: list[int] = []
     if not checks.position:
         missing += [2, 3, 4, 5, 17, 18, 19, 20, 21, 22]
@@ -120,7 +120,7 @@ def _modes(checks: ArmingChecks) -> int:
 
 
 def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
-    """The events that tell it."""
+    """Return the events that report these checks."""
     able = _modes(checks)
     errors = 0 if checks.offboard else _EVENTS_OF_OFFBOARD
     warnings = 0 if checks.sticks else _EVENTS_OF_STICKS
@@ -146,5 +146,5 @@ def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
 
 
 def float_argument(value: float) -> bytes:
-    """A number as an argument."""
+    """Return a number as the argument of an event."""
     return struct.pack("<f", value)

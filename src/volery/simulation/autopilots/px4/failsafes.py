@@ -1,4 +1,8 @@
-"""What PX4's commander does by itself, at each tick: landing and taking off noticed, failsafes, disarming."""
+"""Automatic actions of PX4's commander at each tick: ground detection, failsafes, disarming.
+
+A failsafe replaces only one of lower rank. Most actions are preceded by a hold of COM_FAIL_ACT_T, in which
+the pilot may react.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +32,7 @@ OFFBOARD_ACTIONS = {
     4: (modes.LAND, 7),
     5: (modes.LOITER, 5),
 }
-"""COM_OBL_RC_ACT to a mode, and how an event names the action."""
+"""COM_OBL_RC_ACT to the mode and to the number of the action in events."""
 
 OUTRANKS = {
     "": 0,
@@ -39,17 +43,17 @@ OUTRANKS = {
     BATTERY_EMERGENCY: 5,
     POSITION_LOST: 6,
 }
-"""A failsafe replaces only a lesser one."""
+"""Rank of each failsafe."""
 
 LOSS_DETECTION_DELAY = 145 * MS
-"""Sticks silent for COM_RC_LOSS_T = 0.5 s were missed 0.63 to 0.65 s after the last sample."""
+"""Recorded: with COM_RC_LOSS_T = 0.5 s the loss was detected 0.63 to 0.65 s after the last sample."""
 
 RECOVERY = 0.25
-"""Seconds of Hold that come back for each second without a failsafe, as recorded."""
+"""Hold time [s] that is regained for each second without a failsafe, as recorded."""
 
 
 def on_step(vehicle: Vehicle) -> None:
-    """At each tick."""
+    """Run the commander for one tick."""
     commander = commander_of(vehicle)
     now = vehicle.kernel.now()
     passed = 0.0 if commander.last_step == NEVER else to_seconds(now - commander.last_step)
@@ -150,7 +154,7 @@ def _outranked(commander: Commander, name: str) -> bool:
 
 
 def _end_hold(commander: Commander) -> None:
-    """The time to react has passed: now the action itself."""
+    """Execute the action of a failsafe after its hold."""
     if commander.hold_until == NEVER or commander.vehicle.kernel.now() < commander.hold_until:
         return
     commander.hold_until = NEVER
@@ -160,7 +164,7 @@ def _end_hold(commander: Commander) -> None:
 
 
 def _hold_first(commander: Commander, name: str, number: int) -> None:
-    """Hold for what is left of COM_FAIL_ACT_T, so that the pilot may react; then *number*."""
+    """Hold for the rest of COM_FAIL_ACT_T, then enter mode ``number``."""
     vehicle, left = commander.vehicle, commander.hold_delay_left
     if left <= 0.0:
         vehicle.send_text(CRITICAL, "Failsafe activated\t")
@@ -269,7 +273,7 @@ def _say_once(vehicle: Vehicle, severity: int, text: str) -> None:
 
 
 def _check_position(commander: Commander) -> None:
-    """Without a position: the pilot gets the height, or nobody does and it sinks level."""
+    """React to a lost position: ALTCTL if the pilot flies, else a level descent."""
     vehicle = commander.vehicle
     flown = commander.failsafe_mode or commander.requested
     lost = not vehicle.has_position

@@ -1,10 +1,6 @@
-"""What PX4 does by itself after it is switched on, and what all kinds of vehicles have in common.
+"""What PX4's kinds of vehicles share: boot timeline, telemetry rates of each link, MAVLink rules.
 
-Which messages PX4 sends on which link, how often, and who builds them.
-
-PX4's MAVLink, for any kind of vehicle.
-
-What a dialect of PX4 says of every vehicle, whatever its kind.
+All times are recorded.
 """
 
 from __future__ import annotations
@@ -43,16 +39,16 @@ from volery.simulation.autopilots.vehicle_state import (
 )
 
 ORIGIN: Ns = 6_200 * MS
-"""Recorded: positions from 6.4 s on."""
+"""First position; recorded from 6.4 s on."""
 
 HOME: Ns = 7_600 * MS
-"""Recorded: the first home 7.59 to 7.60 s after boot."""
+"""First home position; recorded 7.59 to 7.60 s after boot."""
 
 STREAMS: Ns = 500 * MS
-"""Recorded: streams half a second after boot, the first heartbeat later."""
+"""First telemetry stream."""
 
 FIRST_HEARTBEAT: Ns = 1_252 * MS
-"""Recorded: 1.19 to 1.34 s after boot."""
+"""Recorded 1.19 to 1.34 s after boot."""
 
 
 def _origin_set(vehicle: Vehicle) -> None:
@@ -60,13 +56,13 @@ def _origin_set(vehicle: Vehicle) -> None:
 
 
 def set_home_position(vehicle: Vehicle) -> None:
-    """The position is good enough for a home."""
+    """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.estimate.position_ok and vehicle.home is None:
         vehicle.set_home_here()
 
 
 def stand_on_ground(vehicle: Vehicle) -> None:
-    """On the ground, disarmed."""
+    """Put the vehicle on the ground."""
     vehicle.ground.landed = True
 
 
@@ -79,13 +75,13 @@ EVENTS = (
 
 
 def on_position(vehicle: Vehicle) -> None:
-    """A warm vehicle has found its place."""
+    """Set the home position of a vehicle that starts warm, whose arming checks are not reported."""
     set_home_position(vehicle)
     commander_of(vehicle).reported = commander_of(vehicle).checks()
 
 
 def own_parameters(system: int, _flight: Flight) -> Mapping[str, float]:
-    """What follows from the vehicle."""
+    """Return the parameters that follow from the system id."""
     return {"MAV_SYS_ID": system}
 
 
@@ -148,7 +144,7 @@ USES: Mapping[str, Mapping[str, Ns]] = {
         }
     ),
 }
-"""What a link is for, to the period of each message on it, as recorded."""
+"""Use of a link to the period of each message on it, as recorded."""
 
 BUILDERS: Mapping[str, Builder] = {
     "ALTITUDE": telemetry.altitude,
@@ -183,7 +179,7 @@ BUILDERS: Mapping[str, Builder] = {
 }
 
 ORDER: Sequence[str] = tuple(sorted(BUILDERS))
-"""Of the messages within one burst."""
+"""Order of the messages within one burst."""
 
 
 TEXTS = StatusTextPolicy(numbered=True, to_stations=True, spacing=48 * MS)
@@ -206,7 +202,7 @@ def _refuse_interval(_vehicle: Vehicle, _number: int) -> int:
 
 
 def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmware:
-    """Return the MAVLink of a vehicle of that MAV_TYPE that supports these commands."""
+    """Return the MAVLink rules of a vehicle of that MAV_TYPE with these commands."""
     return MavlinkFirmware(
         start=LinkStart(heartbeat_from=FIRST_HEARTBEAT),
         telemetry=TelemetryPolicy(
@@ -229,7 +225,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
         ),
         missions=MissionPolicy(
             upload=MissionUploadPolicy(
-                mission.request_message, received="", turns_to_integers=True, keeps_old=True
+                mission.request_message, received="", falls_back_to_int=True, keeps_old=True
             ),
             runs=mission.runs,
             stored_item=mission.stored_item,
@@ -242,7 +238,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
 
 
 ROVER_ARMING = ArmingTimes()
-"""Wheels have nothing to spool up."""
+"""A rover has no spool-up."""
 
 
 def px4_firmware(
@@ -253,7 +249,7 @@ def px4_firmware(
     on_step: VehicleAction,
     arming: ArmingTimes = ROVER_ARMING,
 ) -> Firmware:
-    """Return the firmware of one kind of vehicle: what all kinds share, and the arguments."""
+    """Return the firmware of one kind of vehicle: the shared rules, and the arguments."""
     return Firmware(
         name="px4",
         kind=kind,

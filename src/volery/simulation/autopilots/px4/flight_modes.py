@@ -1,8 +1,6 @@
-"""Speeds that depend on something by straight lines between points.
+"""Manoeuvres of PX4's multirotor: hold, take-off, landing, return, circle, and POSCTL by stick.
 
-The automatic modes of PX4's multirotor, which plan their path: hold, take-off, landing, return, circle.
-
-POSCTL: PX4's multirotor flown by sticks, or by nobody.
+Figures without a parameter name are fitted to the recordings.
 """
 
 from __future__ import annotations
@@ -21,11 +19,11 @@ from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
-"""Share of a climb rate over the time since it left the ground, in MPC_TKO_RAMP_T: as recorded."""
+"""Share of the climb rate over the time since lift-off in MPC_TKO_RAMP_T, as recorded."""
 
 
 def interpolated(value: float, low: tuple[float, float], high: tuple[float, float]) -> float:
-    """Between two points (value, result), and their results beyond them."""
+    """Interpolate linearly between two points (value, result), constant beyond them."""
     if high[0] <= low[0]:
         return high[1] if value > low[0] else low[1]
     share = min(1.0, max(0.0, (value - low[0]) / (high[0] - low[0])))
@@ -33,7 +31,7 @@ def interpolated(value: float, low: tuple[float, float], high: tuple[float, floa
 
 
 def climb_share(vehicle: Vehicle) -> float:
-    """How much of its climb rate it may use: little just after it has left the ground."""
+    """Return the share of the climb rate that is allowed this long after lift-off."""
     lifted = vehicle.firmware_state.lifted_at
     if lifted == NEVER:
         return CLIMB_RAMP[0][1]
@@ -48,20 +46,20 @@ JERK_AUTO = 4.0
 """MPC_JERK_AUTO [m/s^3]."""
 
 CRUISE_SHARE = 0.84
-"""Of MPC_XY_CRUISE: legs asked for at 5 m/s were flown at 4.0 to 4.2."""
+"""Share of MPC_XY_CRUISE: legs commanded at 5 m/s were flown at 4.0 to 4.2 m/s."""
 
 ACCEL_SHARE = 0.67
-"""Of MPC_ACC_HOR: how a leg begins and ends in the recordings."""
+"""Share of MPC_ACC_HOR at the start and end of a leg, as recorded."""
 
 ALIGNED, SPEED_ASIDE = 0.35, 0.5
-"""A leg is flown in earnest once the nose is that close to its direction [rad]; before, that fast [m/s]."""
+"""Heading error [rad] below which a leg is flown at full speed; before that, the speed limit [m/s]."""
 
 
 class Hold(ToPoint):
-    """AUTO.LOITER: stop and stay; a reposition moves the point."""
+    """AUTO.LOITER: stop and hold a point, which a reposition moves."""
 
     def towards(self, point: Vector) -> Setpoint:
-        """As planned by the firmware: gently."""
+        """Return the set-point with the jerk limit of the firmware's trajectory planner."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         return Setpoint(
             Control.POSITION,
@@ -77,7 +75,7 @@ class Hold(ToPoint):
         )
 
     def _cruise(self) -> float:
-        """Speed in the plane; slow until the nose points along the leg."""
+        """Return the horizontal speed [m/s], limited until the nose points along the leg."""
         vehicle = self.vehicle
         speed = CRUISE_SHARE * (self.speed or vehicle.commanded.speed or vehicle.parameters["MPC_XY_CRUISE"])
         if self.yaw is None or abs(wrap(self.yaw - vehicle.estimate.attitude[2])) < ALIGNED:
@@ -85,7 +83,7 @@ class Hold(ToPoint):
         return min(speed, SPEED_ASIDE)
 
     def near(self, sideways: float, height: float) -> bool:
-        """Whether it is that close to the point."""
+        """Return whether the point is within these distances [m]."""
         if self.point is None:
             return True
         here = self.vehicle.estimate.position
@@ -93,7 +91,7 @@ class Hold(ToPoint):
 
 
 class TakeOff(Hold):
-    """Straight up to an altitude, as MPC_TKO_SPEED and its ramp allow. It counts as there 0.8 m below."""
+    """Climb vertically to an altitude at MPC_TKO_SPEED with its ramp."""
 
     taking_off = True
     slow_start = True
@@ -103,30 +101,30 @@ class TakeOff(Hold):
         self.down = down
 
     def enter(self) -> None:
-        """From where it stands."""
+        """Climb over the present position."""
         north, east, _ = self.vehicle.estimate.position
         self.point = self.target = (north, east, self.down)
 
     def takeoff_requested(self) -> bool:
-        """That is what it is for."""
+        """Return True: the manoeuvre is a take-off."""
         return True
 
     def towards(self, point: Vector) -> Setpoint:
-        """Slowly at first."""
+        """Return the set-point with the climb rate of the ramp."""
         share = climb_share(self.vehicle)
         return replace(super().towards(point), speed_up=share * self.vehicle.parameters["MPC_TKO_SPEED"])
 
     def arrived(self, passing: bool = False) -> bool:
-        """Within NAV_MC_ALT_RAD, or above."""
+        """Return whether the vehicle is within NAV_MC_ALT_RAD below the altitude, or above it."""
         reach = self.vehicle.parameters["NAV_MC_ALT_RAD"]
         return self.vehicle.estimate.position[2] - self.down < reach
 
 
 class Descent(Land):
-    """AUTO.LAND: slower and slower below MPC_LAND_ALT1, ALT2 and ALT3."""
+    """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, ALT2 and ALT3."""
 
     def sink(self) -> float:
-        """Metres per second down at the present height."""
+        """Return the sink rate at the present height [m/s]."""
         p, height = self.vehicle.parameters, self.vehicle.firmware_state.above_ground
         middle = p["MPC_LAND_SPEED"]
         if height > p["MPC_LAND_ALT2"]:
@@ -137,9 +135,7 @@ class Descent(Land):
 
 
 class Return(Manoeuvre):
-    """AUTO.RTL: climb, fly home, sink to RTL_DESCEND_ALT, land. *stage* is told the name of each stage, its
-    altitude AMSL and its height above the destination.
-    """
+    """AUTO.RTL: climb, fly home, descend to RTL_DESCEND_ALT, land. ``report`` is called at each stage."""
 
     def __init__(self, vehicle: Vehicle, told: Callable[[Vehicle, str, float, float], None]) -> None:
         super().__init__(vehicle)
@@ -148,7 +144,7 @@ class Return(Manoeuvre):
         self._active: Manoeuvre = Hold(vehicle)
 
     def enter(self) -> None:
-        """Straight up first."""
+        """Climb vertically first."""
         here, home = self.vehicle.estimate.position, self._home
         away = hypot(home[0] - here[0], home[1] - here[1])
         self._height = max(self._least_height(away), home[2] - here[2])
@@ -159,7 +155,7 @@ class Return(Manoeuvre):
         return self.vehicle.home.ned if self.vehicle.home else (0.0, 0.0, 0.0)
 
     def _least_height(self, away: float) -> float:
-        """Above home: RTL_RETURN_ALT, less within a cone of RTL_CONE_ANG about home."""
+        """Return the least height above home [m]: RTL_RETURN_ALT, less within the cone of RTL_CONE_ANG."""
         p = self.vehicle.parameters
         full, reach, angle = p["RTL_RETURN_ALT"], p["NAV_ACC_RAD"], p["RTL_CONE_ANG"]
         if angle <= 0.0:
@@ -181,7 +177,7 @@ class Return(Manoeuvre):
         self._report(self.vehicle, stage, amsl, above)
 
     def step(self) -> None:
-        """On to the next stage when one is done."""
+        """Continue with the next stage when one has ended."""
         active, home = self._active, self._home
         p = self.vehicle.parameters
         if isinstance(active, Hold):
@@ -195,7 +191,7 @@ class Return(Manoeuvre):
 
 
 class Orbit(Manoeuvre):
-    """Circles about a centre, nose to it."""
+    """Circle about a centre with the nose towards it."""
 
     def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, speed: float) -> None:
         super().__init__(vehicle)
@@ -203,7 +199,7 @@ class Orbit(Manoeuvre):
         self.target = centre
 
     def step(self) -> None:
-        """Along the tangent, with a pull to the circle; positive radius: clockwise."""
+        """Fly along the tangent with a correction towards the circle; a positive radius is clockwise."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         north, east, _ = vehicle.estimate.position
         angle = atan2(east - self.centre[1], north - self.centre[0])
@@ -231,17 +227,17 @@ class Orbit(Manoeuvre):
 
 
 SINK_BLIND = 0.7
-"""MPC_LAND_SPEED: how it sinks in POSCTL without sticks [m/s]."""
+"""MPC_LAND_SPEED: sink rate in POSCTL without sticks [m/s]."""
 
 EXPO = 0.6
 """MPC_XY_MAN_EXPO, MPC_Z_MAN_EXPO."""
 
 STICK_SPEED_SHARE = 0.78
-"""Of MPC_VEL_MANUAL: what a stick held for long came to in the recordings."""
+"""Share of MPC_VEL_MANUAL that a held stick reaches, as recorded."""
 
 
 def apply_expo(stick: float, dead: float) -> float:
-    """-1..1: nothing within the dead zone, gently beyond."""
+    """Return a stick deflection -1..1 after dead zone and expo curve."""
     size = abs(stick)
     if size <= dead:
         return 0.0
@@ -251,7 +247,7 @@ def apply_expo(stick: float, dead: float) -> float:
 
 
 class BlindDescent(Manoeuvre):
-    """POSCTL with nobody at the sticks: it keeps its place and sinks."""
+    """POSCTL without manual control: hold the horizontal position and sink."""
 
     landing = False
 
@@ -260,11 +256,11 @@ class BlindDescent(Manoeuvre):
         self._held: Vector = (0.0, 0.0, 0.0)
 
     def enter(self) -> None:
-        """Where it is."""
+        """Hold the present position."""
         self._held = self.vehicle.estimate.position
 
     def step(self) -> None:
-        """Sink."""
+        """Sink at MPC_LAND_SPEED."""
         tuning = self.vehicle.tuning
         self.vehicle.drive(
             Setpoint(
@@ -281,7 +277,7 @@ class BlindDescent(Manoeuvre):
 
 
 class PositionControl(ByPilot):
-    """POSCTL: sticks are accelerations against a drag; let go, it brakes and stays."""
+    """POSCTL: sticks command an acceleration against drag; centred sticks brake and hold."""
 
     slow_start = True
 
@@ -293,13 +289,13 @@ class PositionControl(ByPilot):
         self._blind: BlindDescent | None = None
 
     def enter(self) -> None:
-        """With the speed that it has."""
+        """Start with the present velocity."""
         north, east, _ = self.vehicle.estimate.velocity
         self._velocity, self._held, self._blind = (north, east), None, None
         self._last = self.vehicle.kernel.now()
 
     def takeoff_requested(self) -> bool:
-        """When the pilot asks to climb."""
+        """Return whether the pilot commands a climb."""
         return self._sticks and self._climb() > 0.0
 
     @property
@@ -313,7 +309,7 @@ class PositionControl(ByPilot):
         return asked * (p["MPC_Z_VEL_MAX_UP"] if asked > 0.0 else p["MPC_Z_VEL_MAX_DN"])
 
     def step(self) -> None:
-        """Sticks to speed; without sticks it sinks."""
+        """Follow the sticks; sink without them."""
         if not self._sticks:
             if self._blind is None:
                 self._blind = BlindDescent(self.vehicle)

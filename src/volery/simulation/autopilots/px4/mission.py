@@ -1,4 +1,4 @@
-"""PX4's missions: what is accepted, how items are flown, what is said on the way."""
+"""PX4's missions: which items are accepted, how they are flown and reported."""
 
 from __future__ import annotations
 
@@ -43,47 +43,47 @@ MISSION_FRAME = 2
 
 FLOWN = frozenset({WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, CHANGE_SPEED})
 KEPT = frozenset({SET_HOME, 115, 195, 197, 201, 203, 205, 206, 211, 214, 530, 1000, 2000, 2001, 2500, 2501})
-"""Items that are stored and read back but do nothing here: cameras, mounts, regions of interest, grippers,
+"""Items that are stored and read back without effect: cameras, mounts, regions of interest, grippers,
 headings.
 """
 
 FRAMES = (GLOBAL, GLOBAL_INT, GLOBAL_RELATIVE, GLOBAL_RELATIVE_INT, MISSION_FRAME)
 
 REACHED_AGAIN = 10
-"""MISSION_ITEM_REACHED comes that often again,"""
+"""Number of repetitions of MISSION_ITEM_REACHED."""
 REACHED_EVERY: Ns = 100 * MS
-"""and so far apart."""
+"""Interval of the repetitions."""
 
 
 def request_message(number: int) -> str:
-    """The first item is asked for by the old message, the rest by the new one."""
+    """Return the message that requests an item: the deprecated one for the first item."""
     return "MISSION_REQUEST" if number == 0 else "MISSION_REQUEST_INT"
 
 
 def stored_item(item: MissionItem) -> MissionItem | int:
-    """As it was sent."""
+    """Return an item as sent, or the MAV_MISSION_RESULT that refuses it."""
     if item.command not in FLOWN | KEPT:
         return UNSUPPORTED
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
 
 
 def no_home_item(_vehicle: Vehicle) -> MissionItem | None:
-    """Item 0 is the first of the mission."""
+    """Return None: item 0 is the first item of the mission."""
     return None
 
 
 def runs(_vehicle: Vehicle) -> bool:
-    """It may be cleared at any time."""
+    """Return False: the mission may be cleared at any time."""
     return False
 
 
 def refuse_guided_item(_vehicle: Vehicle, _item: MissionItem) -> bool:
-    """An item that is no part of a mission is refused."""
+    """Return False: an item outside an upload is refused."""
     return False
 
 
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
-    """MISSION_ITEM_REACHED, again and again."""
+    """Send MISSION_ITEM_REACHED with its repetitions."""
 
     def tell() -> None:
         vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
@@ -94,7 +94,7 @@ def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
 
 
 def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
-    """A take-off says how high; a return is the mode of that name."""
+    """Report the height of a take-off."""
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
         vehicle.send_text(INFO, f"Takeoff to {above:.1f} meters above home\t")
@@ -102,7 +102,7 @@ def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
 
 
 def ended(vehicle: Vehicle) -> None:
-    """It stays where it is, in AUTO.LOITER."""
+    """Enter AUTO.LOITER after the mission."""
     vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _loiter(vehicle))
 
 
@@ -112,7 +112,7 @@ def _loiter(vehicle: Vehicle) -> None:
 
 
 def act(vehicle: Vehicle, item: MissionItem) -> None:
-    """Items that are done at once."""
+    """Execute an item that does not navigate."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
         vehicle.commanded.speed = item.param2
 
@@ -123,10 +123,10 @@ MISSION_RULES = MissionRules(
 
 
 class ReturnFromMission(Manoeuvre):
-    """An item that says: return. The mode changes."""
+    """Item RETURN_TO_LAUNCH: enter AUTO.RTL."""
 
     def step(self) -> None:
-        """Once."""
+        """Change the mode after the present step."""
         vehicle = self.vehicle
         vehicle.kernel.call_at(vehicle.kernel.now(), self._change)
 
@@ -139,7 +139,7 @@ _NO_COMMAND = Command(RETURN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GLOBAL_RELATIVE
 
 
 class LandAt(Manoeuvre):
-    """Fly level to a place, then land there; without a place, here."""
+    """Fly level to a point and land there; without a point, land here."""
 
     def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
         super().__init__(vehicle)
@@ -148,12 +148,12 @@ class LandAt(Manoeuvre):
         self._going = None if point is None else Hold(vehicle, (point[0], point[1], down))
 
     def enter(self) -> None:
-        """Begin with whichever comes first."""
+        """Start with the flight to the point, if there is one."""
         (self._going or self._landing).enter()
         self.landing = self._going is None
 
     def step(self) -> None:
-        """Go, then sink."""
+        """Fly to the point, then descend."""
         if self._going is not None and self._going.near(1.0, 2.0):
             self._going = None
             self._landing.enter()
@@ -162,7 +162,7 @@ class LandAt(Manoeuvre):
 
 
 class FlyToItem(Hold):
-    """To an item's place; from the ground straight up to its height first."""
+    """Fly to the point of an item; from the ground, climb vertically to its height first."""
 
     slow_start = True
 
@@ -171,17 +171,17 @@ class FlyToItem(Hold):
         self._climbing: TakeOff | None = TakeOff(vehicle, point[2]) if vehicle.landed else None
 
     def enter(self) -> None:
-        """Whichever comes first."""
+        """Start with the climb, if the vehicle is on the ground."""
         super().enter()
         if self._climbing is not None:
             self._climbing.enter()
 
     def takeoff_requested(self) -> bool:
-        """A mission does."""
+        """Return True: a mission takes off."""
         return True
 
     def step(self) -> None:
-        """Climb, then go."""
+        """Climb, then fly to the point."""
         if self._climbing is not None and self._climbing.arrived():
             self._climbing = None
         self.taking_off = self._climbing is not None
@@ -192,7 +192,7 @@ class FlyToItem(Hold):
 
 
 def leg(vehicle: Vehicle, item: MissionItem, _goes_on: bool) -> Leg:
-    """The leg of a multirotor for an item that navigates."""
+    """Return the leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
         climbing = TakeOff(vehicle, point_height(vehicle, item))
         return Leg(climbing, climbing.arrived)

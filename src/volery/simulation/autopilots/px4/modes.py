@@ -1,10 +1,8 @@
-"""PX4's modes as the wire knows them: main mode and sub-mode in one number, bits of the heartbeat, words.
+"""PX4's modes and its commander, which decides the mode that is flown and whether the vehicle may arm.
 
-PX4's commander: who decides the mode. The user's wish, and what a failsafe makes of it.
-
-A failsafe replaces the mode that is flown, not the one that was wished for: when its cause goes away, some
-give the wished mode back by themselves (the stream of OFFBOARD set-points is there again), others only when
-the user asks for a mode, moves the sticks or disarms.
+A mode is main mode and sub-mode in one number. A failsafe replaces the mode that is flown, not the requested
+one: some failsafes return to the requested mode when their cause ends (the stream of OFFBOARD set-points),
+the others only when the user requests a mode, moves the sticks or disarms.
 """
 
 from __future__ import annotations
@@ -30,12 +28,12 @@ BY_COMPUTER = CUSTOM | STABILIZED
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
-    """``custom_mode`` of the heartbeat."""
+    """Return ``custom_mode`` of the heartbeat."""
     return sub << 24 | main << 16
 
 
 def main_and_sub(number: int) -> tuple[int, int]:
-    """The inverse of ``custom_mode``."""
+    """Return main mode and sub-mode of a ``custom_mode``."""
     return number >> 16 & 0xFF, number >> 24 & 0xFF
 
 
@@ -59,13 +57,13 @@ WORDS: Mapping[int, str] = {
     LAND: "AUTO_LAND",
     FOLLOW: "AUTO_FOLLOW_TARGET",
 }
-"""How a refusal names a mode: OFFBOARD as recorded, the others as the firmware's status names them."""
+"""Names of modes in refusals: OFFBOARD as recorded, the others as in the firmware's status."""
 
 NEEDS_STICKS = frozenset({MANUAL, ALTCTL, POSCTL, ACRO, STABILIZE})
-"""Cannot be armed, or entered in the air, without MANUAL_CONTROL."""
+"""Modes that cannot be armed, or entered in flight, without MANUAL_CONTROL."""
 
 AUTOMATIC = frozenset({TAKEOFF, LOITER, MISSION, RTL, LAND, ORBIT, FOLLOW})
-"""Moving the sticks takes these over."""
+"""Modes that moved sticks take over."""
 
 NAVIGATION_STATE: Mapping[int, int] = {
     MANUAL: 0,
@@ -82,7 +80,7 @@ NAVIGATION_STATE: Mapping[int, int] = {
     FOLLOW: 19,
     ORBIT: 21,
 }
-"""Bits by which events name modes: ``nav_state`` of VehicleStatus."""
+"""Bits of the modes in events: ``nav_state`` of VehicleStatus."""
 
 DESCEND_STATE = 12
 
@@ -101,45 +99,47 @@ REPORT_FROM: Ns = 2_084 * MS
 REPORT_EVERY: Ns = 2_000 * MS
 
 THROTTLE_HIGH = 0.2
-"""Of the stick's way above its centre, in modes that hold the climb rate; in the others above its low end."""
+"""Throttle that refuses arming, above the centre of the stick; in modes that command thrust, above its low
+end.
+"""
 
 
 class Commander:
-    """``Vehicle.firmware_state`` of a PX4."""
+    """State that only PX4 keeps about a vehicle (``Vehicle.firmware_state``)."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.reset()
 
     def reset(self) -> None:
-        """As after a boot."""
+        """Reset to the state after a boot."""
         self.joystick = Joystick()
         self.stream = SetpointStream()
         self.log = events.EventLog(self.vehicle)
         self.requested = LOITER
-        """The mode that the user wants."""
+        """Mode that the user requested."""
         self.after_disarming = LOITER
         self.failsafe = ""
-        """What replaces the wished mode now: its name, or nothing."""
+        """Name of the active failsafe, or empty."""
         self.failsafe_mode: int | None = None
-        """The mode that the failsafe flies; ``None``: the wished one."""
+        """Mode that the failsafe flies; None: the requested one."""
         self.descending = False
-        """Whether AUTO.LAND stands for the blind descent without a position."""
+        """Whether AUTO.LAND is the level descent without a position."""
         self.takeoff_amsl: float | None = None
-        """Altitude of the next take-off, where one was commanded."""
+        """Commanded altitude of the next take-off [m], or None."""
         self.minimum_height = 0.0
-        """Of the next take-off, where that was raised to the least one; 0: it was not."""
+        """Height [m] to which the next take-off was raised, or 0."""
         self.orbit: tuple[Vector, float, float] | None = None
-        """Centre, radius, speed of a circle."""
+        """Centre, radius [m] and speed [m/s] of a circle."""
         self.hold_delay_left = -1.0
-        """Seconds of Hold that a failsafe may still take; below 0: all of COM_FAIL_ACT_T."""
+        """Remaining hold before a failsafe acts [s]; negative: all of COM_FAIL_ACT_T."""
         self.hold_until: Ns = NEVER
         self.after_hold = 0
         self.station_seen: Ns = NEVER
         self.ground = 0.0
-        """Down about the estimator's origin of the ground where it was armed."""
+        """Height of the ground at arming, down about the estimator's origin [m]."""
         self.lifted_at: Ns = NEVER
-        """When it left the ground."""
+        """Time of the last lift-off."""
         self.flying = False
         self.took_off = False
         self.landed_at: Ns = NEVER
@@ -151,22 +151,22 @@ class Commander:
 
     @property
     def above_ground(self) -> float:
-        """Metres above where it was armed: the ground is flat."""
+        """Height above the place of arming [m]; the ground is flat."""
         return self.ground - self.vehicle.estimate.position[2]
 
     @property
     def ready(self) -> bool:
-        """Sensors and estimator would let it arm."""
+        """Whether sensors and estimator allow arming."""
         vehicle = self.vehicle
         return vehicle.home is not None and vehicle.has_position
 
     def stream_alive(self) -> bool:
-        """Whether OFFBOARD may be flown."""
+        """Return whether the stream of OFFBOARD set-points is younger than COM_OF_LOSS_T."""
         vehicle = self.vehicle
         return self.stream.alive(vehicle.kernel.now(), vehicle.seconds_parameter("COM_OF_LOSS_T"))
 
     def checks(self) -> events.ArmingChecks:
-        """What the report of the arming checks says."""
+        """Return the results of the arming checks."""
         vehicle = self.vehicle
         age = vehicle.uptime()
         return events.ArmingChecks(
@@ -180,7 +180,7 @@ class Commander:
         )
 
     def can_fly(self, number: int) -> bool:
-        """Whether that mode has what it needs."""
+        """Return whether the requirements of a mode are met."""
         vehicle = self.vehicle
         mode = vehicle.rules.modes[number]
         if mode.needs_position and not vehicle.has_position:
@@ -194,7 +194,10 @@ class Commander:
     # -- modes
 
     def request_mode(self, number: int) -> int:
-        """The user asks for a mode; returns a MAV_RESULT. Disarmed every mode is accepted."""
+        """Enter a mode on request of the user, and return a MAV_RESULT.
+
+        A disarmed vehicle accepts every mode.
+        """
         vehicle = self.vehicle
         if number not in vehicle.rules.modes:
             return ACCEPTED if not vehicle.armed else UNSUPPORTED
@@ -221,14 +224,14 @@ class Commander:
             self.vehicle.enter_mode(mode)
 
     def restart_mode(self, number: int) -> None:
-        """Fly that mode from its start, although it may be flown already: its aim has changed."""
+        """Enter a mode again because its target has changed."""
         again = self.vehicle.mode.number == number and self.failsafe_mode is None
         self._accept_mode(number)
         if again:
             self._fly(number, anew=True)
 
     def continue_with(self, number: int) -> None:
-        """A mode has ended; another one follows by itself."""
+        """Enter the mode that follows after a mode has ended."""
         self.requested = number
         if self.vehicle.rules.modes[number].armable:
             self.after_disarming = number
@@ -238,24 +241,24 @@ class Commander:
     # -- failsafes
 
     def begin_failsafe(self, name: str, number: int) -> None:
-        """Fly that mode instead of the wished one."""
+        """Fly a mode instead of the requested one."""
         self.failsafe, self.failsafe_mode = name, number
         self.joystick.set_reference()
         self._fly(number)
 
     def end_failsafe(self) -> None:
-        """Its cause is gone, or somebody took over."""
+        """Clear the failsafe after its cause ended or the user took over."""
         self.failsafe, self.failsafe_mode, self.hold_until = "", None, NEVER
         self.descending = False
 
     def resume_requested(self) -> None:
-        """Fly the wished mode again."""
+        """Fly the requested mode again."""
         self.end_failsafe()
         self.joystick.set_reference()
         self._fly(self.requested)
 
     def pilot_takes_over(self) -> None:
-        """The sticks moved in a mode that flies by itself."""
+        """Enter POSCTL because the sticks moved in an automatic mode."""
         if self.failsafe:
             self.log.send(events.PILOT_TOOK_OVER)
         else:
@@ -265,7 +268,10 @@ class Commander:
     # -- arming
 
     def arm(self, force: bool) -> int:
-        """By command; returns a MAV_RESULT. Why it is refused, only events say, but for the throttle."""
+        """Arm by command, and return a MAV_RESULT.
+
+        Reasons of a refusal appear in events, except for the throttle.
+        """
         vehicle = self.vehicle
         if vehicle.armed:
             return ACCEPTED
@@ -291,7 +297,7 @@ class Commander:
         return ACCEPTED
 
     def report_minimum_height(self) -> None:
-        """Once, if the take-off that begins was raised to the least height."""
+        """Report once that a take-off was raised to the minimum height."""
         if self.minimum_height and self.requested == TAKEOFF:
             self.vehicle.send_text(INFO, f"Using minimum takeoff altitude: {self.minimum_height:.2f} m\t")
             self.log.send(events.MINIMUM_TAKEOFF, events.float_argument(self.minimum_height))
@@ -299,31 +305,23 @@ class Commander:
 
     @property
     def armable(self) -> bool:
-        """Whether the checks let it arm in the wished mode."""
+        """Whether the checks allow arming in the requested mode (COM_ARM_WO_GPS included)."""
         mode = self.vehicle.rules.modes[self.requested]
-        return (
-            self._position_checks_pass(mode.needs_position) and mode.armable and self.can_fly(self.requested)
-        )
-
-    def _position_checks_pass(self, to_go_by_position: bool) -> bool:
-        """COM_ARM_WO_GPS: by sticks it also arms without a position."""
+        if not mode.armable or not self.can_fly(self.requested):
+            return False
         if self.ready:
             return True
-        allowed = self.vehicle.parameters["COM_ARM_WO_GPS"] != 0.0
-        return not to_go_by_position and allowed and self.checks().attitude
+        without_position = self.vehicle.parameters["COM_ARM_WO_GPS"] != 0.0
+        return not mode.needs_position and without_position and self.checks().attitude
 
     def _throttle_is_high(self) -> bool:
         if not self.joystick.valid or self.requested not in NEEDS_STICKS:
             return False
-        by_thrust = self.vehicle.flies and self.requested in (
-            MANUAL,
-            STABILIZE,
-            ACRO,
-        )
+        by_thrust = self.vehicle.flies and self.requested in (MANUAL, STABILIZE, ACRO)
         return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
 
     def disarm(self, force: bool) -> int:
-        """By command; returns a MAV_RESULT."""
+        """Disarm by command, and return a MAV_RESULT."""
         vehicle = self.vehicle
         if not vehicle.armed:
             return ACCEPTED
@@ -335,7 +333,7 @@ class Commander:
         return ACCEPTED
 
     def finish_disarming(self, words: str, reason: bytes) -> None:
-        """Disarm, say by what, and go back to a mode that may be armed."""
+        """Disarm, report the reason, and return to an armable mode."""
         vehicle = self.vehicle
         vehicle.disarm()
         vehicle.send_text(INFO, f"Disarmed by {words}\t")
@@ -348,7 +346,7 @@ class Commander:
     # -- reports
 
     def report(self) -> None:
-        """The arming checks, when they changed."""
+        """Send the arming checks if they changed, at most every two seconds."""
         vehicle = self.vehicle
         now = vehicle.kernel.now()
         if vehicle.uptime() < REPORT_FROM or now - self.reported_at < REPORT_EVERY:
@@ -361,10 +359,10 @@ class Commander:
 
 
 OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3
-"""How an event names the wished mode, as far as recorded."""
+"""Numbers of the requested mode in events, as far as recorded."""
 
 
 def commander_of(vehicle: Vehicle) -> Commander:
-    """The commander of a vehicle."""
+    """Return the commander of a vehicle."""
     commander: Commander = vehicle.firmware_state
     return commander

@@ -1,15 +1,12 @@
-"""OFFBOARD: what counts as a set-point, how long its stream lives, and what each axis is to hold.
+"""OFFBOARD: parsing of set-points, the life time of their stream, and the manoeuvre that follows them.
 
-A set-point that is understood counts as a sign of life in any mode; it is flown only while the mode is
-OFFBOARD. Each axis may be given a position, a velocity, an acceleration, or several of them; what is masked
-or no number is left alone.
+A valid set-point keeps the stream alive in any mode; it is flown only in OFFBOARD. Each axis may have a
+position, a velocity, an acceleration, or several of them; masked and NaN values are ignored.
 
-OFFBOARD: what PX4's multirotor makes of a stream of set-points.
-
-It has no planned path: a point is chased at a speed proportional to what is left, up to MPC_XY_VEL_MAX. The
-recorded airframe has much drag, against which the velocity loop's integral builds up: so a speed is reached
-slowly, and a long leg ends two metres too far. A reference velocity that obeys the same gains and the same
-drag shows the same.
+The firmware plans no path in OFFBOARD: a point is approached at a speed proportional to the distance, up to
+MPC_XY_VEL_MAX. The recorded airframe has a large drag, against which the integral of the velocity loop winds
+up, so that a speed is reached slowly and a long leg overshoots by two metres. A reference velocity with the
+same gains and the same drag reproduces both.
 """
 
 from __future__ import annotations
@@ -48,7 +45,7 @@ ABSENT: Vector = (nan, nan, nan)
 
 
 class OffboardTarget(NamedTuple):
-    """What a set-point asks for: north, east, down about the estimator's origin; NaN: not asked."""
+    """Set-point, north-east-down about the estimator's origin [m, m/s, m/s^2]; NaN: not given."""
 
     position: Vector = ABSENT
     velocity: Vector = ABSENT
@@ -57,12 +54,12 @@ class OffboardTarget(NamedTuple):
     yaw_rate: float | None = None
 
     def lifts(self, down: float) -> bool:
-        """Whether it would leave the ground from there."""
+        """Return whether the set-point leaves the ground at that height (down) [m]."""
         return self.position[2] < down or self.velocity[2] < 0.0 or self.acceleration[2] < 0.0
 
 
 class AttitudeTarget(NamedTuple):
-    """An attitude, or a turn rate in place of its heading, and a collective of 0..1."""
+    """Attitude, or a yaw rate in place of its heading, and a collective thrust 0..1."""
 
     attitude: Quaternion
     yaw_rate: float | None
@@ -70,18 +67,18 @@ class AttitudeTarget(NamedTuple):
 
 
 class SetpointStream:
-    """The set-points of one vehicle."""
+    """The last set-point of one vehicle."""
 
     def __init__(self) -> None:
         self.last_received_ns: Ns = NEVER
         self.target: OffboardTarget | AttitudeTarget | None = None
 
     def receive(self, target: OffboardTarget | AttitudeTarget, now: Ns) -> None:
-        """A set-point came."""
+        """Store a set-point and its time."""
         self.last_received_ns, self.target = now, target
 
     def alive(self, now: Ns, within: Ns) -> bool:
-        """Whether the last one is not older than that."""
+        """Return whether the last set-point is not older than ``within``."""
         return self.last_received_ns != NEVER and now - self.last_received_ns <= within
 
 
@@ -98,7 +95,7 @@ def _asked(values: Vector) -> bool:
 
 
 def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
-    """Forward, right, down to north, east, down, by the heading alone; what is missing counts as 0."""
+    """Rotate forward-right-down to north-east-down by the heading alone; missing values count as 0."""
     if not _asked((*vector[:2], nan)):
         return nan, nan, vector[2]
     x, y = (value if isfinite(value) else 0.0 for value in vector[:2])
@@ -108,7 +105,7 @@ def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
 
 
 def _target(fields: dict[str, Any], position: Vector) -> OffboardTarget | None:
-    """``None`` where nothing at all is asked, or of something that is nowhere."""
+    """Return the set-point, or None if nothing is given or a value is out of range."""
     mask = fields["type_mask"]
     velocity = _masked((fields["vx"], fields["vy"], fields["vz"]), mask, 3)
     push = _masked((fields["afx"], fields["afy"], fields["afz"]), mask, 6)
@@ -121,7 +118,7 @@ def _target(fields: dict[str, Any], position: Vector) -> OffboardTarget | None:
 
 
 def local_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> OffboardTarget | None:
-    """Of SET_POSITION_TARGET_LOCAL_NED; where it is refused, it says so."""
+    """Parse SET_POSITION_TARGET_LOCAL_NED, and report a refusal."""
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_LOCAL_NED"
     if frame not in (LOCAL_NED, BODY_NED):
@@ -142,7 +139,7 @@ def local_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Off
 
 
 def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> OffboardTarget | None:
-    """Of SET_POSITION_TARGET_GLOBAL_INT; heights above terrain are taken as above home."""
+    """Parse SET_POSITION_TARGET_GLOBAL_INT, and report a refusal. Terrain heights count above home."""
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_GLOBAL_INT"
     if frame not in GLOBAL_FRAMES:
@@ -159,7 +156,7 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Of
 
 
 def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | None:
-    """Of SET_ATTITUDE_TARGET; ``None`` for what is not understood."""
+    """Parse SET_ATTITUDE_TARGET, or return None if it is invalid."""
     mask = fields["type_mask"]
     if mask & (ATTITUDE_IGNORED | THRUST_IGNORED) or not all_within((*fields["q"], fields["thrust"])):
         return None
@@ -174,26 +171,26 @@ def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | None:
 
 
 JERK = 60.0
-"""Of set-points that are flown as they come [m/s^3]."""
+"""Jerk limit of set-points that are flown directly [m/s^3]."""
 
 PUSH = 7.0
-"""Acceleration in the plane at which OFFBOARD starts, in the recordings [m/s^2]."""
+"""Horizontal acceleration at the start of OFFBOARD, as recorded [m/s^2]."""
 
 VELOCITY_GAIN, VELOCITY_INTEGRAL = 1.8, 0.4
 """MPC_XY_VEL_P_ACC [1/s], MPC_XY_VEL_I_ACC [1/s^2]."""
 
 DRAG = 1.0
-"""Of the recorded airframe, by its mass (SIH_KDV / SIH_MASS) [1/s]."""
+"""Drag of the recorded airframe divided by its mass (SIH_KDV / SIH_MASS) [1/s]."""
 
 LAG = 0.6
-"""By which the inner loops here follow a velocity later than the recorded airframe did [s]."""
+"""Additional lag of the simulated inner loops behind the recorded airframe [s]."""
 
 SUBSTEP = 0.02
-"""In which the reference velocity is reckoned [s]."""
+"""Step of the integration of the reference velocity [s]."""
 
 
 class FollowTarget(Manoeuvre):
-    """Chase a ``OffboardTarget`` axis by axis; without one, stay."""
+    """Follow an ``OffboardTarget`` axis by axis; without one, hold."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
@@ -203,14 +200,14 @@ class FollowTarget(Manoeuvre):
         self._last: Ns = 0
 
     def enter(self) -> None:
-        """With the speed that it has; stop where it can."""
+        """Start with the present velocity."""
         self._velocity = self.vehicle.estimate.velocity
         self._integral = (DRAG * self._velocity[0], DRAG * self._velocity[1])
         self._last = self.vehicle.kernel.now()
         self._setpoint = None
 
     def follow(self, target: OffboardTarget) -> None:
-        """Chase that from now on."""
+        """Follow a set-point."""
         self._setpoint = target
         north, east, down = target.position
         here = self.vehicle.estimate.position
@@ -218,11 +215,11 @@ class FollowTarget(Manoeuvre):
         self.target = (north, east, down if isfinite(down) else here[2]) if known else None
 
     def takeoff_requested(self) -> bool:
-        """If what it chases is above."""
+        """Return whether the set-point is above the vehicle."""
         return self._setpoint is not None and self._setpoint.lifts(self.vehicle.estimate.position[2])
 
     def step(self) -> None:
-        """Go on chasing."""
+        """Integrate the reference velocity and apply it."""
         vehicle = self.vehicle
         now = vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
@@ -248,7 +245,7 @@ class FollowTarget(Manoeuvre):
         )
 
     def _reference_velocity(self, setpoint: OffboardTarget, passed: float) -> Vector:
-        """The velocity to fly now: what the recorded airframe would have come to."""
+        """Return the velocity that the recorded airframe would have reached [m/s]."""
         north, east = self._axis_velocity(setpoint, 0), self._axis_velocity(setpoint, 1)
         speed, most = hypot(north, east), self.vehicle.tuning.speed
         if speed > most:
@@ -258,7 +255,7 @@ class FollowTarget(Manoeuvre):
         return self._velocity[0], self._velocity[1], self._axis_velocity(setpoint, 2)
 
     def _integrate(self, north: float, east: float) -> None:
-        """One substep of velocity loop and drag."""
+        """Integrate velocity loop and drag over one substep."""
         vn, ve, _ = self._velocity
         gn, ge = self._integral
         dn, de = north - vn, east - ve
@@ -282,7 +279,7 @@ class FollowTarget(Manoeuvre):
 
 
 class Offboard(Manoeuvre):
-    """Whatever the stream of set-points says. Attitudes are flown as they are."""
+    """Mode OFFBOARD: position and velocity set-points by ``FollowTarget``, attitudes directly."""
 
     slow_start = True
 
@@ -292,25 +289,25 @@ class Offboard(Manoeuvre):
         self._attitude: AttitudeTarget | None = None
 
     def enter(self) -> None:
-        """Stay until told."""
+        """Hold until a set-point arrives."""
         self._follower.enter()
         self.receive(self.vehicle.firmware_state.stream.target)
 
     def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
-        """A set-point came."""
+        """Follow a new set-point."""
         self._attitude = target if isinstance(target, AttitudeTarget) else None
         if isinstance(target, OffboardTarget):
             self._follower.follow(target)
         self.target = None if self._attitude else self._follower.target
 
     def takeoff_requested(self) -> bool:
-        """If it is asked to climb, or given much thrust."""
+        """Return whether the set-point climbs or has a high thrust."""
         if self._attitude is not None:
             return self._attitude.thrust > 0.3
         return self._follower.takeoff_requested()
 
     def step(self) -> None:
-        """Fly it."""
+        """Apply the set-point."""
         if self._attitude is None:
             self._follower.step()
             return

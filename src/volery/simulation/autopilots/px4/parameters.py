@@ -1,6 +1,6 @@
-"""The parameters that change what a simulated PX4 does. All others are kept, listed and read back.
+"""PX4's parameters: which ones change the behaviour, and the tuning that follows from their values.
 
-From PX4's parameters to the figures that manoeuvres fly by.
+All other parameters are only stored, listed and read back.
 """
 
 from __future__ import annotations
@@ -65,14 +65,14 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "RTL_RETURN_ALT": "height of the return",
     }
 )
-"""A multirotor's, and what each changes."""
+"""Parameters of a multirotor that have an effect, and what each changes."""
 
 ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType({**_SHARED, "GND_SPEED_TRIM": "speed"})
-"""A rover's, and what each changes."""
+"""Parameters of a rover that have an effect, and what each changes."""
 
 
 SLOWEST, FASTEST = 0.1, 100.0
-"""Bounds of a speed or an acceleration [m/s, m/s^2]: a parameter beyond them stops or flings nothing."""
+"""Limits of speeds and accelerations [m/s, m/s^2]: no parameter value stops a manoeuvre."""
 
 STICKS = StickMap(1, 2, 3, 4, (ChannelRange(1000, 1500, 2000, 0),) * 4)
 
@@ -82,7 +82,7 @@ def _moving(value: float) -> float:
 
 
 def copter_tuning(parameters: Parameters) -> Tuning:
-    """A multirotor's."""
+    """Return the tuning of a multirotor."""
     p = parameters
     tilt = radians(min(80.0, max(5.0, p["MPC_TILTMAX_AIR"])))
     return Tuning(
@@ -106,7 +106,7 @@ def copter_tuning(parameters: Parameters) -> Tuning:
 
 
 def rover_tuning(parameters: Parameters) -> Tuning:
-    """A rover's."""
+    """Return the tuning of a rover."""
     p = parameters
     speed = _moving(p["GND_SPEED_TRIM"])
     return Tuning(

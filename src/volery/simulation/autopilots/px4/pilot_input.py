@@ -1,4 +1,4 @@
-"""The pilot's sticks as MANUAL_CONTROL brings them: when they are there, are lost, move."""
+"""Manual control by MANUAL_CONTROL: availability, loss and movement of the sticks."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 
 INVALID = 32_767
 CENTRE = 500
-"""``z`` of a throttle stick in its middle."""
+"""``z`` of a centred throttle stick."""
 
 ROLL, PITCH, THROTTLE, YAW = 1, 2, 3, 4
 NEUTRAL = (1500,) * 4 + (0,) * 12
-"""The channels while there is nobody at the sticks."""
+"""RC channels without manual control [us]."""
 
 
 class StickDeflection(NamedTuple):
-    """-1..1 each: forward, right, up, clockwise."""
+    """Sticks -1..1: forward, right, up, clockwise."""
 
     pitch: float = 0.0
     roll: float = 0.0
@@ -28,7 +28,7 @@ class StickDeflection(NamedTuple):
 
 
 def deflection(fields: Mapping[str, Any]) -> StickDeflection | None:
-    """What a MANUAL_CONTROL says; ``None`` where an axis is not given."""
+    """Return the sticks of a MANUAL_CONTROL, or None if an axis is not given."""
     x, y, z, r = (fields[axis] for axis in "xyzr")
     if INVALID in (x, y, z, r):
         return None
@@ -37,31 +37,29 @@ def deflection(fields: Mapping[str, Any]) -> StickDeflection | None:
 
 
 class Joystick:
-    """Of one vehicle."""
+    """State of one vehicle's manual control."""
 
     def __init__(self) -> None:
         self.now = StickDeflection()
         self.last_received_ns: Ns = NEVER
         self.valid = False
         self.lost_when_armed = True
-        """Whether they were missing when it was armed and have not come since: then their absence is no
-        failsafe.
-        """
+        """Whether manual control was missing at arming and since, which is no failsafe."""
         self._reference = StickDeflection()
         self._moved = False
 
     @property
     def ever_received(self) -> bool:
-        """Whether they have ever been heard."""
+        """Whether manual control was ever received."""
         return self.last_received_ns != NEVER
 
     def set_reference(self) -> None:
-        """From now on movement is counted from here."""
+        """Measure stick movement from the present deflection on."""
         self._reference = self.now
         self._moved = False
 
     def receive(self, given: StickDeflection, now: Ns) -> float:
-        """A sample came. Returns the seconds for which they had been lost; 0 if they had not."""
+        """Store a sample, and return for how long manual control was lost [s]; 0 if it was not."""
         lost_for = to_seconds(now - self.last_received_ns) if self.ever_received and not self.valid else 0.0
         if not self.valid:
             self._reference = given
@@ -70,13 +68,13 @@ class Joystick:
         return lost_for
 
     def moved(self, share: float) -> bool:
-        """Whether any stick has moved by more than that share of its way since it rested."""
+        """Return whether a stick moved by more than this share of its range since the reference."""
         pairs = zip(self.now, self._reference, strict=True)
         return self.valid and any(abs(value - rested) > share for value, rested in pairs)
 
 
 def set_rc_channels(vehicle: Vehicle, given: StickDeflection) -> None:
-    """Let the manoeuvres that fly by channels see them."""
+    """Write the sticks to the RC channels, which the generic manoeuvres read."""
     now = vehicle.kernel.now()
     axes = {ROLL: given.roll, PITCH: -given.pitch, THROTTLE: given.throttle, YAW: given.yaw}
     for channel, value in axes.items():

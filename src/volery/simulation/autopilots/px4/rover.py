@@ -1,5 +1,6 @@
-"""PX4 1.14.0 on a rover. There is no recording of one: what it shares with the multirotor is recorded, how
-it drives is assumed.
+"""PX4 1.14.0 on a rover, composed as a firmware.
+
+There is no recording of a rover: what it shares with the multirotor is recorded, its driving is assumed.
 """
 
 from __future__ import annotations
@@ -38,37 +39,37 @@ ASSUMED = (Parameter("GND_SPEED_MAX", REAL32, 10.0), Parameter("GND_SPEED_TRIM",
 
 
 class HoldRover(Manoeuvre):
-    """AUTO.LOITER: stand, or drive to where it was sent."""
+    """AUTO.LOITER: stand, or drive to a point."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._active: Manoeuvre = Stand(vehicle)
 
     def send_to(self, point: Vector) -> None:
-        """Drive there and stand."""
+        """Drive to a point and stand there."""
         self._active = DriveTo(self.vehicle, point)
         self.target = point
 
     def step(self) -> None:
-        """Go on."""
+        """Drive until the point is reached."""
         if isinstance(self._active, DriveTo) and self._active.arrived():
             self._active = Stand(self.vehicle)
         self._active.step()
 
 
 class OffboardRover(Manoeuvre):
-    """A point, or a speed over the ground in a direction: whatever the stream says."""
+    """OFFBOARD: a point, or a speed over ground in a direction."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._active: Manoeuvre = Stand(vehicle)
 
     def enter(self) -> None:
-        """Stand until told."""
+        """Stand until a set-point arrives."""
         self.receive(commander_of(self.vehicle).stream.target)
 
     def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
-        """A set-point came; attitudes mean nothing to wheels."""
+        """Follow a new set-point; attitudes are ignored."""
         if not isinstance(target, OffboardTarget):
             return
         north, east, _ = target.position
@@ -92,7 +93,7 @@ class OffboardRover(Manoeuvre):
         self.target = point
 
     def step(self) -> None:
-        """Go on; on a point it stands."""
+        """Drive, and stand on a reached point."""
         active = self._active
         if isinstance(active, DriveTo) and active.arrived():
             Stand(self.vehicle).step()
@@ -105,10 +106,10 @@ def _course(north: float, east: float, otherwise: float) -> float:
 
 
 class StickDrive(Manual):
-    """MANUAL, and POSCTL with or without sticks: without them it brakes and stands."""
+    """MANUAL and POSCTL: sticks are steering and throttle; without them the rover brakes and stands."""
 
     def step(self) -> None:
-        """Pass the sticks on."""
+        """Pass the sticks to the wheels, or brake."""
         if commander_of(self.vehicle).joystick.valid:
             super().step()
         else:
@@ -117,7 +118,7 @@ class StickDrive(Manual):
 
 
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
-    """DO_REPOSITION, with its flag."""
+    """Handle DO_REPOSITION with its flag."""
     point = commands.commanded_point(vehicle, command)
     if point is None or not vehicle.has_position:
         return DENIED
@@ -157,7 +158,7 @@ MODES = {
 
 @cache
 def parameters() -> tuple[Parameter, ...]:
-    """The multirotor's recorded list, with a rover's type and what only a rover has."""
+    """Return the multirotor's recorded parameters with a rover's MAV_TYPE and a rover's additions."""
     shared = (
         parameter._replace(value=float(GROUND_ROVER)) if parameter.name == "MAV_TYPE" else parameter
         for parameter in copter.parameters()

@@ -1,6 +1,6 @@
-"""Telemetry of PX4 about where the vehicle is and how it moves. Units and signs are the messages' own.
+"""Fields of PX4's telemetry messages. Units and signs are those of the messages.
 
-Telemetry of PX4 about itself: heartbeat, health, battery, motors, mission, estimator, version, events.
+A builder returns None while the firmware does not send its message.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from volery.simulation.autopilots.px4.offboard import AttitudeTarget
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GLOBAL_AFTER: Ns = 6_500 * MS
-"""Recorded: the first GLOBAL_POSITION_INT a tenth of a second after the first ATTITUDE."""
+"""Recorded: the first GLOBAL_POSITION_INT 0.1 s after the first ATTITUDE."""
 
 HOME_FROM: Ns = 2_200 * MS
-"""Before there is a home, the receiver's own place is sent as one."""
+"""Uptime [ns] from which the GPS position is sent as home position until there is one."""
 
 NOT_KNOWN = 65_535
 
@@ -39,17 +39,17 @@ def _aligned(vehicle: Vehicle) -> bool:
 
 
 def attitude(vehicle: Vehicle) -> Fields | None:
-    """ATTITUDE: once the estimator is aligned."""
+    """Return ATTITUDE once the estimator is aligned."""
     return message_fields.attitude(vehicle) if _aligned(vehicle) else None
 
 
 def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
-    """ATTITUDE_QUATERNION: likewise."""
+    """Return ATTITUDE_QUATERNION once the estimator is aligned."""
     return message_fields.attitude_quaternion(vehicle) if _aligned(vehicle) else None
 
 
 def global_position(vehicle: Vehicle) -> Fields | None:
-    """GLOBAL_POSITION_INT: once there is a position."""
+    """Return GLOBAL_POSITION_INT once there is a position."""
     estimate = vehicle.estimate
     if vehicle.uptime() < GLOBAL_AFTER or not estimate.position_ok:
         return None
@@ -69,7 +69,7 @@ def global_position(vehicle: Vehicle) -> Fields | None:
 
 
 def local_position(vehicle: Vehicle) -> Fields:
-    """LOCAL_POSITION_NED: from the start."""
+    """Return LOCAL_POSITION_NED, with zeros before the first position."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle)}
     if estimate.position_ok:
@@ -79,7 +79,7 @@ def local_position(vehicle: Vehicle) -> Fields:
 
 
 def odometry(vehicle: Vehicle) -> Fields:
-    """ODOMETRY."""
+    """Return ODOMETRY."""
     estimate = vehicle.estimate
     p, q, r = estimate.rates
     x, y, z = estimate.position
@@ -106,7 +106,7 @@ def odometry(vehicle: Vehicle) -> Fields:
 
 
 def _diagonal(*variances: float) -> tuple[float, ...]:
-    """The upper triangle of a 6 by 6 matrix, row by row."""
+    """Return the upper triangle of a 6x6 matrix row by row, NaN off the diagonal."""
     values: list[float] = []
     for row, variance in enumerate(variances):
         values += [variance, *([nan] * (5 - row))]
@@ -114,7 +114,7 @@ def _diagonal(*variances: float) -> tuple[float, ...]:
 
 
 def altitude(vehicle: Vehicle) -> Fields:
-    """ALTITUDE."""
+    """Return ALTITUDE."""
     estimate = vehicle.estimate
     return {
         "time_usec": boot_us(vehicle),
@@ -128,7 +128,7 @@ def altitude(vehicle: Vehicle) -> Fields:
 
 
 def vfr_hud(vehicle: Vehicle) -> Fields:
-    """VFR_HUD: no airspeed sensor."""
+    """Return VFR_HUD (no airspeed sensor)."""
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
     return {
@@ -142,7 +142,7 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
 
 
 def highres_imu(vehicle: Vehicle) -> Fields:
-    """HIGHRES_IMU: m/s^2, rad/s, gauss, hectopascals as PX4 1.14 fills them."""
+    """Return HIGHRES_IMU (m/s^2, rad/s, gauss; pressure in Pa, as PX4 1.14 sends it)."""
     estimate = vehicle.estimate
     xacc, yacc, zacc = estimate.accel
     xgyro, ygyro, zgyro = estimate.gyro
@@ -166,12 +166,12 @@ def highres_imu(vehicle: Vehicle) -> Fields:
 
 
 def pressure(vehicle: Vehicle) -> Fields:
-    """SCALED_PRESSURE."""
+    """Return SCALED_PRESSURE."""
     return {"time_boot_ms": boot_ms(vehicle), "press_abs": vehicle.estimate.pressure, "temperature": 1479}
 
 
 def gps_raw(vehicle: Vehicle) -> Fields:
-    """GPS_RAW_INT."""
+    """Return GPS_RAW_INT."""
     fix = vehicle.estimate.gps
     if fix.fix_type == 0:
         return {"time_usec": boot_us(vehicle), "eph": NOT_KNOWN, "epv": NOT_KNOWN, "cog": NOT_KNOWN}
@@ -196,13 +196,13 @@ def gps_raw(vehicle: Vehicle) -> Fields:
 
 
 def system_time(vehicle: Vehicle) -> Fields:
-    """SYSTEM_TIME."""
+    """Return SYSTEM_TIME."""
     now = EPOCH_US + vehicle.kernel.now() // US
     return {"time_unix_usec": now, "time_boot_ms": boot_ms(vehicle)}
 
 
 def position_target(vehicle: Vehicle) -> Fields:
-    """POSITION_TARGET_LOCAL_NED: not-a-number where nothing is held."""
+    """Return POSITION_TARGET_LOCAL_NED, with NaN where nothing is controlled."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "coordinate_frame": 1}
     if not vehicle.armed or vehicle.landed:
@@ -216,7 +216,7 @@ def position_target(vehicle: Vehicle) -> Fields:
 
 
 def global_target(vehicle: Vehicle) -> Fields | None:
-    """POSITION_TARGET_GLOBAL_INT: once it flies to a point."""
+    """Return POSITION_TARGET_GLOBAL_INT while the vehicle flies to a point."""
     target = vehicle.manoeuvre.target
     if target is None or not vehicle.armed:
         return None
@@ -236,7 +236,7 @@ def global_target(vehicle: Vehicle) -> Fields | None:
 
 
 def attitude_target(vehicle: Vehicle) -> Fields:
-    """ATTITUDE_TARGET."""
+    """Return ATTITUDE_TARGET."""
     estimate = vehicle.estimate
     wanted = commander_of(vehicle).stream.target
     thrust = estimate.throttle
@@ -247,7 +247,7 @@ def attitude_target(vehicle: Vehicle) -> Fields:
 
 
 def home_position(vehicle: Vehicle) -> Fields | None:
-    """HOME_POSITION: until there is a home, where the receiver says the vehicle is."""
+    """Return HOME_POSITION; until it is set, the position of the GPS receiver."""
     home = vehicle.home
     fields: Fields = {"q": (1.0, 0.0, 0.0, 0.0), "time_usec": boot_us(vehicle)}
     if home is not None:
@@ -266,7 +266,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
 
 
 def origin(vehicle: Vehicle) -> Fields | None:
-    """GPS_GLOBAL_ORIGIN: once the estimator has one."""
+    """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
     if not vehicle.estimate.position_ok:
         return None
     latitude, longitude, amsl = vehicle.estimate.origin
@@ -279,7 +279,7 @@ def origin(vehicle: Vehicle) -> Fields | None:
 
 
 def distance_sensor(vehicle: Vehicle) -> Fields:
-    """DISTANCE_SENSOR, looking down: the recorded airframe has one that reaches 100 m."""
+    """Return DISTANCE_SENSOR (downwards); the recorded airframe has one with a range of 100 m."""
     height = max(0.0, commander_of(vehicle).above_ground)
     return {
         "time_boot_ms": boot_ms(vehicle),
@@ -290,7 +290,7 @@ def distance_sensor(vehicle: Vehicle) -> Fields:
 
 
 def orbit_status(vehicle: Vehicle) -> Fields | None:
-    """ORBIT_EXECUTION_STATUS: while it circles."""
+    """Return ORBIT_EXECUTION_STATUS while the vehicle circles."""
     circling = vehicle.manoeuvre
     if not isinstance(circling, Orbit):
         return None
@@ -316,23 +316,23 @@ ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 NOT_THERE = 65_535
 
 PRESENT, ENABLED, HEALTHY, PREARM, GPS = 35_651_629, 35_717_165, 572_555_327, 1 << 28, 1 << 5
-"""Words of SYS_STATUS as recorded; the check before arming is a bit of its own."""
+"""Sensor bits of SYS_STATUS as recorded; the pre-arm check is a separate bit."""
 
 CAPABILITIES = 60_671
 """MAV_PROTOCOL_CAPABILITY bits, as recorded."""
 
 VERSION, OS_VERSION = 17_694_975, 101_854_463
-"""1.14.0, an official release, as recorded, and the recorded machine's kernel."""
+"""1.14.0, official release, as recorded, and the kernel of the recorded machine."""
 
 GIT_HASH = (0, 0, 0, 114, 221, 65, 197, 184)
 UID = 5_283_920_058_631_409_231
 
 WITH_POSITION, WITHOUT_POSITION = 831, 1
-"""ESTIMATOR_STATUS_FLAGS as recorded with a position; without one only the attitude counts."""
+"""ESTIMATOR_STATUS_FLAGS as recorded with a position; without one only the attitude is valid."""
 
 
 def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
-    """HEARTBEAT; *kind* is a MAV_TYPE."""
+    """Return HEARTBEAT of a vehicle of that MAV_TYPE."""
     commander, mode = commander_of(vehicle), vehicle.mode
     base = mode.base_mode
     if mode.number == modes.OFFBOARD and commander.stream.target is None:
@@ -351,7 +351,7 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
 
 
 def sys_status(vehicle: Vehicle) -> Fields:
-    """SYS_STATUS."""
+    """Return SYS_STATUS."""
     estimate = vehicle.estimate
     healthy = HEALTHY
     if commander_of(vehicle).armable or vehicle.armed:
@@ -375,7 +375,7 @@ def _percent(vehicle: Vehicle) -> int:
 
 
 def battery_status(vehicle: Vehicle) -> Fields:
-    """BATTERY_STATUS."""
+    """Return BATTERY_STATUS."""
     estimate = vehicle.estimate
     return {
         "id": 0,
@@ -392,14 +392,14 @@ def battery_status(vehicle: Vehicle) -> Fields:
 
 
 def _charge_state(vehicle: Vehicle) -> int:
-    """MAV_BATTERY_CHARGE_STATE."""
+    """Return the MAV_BATTERY_CHARGE_STATE."""
     left, p = vehicle.estimate.battery_left, vehicle.parameters
     levels = (p["BAT_LOW_THR"], p["BAT_CRIT_THR"], p["BAT_EMERGEN_THR"])
     return 1 + sum(left < level for level in levels)
 
 
 def extended_sys_state(vehicle: Vehicle) -> Fields:
-    """EXTENDED_SYS_STATE."""
+    """Return EXTENDED_SYS_STATE."""
     manoeuvre = vehicle.manoeuvre
     state = IN_AIR
     if not vehicle.flies or not commander_of(vehicle).flying:
@@ -412,7 +412,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
 
 
 def estimator_status(vehicle: Vehicle) -> Fields:
-    """ESTIMATOR_STATUS."""
+    """Return ESTIMATOR_STATUS."""
     estimate = vehicle.estimate
     plane, height, _, _ = estimate.sigmas
     return {
@@ -428,7 +428,7 @@ def estimator_status(vehicle: Vehicle) -> Fields:
 
 
 def servo_output(vehicle: Vehicle) -> Fields:
-    """SERVO_OUTPUT_RAW: 900 is off."""
+    """Return SERVO_OUTPUT_RAW; 900 us is off."""
     pulses = vehicle.estimate.motor_pwm if vehicle.armed else (900,) * 4
     fields: Fields = {"time_usec": boot_us(vehicle), "port": 0}
     for place, pulse in enumerate((*pulses, *([900] * 12)), start=1):
@@ -437,33 +437,33 @@ def servo_output(vehicle: Vehicle) -> Fields:
 
 
 def vibration(vehicle: Vehicle) -> Fields:
-    """VIBRATION: the law of the body has none."""
+    """Return VIBRATION: the body model has none."""
     return {"time_usec": boot_us(vehicle), "vibration_x": 0.0, "vibration_y": 0.1, "vibration_z": 1.3}
 
 
 def mission_current(vehicle: Vehicle) -> Fields | None:
-    """MISSION_CURRENT: only while there is a mission."""
+    """Return MISSION_CURRENT while there is a mission."""
     plan = vehicle.mission
     return {"seq": plan.current} if len(plan) else None
 
 
 def ping(vehicle: Vehicle) -> Fields:
-    """PING, to anyone."""
+    """Return PING as a broadcast."""
     return {"time_usec": boot_us(vehicle), "seq": vehicle.uptime() // S}
 
 
 def timesync(vehicle: Vehicle) -> Fields:
-    """TIMESYNC, as a question."""
+    """Return TIMESYNC as a request."""
     return {"tc1": 0, "ts1": vehicle.uptime()}
 
 
 def event_sequence(vehicle: Vehicle) -> Fields:
-    """CURRENT_EVENT_SEQUENCE: by it a listener notices that it missed events."""
+    """Return CURRENT_EVENT_SEQUENCE, by which a receiver detects missed events."""
     return {"sequence": commander_of(vehicle).log.latest}
 
 
 def autopilot_version(vehicle: Vehicle) -> Fields:
-    """AUTOPILOT_VERSION."""
+    """Return AUTOPILOT_VERSION."""
     return {
         "capabilities": CAPABILITIES,
         "flight_sw_version": VERSION,
