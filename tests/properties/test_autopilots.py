@@ -100,7 +100,7 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
 
 COMMANDS = [*sorted(_vehicle()[1].endpoint.firmware.commands.commands), 510, 511, 512, 520]
 PARAMETERS = sorted(FIRMWARE.kinds["multirotor"].rules.parameters.supported)
-LISTENED = sorted(_vehicle()[1].endpoint.listens_to)
+LISTENED = sorted(_vehicle()[1].endpoint.handled_messages)
 
 
 @settings(max_examples=40, deadline=None)

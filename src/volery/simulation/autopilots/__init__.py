@@ -1,1 +1,1 @@
-"""Simulated autopilots: they live behind the wire protocols of the real ones."""
+"""Simulated autopilots, each behind the wire protocol or the ROS interface of the real one."""

@@ -1,9 +1,7 @@
-"""The parameter store of a simulated autopilot: names, types and values in the order of their indices.
+"""Parameters of a simulated autopilot, and the figures that manoeuvres fly by.
 
-Values are kept as the wire carries them: a ``float`` rounded to the parameter's own type (an integer type
-rounds, a real type is single precision). Knows no protocol and no vehicle.
-
-Figures that manoeuvres fly by, in SI units and radians. A dialect works them out from its parameters.
+Values are stored as the wire carries them: a ``float`` rounded to the parameter's own type (an integer type
+rounds, a real type is single precision). Each firmware derives its ``Tuning`` from its parameters.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ _SINGLE = struct.Struct("<f")
 
 
 def single(value: float) -> float:
-    """The nearest single-precision number: what a ``float`` field of a message carries."""
+    """Return the nearest single-precision number, as a ``float`` field of a message carries it."""
     rounded: float = _SINGLE.unpack(_SINGLE.pack(value))[0]
     return rounded
 
@@ -41,7 +39,7 @@ class Parameter(NamedTuple):
 
 
 def quantised(kind: int, value: float) -> float:
-    """*value* as a parameter of type *kind* holds it: out-of-range integers stay at the end of the range."""
+    """Return *value* as a parameter of type *kind* stores it; integers are limited to their range."""
     if kind not in _BOUNDS:
         return single(value)
     low, high = _BOUNDS[kind]
@@ -49,7 +47,7 @@ def quantised(kind: int, value: float) -> float:
 
 
 def load(package: str, resource: str) -> tuple[Parameter, ...]:
-    """Read a packaged list: ``name type value`` a line, ``#`` starts a comment."""
+    """Read a packaged list: ``name type value`` per line, ``#`` starts a comment."""
     found = []
     for line in files(package).joinpath(resource).read_text(encoding="ascii").splitlines():
         if line and not line.startswith("#"):
@@ -59,8 +57,14 @@ def load(package: str, resource: str) -> tuple[Parameter, ...]:
 
 
 class Parameters:
-    """What a vehicle's parameters are now. Reading one that does not exist is a ``KeyError``: a fault of
-    the house.
+    """Parameters of one vehicle in the order of their indices.
+
+    Args:
+        defaults: All parameters with their default values.
+        overrides: Values that replace defaults.
+
+    Raises:
+        UsageError: A name in *overrides* does not exist, or its value is not finite.
     """
 
     def __init__(self, defaults: Iterable[Parameter], overrides: Mapping[str, float] | None = None) -> None:
@@ -86,21 +90,25 @@ class Parameters:
         return self._values[name]
 
     def at(self, index: int) -> Parameter:
-        """The parameter with that index."""
+        """Return the parameter with that index."""
         name, kind, _ = self._order[index]
         return Parameter(name, kind, self._values[name])
 
     def index(self, name: str) -> int:
-        """The index of a parameter that exists."""
+        """Return the index of a parameter that exists."""
         return self._index[name]
 
     def find(self, name: str) -> Parameter | None:
-        """The parameter of that name, or ``None``."""
+        """Return the parameter of that name, or ``None``."""
         index = self._index.get(name)
         return None if index is None else self.at(index)
 
     def set(self, name: str, value: float) -> Parameter | None:
-        """Set it, rounded to its type; ``None`` if there is no such parameter or *value* is not finite."""
+        """Set a parameter and return it, rounded to its type.
+
+        Returns:
+            ``None`` if there is no such parameter or *value* is not finite.
+        """
         index = self._index.get(name)
         if index is None or not isfinite(value):
             return None
@@ -110,7 +118,7 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Speeds m/s, accelerations m/s^2, angles rad, lengths m, times ns."""
+    """Limits and gains of manoeuvres: speeds m/s, accelerations m/s^2, angles rad, lengths m, times ns."""
 
     sticks: StickMap = field(default_factory=StickMap)
     speed: float = 10.0
@@ -121,7 +129,7 @@ class Tuning:
     tilt: float = radians(30.0)
     waypoint_radius: float = 2.0
     face_path: bool = True
-    """Turn the nose along the path of a mission."""
+    """Whether the nose points along the path of a mission."""
 
     land_speed: float = 0.5
     land_speed_high: float = 1.5
@@ -133,14 +141,14 @@ class Tuning:
     return_speed: float = 10.0
     return_wait: Ns = 5 * S
     return_final: float = 0.0
-    """Height at which it stays over home; 0: it lands."""
+    """Height above home at which a return ends; 0: it lands."""
 
     pilot_up: float = 2.5
     pilot_down: float = 2.5
     pilot_accel_z: float = 2.5
     pilot_yaw_rate: float = radians(202.5)
     throttle_dead: float = 0.1
-    """Half of the throttle's dead zone about its middle, on its scale of 0..1."""
+    """Half width of the throttle's dead zone about its middle, on a scale of 0..1."""
     hover_throttle: float = 0.39
 
     loiter_speed: float = 12.5

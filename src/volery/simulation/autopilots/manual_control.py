@@ -1,9 +1,8 @@
-"""What the pilot's sticks say: a transmitter that is always there, and overrides that expire.
+"""Manual control: RC channels of a simulated transmitter, overrides that expire, and stick positions.
 
-Channels count from 1; a value is the pulse width in microseconds, 0 where the receiver has none. An
-override replaces one channel of the transmitter until it is released or has not been repeated for the
-override time. Deflections are worked out from the channel's own minimum, trim, maximum and dead zone. Knows
-no message.
+Channels count from 1; a value is the pulse width in microseconds, 0 where the receiver has none. An override
+replaces one channel of the transmitter until it is released or has not been repeated for the override time.
+Stick positions are computed from the channel's own minimum, trim, maximum and dead zone.
 """
 
 from __future__ import annotations
@@ -15,10 +14,19 @@ from typing import NamedTuple
 from volery.base.time import Ns
 
 NEVER: Ns = -(1 << 62)
+"""Time of an event that has not happened."""
 
 
 class ChannelRange(NamedTuple):
-    """How a channel's pulse widths are meant: ends, middle and dead zone in microseconds."""
+    """Range of a channel's pulse widths.
+
+    Args:
+        low: Lower end [us].
+        trim: Middle [us].
+        high: Upper end [us].
+        dead: Half width of the dead zone about the middle [us].
+        reversed: Whether a larger pulse width is a smaller value.
+    """
 
     low: float
     trim: float
@@ -27,7 +35,7 @@ class ChannelRange(NamedTuple):
     reversed: bool = False
 
     def deflection(self, pulse: float) -> float:
-        """-1..1 about the trim; 0 within the dead zone."""
+        """Return a pulse width [us] as -1..1 about the trim; 0 within the dead zone."""
         upper, lower = self.trim + self.dead, self.trim - self.dead
         sign = -1.0 if self.reversed else 1.0
         if pulse > upper and self.high > upper:
@@ -37,7 +45,7 @@ class ChannelRange(NamedTuple):
         return 0.0
 
     def share(self, pulse: float) -> float:
-        """0..1 between the ends, with the dead zone at the low end: a throttle."""
+        """Return a pulse width [us] as 0..1 between the ends: a throttle, with the dead zone at its low end."""
         start = self.low + self.dead
         if self.high <= start:
             return 0.0
@@ -47,13 +55,17 @@ class ChannelRange(NamedTuple):
         return max(0.0, (within - start) / (self.high - start))
 
     def pulse(self, share: float) -> int:
-        """The pulse width that lies at *share* (0..1) between the ends."""
+        """Return the pulse width [us] at *share* (0..1) of the range."""
         along = 1.0 - share if self.reversed else share
         return int(self.low + (self.high - self.low) * along)
 
 
 class RcChannels:
-    """Sixteen channels as the autopilot reads them."""
+    """RC channels as the autopilot reads them.
+
+    Args:
+        transmitter: Pulse widths of the simulated transmitter [us].
+    """
 
     def __init__(self, transmitter: Sequence[int]) -> None:
         self.transmitter = list(transmitter)
@@ -61,17 +73,23 @@ class RcChannels:
         self._given = [NEVER] * len(transmitter)
 
     def override(self, channel: int, pulse: int, now: Ns) -> None:
-        """Replace a channel from now on; 0 gives it back to the transmitter."""
+        """Replace a channel from now on; 0 returns it to the transmitter.
+
+        Args:
+            channel: Number of the channel, from 1; others are ignored.
+            pulse: Pulse width [us].
+            now: The time [ns].
+        """
         if 1 <= channel <= len(self._override):
             self._override[channel - 1] = pulse
             self._given[channel - 1] = now
 
     def release(self) -> None:
-        """Give every channel back to the transmitter."""
+        """Return every channel to the transmitter."""
         self._override = [0] * len(self._override)
 
     def expire(self, now: Ns, within: Ns) -> bool:
-        """Drop overrides that were not repeated within that time. True if one was dropped."""
+        """Drop overrides that were not repeated within a time [ns], and return whether one was dropped."""
         if not any(self._override):
             return False
         dropped = False
@@ -83,20 +101,21 @@ class RcChannels:
 
     @property
     def overridden(self) -> bool:
-        """Whether any channel is not the transmitter's."""
+        """Whether any channel is overridden."""
         return any(self._override)
 
     def __getitem__(self, channel: int) -> int:
         return self._override[channel - 1] or self.transmitter[channel - 1]
 
     def pulses(self) -> list[int]:
-        """All channels, in order."""
+        """Return the pulse widths of all channels in order [us]."""
         return [over or given for over, given in zip(self._override, self.transmitter, strict=True)]
 
 
 class StickPositions(NamedTuple):
-    """The four sticks, dead zones taken off: right, back (nose up), clockwise -1..1; throttle 0..1 from its
-    low end.
+    """Positions of the four sticks without dead zones.
+
+    Roll right, pitch back (nose up) and yaw clockwise are -1..1; the throttle is 0..1 from its low end.
     """
 
     roll: float
@@ -107,7 +126,7 @@ class StickPositions(NamedTuple):
 
 @dataclass(frozen=True)
 class StickMap:
-    """Which channel is which stick, and how each travels."""
+    """Channel and range of each stick."""
 
     roll: int = 1
     pitch: int = 2
@@ -116,10 +135,10 @@ class StickMap:
     travels: tuple[ChannelRange, ChannelRange, ChannelRange, ChannelRange] = (
         ChannelRange(1000, 1500, 2000, 20),
     ) * 4
-    """Of roll, pitch, throttle, yaw."""
+    """Ranges of roll, pitch, throttle, yaw."""
 
     def read(self, sticks: RcChannels) -> StickPositions:
-        """What the pilot asks for."""
+        """Return the stick positions."""
         roll, pitch, throttle, yaw = self.travels
         return StickPositions(
             roll.deflection(sticks[self.roll]),
@@ -130,6 +149,6 @@ class StickMap:
 
     @property
     def throttle_middle(self) -> float:
-        """Where the middle of the throttle stick's travel lies on its scale of 0..1."""
+        """Position of the middle of the throttle stick's range on its scale of 0..1."""
         travel = self.travels[2]
         return travel.share((travel.low + travel.high) / 2.0)

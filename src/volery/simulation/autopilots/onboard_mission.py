@@ -1,8 +1,7 @@
-"""The mission as it lies on board: items as they were uploaded, item 0 being home where the firmware has it
-so.
+"""The mission stored on board, as uploaded; item 0 is the home position where the firmware stores it there.
 
-Numbers and frames are MAVLink's. Coordinates stay the integers of the wire (degrees times 1e7), so that what
-is read back is what was sent.
+Numbers and frames are MAVLink's. Coordinates stay the integers of the wire (degrees times 1e7), so that a
+download returns what was uploaded.
 """
 
 from __future__ import annotations
@@ -22,7 +21,14 @@ LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, GLOBAL_TERRAIN, GLOBAL_TERRAIN_INT 
 class MissionItem(NamedTuple):
     """One mission item.
 
-    ``x`` and ``y`` are latitude and longitude in 1e-7 degrees, ``z`` metres in its frame.
+    Args:
+        command: MAV_CMD.
+        frame: MAV_FRAME.
+        param1: First parameter; likewise ``param2`` to ``param4``.
+        x: Latitude [1e-7 degrees].
+        y: Longitude [1e-7 degrees].
+        z: Height in the frame [m].
+        autocontinue: Flag of the wire; stored only.
     """
 
     command: int
@@ -38,22 +44,22 @@ class MissionItem(NamedTuple):
 
     @property
     def navigates(self) -> bool:
-        """Whether the vehicle goes somewhere or waits for it (as against an action that is done at once)."""
+        """Whether the item is flown or waited for, as against an action that is done at once."""
         return self.command <= LAST_NAVIGATION or self.command == SET_YAW_SPEED
 
     @property
     def is_condition(self) -> bool:
-        """Whether it holds back the actions that follow it."""
+        """Whether the item delays the actions that follow it."""
         return CONDITION_DELAY <= self.command <= LAST_CONDITION
 
     @property
     def has_place(self) -> bool:
-        """Whether it names a point; an item with no coordinates means: here."""
+        """Whether the item names a point; without coordinates it means the present position."""
         return bool(self.x or self.y)
 
 
 class OnboardMission:
-    """The items and the one that is flown next or now."""
+    """The items, and the index of the item that is flown now or next."""
 
     def __init__(self) -> None:
         self.items: list[MissionItem] = []
@@ -67,11 +73,11 @@ class OnboardMission:
         return self.items[index]
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Delete all items."""
         self.replace([])
 
     def replace(self, items: list[MissionItem]) -> None:
-        """Another mission, to be flown from its start."""
+        """Store another mission, to be flown from its start."""
         self.items = items
         self.restart()
 
@@ -81,7 +87,7 @@ class OnboardMission:
         self.complete = False
 
     def choose(self, index: int) -> bool:
-        """Fly that item next; False if there is none."""
+        """Make item *index* the current one; return False if there is none."""
         if not 0 <= index < len(self.items):
             return False
         self.current = index

@@ -24,11 +24,11 @@ from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, Onb
 
 
 class Manoeuvre:
-    """One way of flying or driving: ``enter`` once, then ``step`` at every tick and when the RC channels
-    move.
+    """One way of flying or driving.
 
-    While the vehicle stands on the ground with its motors off or idling, ``takeoff_requested`` decides
-    whether they come up; until then the manoeuvre is not stepped.
+    ``enter`` is called once, then ``step`` at every tick and when the RC channels move. While the vehicle
+    stands on the ground with its motors off or idling, ``takeoff_requested`` decides whether they come up;
+    until then the manoeuvre is not stepped.
 
     Args:
         vehicle: The vehicle that is flown.

@@ -45,7 +45,12 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
-from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Loiter, Stabilize
+from volery.simulation.autopilots.manoeuvres.manual_flight import (
+    AltitudeHold,
+    Loiter,
+    ManualFlight,
+    Stabilize,
+)
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
@@ -160,7 +165,7 @@ def problems(vehicle: Vehicle) -> list[str]:
 
 
 def _throttle_is_high(vehicle: Vehicle) -> bool:
-    sticks = ByPilot(vehicle)
+    sticks = ManualFlight(vehicle)
     throttle = sticks.pilot.throttle
     return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
 
@@ -211,7 +216,7 @@ def _disarm_by_itself(vehicle: Vehicle) -> None:
     if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:
         disarm(vehicle, ARMED_WORDS[1], force=True)
         return
-    if ByPilot(vehicle).pilot.throttle > 0.0:
+    if ManualFlight(vehicle).pilot.throttle > 0.0:
         vehicle.ground.idle_since = now
     delay = vehicle.parameters["DISARM_DELAY"]
     if delay > 0.0 and now - vehicle.ground.idle_since >= from_seconds(delay):

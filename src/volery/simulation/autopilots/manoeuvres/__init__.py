@@ -1,4 +1,1 @@
-"""Ways of flying and driving.
-
-Each turns what is asked and what is believed into set-points, ten times a second.
-"""
+"""Manoeuvres: each turns commands and the estimate into set-points at every tick of the autopilot."""

@@ -1,4 +1,4 @@
-"""A multirotor flown by another computer: take-off, points, velocities and attitudes as commanded."""
+"""A multirotor flown by an on-board computer: take-off, points, velocities and attitudes as commanded."""
 
 from __future__ import annotations
 
@@ -12,18 +12,25 @@ from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 
 class Turn(NamedTuple):
-    """Where the nose is to point [rad], or how fast to turn [rad/s]; neither: leave it."""
+    """Commanded heading [rad] or yaw rate [rad/s]; neither: keep the heading."""
 
     yaw: float | None = None
     rate: float | None = None
 
 
-AS_IT_IS = Turn()
-"""Leave the nose where it points."""
+KEEP_HEADING = Turn()
+"""Keep the heading."""
 
 
 class FollowVelocity(Manoeuvre):
-    """Keep a velocity, or one that grows; without news for the time-out stand still."""
+    """Follow a velocity that may grow; stop when no command arrives for the time-out.
+
+    Args:
+        vehicle: The vehicle.
+        velocity: North, east, down [m/s].
+        turn: Heading or yaw rate.
+        acceleration: Growth of the velocity, north, east, down [m/s^2].
+    """
 
     def __init__(
         self, vehicle: Vehicle, velocity: Vector, turn: Turn, acceleration: Vector = (0.0, 0.0, 0.0)
@@ -35,7 +42,7 @@ class FollowVelocity(Manoeuvre):
         self._given: Ns = vehicle.kernel.now()
 
     def step(self) -> None:
-        """Drive on, or stop."""
+        """Give the velocity, or zero once the command is outdated."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         age = vehicle.kernel.now() - self._given
         stale = age > tuning.target_timeout
@@ -56,13 +63,23 @@ class FollowVelocity(Manoeuvre):
         )
 
     def _after(self, seconds: float) -> Vector:
+        """Return the velocity some seconds after the command."""
         north, east, down = self._velocity
         more_north, more_east, more_down = self._acceleration
         return north + more_north * seconds, east + more_east * seconds, down + more_down * seconds
 
 
 class FollowAttitude(Manoeuvre):
-    """Keep an attitude and a climb rate; without news for the time-out level out and hold the height."""
+    """Follow an attitude and a climb rate.
+
+    When no command arrives for the time-out, it levels out and holds the height.
+
+    Args:
+        vehicle: The vehicle.
+        attitude: Quaternion from forward, right, down to north, east, down; ``None``: level.
+        yaw_rate: Yaw rate [rad/s] instead of the heading of *attitude*.
+        thrust: 0..1; one half holds the height.
+    """
 
     def __init__(
         self, vehicle: Vehicle, attitude: Quaternion | None, yaw_rate: float | None, thrust: float
@@ -74,7 +91,7 @@ class FollowAttitude(Manoeuvre):
         self._given: Ns = vehicle.kernel.now()
 
     def step(self) -> None:
-        """Thrust of one half holds the height; 0 and 1 sink and climb at the largest speeds."""
+        """Give the attitude and a climb rate: thrust 0 and 1 descend and climb at the largest speeds."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         if vehicle.kernel.now() - self._given > tuning.target_timeout:
             vehicle.drive(Setpoint(Control.CLIMB, accel_z=tuning.accel_z))
@@ -97,14 +114,14 @@ class FollowAttitude(Manoeuvre):
 
 
 class Guided(Manoeuvre):
-    """Whatever was commanded last. On the ground only a take-off lifts it."""
+    """Execute the last command. On the ground only a take-off starts the motors."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._doing: Manoeuvre = ToPoint(vehicle)
 
     def enter(self) -> None:
-        """Stop and stay until told."""
+        """Stop and hold the position until a command arrives."""
         self._begin(ToPoint(self.vehicle))
 
     def _begin(self, doing: Manoeuvre) -> None:
@@ -116,32 +133,38 @@ class Guided(Manoeuvre):
             doing.step()
 
     def takeoff_requested(self) -> bool:
-        """Only for a take-off."""
+        """Return whether the command is a take-off."""
         return self._doing.taking_off
 
     def step(self) -> None:
-        """Go on with it."""
+        """Continue the command."""
         doing = self._doing
         if doing.taking_off and isinstance(doing, TakeOff) and doing.arrived():
             self.taking_off = doing.taking_off = False
         doing.step()
 
     def take_off(self, height: float) -> None:
-        """Straight up to *height* metres above home."""
+        """Climb straight up to a height above home [m]."""
         self._begin(TakeOff(self.vehicle, height))
 
-    def go_to(self, point: Vector, turn: Turn = AS_IT_IS) -> None:
-        """To a point north, east, down about the estimator's origin. It never expires."""
+    def go_to(self, point: Vector, turn: Turn = KEEP_HEADING) -> None:
+        """Go to a point north, east, down about the estimator's origin [m]; the command does not expire."""
         self._begin(ToPoint(self.vehicle, point, turn.yaw))
 
-    def follow_velocity(self, velocity: Vector, turn: Turn = AS_IT_IS) -> None:
-        """North, east, down m/s."""
+    def follow_velocity(self, velocity: Vector, turn: Turn = KEEP_HEADING) -> None:
+        """Follow a velocity north, east, down [m/s]."""
         self._begin(FollowVelocity(self.vehicle, velocity, turn))
 
-    def follow_acceleration(self, acceleration: Vector, turn: Turn = AS_IT_IS) -> None:
-        """North, east, down m/s^2."""
+    def follow_acceleration(self, acceleration: Vector, turn: Turn = KEEP_HEADING) -> None:
+        """Follow an acceleration north, east, down [m/s^2], from the present velocity."""
         self._begin(FollowVelocity(self.vehicle, self.vehicle.estimate.velocity, turn, acceleration))
 
     def follow_attitude(self, attitude: Quaternion | None, yaw_rate: float | None, thrust: float) -> None:
-        """Forward, right, down to north, east, down; a turn rate instead of its heading; thrust 0..1."""
+        """Follow an attitude.
+
+        Args:
+            attitude: Quaternion from forward, right, down to north, east, down; ``None``: level.
+            yaw_rate: Yaw rate [rad/s] instead of the heading of *attitude*.
+            thrust: 0..1; one half holds the height.
+        """
         self._begin(FollowAttitude(self.vehicle, attitude, yaw_rate, thrust))

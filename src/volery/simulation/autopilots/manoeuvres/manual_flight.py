@@ -1,4 +1,4 @@
-"""Manoeuvres of a multirotor by the pilot's sticks: attitude, climb rate, or speed over the ground."""
+"""Manoeuvres of a multirotor by RC channels: attitude, climb rate, or speed over the ground."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 GRAVITY = 9.80665
 
 
-class ByPilot(Manoeuvre):
-    """What the three have in common."""
+class ManualFlight(Manoeuvre):
+    """Common part of the manoeuvres by RC channels."""
 
     @property
     def pilot(self) -> StickPositions:
-        """The sticks now."""
+        """The stick positions now."""
         return self.vehicle.tuning.sticks.read(self.vehicle.rc)
 
     def climb(self, throttle: float) -> float:
-        """Metres per second up that the throttle stick asks for; 0 within its dead zone."""
+        """Return the climb rate [m/s] for a throttle position 0..1; 0 within the dead zone."""
         tuning = self.vehicle.tuning
         middle = tuning.sticks.throttle_middle
         top, bottom = middle + tuning.throttle_dead, middle - tuning.throttle_dead
@@ -34,14 +34,14 @@ class ByPilot(Manoeuvre):
         return 0.0
 
 
-class Stabilize(ByPilot):
-    """Sticks are lean angles, turn rate and thrust.
+class Stabilize(ManualFlight):
+    """Sticks command tilt angles, yaw rate and thrust.
 
-    With the throttle closed the motors idle, wherever it is.
+    With the throttle closed the motors idle, also in flight.
     """
 
     def takeoff_requested(self) -> bool:
-        """As soon as the throttle is open."""
+        """Return whether the throttle is open."""
         return self.pilot.throttle > 0.0
 
     def step(self) -> None:
@@ -61,10 +61,10 @@ class Stabilize(ByPilot):
         )
 
     def thrust(self, throttle: float) -> float:
-        """Thrust 0..1 for a throttle stick 0..1.
+        """Return the thrust 0..1 for a throttle position 0..1.
 
-        The middle of the stick is hover thrust: the stick is brought to a middle of one half, then bent by
-        a cubic. (ArduCopter's documented throttle curve, with the learnt hover throttle as its middle.)
+        The middle of the stick is hover thrust: the stick is scaled to a middle of one half, then bent by a
+        cubic (ArduCopter's documented throttle curve, with the learnt hover throttle as its middle).
         """
         hover = self.vehicle.estimate.hover_throttle
         middle = self.vehicle.tuning.sticks.throttle_middle
@@ -75,11 +75,14 @@ class Stabilize(ByPilot):
         return min(1.0, max(0.0, centred * (1.0 - bend) + bend * centred**3))
 
 
-class AltitudeHold(ByPilot):
-    """Sticks are lean angles, turn rate and climb rate; in the throttle's dead zone the height is held."""
+class AltitudeHold(ManualFlight):
+    """Sticks command tilt angles, yaw rate and climb rate.
+
+    In the throttle's dead zone the height is held.
+    """
 
     def takeoff_requested(self) -> bool:
-        """When the pilot asks to climb."""
+        """Return whether the pilot commands a climb."""
         return self.climb(self.pilot.throttle) > 0.0
 
     def step(self) -> None:
@@ -99,8 +102,11 @@ class AltitudeHold(ByPilot):
         )
 
 
-class Loiter(ByPilot):
-    """Sticks are accelerations over the ground; let go, it brakes after a moment and holds its place."""
+class Loiter(ManualFlight):
+    """Sticks command accelerations over the ground.
+
+    With the sticks centred the vehicle brakes and holds its position.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
@@ -108,26 +114,26 @@ class Loiter(ByPilot):
         self._last: Ns = 0
         self._centred_at: Ns = 0
         self._held: Vector | None = None
-        self._height: float | None = None  # that a take-off was commanded to
+        self._height: float | None = None  # of a commanded take-off [m]
 
     def take_off(self, height: float) -> None:
-        """Climb to *height* metres above home, unless the pilot's throttle says otherwise."""
+        """Climb to a height above home [m], unless the throttle commands a descent."""
         self._height = height
         self.taking_off = True
 
     def enter(self) -> None:
-        """With the speed that it has."""
+        """Begin with the present velocity."""
         north, east, _ = self.vehicle.estimate.velocity
         self._velocity = (north, east)
         self._last = self._centred_at = self.vehicle.kernel.now()
         self._held = None
 
     def takeoff_requested(self) -> bool:
-        """When the pilot asks to climb, or a take-off was commanded."""
+        """Return whether the pilot commands a climb, or a take-off was commanded."""
         return self.taking_off or self.climb(self.pilot.throttle) > 0.0
 
     def step(self) -> None:
-        """Sticks to speed, speed to set-point."""
+        """Update the velocity from the sticks, and give the set-point."""
         pilot, climb = self.pilot, self._climb()
         now = self.vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
@@ -144,14 +150,14 @@ class Loiter(ByPilot):
         if self._height is None:
             return climb
         left = self._height - self.vehicle.height
-        if climb < 0.0 or left < CLOSE:  # the pilot lowers it, or it is there
+        if climb < 0.0 or left < CLOSE:  # the pilot commands a descent, or the height is reached
             self._height = None
             self.taking_off = False
             return climb
         return max(climb, min(self.vehicle.tuning.speed_up, root_speed(left, self.vehicle.tuning.accel_z)))
 
     def _push(self, pilot: StickPositions, passed: float) -> None:
-        """Accelerate as the lean would, less a drag that ends at the largest speed."""
+        """Accelerate as the commanded tilt would, less a drag that balances it at the largest speed."""
         tuning = self.vehicle.tuning
         forward = -GRAVITY * tan(pilot.pitch * tuning.loiter_tilt)
         right = GRAVITY * tan(pilot.roll * tuning.loiter_tilt)
@@ -165,7 +171,7 @@ class Loiter(ByPilot):
         self._velocity = (north * kept, east * kept)
 
     def _let_go(self, now: Ns, passed: float) -> None:
-        """Glide at first, then brake to a stand."""
+        """Coast at first, then brake to a stop."""
         tuning = self.vehicle.tuning
         north, east = self._velocity
         speed = hypot(north, east)

@@ -1,8 +1,7 @@
-"""Fly the mission on board: one leg for each item that navigates, actions between them, conditions that
-hold actions.
+"""Flight of the mission on board: one leg for each item that navigates, actions between them, and conditions.
 
 Actions between two legs are done when the first of the legs ends. A condition lets the next leg begin and
-holds back only the actions that follow it.
+delays only the actions that follow it.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ FOREVER = -1
 
 @dataclass
 class Leg:
-    """A manoeuvre, when it is done, and how long to stay then."""
+    """A manoeuvre, the condition that it is done, and the time to stay then [ns]."""
 
     manoeuvre: Manoeuvre
     done: Callable[[], bool]
@@ -46,7 +45,7 @@ class Leg:
 
 
 MakeLeg = Callable[[Vehicle, MissionItem, bool], Leg]
-"""Vehicle, item, whether the mission goes on to a waypoint without a stop."""
+"""Creates a leg from the vehicle, the item, and whether the mission goes on to a waypoint without a stop."""
 
 
 def _ignore(*_event: object) -> None:
@@ -69,7 +68,14 @@ class MissionRules:
 
 
 class FlyMission(Manoeuvre):
-    """Runs the vehicle's plan from its current item."""
+    """Fly the mission on board from its current item.
+
+    Args:
+        vehicle: The vehicle.
+        make_leg: Creates the leg of an item.
+        rules: How the firmware treats items and reports progress.
+        leaves_ground: Whether the mission may start the motors by itself; ``None``: only a start command may.
+    """
 
     slow_start = True
 
@@ -86,13 +92,13 @@ class FlyMission(Manoeuvre):
         self._leaves_ground = leaves_ground
         self._leg: Leg | None = None
         self._flown = (0, MissionItem(WAYPOINT))
-        """Index and item of the leg: an upload may replace the plan meanwhile."""
+        """Index and item of the leg; an upload may replace the mission meanwhile."""
         self._reached_at: Ns | None = None
         self._jumps: dict[int, int] = {}
         self._held: deque[MissionItem] = deque()
         self._condition_since: Ns = 0
         self.started = False
-        """Whether it may leave the ground: a station started the mission, or *leaves_ground* said so."""
+        """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
 
     def enter(self) -> None:
         """Wait for the next step: the mission begins once the vehicle is armed."""
@@ -100,13 +106,13 @@ class FlyMission(Manoeuvre):
         self.started = self.started or (self.vehicle.armed and not self.vehicle.landed)
 
     def start(self) -> None:
-        """It may leave the ground; begin if it is armed."""
+        """Permit to leave the ground, and begin if armed."""
         self.started = True
         if self.vehicle.armed and self._leg is None:
             self._begin_current()
 
     def takeoff_requested(self) -> bool:
-        """If its leg does and it may."""
+        """Return whether the mission may leave the ground and its leg requests it."""
         if not self.started and self._leaves_ground is not None:
             self.started = self._leaves_ground(self.vehicle)
         if self._leg is None:
@@ -114,18 +120,18 @@ class FlyMission(Manoeuvre):
         return self.started and self._leg is not None and self._leg.manoeuvre.takeoff_requested()
 
     def step(self) -> None:
-        """Go on with the leg; when it is done, to the next."""
+        """Continue the leg, or begin the next when it is done."""
         self._progress()
         if self._leg is not None and self.vehicle.armed and not self.vehicle.landed:
             self._leg.manoeuvre.step()
             self._mirror(self._leg.manoeuvre)
 
     def on_ground(self) -> None:
-        """A leg may end on the ground."""
+        """Continue the mission: a leg may end on the ground."""
         self._progress()
 
     def item_chosen(self) -> None:
-        """Another item is current: begin it at the next step."""
+        """Begin the chosen item at the next step."""
         self._leg = None
 
     def _progress(self) -> None:
@@ -159,7 +165,7 @@ class FlyMission(Manoeuvre):
         vehicle, plan = self.vehicle, self.vehicle.mission
         self._leg = None
         self._held.clear()
-        for _ in range(len(plan) + 100):  # jumps may go in circles: without a leg between them, for ever
+        for _ in range(len(plan) + 100):  # jumps may form a loop without a leg in it
             if index >= len(plan):
                 break
             item = plan[index]
@@ -182,7 +188,7 @@ class FlyMission(Manoeuvre):
         self._mirror(self._leg.manoeuvre)
 
     def _goes_on(self, index: int) -> bool:
-        """Whether the next item that navigates is a waypoint and this one asks for no stop."""
+        """Return whether the next item that navigates is a waypoint and this one has no stop."""
         plan = self.vehicle.mission
         following = next((item for item in plan.items[index + 1 :] if item.navigates), None)
         stops = plan[index].param1 > 0.0
@@ -191,7 +197,7 @@ class FlyMission(Manoeuvre):
     # -- actions
 
     def _act(self, index: int, item: MissionItem) -> int:
-        """Do an item that does not navigate; returns the index of the next."""
+        """Do an item that does not navigate and return the index of the next."""
         if item.command == JUMP:
             return self._jump(index, item)
         if item.is_condition or self._held:
@@ -233,17 +239,24 @@ class FlyMission(Manoeuvre):
 
 
 class Circle(Manoeuvre):
-    """Turns about a centre at a height, at a turn rate; negative: anticlockwise."""
+    """Fly a circle at a height.
+
+    Args:
+        vehicle: The vehicle.
+        centre: Centre, north, east, down about the estimator's origin [m].
+        radius: Radius [m], at least 1.
+        rate: Turn rate [rad/s]; negative: anticlockwise.
+    """
 
     def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, rate: float) -> None:
         super().__init__(vehicle)
         self._centre, self._radius, self._rate = centre, max(1.0, radius), rate
         self._angle = 0.0
         self.turned = 0.0
-        """Radians so far."""
+        """Angle flown so far [rad]."""
 
     def enter(self) -> None:
-        """From where it is."""
+        """Begin where the vehicle is."""
         self.target = self._centre
         self._angle = self._bearing()
 
@@ -252,7 +265,7 @@ class Circle(Manoeuvre):
         return atan2(east - self._centre[1], north - self._centre[0])
 
     def step(self) -> None:
-        """Along the tangent, with a pull to the circle."""
+        """Fly along the tangent, with a correction towards the circle."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         north, east, _ = vehicle.estimate.position
         angle = self._bearing()
@@ -262,7 +275,7 @@ class Circle(Manoeuvre):
         pull = self._radius - away
         if abs(pull) < 0.5 * self._radius:
             self.turned += abs(passed)
-        fastest = sqrt(tuning.accel * self._radius)  # faster, and it could not stay on the circle
+        fastest = sqrt(tuning.accel * self._radius)  # the largest centripetal acceleration
         along = max(-fastest, min(fastest, self._rate * self._radius))
         velocity = (pull * cos(angle) - along * sin(angle), pull * sin(angle) + along * cos(angle), 0.0)
         vehicle.drive(
@@ -283,7 +296,7 @@ class Circle(Manoeuvre):
 
 
 def item_point(vehicle: Vehicle, item: MissionItem) -> Vector:
-    """Where an item is; where it gives no place or no height, the vehicle's own."""
+    """Return the point of an item; without coordinates or height, the vehicle's own."""
     here = vehicle.estimate.position
     point = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
     if not item.has_place:
@@ -292,13 +305,13 @@ def item_point(vehicle: Vehicle, item: MissionItem) -> Vector:
 
 
 def point_height(vehicle: Vehicle, item: MissionItem) -> float:
-    """The item's altitude as down about the estimator's origin."""
+    """Return an item's height as down about the estimator's origin [m]."""
     latitude, longitude, _ = vehicle.estimate.geodetic
     return vehicle.point(item.frame, latitude, longitude, item.z)[2]
 
 
 def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
-    """The leg of a multirotor for an item that navigates."""
+    """Return the leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
         return _take_off(vehicle, item)
     if item.command == LAND:
@@ -344,7 +357,12 @@ def _turns(vehicle: Vehicle, item: MissionItem) -> Leg:
 
 
 class LandAt(Manoeuvre):
-    """Fly level to a place, then land there; without a place, here."""
+    """Fly level to a point, then land there.
+
+    Args:
+        vehicle: The vehicle.
+        point: The point; ``None``: land at the present position.
+    """
 
     def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
         super().__init__(vehicle)
@@ -354,13 +372,13 @@ class LandAt(Manoeuvre):
             self._going = ToPoint(vehicle, (point[0], point[1], vehicle.estimate.position[2]))
 
     def enter(self) -> None:
-        """Begin with whichever comes first."""
+        """Begin with the flight, or with the landing."""
         (self._going or self._landing).enter()
         self.target = self._going.target if self._going else None
         self.landing = self._going is None
 
     def step(self) -> None:
-        """Go, then sink."""
+        """Fly, then descend."""
         if self._going is not None and self._going.arrived():
             self._going = None
             self._landing.enter()

@@ -1,4 +1,4 @@
-"""Ways of driving: by sticks, to points, at a speed and a turn rate, along a mission, home."""
+"""Manoeuvres of a rover: by RC channels, to points, at a speed and a turn rate, along a mission, home."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from volery.simulation.autopilots.onboard_mission import (
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction
 
 AT_POINT = 1.0
-"""Metres within which a rover that is to stop has arrived."""
+"""Distance within which a rover that stops has arrived [m]."""
 
 STANDING = Setpoint(Control.STEER)
 
 
 class Manual(Manoeuvre):
-    """Sticks are steering and throttle."""
+    """Sticks command steering and throttle."""
 
     def step(self) -> None:
-        """Pass them on."""
+        """Pass the sticks on."""
         sticks, channels = self.vehicle.tuning.sticks, self.vehicle.rc
         steering = sticks.travels[0].deflection(channels[sticks.roll])
         throttle = sticks.travels[2].deflection(channels[sticks.throttle])
@@ -37,22 +37,27 @@ class Manual(Manoeuvre):
 
 
 class Stand(Manoeuvre):
-    """Wheels straight, no throttle."""
+    """Keep the wheels straight and the throttle at zero."""
 
     def step(self) -> None:
-        """Nothing to decide."""
+        """Give the set-point."""
         self.vehicle.drive(STANDING)
 
 
 class DriveTo(Manoeuvre):
-    """To a point, and stop there."""
+    """Drive to a point and stop there.
+
+    Args:
+        vehicle: The vehicle.
+        point: North, east, down about the estimator's origin [m].
+    """
 
     def __init__(self, vehicle: Vehicle, point: Vector) -> None:
         super().__init__(vehicle)
         self.point = self.target = point
 
     def step(self) -> None:
-        """Drive there."""
+        """Give the set-point."""
         tuning = self.vehicle.tuning
         self.vehicle.drive(
             Setpoint(
@@ -64,7 +69,12 @@ class DriveTo(Manoeuvre):
         )
 
     def arrived(self, passing: bool = False) -> bool:
-        """Within the radius if it drives on; else close by or standing within the radius."""
+        """Return whether the rover has arrived.
+
+        Args:
+            passing: Whether it suffices to be within the waypoint radius; else it must be close, or stand
+                within it.
+        """
         away = self.distance()
         if away >= self.vehicle.tuning.waypoint_radius:
             return False
@@ -73,7 +83,13 @@ class DriveTo(Manoeuvre):
 
 
 class FollowSpeed(Manoeuvre):
-    """A speed ahead with a heading or a turn rate; without news for the time-out it stops."""
+    """Drive at a speed with a heading or a turn rate; stop when no command arrives for the time-out.
+
+    Args:
+        vehicle: The vehicle.
+        speed: Forward speed [m/s].
+        turn: Heading or turn rate.
+    """
 
     def __init__(self, vehicle: Vehicle, speed: float, turn: Turn) -> None:
         super().__init__(vehicle)
@@ -82,7 +98,7 @@ class FollowSpeed(Manoeuvre):
         self.stale = False
 
     def step(self) -> None:
-        """Drive on, or stop."""
+        """Give the speed, or zero once the command is outdated."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         self.stale = vehicle.kernel.now() - self._given > tuning.target_timeout
         speed = 0.0 if self.stale else self._speed
@@ -99,47 +115,53 @@ class FollowSpeed(Manoeuvre):
 
 
 class GuidedRover(Manoeuvre):
-    """Whatever was commanded last."""
+    """Execute the last command.
+
+    Args:
+        vehicle: The vehicle.
+        on_arrival: Called once the commanded point is reached.
+        on_timeout: Called once the rover stops because commands are outdated.
+    """
 
     def __init__(self, vehicle: Vehicle, on_arrival: VehicleAction, on_timeout: VehicleAction) -> None:
         super().__init__(vehicle)
         self._on_arrival, self._on_timeout = on_arrival, on_timeout
         self._doing: Manoeuvre = Stand(vehicle)
-        self._told = True
+        self._reported = True
 
     def enter(self) -> None:
-        """Stop until told."""
+        """Stop until a command arrives."""
         self._begin(Stand(self.vehicle))
 
     def _begin(self, doing: Manoeuvre) -> None:
-        self._doing, self._told = doing, False
+        self._doing, self._reported = doing, False
         self.target = doing.target
         if self.vehicle.armed:
             doing.step()
 
     def step(self) -> None:
-        """Go on; tell once that it arrived, or that it stops because nothing was heard."""
+        """Continue the command; report once that it is done or outdated."""
         doing = self._doing
         doing.step()
-        if self._told:
+        if self._reported:
             return
         if isinstance(doing, DriveTo) and doing.arrived():
-            self._told = True
+            self._reported = True
             self._on_arrival(self.vehicle)
         elif isinstance(doing, FollowSpeed) and doing.stale:
-            self._told = True
+            self._reported = True
             self._on_timeout(self.vehicle)
 
     def go_to(self, point: Vector) -> None:
-        """To a point north, east, down about the estimator's origin."""
+        """Drive to a point north, east, down about the estimator's origin [m]."""
         self._begin(DriveTo(self.vehicle, point))
 
     def follow_speed(self, speed: float, turn: Turn) -> None:
-        """Metres per second ahead; backwards if negative."""
+        """Drive forward at a speed [m/s]; backwards if negative."""
         self._begin(FollowSpeed(self.vehicle, speed, turn))
 
     def follow_velocity(self, velocity: Vector, turn: Turn) -> None:
-        """North, east m/s: the speed is what lies ahead of the nose when a turn is given, else the whole."""
+        """Drive at the part of a velocity (north, east, down [m/s]) that lies along the heading."""
         north, east, _ = velocity
         heading = self.vehicle.estimate.attitude[2]
         ahead = north * cos(heading) + east * sin(heading)
@@ -147,7 +169,7 @@ class GuidedRover(Manoeuvre):
 
 
 class ReturnRover(Manoeuvre):
-    """Home, and stop."""
+    """Drive home and stop."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
@@ -155,21 +177,21 @@ class ReturnRover(Manoeuvre):
         self._driving = DriveTo(vehicle, home.ned if home else vehicle.estimate.position)
 
     def enter(self) -> None:
-        """At the speed of the return."""
+        """Set the speed of the return."""
         self.target = self._driving.point
         self.vehicle.commanded.speed = self.vehicle.tuning.return_speed
 
     def step(self) -> None:
-        """Drive."""
+        """Give the set-point."""
         self._driving.step()
 
     def arrived(self) -> bool:
-        """Whether it is home."""
+        """Return whether the rover is home."""
         return self._driving.arrived()
 
 
 def rover_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
-    """The leg of a rover for an item that navigates."""
+    """Return the leg of a rover for an item that navigates."""
     if item.command == RETURN:
         returning = ReturnRover(vehicle)
         return Leg(returning, returning.arrived)

@@ -1,4 +1,4 @@
-"""Manoeuvres of a multirotor towards a point: take off, hold, go, land, return, brake."""
+"""Manoeuvres of a multirotor towards a point: go, hold, take off, land, return, brake."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CLOSE = 0.1
-"""Metres within which a height or a shaped target counts as there."""
+"""Distance within which a height or a shaped target counts as reached [m]."""
 
 SLOW = 0.05
-"""Metres per second below which it counts as standing still."""
+"""Speed below which a vehicle counts as standing still [m/s]."""
 
 
 def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
-    """The speed [m/s] from which one can stop within *distance* [m] at *accel* [m/s^2].
+    """Return the speed [m/s] from which a vehicle can stop.
 
-    Proportional by *gain* [1/s] close to the end, the square root of the distance beyond: the shape of the
-    position controllers of ArduPilot (its documentation calls it the square-root controller).
+    Proportional near the end, the square root of the distance beyond: the shape of ArduPilot's position
+    controllers (its documentation calls it the square-root controller).
+
+    Args:
+        distance: Distance to stop in [m].
+        accel: Deceleration [m/s^2].
+        gain: Gain near the end [1/s].
     """
     bend = accel / gain**2
     if distance <= bend:
@@ -29,13 +34,20 @@ def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
 
 
 def stopping_distance(speed: float, accel: float, gain: float = 1.0) -> float:
-    """Metres [m] in which it comes to rest: the inverse of ``root_speed``."""
+    """Return the distance [m] in which a vehicle stops: the inverse of ``root_speed``."""
     bend = accel / gain
     return speed / gain if speed <= bend else speed**2 / (2.0 * accel) + bend / (2.0 * gain)
 
 
 def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: float) -> Vector:
-    """Where a vehicle comes to rest that brakes at *accel* in the plane and *accel_z* [m/s^2] up and down."""
+    """Return the point at which a vehicle comes to rest.
+
+    Args:
+        position: Present position, north, east, down [m].
+        velocity: Present velocity, north, east, down [m/s].
+        accel: Horizontal deceleration [m/s^2].
+        accel_z: Vertical deceleration [m/s^2].
+    """
     north, east, down = velocity
     speed = hypot(north, east)
     share = stopping_distance(speed, accel) / speed if speed > SLOW else 0.0
@@ -48,12 +60,18 @@ def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: fl
 
 
 def bearing(start: Vector, end: Vector) -> float:
-    """Radians clockwise from north."""
+    """Return the bearing from *start* to *end*, clockwise from north [rad]."""
     return atan2(end[1] - start[1], end[0] - start[0])
 
 
 class ToPoint(Manoeuvre):
-    """Go to a point with limited speed and stay there. Without a point: stop and stay."""
+    """Go to a point with limited speed and hold it.
+
+    Args:
+        vehicle: The vehicle.
+        point: North, east, down about the estimator's origin [m]; ``None``: where the vehicle can stop.
+        yaw: Heading [rad]; ``None``: keep it.
+    """
 
     def __init__(self, vehicle: Vehicle, point: Vector | None = None, yaw: float | None = None) -> None:
         super().__init__(vehicle)
@@ -62,7 +80,7 @@ class ToPoint(Manoeuvre):
         self.speed: float | None = None
 
     def enter(self) -> None:
-        """Where no point was given it is where the vehicle can stop."""
+        """Take the stopping point where no point was given."""
         if self.point is None:
             estimate = self.vehicle.estimate
             tuning = self.vehicle.tuning
@@ -71,12 +89,12 @@ class ToPoint(Manoeuvre):
             self.target = self.point
 
     def step(self) -> None:
-        """Drive there."""
+        """Give the set-point."""
         if self.point is not None:
             self.vehicle.drive(self.towards(self.point))
 
     def towards(self, point: Vector) -> Setpoint:
-        """The set-point for a point, with the limits that hold now."""
+        """Return the set-point for a point, with the limits in force."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         return Setpoint(
             Control.POSITION,
@@ -91,7 +109,12 @@ class ToPoint(Manoeuvre):
         )
 
     def arrived(self, passing: bool = False) -> bool:
-        """Whether the vehicle is there: the path to it has ended, or it flies past within the radius."""
+        """Return whether the vehicle has arrived.
+
+        Args:
+            passing: Whether it suffices to be within the waypoint radius; else the shaped target must have
+                arrived too.
+        """
         if self.point is None:
             return True
         estimate, radius = self.vehicle.estimate, self.vehicle.tuning.waypoint_radius
@@ -100,7 +123,12 @@ class ToPoint(Manoeuvre):
 
 
 class TakeOff(ToPoint):
-    """Straight up to a height above home."""
+    """Climb straight up.
+
+    Args:
+        vehicle: The vehicle.
+        height: Height above home [m].
+    """
 
     taking_off = True
     slow_start = True
@@ -110,22 +138,27 @@ class TakeOff(ToPoint):
         self.height = height
 
     def enter(self) -> None:
-        """From where it stands."""
+        """Take the point above the present position."""
         north, east, _ = self.vehicle.estimate.position
         home = self.vehicle.home
         self.point = (north, east, (home.ned[2] if home else 0.0) - self.height)
 
     def takeoff_requested(self) -> bool:
-        """That is what it is for."""
+        """Return True."""
         return True
 
     def arrived(self, passing: bool = False) -> bool:
-        """Within a decimetre of the height, or above it."""
+        """Return whether the vehicle is within a decimetre of the height, or above it."""
         return self.vehicle.height > self.height - CLOSE
 
 
 class Land(Manoeuvre):
-    """Straight down: fast while high, slowly near the ground. Without a position it sinks level."""
+    """Descend straight down: fast while high, slowly near the ground. Without a position it descends level.
+
+    Args:
+        vehicle: The vehicle.
+        point: Point to land below; ``None``: where the vehicle can stop.
+    """
 
     landing = True
 
@@ -134,20 +167,20 @@ class Land(Manoeuvre):
         self.point = point
 
     def enter(self) -> None:
-        """Above the point, or where the vehicle can stop."""
+        """Take the stopping point where no point was given."""
         if self.point is None:
             estimate = self.vehicle.estimate
             tuning = self.vehicle.tuning
             self.point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
 
     def sink(self) -> float:
-        """Metres per second down at the present height."""
+        """Return the descent rate at the present height [m/s]."""
         tuning = self.vehicle.tuning
         above = self.vehicle.height - tuning.land_slow_below
         return max(tuning.land_speed, min(tuning.land_speed_high, root_speed(above, tuning.accel_z)))
 
     def step(self) -> None:
-        """Sink over the point."""
+        """Descend over the point."""
         vehicle, tuning, sink = self.vehicle, self.vehicle.tuning, self.sink()
         if not vehicle.has_position or self.point is None:
             vehicle.drive(Setpoint(Control.CLIMB, climb=-sink, speed_down=sink, accel_z=tuning.accel_z))
@@ -178,17 +211,17 @@ class Return(Manoeuvre):
         self._waiting_since: Ns = 0
 
     def enter(self) -> None:
-        """Straight up first, to the height of the return."""
+        """Climb straight up first, to the height of the return."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         ground = vehicle.home.ned if vehicle.home else (0.0, 0.0, 0.0)
         estimate = vehicle.estimate
         here = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
         away = hypot(ground[0] - here[0], ground[1] - here[1])
-        height = max(vehicle.height + tuning.return_climb_min, self._climb(vehicle.height, away))
+        height = max(vehicle.height + tuning.return_climb_min, self._return_height(vehicle.height, away))
         self._home = (ground[0], ground[1], ground[2] - height)
-        self._to("climb", ToPoint(vehicle, (here[0], here[1], ground[2] - height)))
+        self._begin("climb", ToPoint(vehicle, (here[0], here[1], ground[2] - height)))
 
-    def _climb(self, height: float, away: float) -> float:
+    def _return_height(self, height: float, away: float) -> float:
         """Height of the return: lower within a cone about home."""
         tuning = self.vehicle.tuning
         wanted = tuning.return_height
@@ -196,7 +229,7 @@ class Return(Manoeuvre):
             wanted = min(wanted, max(away * tuning.return_cone, 2.0))
         return max(height, wanted)
 
-    def _to(self, name: str, stage: Manoeuvre) -> None:
+    def _begin(self, name: str, stage: Manoeuvre) -> None:
         self._name, self._stage = name, stage
         if isinstance(stage, ToPoint) and name != "climb":
             stage.speed = self.vehicle.tuning.return_speed
@@ -205,18 +238,18 @@ class Return(Manoeuvre):
         self.landing = stage.landing
 
     def step(self) -> None:
-        """Go on to the next stage when one is done."""
+        """Change to the next stage when one is done."""
         stage, now = self._stage, self.vehicle.kernel.now()
-        if self._name == "climb" and self._near(stage):
-            self._to("fly", ToPoint(self.vehicle, self._home))
+        if self._name == "climb" and self._has_climbed(stage):
+            self._begin("fly", ToPoint(self.vehicle, self._home))
         elif self._name == "fly" and isinstance(stage, ToPoint) and stage.arrived():
             self._waiting_since = now
-            self._to("wait", ToPoint(self.vehicle, self._home))
+            self._begin("wait", ToPoint(self.vehicle, self._home))
         elif self._name == "wait" and now - self._waiting_since >= self.vehicle.tuning.return_wait:
             self._finish()
         self._stage.step()
 
-    def _near(self, stage: Manoeuvre) -> bool:
+    def _has_climbed(self, stage: Manoeuvre) -> bool:
         return isinstance(stage, ToPoint) and stage.arrived(passing=True)
 
     def _finish(self) -> None:
@@ -224,25 +257,25 @@ class Return(Manoeuvre):
         north, east, down = self._home
         if final > 0.0:
             ground = self.vehicle.home.ned[2] if self.vehicle.home else 0.0
-            self._to("final", ToPoint(self.vehicle, (north, east, ground - final)))
+            self._begin("final", ToPoint(self.vehicle, (north, east, ground - final)))
         else:
-            self._to("land", Land(self.vehicle, (north, east, down)))
+            self._begin("land", Land(self.vehicle, (north, east, down)))
 
 
 class Brake(Manoeuvre):
-    """Stop as fast as it may, and stay there."""
+    """Stop as fast as possible, and hold the position."""
 
     ACCEL = 7.5
     """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
     STANDS = 0.3
-    """Speed [m/s] below which it holds its place."""
+    """Speed below which it holds its position [m/s]."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._held: Vector | None = None
 
     def step(self) -> None:
-        """No speed, then a place."""
+        """Control to zero velocity, then to the position reached."""
         estimate, tuning = self.vehicle.estimate, self.vehicle.tuning
         north, east, _ = estimate.velocity
         if self._held is None and hypot(north, east) < self.STANDS:

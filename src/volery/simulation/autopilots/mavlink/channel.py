@@ -1,7 +1,4 @@
-"""Words on one link: cut into STATUSTEXT messages, and held back as the firmware holds them back.
-
-One link of an autopilot, and whom an answer goes to.
-"""
+"""One MAVLink link of a simulated autopilot: its streams, its queue of status texts, and its peers."""
 
 from __future__ import annotations
 
@@ -17,10 +14,10 @@ from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 
 WAITING = 4
-"""Texts that wait for a ground station; older ones are lost."""
+"""Number of texts that wait for a ground station; older ones are lost."""
 
 STATION_SILENT: Ns = 2500 * MS
-"""A ground station that has been silent for that long is not there."""
+"""Time after its last heartbeat for which a ground station counts as connected [ns]."""
 
 GROUND_STATION = 6
 """MAV_TYPE_GCS."""
@@ -29,53 +26,59 @@ Chunks = list[dict[str, Any]]
 
 
 class StatusTextQueue:
-    """The texts of one link. *send* sends the fields of one message."""
+    """Status texts of one link, held back as the firmware holds them back.
+
+    Args:
+        kernel: Clock and timers.
+        policy: When texts may be sent.
+        send: Sends the fields of one STATUSTEXT.
+    """
 
     def __init__(
-        self, kernel: Kernel, habits: StatusTextPolicy, send: Callable[[dict[str, Any]], None]
+        self, kernel: Kernel, policy: StatusTextPolicy, send: Callable[[dict[str, Any]], None]
     ) -> None:
         self._kernel = kernel
-        self._habits = habits
+        self._policy = policy
         self._send = send
         self._waiting: deque[Chunks] = deque(maxlen=WAITING)
         self._free_at: Ns = NEVER
         self._due = False
-        self._station_seen: Ns = NEVER
+        self._station_last_ns: Ns = NEVER
 
     def on_heartbeat(self, kind: int) -> None:
-        """Somebody's heartbeat came in through the link; *kind* is a MAV_TYPE."""
+        """Take note of a heartbeat that arrived on the link; *kind* is a MAV_TYPE."""
         if kind == GROUND_STATION:
-            self._station_seen = self._kernel.now()
+            self._station_last_ns = self._kernel.now()
             self._flush()
 
     def put(self, text: Chunks) -> None:
-        """Send it, as soon as it may be."""
-        if not (self._habits.to_stations or self._habits.spacing):
-            self._tell(text)
+        """Send a text as soon as the policy permits; *text* are the fields of its messages."""
+        if not (self._policy.to_stations or self._policy.spacing):
+            self._send_chunks(text)
             return
         self._waiting.append(text)
         self._flush()
 
-    def _tell(self, text: Chunks) -> None:
+    def _send_chunks(self, text: Chunks) -> None:
         for fields in text:
             self._send(fields)
 
-    def _listened_to(self) -> bool:
-        heard = self._kernel.now() - self._station_seen <= STATION_SILENT
-        return heard or not self._habits.to_stations
+    def _station_connected(self) -> bool:
+        connected = self._kernel.now() - self._station_last_ns <= STATION_SILENT
+        return connected or not self._policy.to_stations
 
     def _flush(self) -> None:
         now = self._kernel.now()
-        if self._due or not self._waiting or not self._listened_to():
+        if self._due or not self._waiting or not self._station_connected():
             return
         if now >= self._free_at:
-            self._tell(self._waiting.popleft())
-            self._free_at = now + self._habits.spacing
+            self._send_chunks(self._waiting.popleft())
+            self._free_at = now + self._policy.spacing
         if self._waiting:
             self._due = True
-            self._kernel.call_at(self._free_at, self._go_on)
+            self._kernel.call_at(self._free_at, self._on_free)
 
-    def _go_on(self) -> None:
+    def _on_free(self) -> None:
         self._due = False
         self._flush()
 
@@ -85,8 +88,13 @@ AUTOPILOT = 1
 
 
 class MavlinkChannel:
-    """A link with its streams. ``index`` numbers the links that are open at once; ``usual`` is what is
-    streamed unasked.
+    """A link with its streams.
+
+    Args:
+        link: The autopilot's end of the link.
+        index: Number of the link among those that are open.
+        system: MAVLink system id of the autopilot.
+        usual: Periods of the streams that are sent without a request.
     """
 
     def __init__(self, link: Link, index: int, system: int, usual: Mapping[str, Ns]) -> None:
@@ -99,35 +107,35 @@ class MavlinkChannel:
         self._system = system
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
-        """Send a message as the autopilot; nothing once it has hung up."""
+        """Send a message as the autopilot, while the channel is open."""
         if self.open:
             self.link.send(Frame(name, fields, self._system, AUTOPILOT))
 
     def stream(self) -> None:
-        """Send regularly from now on: the usual, and what was asked for."""
+        """Start the streams: the usual ones and those that were requested."""
         for name, period in self.usual.items():
             if not self.streams.period(name):
                 self.streams.set((name,), period)
         self.streams.start()
 
     def send_bytes(self, data: bytes) -> None:
-        """Bytes that are no message, where the link carries bytes; else nothing."""
+        """Send bytes that are no message, where the link carries bytes."""
         if self.open and isinstance(self.link, ByteLink):
             self.link.send_bytes(data)
 
     def close(self) -> None:
-        """Neither speak nor listen any more."""
+        """Send nothing and handle nothing from now on."""
         self.open = False
         self.streams.stop()
 
 
 class Peer(NamedTuple):
-    """Who asked: through which link, and with which ids."""
+    """Sender of a message: the channel, and its system and component ids."""
 
     channel: MavlinkChannel
     system: int
     component: int
 
     def answer(self, name: str, **fields: Any) -> None:
-        """Send a message that names the asker as its target."""
+        """Send a message with the peer as its target."""
         self.channel.send(name, {**fields, "target_system": self.system, "target_component": self.component})

@@ -4,26 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite, nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from volery.simulation.autopilots.mavlink.message_fields import finite
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE
-
-if TYPE_CHECKING:
-    from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Vehicle
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 """MAV_RESULT."""
 
 NOT_GIVEN = 2_147_483_647
-"""A coordinate of COMMAND_INT that is none."""
+"""Value of a coordinate of COMMAND_INT that is not given."""
 
 
 class Command(NamedTuple):
-    """A command, whichever form it came in. ``x`` and ``y`` are degrees where they are a place.
+    """One command.
 
-    All are numbers, but ``param4``, where a NaN may mean: leave the heading alone; and the others where the
-    firmware reads a NaN as: not given.
+    Args:
+        number: MAV_CMD.
+        param1: First parameter; likewise ``param2`` and ``param3``.
+        param4: Fourth parameter; NaN may mean to keep the heading.
+        x: Fifth parameter; degrees where it is a latitude. Likewise ``y`` for the longitude.
+        z: Seventh parameter.
+        frame: MAV_FRAME.
+        is_int: Whether it arrived as COMMAND_INT.
+
+    The others are NaN only for firmwares that read NaN as "not given".
     """
 
     number: int
@@ -38,12 +44,12 @@ class Command(NamedTuple):
     is_int: bool
 
 
-Handler = Callable[["Vehicle", Command], int]
-"""Does it and returns a MAV_RESULT."""
+Handler = Callable[[Vehicle, Command], int]
+"""Executes a command and returns a MAV_RESULT."""
 
 
 def from_long(fields: dict[str, Any], reads_nan: bool = False) -> Command:
-    """COMMAND_LONG. *reads_nan*: what is no number stays none."""
+    """Return the command of a COMMAND_LONG; with *reads_nan*, NaN parameters stay NaN."""
     read = _number_or_nan if reads_nan else finite
     return Command(
         fields["command"],
@@ -60,7 +66,10 @@ def from_long(fields: dict[str, Any], reads_nan: bool = False) -> Command:
 
 
 def from_int(fields: dict[str, Any], reads_nan: bool = False) -> Command:
-    """COMMAND_INT. *reads_nan*: what is no number stays none, and the largest integer is none."""
+    """Return the command of a COMMAND_INT.
+
+    With *reads_nan*, NaN parameters stay NaN and the largest integer becomes NaN.
+    """
     read = _number_or_nan if reads_nan else finite
     x, y = (nan if reads_nan and value == NOT_GIVEN else value / 1e7 for value in (fields["x"], fields["y"]))
     return Command(

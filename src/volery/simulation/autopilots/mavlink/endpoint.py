@@ -1,7 +1,7 @@
-"""The MAVLink face of a vehicle: links, heartbeats, streams, and which part answers which message.
+"""The MAVLink endpoint of a vehicle: links, heartbeats, streams, and the handler of each message.
 
-A frame is handled a few milliseconds after it arrived, in order. What handling it makes the vehicle say
-goes out after the answer, as the recorded firmware does it once it has booted.
+A frame is handled a few milliseconds after it has arrived, in order. Messages that its handling causes are
+sent after the answer, as in recordings of the firmware once it has booted.
 """
 
 from __future__ import annotations
@@ -33,7 +33,12 @@ COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 
 
 class MavlinkEndpoint:
-    """One vehicle's ``Outlet``, and its ear."""
+    """``LinkEndpoint`` of one vehicle that uses MAVLink.
+
+    Args:
+        firmware: What differs between firmwares.
+        vehicle: The vehicle.
+    """
 
     def __init__(self, firmware: MavlinkFirmware, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
@@ -44,7 +49,7 @@ class MavlinkEndpoint:
         self._handling = False
         self._after: list[Action] = []
         self._text_id = 0
-        self._clocks: list[Handle] = []
+        self._timers: list[Handle] = []
         self._parameters = parameters = ParameterService(vehicle, firmware.parameters)
         missions = MissionService(vehicle, firmware)
         self._commands = CommandService(vehicle, firmware)
@@ -73,11 +78,16 @@ class MavlinkEndpoint:
 
     @property
     def banner(self) -> bytes:
-        """The first bytes on a wire after the autopilot was switched on: text, no MAVLink."""
+        """Bytes that the autopilot writes to a new byte connection before any frame."""
         return self.firmware.start.boot_bytes[0].data if self.firmware.start.boot_bytes else b""
 
     def connect(self, link: Link, use: str = "") -> None:
-        """Listen to and speak on this link, too. *use* is what the firmware has it for."""
+        """Serve *link*.
+
+        Args:
+            link: The autopilot's end of the link.
+            use: What the firmware uses the link for; empty: its default.
+        """
         vehicle, uses = self._vehicle, self.firmware.telemetry.link_uses
         taken = {channel.index for channel in self.channels}
         index = next(index for index in count() if index not in taken)
@@ -94,23 +104,23 @@ class MavlinkEndpoint:
         self.channels.append(channel)
         if vehicle.uptime() >= vehicle.rules.startup.ready_after:
             channel.stream()
-        link.receive(lambda frame: self._hear(channel, frame))
+        link.receive(lambda frame: self._receive(channel, frame))
 
     def disconnect(self, link: Link) -> None:
-        """Nobody is there any more."""
+        """Stop serving *link*."""
         for channel in [channel for channel in self.channels if channel.link is link]:
             channel.close()
             self.channels.remove(channel)
 
     def close(self) -> None:
-        """Stop serving all of them."""
+        """Stop serving all links."""
         for channel in self.channels:
             channel.close()
         self.channels.clear()
 
     @property
-    def listens_to(self) -> frozenset[str]:
-        """The messages that change something or are answered."""
+    def handled_messages(self) -> frozenset[str]:
+        """Names of the messages that have an effect or an answer."""
         return frozenset(self._handlers) | frozenset(self.firmware.commands.handlers)
 
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
@@ -121,119 +131,118 @@ class MavlinkEndpoint:
                 channel.send(name, fields)
 
     def _send_bytes(self, data: bytes) -> None:
-        """Bytes that are no message, to links that carry bytes."""
+        """Send bytes that are no message, on all links that carry bytes."""
         for channel in self.channels:
             channel.send_bytes(data)
 
-    # -- the clock
+    # -- timers
 
     def start(self) -> None:
-        """The vehicle was switched on: heartbeats and time requests from its boot on."""
+        """Start heartbeats, time requests and streams, in phase with the boot."""
         self.stop()
         vehicle, firmware = self._vehicle, self.firmware
         age = vehicle.uptime()
-        for words in firmware.start.boot_bytes[1:] if not age else ():
-            self._at_uptime(words.after, partial(self._send_bytes, words.data))
+        for piece in firmware.start.boot_bytes[1:] if not age else ():
+            self._at_uptime(piece.after, partial(self._send_bytes, piece.data))
         for after in firmware.start.heartbeat_first:
             if after >= age:
                 self._at_uptime(after, lambda: self.send_message("HEARTBEAT"))
         self._regularly(firmware.start.heartbeat_from, S, lambda: self.send_message("HEARTBEAT"))
         if firmware.start.timesync_every:
-            self._regularly(firmware.start.timesync_every, firmware.start.timesync_every, self._ask_time)
+            self._regularly(firmware.start.timesync_every, firmware.start.timesync_every, self._request_time)
         if age >= vehicle.rules.startup.ready_after:
             self.stream()
         else:
             self._at_uptime(vehicle.rules.startup.ready_after, self.stream)
 
     def stop(self) -> None:
-        """Fall silent."""
-        for clock in self._clocks:
-            clock.cancel()
-        self._clocks.clear()
+        """Stop all timers and streams."""
+        for timer in self._timers:
+            timer.cancel()
+        self._timers.clear()
         for channel in self.channels:
             channel.streams.stop()
 
     def stream(self) -> None:
-        """Send what was asked for."""
+        """Start the streams of all links."""
         for channel in self.channels:
             channel.stream()
 
     def _at_uptime(self, uptime: int, action: Action) -> None:
-        self._clocks.append(self._kernel.call_at(self._vehicle.boot_at + uptime, action))
+        self._timers.append(self._kernel.call_at(self._vehicle.boot_at + uptime, action))
 
     def _regularly(self, first: int, period: int, action: Action) -> None:
-        """Each *period*, in phase with the boot; not before *first*."""
+        """Run *action* each *period*, in phase with the boot, not before uptime *first*."""
         age = self._vehicle.uptime()
         if age > first:
             first += -(-(age - first) // period) * period
-        self._at_uptime(first, lambda: self._clocks.append(self._kernel.every(period, action)))
+        self._at_uptime(first, lambda: self._timers.append(self._kernel.every(period, action)))
 
-    def _ask_time(self) -> None:
+    def _request_time(self) -> None:
         fields = {"tc1": 0, "ts1": self._vehicle.uptime() // 1000 * 1000 + self._vehicle.system}
         for channel in self.channels:
             channel.send("TIMESYNC", fields)
 
-    # -- speaking
+    # -- sending
 
     def send_text(self, severity: int, text: str) -> None:
-        """STATUSTEXT to everyone, in chunks where it is long; and to the trace."""
+        """Send STATUSTEXT on all links, in chunks where it is long, and record it in the trace."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text.strip()))
         numbered = self.firmware.texts.numbered or len(status_text_chunks(severity, text, 0)) > 1
         if numbered:
             self._text_id = self._text_id % 65_535 + 1
-        pieces = status_text_chunks(severity, text, self._text_id if numbered else 0)
+        chunks = status_text_chunks(severity, text, self._text_id if numbered else 0)
 
-        def tell() -> None:
+        def send() -> None:
             for channel in self.channels:
-                channel.texts.put(pieces)
+                channel.texts.put(chunks)
 
-        self.after_reply(tell)
+        self.after_reply(send)
 
     def parameter_changed(self, name: str) -> None:
-        """PARAM_VALUE to everyone."""
+        """Send PARAM_VALUE on all links."""
         fields = self._parameters.unlisted(name)
         if fields is not None:
-            self._tell_all("PARAM_VALUE", fields)
+            self.send_event("PARAM_VALUE", fields)
 
     def mode_changed(self) -> None:
-        """What a change of mode sends, to everyone."""
+        """Send the messages of a change of mode on all links."""
         for message in self.firmware.telemetry.on_mode_change:
             self.send_message(message)
 
     def home_changed(self) -> None:
-        """What a change of home sends, to everyone."""
+        """Send the messages of a change of the home position on all links."""
         for message in self.firmware.telemetry.on_home_change:
             self.send_message(message)
 
     def send_message(self, message: str) -> None:
-        """That message to everyone."""
+        """Send a telemetry message now, on all links."""
         fields = self.firmware.telemetry.messages[message](self._vehicle)
         if fields is not None:
-            self._tell_all(message, fields)
+            self.send_event(message, fields)
 
     def send_event(self, message: str, fields: dict[str, Any]) -> None:
-        """A message that is no state, such as an event, to everyone."""
-        self._tell_all(message, fields)
+        """Send a message with these fields, on all links."""
 
-    def _tell_all(self, name: str, fields: dict[str, Any]) -> None:
-        def tell() -> None:
+        def send() -> None:
             for channel in self.channels:
-                channel.send(name, fields)
+                channel.send(message, fields)
 
-        self.after_reply(tell)
+        self.after_reply(send)
 
     def after_reply(self, action: Action) -> None:
-        """Once the frame in hand has been answered; at once if there is none, or the autopilot is still
-        booting.
+        """Run *action* once the frame in hand has been answered.
+
+        Run it at once if there is none, or while the autopilot is booting.
         """
         if self._handling and self._vehicle.uptime() >= self._vehicle.rules.startup.ready_after:
             self._after.append(action)
         else:
             action()
 
-    # -- hearing
+    # -- receiving
 
-    def _hear(self, channel: MavlinkChannel, frame: Frame) -> None:
+    def _receive(self, channel: MavlinkChannel, frame: Frame) -> None:
         if not channel.open:
             return
         self._arrived.append((channel, frame))
@@ -242,8 +251,8 @@ class MavlinkEndpoint:
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
         fields = frame.fields
-        if not self._is_for_me(frame):
-            self._turn_away(channel, frame)
+        if not self._is_addressed(frame):
+            self._reject(channel, frame)
             return
         if frame.name == "HEARTBEAT":
             channel.texts.on_heartbeat(fields["type"])
@@ -252,15 +261,15 @@ class MavlinkEndpoint:
         if own is not None:
             own(Peer(channel, frame.system, frame.component), fields)
         else:
-            heard = self.firmware.commands.handlers.get(frame.name)
-            if heard is not None:
-                heard(self._vehicle, fields, frame.system)
+            handler = self.firmware.commands.handlers.get(frame.name)
+            if handler is not None:
+                handler(self._vehicle, fields, frame.system)
         self._handling = False
         after, self._after = self._after, []
         for action in after:
             action()
 
-    def _is_for_me(self, frame: Frame) -> bool:
+    def _is_addressed(self, frame: Frame) -> bool:
         fields, strict = frame.fields, self.firmware.commands.wrong_target is not None
         system, component = fields.get("target_system", BROADCAST), fields.get("target_component", BROADCAST)
         if strict and frame.name in COMMANDS and system != self._vehicle.system:
@@ -269,7 +278,7 @@ class MavlinkEndpoint:
             return False
         return not strict or component in (BROADCAST, AUTOPILOT)
 
-    def _turn_away(self, channel: MavlinkChannel, frame: Frame) -> None:
+    def _reject(self, channel: MavlinkChannel, frame: Frame) -> None:
         result = self.firmware.commands.wrong_target
         if result is not None and frame.name in COMMANDS:
             peer = Peer(channel, frame.system, frame.component)

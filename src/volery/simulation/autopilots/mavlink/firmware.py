@@ -1,6 +1,7 @@
-"""How firmwares differ in the parts of MAVLink that all of them speak: texts, parameters, missions.
+"""What differs between firmwares that use MAVLink, grouped by subject.
 
-What differs between firmwares that speak MAVLink: what they send, how often, and how they answer.
+The endpoint and its microservices read these groups: what is sent and how often, how commands, parameters and
+missions are answered, when texts are sent.
 """
 
 from __future__ import annotations
@@ -19,50 +20,50 @@ def _ignore(*_event: object) -> None:
     """Do nothing: the default of events."""
 
 
-def _always_plain(_number: int) -> str:
+def _plain_request(_number: int) -> str:
     return "MISSION_REQUEST"
 
 
 class StatusTextPolicy(NamedTuple):
-    """How words become STATUSTEXT."""
+    """How texts become STATUSTEXT."""
 
     numbered: bool = False
-    """Whether a text that fits into one message has an id, too."""
+    """Whether a text that fits into one message also has an id."""
     to_stations: bool = False
-    """Whether they wait, four at most, until a ground station is heard on the link."""
+    """Whether texts wait, four at most, until a ground station is connected on the link."""
     spacing: Ns = 0
-    """Least time between two texts on a link."""
+    """Shortest time between two texts on a link [ns]."""
 
 
 class ParameterPolicy(NamedTuple):
     """How parameters are listed, read and written.
 
-    The values are those of ArduPilot: 1390 parameters in 0.61 s, about 230 each tenth of a second; a
-    parameter read by name is answered after 55 to 100 ms, a list and a set at once.
+    The defaults are ArduPilot's: 1390 parameters in 0.61 s, about 230 each tenth of a second; a parameter
+    read by name is answered after 55 to 100 ms, a list and a set at once.
     """
 
     burst: int = 200
     period: Ns = 100 * MS
     read_delay: Ns = 50 * MS
     bytewise: bool = False
-    """Whether an integer travels as its bytes in the place of the number; else as the number."""
+    """Whether an integer is sent as its bytes in the float field; else it is converted to float."""
     keeps_index: bool = False
-    """Whether a value that nobody listed carries its own index; else 65535."""
+    """Whether a value outside of a list carries its own index; else 65535."""
     typed: bool = False
-    """Whether a set of another type than the parameter's is ignored."""
+    """Whether a PARAM_SET with another type than the parameter's is ignored."""
     checksum: str = ""
-    """Name of a value over all of them that is sent first; none if empty."""
+    """Name of a checksum over all parameters that is sent first; empty: none."""
 
 
 class MissionUploadPolicy(NamedTuple):
-    """How a mission is taken."""
+    """How a mission is uploaded."""
 
-    asks_with: Callable[[int], str] = _always_plain
-    """The message that asks for an item, by its number."""
+    request: Callable[[int], str] = _plain_request
+    """Name of the message that requests an item, by the item's number."""
     received: str = "Flight plan received"
-    """Said when it is complete; nothing if empty."""
-    turns_to_integers: bool = False
-    """Whether a peer that acknowledges a question as unsupported is asked by MISSION_REQUEST_INT instead."""
+    """Text that is sent when the upload is complete; empty: none."""
+    falls_back_to_int: bool = False
+    """Whether MISSION_REQUEST_INT is used once the peer has acknowledged a request as unsupported."""
     keeps_old: bool = False
     """Whether the mission on board stays until the new one is complete."""
 
@@ -75,7 +76,7 @@ MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
 
 
 class BootBytes(NamedTuple):
-    """Bytes on the wire that are no message, a fixed time after boot."""
+    """Bytes that are no message, sent a fixed time after boot."""
 
     after: Ns
     data: bytes

@@ -1,7 +1,6 @@
-"""Numbers between the wire and the vehicle: a float of the wire need not be a number at all, and a field of
-16 bits does not hold everything.
+"""Field values of MAVLink messages that all firmwares build alike, and numbers that arrive in fields.
 
-Telemetry that every firmware on MAVLink sends alike. Units and signs are the messages' own.
+A float on the wire may be no number, and a field of 16 bits does not hold every value.
 """
 
 from __future__ import annotations
@@ -15,26 +14,26 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 
 LARGEST = 1e9
 FARTHEST = 1e6
-"""Metres beyond which a point means nothing."""
+"""Largest distance of a point that is accepted [m]."""
 
 
 def finite(value: float) -> float:
-    """*value*, or 0 if it is none; kept between plus and minus ``LARGEST``."""
+    """Return *value* limited to plus and minus ``LARGEST``, or 0 if it is no number."""
     return min(LARGEST, max(-LARGEST, value)) if isfinite(value) else 0.0
 
 
 def all_within(values: Iterable[float], most: float = LARGEST) -> bool:
-    """Whether all of them are numbers no larger than *most*."""
+    """Return whether all values are numbers of a magnitude up to *most*."""
     return all(abs(value) <= most for value in values)  # false for NaN
 
 
 def to_int16(value: float) -> int:
-    """The nearest signed 16-bit number: a field shows its end where the value lies beyond."""
+    """Return the nearest signed 16-bit integer."""
     return min(32_767, max(-32_768, round(value)))
 
 
 def to_uint16(value: float) -> int:
-    """The nearest unsigned 16-bit number."""
+    """Return the nearest unsigned 16-bit integer."""
     return min(65_535, max(0, round(value)))
 
 
@@ -45,22 +44,22 @@ EPOCH_US = 1_767_225_600_000_000
 
 
 def boot_ms(vehicle: Vehicle) -> int:
-    """``time_boot_ms``."""
+    """Return the field ``time_boot_ms``."""
     return vehicle.uptime() // MS
 
 
 def boot_us(vehicle: Vehicle) -> int:
-    """``time_usec`` counted from boot."""
+    """Return the field ``time_usec``, counted from boot."""
     return vehicle.uptime() // US
 
 
 def heading_cdeg(yaw: float) -> int:
-    """0..35999."""
+    """Return a yaw angle [rad] as 0..35999 hundredths of a degree."""
     return round(degrees(yaw) * 100.0) % 36_000
 
 
 def attitude(vehicle: Vehicle) -> Fields:
-    """ATTITUDE."""
+    """Return the fields of ATTITUDE."""
     estimate = vehicle.estimate
     roll, pitch, yaw = estimate.attitude
     p, q, r = estimate.rates
@@ -76,7 +75,7 @@ def attitude(vehicle: Vehicle) -> Fields:
 
 
 def attitude_quaternion(vehicle: Vehicle) -> Fields:
-    """ATTITUDE_QUATERNION."""
+    """Return the fields of ATTITUDE_QUATERNION."""
     estimate = vehicle.estimate
     w, x, y, z = estimate.quaternion
     p, q, r = estimate.rates

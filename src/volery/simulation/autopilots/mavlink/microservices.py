@@ -1,10 +1,7 @@
-"""MAVLink's commands: handed to the dialect, acknowledged.
+"""MAVLink's microservices for one vehicle: commands, parameters and missions.
 
-What concerns the link itself (message intervals, single messages) is answered here.
-
-MAVLink's parameter protocol: list, read and set.
-
-MAVLink's mission protocol: upload, download, clear, choose. What an item means is not its business.
+Each service parses and answers the messages of its protocol. What a command or a mission item does is the
+firmware's; message intervals and requests for single messages concern the link and are handled here.
 """
 
 from __future__ import annotations
@@ -39,7 +36,7 @@ REQUEST_CAPABILITIES = 520
 
 
 class CommandService:
-    """Answers for one vehicle."""
+    """Command protocol of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, firmware: MavlinkFirmware) -> None:
         self._vehicle = vehicle
@@ -52,11 +49,11 @@ class CommandService:
         }
 
     def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """COMMAND_LONG."""
+        """Handle COMMAND_LONG."""
         self._perform(peer, from_long(fields, self._firmware.commands.reads_nan))
 
     def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """COMMAND_INT."""
+        """Handle COMMAND_INT."""
         self._perform(peer, from_int(fields, self._firmware.commands.reads_nan))
 
     def _perform(self, peer: Peer, command: Command) -> None:
@@ -69,7 +66,7 @@ class CommandService:
         self.acknowledge(peer, command.number, result)
 
     def acknowledge(self, peer: Peer, number: int, result: int) -> None:
-        """Send the COMMAND_ACK."""
+        """Send the COMMAND_ACK of command *number* with a MAV_RESULT."""
         peer.answer("COMMAND_ACK", command=number, result=result, progress=0, result_param2=0)
 
     # -- messages on request
@@ -104,7 +101,7 @@ class CommandService:
         return self._send(peer, name)
 
     def _send(self, peer: Peer, name: str) -> int:
-        """Send it after the acknowledgement."""
+        """Send a message after the acknowledgement."""
 
         def send() -> None:
             fields = self._firmware.telemetry.messages[name](self._vehicle)
@@ -120,7 +117,7 @@ class CommandService:
 
 
 UNSOLICITED = 65535
-"""The index of a value that nobody listed."""
+"""Index of a PARAM_VALUE outside of a list."""
 
 UINT32 = 5
 """MAV_PARAM_TYPE of a checksum."""
@@ -129,75 +126,75 @@ _REAL = struct.Struct("<f")
 
 
 class ParameterService:
-    """Answers for one vehicle."""
+    """Parameter protocol of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, habits: ParameterPolicy) -> None:
+    def __init__(self, vehicle: Vehicle, policy: ParameterPolicy) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
-        self._habits = habits
+        self._policy = policy
 
     def unlisted(self, name: str) -> dict[str, Any] | None:
-        """The fields of a PARAM_VALUE that nobody listed; ``None`` if there is no such parameter."""
-        if name == self._habits.checksum and name:
+        """Return the fields of a PARAM_VALUE outside of a list, or ``None`` if there is no such parameter."""
+        if name == self._policy.checksum and name:
             return self._fields(self._checksum(), UNSOLICITED)
         found = self._vehicle.parameters.find(name)
         if found is None:
             return None
-        keeps = self._habits.keeps_index
+        keeps = self._policy.keeps_index
         return self._fields(found, self._vehicle.parameters.index(name) if keeps else UNSOLICITED)
 
     def _fields(self, parameter: Parameter, index: int) -> dict[str, Any]:
         name, kind, value = parameter
         return {
             "param_id": name,
-            "param_value": to_bytewise(kind, value) if self._habits.bytewise else value,
+            "param_value": to_bytewise(kind, value) if self._policy.bytewise else value,
             "param_type": kind,
             "param_count": len(self._vehicle.parameters),
             "param_index": index,
         }
 
     def _checksum(self) -> Parameter:
-        """Over names and values: it changes when any of them does."""
+        """Return a checksum over names and values as a parameter."""
         total = 0
         for name, kind, value in self._vehicle.parameters:
             total = crc32(name.encode() + _REAL.pack(to_bytewise(kind, value)), total)
-        return Parameter(self._habits.checksum, UINT32, float(total))
+        return Parameter(self._policy.checksum, UINT32, float(total))
 
     def on_list(self, peer: Peer, _fields: dict[str, Any]) -> None:
-        """PARAM_REQUEST_LIST."""
-        if self._habits.checksum:
+        """Handle PARAM_REQUEST_LIST."""
+        if self._policy.checksum:
             peer.channel.send("PARAM_VALUE", self._fields(self._checksum(), UNSOLICITED))
         self._burst(peer.channel, 0)
 
     def _burst(self, channel: MavlinkChannel, start: int) -> None:
         parameters = self._vehicle.parameters
-        end = min(start + self._habits.burst, len(parameters))
+        end = min(start + self._policy.burst, len(parameters))
         for index in range(start, end):
             channel.send("PARAM_VALUE", self._fields(parameters.at(index), index))
         if end < len(parameters):
-            self._kernel.call_at(self._kernel.now() + self._habits.period, lambda: self._burst(channel, end))
+            self._kernel.call_at(self._kernel.now() + self._policy.period, lambda: self._burst(channel, end))
 
     def on_read(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """PARAM_REQUEST_READ, by name or by index. Silence if there is no such parameter."""
+        """Handle PARAM_REQUEST_READ, by name or by index; no answer if there is no such parameter."""
         index = fields["param_index"]
         if index >= len(self._vehicle.parameters):
             return
         name = fields["param_id"] if index < 0 else self._vehicle.parameters.at(index).name
         self._kernel.call_at(
-            self._kernel.now() + self._habits.read_delay, lambda: self._tell(peer.channel, name, index)
+            self._kernel.now() + self._policy.read_delay, lambda: self._send_value(peer.channel, name, index)
         )
 
     def on_set(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """PARAM_SET. Every link learns the new value; silence if it cannot be set."""
+        """Handle PARAM_SET: report the new value on all links; no answer if it cannot be set."""
         name, kind, value = fields["param_id"], fields["param_type"], fields["param_value"]
         found = self._vehicle.parameters.find(name)
-        if found is None or (self._habits.typed and kind != found.type):
+        if found is None or (self._policy.typed and kind != found.type):
             return
         self._vehicle.set_parameter(
-            name, from_bytewise(found.type, value) if self._habits.bytewise else value
+            name, from_bytewise(found.type, value) if self._policy.bytewise else value
         )
 
-    def _tell(self, channel: MavlinkChannel, name: str, index: int) -> None:
+    def _send_value(self, channel: MavlinkChannel, name: str, index: int) -> None:
         fields = self.unlisted(name)
         if fields is not None:
             channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
@@ -216,12 +213,12 @@ MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE
 MISSION, FENCE, RALLY = 0, 1, 2
 """MAV_MISSION_TYPE."""
 
-MOST_ITEMS = 724
-ASK_AGAIN: Ns = 1 * S
-GIVE_UP: Ns = 8 * S
+MAX_ITEMS = 724
+REQUEST_PERIOD: Ns = 1 * S
+UPLOAD_TIMEOUT: Ns = 8 * S
 REQUEST_INT = "MISSION_REQUEST_INT"
 GUIDED_ITEM = 2
-"""``current`` of an item that is no part of a mission: go there now."""
+"""``current`` of an item outside of a mission: a destination for now."""
 
 
 @dataclass
@@ -232,11 +229,11 @@ class _Upload:
     items: list[MissionItem] = field(default_factory=list)
     reminder: Handle | None = None
     by_integers: bool = False
-    """Whether the peer refused to be asked otherwise."""
+    """Whether the peer has refused other requests."""
 
 
 class MissionService:
-    """Answers for one vehicle. One upload at a time; whoever starts another one replaces it."""
+    """Mission protocol of one vehicle. A new upload replaces one in progress."""
 
     def __init__(self, vehicle: Vehicle, firmware: MavlinkFirmware) -> None:
         self._vehicle = vehicle
@@ -247,11 +244,11 @@ class MissionService:
     # -- upload
 
     def on_count(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_COUNT: an upload begins."""
+        """Handle MISSION_COUNT: begin an upload."""
         self._drop_upload()
         if fields["mission_type"] != MISSION:
             self._acknowledge(peer, MISSION_UNSUPPORTED, fields["mission_type"])
-        elif fields["count"] > MOST_ITEMS:
+        elif fields["count"] > MAX_ITEMS:
             self._acknowledge(peer, NO_SPACE)
         elif fields["count"] == 0:
             self._vehicle.mission.clear()
@@ -260,21 +257,21 @@ class MissionService:
             if not self._firmware.missions.upload.keeps_old:
                 self._vehicle.mission.clear()
             self._upload = _Upload(peer, fields["count"], self._kernel.now())
-            self._ask()
+            self._request_item()
 
-    def _ask(self) -> None:
+    def _request_item(self) -> None:
         upload = self._upload
         if upload is None:
             return
-        if self._kernel.now() - upload.latest >= GIVE_UP:
+        if self._kernel.now() - upload.latest >= UPLOAD_TIMEOUT:
             self._vehicle.send_text(4, "Mission upload timeout")
             self._acknowledge(upload.peer, CANCELLED)
             self._upload = None
             return
-        asked = len(upload.items)
-        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.asks_with(asked)
-        upload.peer.answer(request, seq=asked, mission_type=MISSION)
-        upload.reminder = self._kernel.call_at(self._kernel.now() + ASK_AGAIN, self._ask)
+        wanted = len(upload.items)
+        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.request(wanted)
+        upload.peer.answer(request, seq=wanted, mission_type=MISSION)
+        upload.reminder = self._kernel.call_at(self._kernel.now() + REQUEST_PERIOD, self._request_item)
 
     def _drop_upload(self) -> None:
         if self._upload is not None and self._upload.reminder is not None:
@@ -282,11 +279,11 @@ class MissionService:
         self._upload = None
 
     def on_item_int(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_ITEM_INT."""
+        """Handle MISSION_ITEM_INT."""
         self._on_item(peer, fields, fields["x"], fields["y"])
 
     def on_item(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_ITEM: coordinates in degrees."""
+        """Handle MISSION_ITEM, whose coordinates are degrees."""
         self._on_item(peer, fields, round(finite(fields["x"]) * 1e7), round(finite(fields["y"]) * 1e7))
 
     def _on_item(self, peer: Peer, fields: dict[str, Any], x: int, y: int) -> None:
@@ -314,9 +311,9 @@ class MissionService:
         elif fields["seq"] != len(self._upload.items):
             self._acknowledge(peer, INVALID_SEQUENCE)
         else:
-            self._take(self._upload, item)
+            self._store(self._upload, item)
 
-    def _take(self, upload: _Upload, item: MissionItem) -> None:
+    def _store(self, upload: _Upload, item: MissionItem) -> None:
         stored = self._firmware.missions.stored_item(item)
         if isinstance(stored, int):
             self._drop_upload()
@@ -327,7 +324,7 @@ class MissionService:
         if upload.reminder is not None:
             upload.reminder.cancel()
         if len(upload.items) < upload.count:
-            self._ask()
+            self._request_item()
         else:
             self._upload = None
             self._vehicle.mission.replace(upload.items)
@@ -339,19 +336,19 @@ class MissionService:
     # -- download
 
     def on_request_list(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_REQUEST_LIST."""
+        """Handle MISSION_REQUEST_LIST."""
         kind = fields["mission_type"]
         count = len(self._vehicle.mission) if kind == MISSION else 0
         peer.answer("MISSION_COUNT", count=count, mission_type=kind)
 
     def on_request_int(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_REQUEST_INT."""
+        """Handle MISSION_REQUEST_INT."""
         item = self._requested(peer, fields)
         if item is not None:
             self._send_item(peer, "MISSION_ITEM_INT", fields["seq"], item, (item.x, item.y))
 
     def on_request(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_REQUEST: answered in degrees."""
+        """Handle MISSION_REQUEST; the answer is in degrees."""
         item = self._requested(peer, fields)
         if item is not None:
             self._send_item(peer, "MISSION_ITEM", fields["seq"], item, (item.x / 1e7, item.y / 1e7))
@@ -392,7 +389,7 @@ class MissionService:
     # -- the rest
 
     def on_clear(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_CLEAR_ALL: not while the mission is flown."""
+        """Handle MISSION_CLEAR_ALL, which fails while the mission is flown."""
         if self._firmware.missions.runs(self._vehicle):
             self._acknowledge(peer, MISSION_ERROR, fields["mission_type"])
             return
@@ -403,21 +400,21 @@ class MissionService:
         self._firmware.missions.grew(self._vehicle, 0)
 
     def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_SET_CURRENT."""
+        """Handle MISSION_SET_CURRENT."""
         if self._vehicle.choose_item(fields["seq"]):
             peer.channel.send(
                 "MISSION_CURRENT", self._firmware.telemetry.messages["MISSION_CURRENT"](self._vehicle) or {}
             )
 
     def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """MISSION_ACK: a download has ended, or the question for an item is not understood."""
+        """Handle MISSION_ACK: the end of a download, or the refusal of a request for an item."""
         upload = self._upload
         refused = upload is not None and fields["type"] == MISSION_UNSUPPORTED and not upload.by_integers
-        if upload is not None and refused and self._firmware.missions.upload.turns_to_integers:
+        if upload is not None and refused and self._firmware.missions.upload.falls_back_to_int:
             upload.by_integers = True
             if upload.reminder is not None:
                 upload.reminder.cancel()
-            self._ask()
+            self._request_item()
 
     def _acknowledge(self, peer: Peer, result: int, kind: int = MISSION) -> None:
         peer.answer("MISSION_ACK", type=result, mission_type=kind)

@@ -10,7 +10,7 @@ from math import cos, sin
 
 from volery.base.frames import Vector, enu_to_ned, wrap
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ByPilot, Stabilize
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
 from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
@@ -109,7 +109,7 @@ class HoldHeight(AltitudeHold):
         return 0.0
 
 
-class HoldPlace(ByPilot):
+class HoldPlace(ManualFlight):
     """HOVER_Z_HOLD: it stays where it began; the sticks turn it only."""
 
     def __init__(self, vehicle: Vehicle) -> None:

@@ -13,7 +13,7 @@ from math import atan2, cos, dist, hypot, pi, sin
 from volery.base.frames import Vector, wrap
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.manual_flight import ByPilot
+from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
 from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
@@ -276,7 +276,7 @@ class BlindDescent(Manoeuvre):
         )
 
 
-class PositionControl(ByPilot):
+class PositionControl(ManualFlight):
     """POSCTL: sticks command an acceleration against drag; centred sticks brake and hold."""
 
     slow_start = True
