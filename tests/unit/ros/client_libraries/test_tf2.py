@@ -239,8 +239,8 @@ def test_a_library_that_is_not_there_is_named(stage: Any, line: str) -> None:
 def test_old_transforms_are_forgotten_and_wrong_ones_refused() -> None:
     tree = TransformTree(cache=10 * S)
     for second in range(1, 30):
-        tree.learn("base", "odom", second * S, IDENTITY)
-    tree.learn("base", "odom", 5 * S, IDENTITY)  # too late to matter
+        tree.add("base", "odom", second * S, IDENTITY)
+    tree.add("base", "odom", 5 * S, IDENTITY)  # too late to matter
     assert tree.look_up("odom", "base", 19 * S)[0] == 19 * S
     with pytest.raises(ExtrapolationException, match=r"earliest data is at time 19\.0"):
         tree.look_up("odom", "base", 18 * S)
@@ -251,4 +251,4 @@ def test_old_transforms_are_forgotten_and_wrong_ones_refused() -> None:
         ("a", "b", IDENTITY._replace(rotation=(0.0, 0.0, 0.0, 0.0))),
     ):
         with pytest.raises(InvalidArgumentException):
-            tree.learn(child, parent, S, rigid)
+            tree.add(child, parent, S, rigid)

@@ -1,4 +1,4 @@
-"""The modules ``tf2_ros``, ``tf2_geometry_msgs``, ``tf`` and what they are called besides, for one run."""
+"""The modules ``tf2_ros``, ``tf2_geometry_msgs``, ``tf`` and their submodules for one run."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from volery.ros.client_libraries.tf2.tf2_ros import (
 )
 from volery.ros.client_libraries.tf2.transform_tree import EXCEPTIONS, TransformException
 
-_ENDS = (TransformBroadcaster, StaticTransformBroadcaster, TransformListener)
-_PARTS = {
+_CLASSES = (TransformBroadcaster, StaticTransformBroadcaster, TransformListener)
+_SUBMODULES = {
     "buffer": "Buffer",
     "transform_broadcaster": "TransformBroadcaster",
     "static_transform_broadcaster": "StaticTransformBroadcaster",
@@ -28,17 +28,23 @@ _PARTS = {
 
 
 def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[str, ModuleType]:
-    """By name. They talk through *rospy* where no node is given; *executors* is ``rclpy.executors``."""
+    """Return the modules by name.
+
+    Args:
+        kernel: Kernel of the run.
+        rospy: Module that is used where no node is given.
+        executors: The module ``rclpy.executors``.
+    """
     members = {"rospy": rospy, "executors": executors}
     names: dict[str, Any] = {
         **EXCEPTIONS,
         "Buffer": type("Buffer", (Buffer,), {"kernel": kernel}),
-        **{kind.__name__: type(kind.__name__, (kind,), members) for kind in _ENDS},
+        **{kind.__name__: type(kind.__name__, (kind,), members) for kind in _CLASSES},
     }
     tf2_ros = library_module("tf2_ros", names)
     parts = {
         f"tf2_ros.{part}": library_module(f"tf2_ros.{part}", {name: names[name]})
-        for part, name in _PARTS.items()
+        for part, name in _SUBMODULES.items()
     }
     transformations = library_module("tf.transformations", TRANSFORMATIONS)
     old: dict[str, Any] = {

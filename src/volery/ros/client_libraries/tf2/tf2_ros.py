@@ -1,8 +1,6 @@
-"""``tf2_geometry_msgs``: points, vectors and poses in another frame.
+"""``tf2_ros`` and ``tf2_geometry_msgs``: buffer, listeners, broadcasters, and transformed messages.
 
-``tf2_ros.Buffer``: the tree that a listener fills and a program asks.
-
-``tf2_ros``'s listeners and broadcasters: rospy's without a node, rclpy's with one.
+Listeners and broadcasters use rospy without a node, and rclpy with one.
 """
 
 from __future__ import annotations
@@ -54,11 +52,11 @@ _KINDS: dict[str, tuple[str, Callable[[Any, RigidTransform], None]]] = {
     "geometry_msgs/msg/Pose": ("", _transform_pose),
     "geometry_msgs/msg/PoseStamped": ("pose", _transform_pose),
 }
-"""What can be transformed: the field that holds it, and how."""
+"""Transformable types: the field to transform and the function that does so."""
 
 
 def transformed(given: Any, transform: Any) -> Any:
-    """A copy of *given* by a ``TransformStamped``, whose header it then has."""
+    """Return a copy of *given* transformed by a ``TransformStamped``, with its header."""
     name = getattr(given, "__msgtype__", type(given).__name__)
     if name not in _KINDS:
         raise InvalidArgumentException(f"{name} cannot be transformed; choose {choices(_KINDS)}")
@@ -74,11 +72,11 @@ STAMPED = {
     f"do_transform_{what}": transformed
     for what in ("point", "vector3", "pose", "pose_stamped", "point_stamped", "vector3_stamped")
 }
-"""``tf2_geometry_msgs``."""
+"""Content of ``tf2_geometry_msgs``."""
 
 
 def as_ns(value: Any) -> Ns:
-    """A time or a duration of rospy or of rclpy, a message of either, or seconds."""
+    """Return a time or duration of rospy or rclpy, a message of either, or seconds, in ns."""
     if isinstance(value, (int, float)):
         return from_seconds(value)
     found = getattr(value, "nanoseconds", None)
@@ -86,31 +84,31 @@ def as_ns(value: Any) -> Ns:
 
 
 class Buffer:
-    """Transforms of the last ten seconds, or of *cache_time*."""
+    """The transforms of the last *cache_time* (10 s by default)."""
 
     kernel: ClassVar[Kernel]
 
     def __init__(self, cache_time: Any = None, *options: Any, **more: Any) -> None:
         self._tree = TransformTree(10 * S if cache_time is None else as_ns(cache_time))
-        self._learnt = Signal(self.kernel, "tf2_ros.Buffer (a transform)")
+        self._changed = Signal(self.kernel, "tf2_ros.Buffer (a transform)")
 
     def set_transform(self, transform: Any, authority: str = "", *, static: bool = False) -> None:
-        """Learn a ``geometry_msgs/msg/TransformStamped``."""
+        """Add a ``geometry_msgs/msg/TransformStamped``."""
         header = transform.header
         rigid = from_transform(transform.transform)
-        self._tree.learn(transform.child_frame_id, header.frame_id, as_ns(header.stamp), rigid, static=static)
-        self._learnt.notify()
+        self._tree.add(transform.child_frame_id, header.frame_id, as_ns(header.stamp), rigid, static=static)
+        self._changed.notify()
 
     def set_transform_static(self, transform: Any, authority: str = "") -> None:
-        """Learn one that holds at all times."""
+        """Add a static transform."""
         self.set_transform(transform, authority, static=True)
 
     def clear(self) -> None:
-        """Forget what moves."""
+        """Remove all transforms but the static ones."""
         self._tree.clear()
 
     def all_frames_as_list(self) -> list[str]:
-        """The frames that are known."""
+        """Return the names of all frames."""
         return self._tree.frames()
 
     def can_transform(
@@ -121,34 +119,42 @@ class Buffer:
         timeout: Any = 0,
         return_debug_tuple: bool = False,
     ) -> Any:
-        """Whether ``lookup_transform`` would succeed within *timeout*; with the reason if asked for it."""
-        why = self._why_not(target_frame, source_frame, as_ns(time), as_ns(timeout))
-        return (not why, why) if return_debug_tuple else not why
+        """Return whether ``lookup_transform`` would succeed within *timeout*, optionally with the reason."""
+        reason = self._wait_for(target_frame, source_frame, as_ns(time), as_ns(timeout))
+        return (not reason, reason) if return_debug_tuple else not reason
 
-    def _why_not(self, target: str, source: str, at: Ns, within: Ns) -> str:
-        found: list[str] = [""]
+    def _wait_for(self, target: str, source: str, at: Ns, within: Ns) -> str:
+        """Wait for a transform; return why there is none, or ``""``."""
+        reasons: list[str] = [""]
 
         def can() -> bool:
             try:
                 self._tree.look_up(target, source, at)
             except TransformException as error:
-                found[0] = str(error)
+                reasons[0] = str(error)
                 return False
-            found[0] = ""
+            reasons[0] = ""
             return True
 
         with self.kernel:
             if not can() and within > 0:
-                self._learnt.wait_for(can, within, ends_activation=True)
-        return found[0]
+                self._changed.wait_for(can, within, ends_activation=True)
+        return reasons[0]
 
     def lookup_transform(self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0) -> Any:
-        """The ``TransformStamped`` from *source_frame* to *target_frame* at *time* (0: the latest).
+        """Return the ``TransformStamped`` from *source_frame* to *target_frame*.
 
-        Blocks for at most *timeout* until there is one. Raises what tf2 does.
+        Args:
+            target_frame: Frame of the result.
+            source_frame: Frame of the data to transform.
+            time: Time of the transform; 0 is the latest for which one is available.
+            timeout: Longest time to block until the transform is available.
+
+        Raises:
+            TransformException: There is no such transform; the classes are tf2's.
         """
         at = as_ns(time)
-        self._why_not(target_frame, source_frame, at, as_ns(timeout))
+        self._wait_for(target_frame, source_frame, at, as_ns(timeout))
         found, rigid = self._tree.look_up(target_frame, source_frame, at)
         made = new("geometry_msgs/msg/TransformStamped", child_frame_id=source_frame)
         made.header.frame_id = target_frame
@@ -165,18 +171,18 @@ class Buffer:
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """From *source_frame* then to *target_frame* at another time, by what has not moved meanwhile."""
+        """Return the transform from a source frame at one time to a target frame at another via a fixed frame."""
         source = self.lookup_transform(fixed_frame, source_frame, source_time, timeout)
         target = self.lookup_transform(target_frame, fixed_frame, target_time, timeout)
-        joined = from_transform(source.transform).then(from_transform(target.transform))
+        combined = from_transform(source.transform).then(from_transform(target.transform))
         target.child_frame_id = source_frame
-        write_transform(target.transform, joined)
+        write_transform(target.transform, combined)
         return target
 
     def transform(
         self, object_stamped: Any, target_frame: str, timeout: Any = 0, new_type: Any = None
     ) -> Any:
-        """A stamped point, vector or pose in another frame."""
+        """Return a stamped point, vector or pose in another frame."""
         if new_type is not None:
             raise InvalidArgumentException(
                 "Buffer.transform(new_type=...) is not there on the embedded graph"
@@ -187,59 +193,61 @@ class Buffer:
         )
 
 
-TF, STATIC = "/tf", "/tf_static"
+TF, TF_STATIC = "/tf", "/tf_static"
 _DEPTH = 100
 
 
-def _kind() -> Any:
+def _message_type() -> Any:
     return message_class("tf2_msgs/msg/TFMessage")
 
 
-def _kept(depth: int) -> QoSProfile:
+def _transient_local(depth: int) -> QoSProfile:
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TransformBroadcaster:
-    """Tells where frames lie."""
+    """Publishes transforms."""
 
     rospy: ClassVar[ModuleType]
 
     def __init__(self, node: Any = None, qos: Any = None) -> None:
         if node is None:
-            self._publisher: Any = self.rospy.Publisher(TF, _kind(), queue_size=_DEPTH)
+            self._publisher: Any = self.rospy.Publisher(TF, _message_type(), queue_size=_DEPTH)
         else:
-            self._publisher = node.create_publisher(_kind(), TF, qos or _DEPTH)
+            self._publisher = node.create_publisher(_message_type(), TF, qos or _DEPTH)
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802 - tf2's name
-        """Tell one ``TransformStamped``, or several."""
-        self._publisher.publish(_kind()(transforms=_several(transform)))
+        """Publish one ``TransformStamped``, or several."""
+        self._publisher.publish(_message_type()(transforms=_as_list(transform)))
 
 
 class StaticTransformBroadcaster:
-    """Tells what holds at all times; who comes late hears it, too."""
+    """Publishes static transforms, which late subscribers receive as well."""
 
     rospy: ClassVar[ModuleType]
 
     def __init__(self, node: Any = None, qos: Any = None) -> None:
-        self._told: dict[str, Any] = {}
+        self._sent: dict[str, Any] = {}
         if node is None:
-            self._publisher: Any = self.rospy.Publisher(STATIC, _kind(), queue_size=_DEPTH, latch=True)
+            self._publisher: Any = self.rospy.Publisher(
+                TF_STATIC, _message_type(), queue_size=_DEPTH, latch=True
+            )
         else:
-            self._publisher = node.create_publisher(_kind(), STATIC, qos or _kept(1))
+            self._publisher = node.create_publisher(_message_type(), TF_STATIC, qos or _transient_local(1))
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802 - tf2's name
-        """Tell one ``TransformStamped``, or several, with all that have been told before."""
-        for one in _several(transform):
-            self._told[one.child_frame_id] = one.copy()
-        self._publisher.publish(_kind()(transforms=list(self._told.values())))
+        """Publish one ``TransformStamped``, or several, together with all published before."""
+        for one in _as_list(transform):
+            self._sent[one.child_frame_id] = one.copy()
+        self._publisher.publish(_message_type()(transforms=list(self._sent.values())))
 
 
-def _several(given: Any) -> list[Any]:
+def _as_list(given: Any) -> list[Any]:
     return list(given) if isinstance(given, Sequence) else [given]
 
 
 class TransformListener:
-    """Fills a buffer with what is told on ``/tf`` and ``/tf_static``."""
+    """Fills a buffer with the transforms on ``/tf`` and ``/tf_static``."""
 
     rospy: ClassVar[ModuleType]
     executors: ClassVar[ModuleType]
@@ -255,26 +263,32 @@ class TransformListener:
         **more: Any,
     ) -> None:
         self.buffer = buffer
-        if not hasattr(node, "create_subscription"):  # rospy's second argument is the length of a queue
+        if not hasattr(node, "create_subscription"):  # the second argument of rospy is a queue length
             self._subscriptions = [
-                self.rospy.Subscriber(topic, _kind(), partial(self._hear, topic == STATIC))
-                for topic in (TF, STATIC)
+                self.rospy.Subscriber(
+                    topic, _message_type(), partial(self._on_transforms, topic == TF_STATIC)
+                )
+                for topic in (TF, TF_STATIC)
             ]
             return
         self._node = node
         group = ReentrantCallbackGroup()
         self._subscriptions = [
             node.create_subscription(
-                _kind(), topic, partial(self._hear, topic == STATIC), kept, callback_group=group
+                _message_type(),
+                topic,
+                partial(self._on_transforms, topic == TF_STATIC),
+                kept,
+                callback_group=group,
             )
-            for topic, kept in ((TF, qos or _DEPTH), (STATIC, static_qos or _kept(_DEPTH)))
+            for topic, kept in ((TF, qos or _DEPTH), (TF_STATIC, static_qos or _transient_local(_DEPTH)))
         ]
         if spin_thread:
             executor = self.executors.SingleThreadedExecutor()
             executor.add_node(node)
             node.context.spawn(executor.spin, "tf2_ros.TransformListener")
 
-    def _hear(self, static: bool, message: Any) -> None:
+    def _on_transforms(self, static: bool, message: Any) -> None:
         for transform in message.transforms:
             try:
                 self.buffer.set_transform(transform, static=static)
@@ -289,7 +303,7 @@ class TransformListener:
             node.get_logger().warning(text)
 
     def unregister(self) -> None:
-        """Listen no longer."""
+        """Remove the subscriptions."""
         for subscription in self._subscriptions:
             if hasattr(subscription, "unregister"):
                 subscription.unregister()

@@ -1,8 +1,6 @@
-"""tf2's exceptions, under its own names.
+"""A tree of coordinate frames whose transforms change over time, with tf2's lookups and exceptions.
 
-Rigid transforms: a rotation (w, x, y, z) and a translation in metres, child to parent.
-
-What is known of frames: a tree of transforms over time, asked as tf2 is.
+A rigid transform is a rotation quaternion (w, x, y, z) and a translation in metres, from child to parent.
 """
 
 from __future__ import annotations
@@ -15,29 +13,31 @@ from typing import Any, NamedTuple
 from volery.base.frames import Quaternion, Vector, multiply
 from volery.base.time import Ns, S, to_seconds
 
+# -- exceptions
+
 
 class TransformException(Exception):  # noqa: N818 - tf2's name
-    """What tf2 raises."""
+    """Base class of tf2's exceptions."""
 
 
 class LookupException(TransformException):
-    """A frame that nobody has told of."""
+    """A frame is unknown."""
 
 
 class ConnectivityException(TransformException):
-    """Two frames that nothing connects."""
+    """Two frames are not connected."""
 
 
 class ExtrapolationException(TransformException):
-    """A time that is before or after all that is known."""
+    """A time is before or after all known transforms."""
 
 
 class InvalidArgumentException(TransformException):
-    """A frame's name, or a rotation, that is none."""
+    """A frame name or a rotation is invalid."""
 
 
 class TimeoutException(TransformException):
-    """It took too long."""
+    """A wait has timed out."""
 
 
 EXCEPTIONS = {
@@ -53,23 +53,26 @@ EXCEPTIONS = {
 }
 
 
+# -- rigid transforms
+
+
 class RigidTransform(NamedTuple):
-    """A point p of the child is ``translation`` + ``rotation`` p in the parent."""
+    """A transform that takes a point p of the child to ``rotation`` p + ``translation`` in the parent."""
 
     rotation: Quaternion
     translation: Vector
 
     def point(self, p: Vector) -> Vector:
-        """A point of the child in the parent's axes."""
+        """Return a point of the child in the axes of the parent."""
         x, y, z = rotated(self.rotation, p)
         return x + self.translation[0], y + self.translation[1], z + self.translation[2]
 
     def then(self, outer: RigidTransform) -> RigidTransform:
-        """This one, then from its parent to the parent of that."""
+        """Return this transform followed by *outer*, the transform of the parent to its own parent."""
         return RigidTransform(multiply(outer.rotation, self.rotation), outer.point(self.translation))
 
     def inverse(self) -> RigidTransform:
-        """From the parent to the child."""
+        """Return the transform from parent to child."""
         back = conjugate(self.rotation)
         x, y, z = rotated(back, self.translation)
         return RigidTransform(back, (-x, -y, -z))
@@ -79,19 +82,19 @@ IDENTITY = RigidTransform((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def conjugate(q: Quaternion) -> Quaternion:
-    """The rotation back."""
+    """Return the inverse of a unit quaternion."""
     w, x, y, z = q
     return w, -x, -y, -z
 
 
 def rotated(q: Quaternion, v: Vector) -> Vector:
-    """The vector *v*, rotated."""
+    """Return *v* rotated by the unit quaternion *q*."""
     _, x, y, z = multiply(multiply(q, (0.0, *v)), conjugate(q))
     return x, y, z
 
 
 def interpolate(one: RigidTransform, other: RigidTransform, part: float) -> RigidTransform:
-    """*part* of the way from one to the other: straight, and along the shortest arc at constant speed."""
+    """Return the transform at *part* (0..1) between two: linear translation, spherical linear rotation."""
     x, y, z = (a + (b - a) * part for a, b in zip(one.translation, other.translation, strict=True))
     dot = sum(a * b for a, b in zip(one.rotation, other.rotation, strict=True))
     sign = -1.0 if dot < 0.0 else 1.0
@@ -105,7 +108,7 @@ def interpolate(one: RigidTransform, other: RigidTransform, part: float) -> Rigi
 
 
 def normalised(q: Quaternion) -> Quaternion | None:
-    """The quaternion with length 1; ``None`` for one that is no rotation."""
+    """Return the quaternion with length 1, or None if its length is zero or not finite."""
     length = sqrt(sum(part * part for part in q))
     if not 0.0 < length < float("inf"):
         return None
@@ -114,20 +117,22 @@ def normalised(q: Quaternion) -> Quaternion | None:
 
 
 def from_transform(transform: Any) -> RigidTransform:
-    """From a ``geometry_msgs/msg/Transform``."""
+    """Return the transform in a ``geometry_msgs/msg/Transform``."""
     t, q = transform.translation, transform.rotation
     return RigidTransform((q.w, q.x, q.y, q.z), (t.x, t.y, t.z))
 
 
 def write_transform(transform: Any, rigid: RigidTransform) -> None:
-    """Into a ``geometry_msgs/msg/Transform``."""
+    """Write *rigid* into a ``geometry_msgs/msg/Transform``."""
     transform.translation.x, transform.translation.y, transform.translation.z = rigid.translation
-    turned = transform.rotation
-    turned.w, turned.x, turned.y, turned.z = rigid.rotation
+    rotation = transform.rotation
+    rotation.w, rotation.x, rotation.y, rotation.z = rigid.rotation
 
+
+# -- the tree
 
 LATEST: Ns = 0
-"""The time that stands for the latest at which all is known."""
+"""The time that stands for the latest time at which a transform is available."""
 _CACHE: Ns = 10 * S
 
 
@@ -138,9 +143,10 @@ class _Sample(NamedTuple):
 
 
 class TransformTree:
-    """Frames and their parents.
+    """Frames and their transforms to their parents.
 
-    What is older than *cache* before a frame's newest is forgotten; a static transform holds at all times.
+    Samples of a frame that are older than its newest one by more than *cache* are removed. A static transform
+    is valid at all times.
     """
 
     def __init__(self, cache: Ns = _CACHE) -> None:
@@ -150,15 +156,19 @@ class TransformTree:
         self._parents: dict[str, None] = {}
 
     def clear(self) -> None:
-        """Forget what moves."""
+        """Remove all transforms but the static ones."""
         self._moving.clear()
 
     def frames(self) -> list[str]:
-        """All that have been told of, sorted."""
+        """Return the names of all frames, sorted."""
         return sorted({*self._parents, *self._moving, *self._static})
 
-    def learn(self, child: str, parent: str, at: Ns, rigid: RigidTransform, *, static: bool = False) -> None:
-        """Where *child* lies in *parent* at a time. ``InvalidArgumentException`` for what is no transform."""
+    def add(self, child: str, parent: str, at: Ns, rigid: RigidTransform, *, static: bool = False) -> None:
+        """Add the transform from *child* to *parent* at a time.
+
+        Raises:
+            InvalidArgumentException: A frame name is invalid, or the rotation has no length.
+        """
         rotation = normalised(rigid.rotation)
         problem = _problem(child, parent) or ("" if rotation else "its rotation has no length")
         if problem or rotation is None:
@@ -176,9 +186,17 @@ class TransformTree:
         del history[: bisect_left(history, history[-1].at - self._cache, key=_time)]
 
     def look_up(self, target: str, source: str, at: Ns) -> tuple[Ns, RigidTransform]:
-        """What takes a point of *source* to *target*, and the time that it holds for.
+        """Return the transform from *source* to *target* and the time for which it is valid.
 
-        Raises what tf2 does: ``LookupException``, ``ConnectivityException``, ``ExtrapolationException``.
+        Args:
+            target: Frame to transform to.
+            source: Frame to transform from.
+            at: ROS time in ns, or ``LATEST``.
+
+        Raises:
+            LookupException: A frame is unknown.
+            ConnectivityException: The frames are not connected.
+            ExtrapolationException: The time is before or after all known transforms.
         """
         known = self.frames()
         for name, role in ((target, "target_frame"), (source, "source_frame")):
@@ -187,9 +205,11 @@ class TransformTree:
                     f'"{name}" passed to lookupTransform argument {role} does not exist. '
                     f"There is {', '.join(known) or 'none'}"
                 )
-        up, down = self._ways(target, source)
+        up, down = self._paths(target, source)
         if at == LATEST:
-            at = self._latest([*up, *down])
+            # The latest time for which all moving transforms on the path are known.
+            last = [self._moving[frame][-1].at for frame in (*up, *down) if self._moving.get(frame)]
+            at = min(last, default=LATEST)
         try:
             there, back = self._along(up, at), self._along(down, at)
         except ExtrapolationException as error:
@@ -198,8 +218,8 @@ class TransformTree:
             ) from None
         return at, there.then(back.inverse())
 
-    def _ways(self, target: str, source: str) -> tuple[list[str], list[str]]:
-        """The frames below the first common one, from the source and from the target."""
+    def _paths(self, target: str, source: str) -> tuple[list[str], list[str]]:
+        """Return the frames below the first common ancestor, from the source and from the target."""
         from_source, from_target = list(self._upward(source)), list(self._upward(target))
         common = next((frame for frame in from_source if frame in from_target), None)
         if common is None:
@@ -214,23 +234,15 @@ class TransformTree:
         while frame not in seen:
             seen.add(frame)
             yield frame
-            newest = self._newest(frame)
+            history = self._moving.get(frame)
+            newest = history[-1] if history else self._static.get(frame)
             if newest is None:
                 return
             frame = newest.parent
 
-    def _newest(self, frame: str) -> _Sample | None:
-        history = self._moving.get(frame)
-        return history[-1] if history else self._static.get(frame)
-
-    def _latest(self, way: list[str]) -> Ns:
-        """The latest time for which all that moves on the way is known."""
-        moving = [self._moving[frame][-1].at for frame in way if self._moving.get(frame)]
-        return min(moving, default=LATEST)
-
-    def _along(self, way: list[str], at: Ns) -> RigidTransform:
+    def _along(self, path: list[str], at: Ns) -> RigidTransform:
         found = IDENTITY
-        for frame in way:
+        for frame in path:
             found = found.then(self._at(frame, at))
         return found
 
@@ -242,9 +254,9 @@ class TransformTree:
         if after < len(history) and history[after].at == at:
             return history[after].rigid
         if after == len(history):
-            raise _beyond(at, history[-1].at, "future", "latest")
+            raise _extrapolation(at, history[-1].at, "future", "latest")
         if after == 0:
-            raise _beyond(at, history[0].at, "past", "earliest")
+            raise _extrapolation(at, history[0].at, "past", "earliest")
         one, other = history[after - 1], history[after]
         return interpolate(one.rigid, other.rigid, (at - one.at) / (other.at - one.at))
 
@@ -253,10 +265,10 @@ def _time(sample: _Sample) -> Ns:
     return sample.at
 
 
-def _beyond(asked: Ns, known: Ns, direction: str, which: str) -> ExtrapolationException:
+def _extrapolation(requested: Ns, known: Ns, direction: str, which: str) -> ExtrapolationException:
     return ExtrapolationException(
-        f"Lookup would require extrapolation into the {direction}.  Requested time {to_seconds(asked):.6f} "
-        f"but the {which} data is at time {to_seconds(known):.6f}"
+        f"Lookup would require extrapolation into the {direction}.  Requested time "
+        f"{to_seconds(requested):.6f} but the {which} data is at time {to_seconds(known):.6f}"
     )
 
 
