@@ -31,8 +31,8 @@ POSE = "geometry_msgs/msg/PoseStamped"
 
 def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> EmbeddedGraph:
     tariff = load_catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
-    price = (lambda node, call, x: tariff(call, x)) if priced else free
-    return EmbeddedGraph(kernel, price, records=lambda topic: recorded)
+    tariffs = (lambda node: tariff) if priced else free
+    return EmbeddedGraph(kernel, tariffs, records=lambda topic: recorded)
 
 
 def publishing(count: int, priced: bool, recorded: bool) -> float:

@@ -28,7 +28,7 @@ from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInt
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.link import Link
 from volery.ros.graph import Node, Publisher, RosGraph
-from volery.ros.graph.callbacks import Work
+from volery.ros.graph.interface import Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4

@@ -170,9 +170,9 @@ class _HandOnNode(GraphWire):
         """All passes again."""
         self.hears = self.speaks = True
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Route:
+    def route(self, sender: NodeId, receiver: NodeId) -> Route:
         """See ``GraphWire``; what the hand does not let pass is lost."""
-        whole = super().between(sender, receiver)
+        whole = super().route(sender, receiver)
 
         def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
             unheard = receiver.name == self.held and not self.hears

@@ -44,7 +44,7 @@ class SafetyPilot(Commander):
 
     def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: Autopilot) -> None:
         super().__init__(kernel, driver, protocol="a graph")
-        self._channels = autopilot.vehicle.sticks.transmitter
+        self._channels = autopilot.vehicle.rc.transmitter
 
     def lands_it(self) -> None:
         """By hand."""

@@ -8,12 +8,13 @@ import pytest
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
+from volery.cost import Price
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
-from volery.ros.graph import Cost, EmbeddedGraph, free
+from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import Text
 
 
@@ -24,7 +25,7 @@ class Aviary:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
-        self.graph = EmbeddedGraph(self.kernel, self._price)
+        self.graph = EmbeddedGraph(self.kernel, self._tariff)
         ours, self._theirs = in_process_pair(self.kernel, MS, name="drone_1")
         self._theirs.receive(self._hear)
         self.sent: list[Frame] = []
@@ -36,9 +37,12 @@ class Aviary:
         self.user = self.graph.node("user", context=ExecutionContext("user"))
         self.got: dict[str, list[Any]] = {}
 
-    def _price(self, node: Any, call: str, x: float) -> Cost:
-        self.priced.append((node.name, call))
-        return free(node, call, x)
+    def _tariff(self, node: Any) -> Any:
+        def price(call: str, x: float) -> Price:
+            self.priced.append((node.name, call))
+            return Price(0, 0)
+
+        return price
 
     def _hear(self, frame: Frame) -> None:
         self.sent.append(frame)

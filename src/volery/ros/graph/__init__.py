@@ -1,7 +1,7 @@
-"""The ROS graph: the node interface that every transport implements, and its embedded implementation.
+"""The ROS graph: the node interface that every transport implements, and the embedded implementation.
 
-Knows the kernel (waiting) and messages. It must not know what a call costs nor how a message travels: both
-are asked of two functions that are given from above.
+Depends on the kernel and on messages. Prices of calls and routes of messages are functions given by the
+caller.
 """
 
 from volery.ros.graph.embedded_graph import EmbeddedGraph
@@ -22,7 +22,6 @@ from volery.ros.graph.interface import (
     Handler,
     Node,
     NodeId,
-    Price,
     Publisher,
     QoS,
     Rate,
@@ -32,6 +31,8 @@ from volery.ros.graph.interface import (
     Service,
     ServiceState,
     Subscription,
+    Tariff,
+    Tariffs,
     Timer,
     TopicState,
     Work,
@@ -49,27 +50,28 @@ __all__ = [
     "SENSOR_DATA",
     "TRANSIENT_LOCAL",
     "VOLATILE",
-    "Routing",
     "Client",
     "Cost",
-    "EmbeddedNode",
     "EmbeddedGraph",
+    "EmbeddedNode",
     "Group",
     "Handler",
     "Node",
     "NodeId",
-    "Price",
     "Publisher",
     "QoS",
     "Rate",
     "RosGraph",
+    "Route",
+    "Routing",
     "Service",
     "ServiceError",
     "ServiceState",
     "Subscription",
+    "Tariff",
+    "Tariffs",
     "Timer",
     "TopicState",
-    "Route",
     "Work",
     "free",
 ]

@@ -1,9 +1,8 @@
-"""The embedded ROS graph: nothing to install, one kernel's time, every call priced and every message carried.
+"""The embedded ROS graph: nothing to install, the kernel's time, every call priced, every message carried.
 
-What a call costs and how a message travels are asked of two functions that are given from above; the graph
-knows neither laws nor networks.
-
-``/clock``: ticks while somebody listens, and costs nobody anything: it is no part of the system.
+What a call costs and how a message travels are functions given by the caller: the graph knows neither cost
+laws nor networks. ``/clock`` is published while a node subscribes to it and is not charged, since it is no
+part of the modelled system.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from volery.ros.graph.interface import (
     CLOCK,
     CLOCK_PERIOD,
     CLOCK_TYPE,
-    Price,
     RosGraph,
     Routing,
     ServiceState,
+    Tariffs,
     TopicState,
     free,
     no_route,
@@ -35,30 +34,30 @@ from volery.ros.messages import cdr_size, new
 if TYPE_CHECKING:
 
     def _is_a(graph: EmbeddedGraph) -> RosGraph:
-        """Checked by the type checker: it has all that a graph has."""
+        """Let the type checker verify that the class implements the protocol."""
         return graph
 
 
 class ClockPublisher:
-    """The publisher of ``/clock``."""
+    """Publisher of ``/clock``, which runs while the topic has subscriptions."""
 
-    def __init__(self, context: GraphContext) -> None:
-        self._context = context
+    def __init__(self, graph: GraphContext) -> None:
+        self._graph = graph
         self._ticking: Handle | None = None
 
     def listen(self) -> None:
-        """Somebody has subscribed: tick, if it does not tick already."""
+        """Start publishing for a new subscription, unless it is running."""
         if self._ticking is None:
-            self._ticking = self._context.kernel.every(CLOCK_PERIOD, self._tick)
+            self._ticking = self._graph.kernel.every(CLOCK_PERIOD, self._tick)
 
     def _tick(self) -> None:
-        listeners = self._context.topics[CLOCK].subscriptions
-        if not listeners and self._ticking is not None:
+        subscriptions = self._graph.topics[CLOCK].subscriptions
+        if not subscriptions and self._ticking is not None:
             self._ticking.cancel()
             self._ticking = None
-        now = self._context.kernel.now()
-        stamp = self._context.stamp()
-        for subscription in tuple(listeners):
+        now = self._graph.kernel.now()
+        stamp = self._graph.stamp()
+        for subscription in tuple(subscriptions):
             message = new(CLOCK_TYPE, clock={"sec": stamp // S, "nanosec": stamp % S})
             subscription.arrive(message, now, CLOCK, cdr_size(message))
 
@@ -68,28 +67,29 @@ def record_all(topic_name: str) -> bool:
     return True
 
 
-def _nothing(topic_name: str) -> bool:
+def _record_none(topic_name: str) -> bool:
     return False
 
 
 class EmbeddedGraph:
     """One ROS graph.
 
-    *price* says what a call takes, *between* how messages get from node to node. *records* says for which
-    topics the content of messages is recorded. *epoch* is what ROS time is at the kernel's zero: 0 in virtual
-    time, the Unix time in ns on the wall clock. ``/clock`` ticks each 10 ms of the kernel's time while
-    somebody subscribes to it.
-
-    *unrecorded*: nothing of it is recorded at all; for a graph that is no part of a system, such as the wire
-    to a simulated vehicle. *as_bytes*: messages make the trip through their bytes, so that they have the
-    digits that a transport carries, and no more.
+    Args:
+        kernel: Clock and tasks of its nodes.
+        tariffs: Prices of each node's calls.
+        route: Path of messages from node to node.
+        records: Topics whose messages are recorded with their content.
+        epoch: ROS time at the kernel's zero, ns: 0 in virtual time, Unix time on the wall clock.
+        unrecorded: Record no event; for a graph that is no part of the modelled system, such as the wire to a
+            simulated vehicle.
+        as_bytes: Encode and decode every message, so that values have the precision of a transport.
     """
 
     def __init__(
         self,
         kernel: Kernel,
-        price: Price = free,
-        between: Routing = no_route,
+        tariffs: Tariffs = free,
+        route: Routing = no_route,
         *,
         records: Records = record_all,
         epoch: Ns = 0,
@@ -97,28 +97,28 @@ class EmbeddedGraph:
         as_bytes: bool = False,
     ) -> None:
         self.kernel = kernel
-        self._context = GraphContext(
+        self._graph = GraphContext(
             kernel,
-            price,
-            between,
-            _nothing if unrecorded else records,
+            tariffs,
+            route,
+            _record_none if unrecorded else records,
             epoch,
             Signal(kernel, "the ROS graph"),
             unrecorded=unrecorded,
             as_bytes=as_bytes,
         )
-        self._context.listen_to_clock = ClockPublisher(self._context).listen
+        self._graph.listen_to_clock = ClockPublisher(self._graph).listen
         self._nodes: dict[str, EmbeddedNode] = {}
 
     @property
     def epoch(self) -> Ns:
-        """What ROS time is at the kernel's zero."""
-        return self._context.epoch
+        """ROS time at the kernel's zero, ns."""
+        return self._graph.epoch
 
     @property
     def parameters(self) -> Parameters:
         """All parameters, by absolute name."""
-        return self._context.parameters
+        return self._graph.parameters
 
     def node(
         self,
@@ -129,16 +129,27 @@ class EmbeddedGraph:
         anonymous: bool = False,
         context: ExecutionContext | None = None,
     ) -> EmbeddedNode:
-        """Join the graph as *name*; priced as ``init`` and ``node_handle``.
+        """Join the graph; charged as ``init`` and ``node_handle``.
 
-        *place* is where the node's computing is spent, that of the current task if it is not given.
-        *anonymous* adds a number to the name. Raises ``UsageError`` for an invalid name or one that is
-        taken.
+        Args:
+            name: Name without slashes.
+            namespace: ``/`` or an absolute name.
+            remaps: Names of topics, services and parameters, and what replaces them.
+            anonymous: Append a number to the name.
+            context: Context that the node's computing is charged to; the current task's by default.
+
+        Raises:
+            UsageError: the name is not valid or is taken.
         """
         with self.kernel:
             if anonymous:
-                name = self._numbered(name, namespace)
-            made = EmbeddedNode(self._context, name, namespace, remaps or {}, context or self._here(name))
+                number = 1
+                while f"{namespace.rstrip('/')}/{name}_{number}" in self._nodes:
+                    number += 1
+                name = f"{name}_{number}"
+            task = self.kernel.current()
+            context = context or (task.context if task is not None else ExecutionContext(name))
+            made = EmbeddedNode(self._graph, name, namespace, remaps or {}, context)
             other = self._nodes.get(made.name)
             if other is not None:
                 raise UsageError(
@@ -150,44 +161,34 @@ class EmbeddedGraph:
             made.join()
             return made
 
-    def _here(self, name: str) -> ExecutionContext:
-        task = self.kernel.current()
-        return task.context if task is not None else ExecutionContext(name)
-
-    def _numbered(self, name: str, namespace: str) -> str:
-        number = 1
-        while f"{namespace.rstrip('/')}/{name}_{number}" in self._nodes:
-            number += 1
-        return f"{name}_{number}"
-
     def _forget(self, node: EmbeddedNode) -> None:
         del self._nodes[node.name]
 
     def node_names(self) -> list[str]:
-        """Who is there, sorted."""
+        """Return the names of all nodes, sorted."""
         return sorted(self._nodes)
 
     def topics(self) -> list[TopicState]:
-        """The topics that somebody publishes or subscribes to, by name."""
+        """Return the topics that have a publisher or a subscription, by name."""
         states = []
-        for name, at in sorted(self._context.topics.items()):
-            publishers = tuple(one.member.name for one in at.publishers)
-            subscribers = tuple(one.member.name for one in at.subscriptions)
+        for name, topic in sorted(self._graph.topics.items()):
+            publishers = tuple(one.node.name for one in topic.publishers)
+            subscribers = tuple(one.node.name for one in topic.subscriptions)
             if publishers or subscribers:
-                states.append(TopicState(name, at.type, publishers, subscribers))
+                states.append(TopicState(name, topic.type, publishers, subscribers))
         return states
 
-    def heard(self, topic_name: str) -> bool:
-        """Whether somebody subscribes to the topic; without being an interaction point."""
-        at = self._context.topics.get(topic_name)
-        return at is not None and bool(at.subscriptions)
+    def has_subscribers(self, topic_name: str) -> bool:
+        """Return whether a node subscribes to the topic, without being an interaction point."""
+        topic = self._graph.topics.get(topic_name)
+        return topic is not None and bool(topic.subscriptions)
 
     def services(self) -> list[ServiceState]:
-        """The services that somebody serves, by name."""
-        served = sorted(self._context.services.items())
-        return [ServiceState(name, one.type, one.member.name) for name, one in served]
+        """Return the services that have a server, by name."""
+        served = sorted(self._graph.services.items())
+        return [ServiceState(name, one.type, one.node.name) for name, one in served]
 
     def close(self) -> None:
-        """All nodes leave the graph."""
+        """Close all nodes."""
         for node in list(self._nodes.values()):
             node.close()

@@ -1,6 +1,8 @@
-"""What all parts of one embedded graph share: the kernel, the two functions from above, and who is there.
+"""State shared by the parts of one embedded graph, and the node as its publishers and services use it.
 
-Parameters: one tree of values. A node's own are those below its name.
+`GraphContext` holds the kernel, the prices, the routes and the registered topics and services. `NodeContext`
+charges the calls of one node. Publishers and services stand here as narrow protocols, so that the modules
+that implement them import this one and not each other.
 """
 
 from __future__ import annotations
@@ -8,24 +10,69 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.interface import NodeId, Price, Routing
+from volery.ros.graph.interface import NodeId, QoS, Routing, Tariffs
 from volery.ros.messages import Message, from_cdr, to_cdr
 from volery.trace.events import Charge, Record, ignore
 
-if TYPE_CHECKING:
-    from volery.ros.graph.services import EmbeddedService
-    from volery.ros.graph.topics import Topic
+Records = Callable[[str], bool]
+"""Whether the content of a topic's messages is recorded, by the topic's name."""
+
+
+class PublisherEnd(Protocol):
+    """A publisher as the graph keeps it."""
+
+    node: NodeContext
+    qos: QoS
+
+    def connect(self, subscription: SubscriptionEnd) -> None:
+        """Connect a subscription and deliver latched (transient-local) messages."""
+
+    def disconnect(self, subscription: SubscriptionEnd) -> None:
+        """Stop sending to a subscription."""
+
+
+class SubscriptionEnd(Protocol):
+    """A subscription as the graph keeps it."""
+
+    node: NodeContext
+    qos: QoS
+
+    def arrive(self, message: Any, sent: Ns, publisher: str, size: int) -> None:
+        """Queue a message that has arrived. A framework callback."""
+
+    def lose(self, sent: Ns, publisher: str, size: int) -> None:
+        """Record that a message was lost. A framework callback."""
+
+
+class ServiceEnd(Protocol):
+    """A service as the graph keeps it."""
+
+    node: NodeContext
+    type: str
+
+    def arrive(self, exchange: Any) -> None:
+        """Queue a request that has arrived. A framework callback."""
+
+
+@dataclass(eq=False, slots=True)
+class Topic:
+    """A name at which publishers and subscriptions of one type meet."""
+
+    name: str
+    type: str
+    publishers: list[PublisherEnd] = field(default_factory=list)
+    subscriptions: list[SubscriptionEnd] = field(default_factory=list)
 
 
 class Parameters:
-    """Values by absolute name; a namespace reads as a ``dict`` of what is below it."""
+    """Parameter values by absolute name; a namespace reads as a ``dict`` of what is below it."""
 
     def __init__(self) -> None:
         self._tree: dict[str, Any] = {}
@@ -35,7 +82,7 @@ class Parameters:
         return [step for step in name.split("/") if step]
 
     def has(self, name: str) -> bool:
-        """Whether there is such a parameter or namespace."""
+        """Return whether there is such a parameter or namespace."""
         try:
             self.get(name)
         except UsageError:
@@ -43,7 +90,7 @@ class Parameters:
         return True
 
     def get(self, name: str) -> Any:
-        """A copy of the value, or ``UsageError``."""
+        """Return a copy of the value; raise ``UsageError`` if there is none."""
         value: Any = self._tree
         for step in self._steps(name):
             if not isinstance(value, dict) or step not in value:
@@ -66,7 +113,7 @@ class Parameters:
         branch[last] = deepcopy(value)
 
     def delete(self, name: str) -> None:
-        """Remove a value or a namespace; ``UsageError`` if there is none."""
+        """Remove a value or a namespace; raise ``UsageError`` if there is none."""
         self.get(name)
         *path, last = self._steps(name)
         branch = self._tree
@@ -75,7 +122,7 @@ class Parameters:
         del branch[last]
 
     def names(self) -> list[str]:
-        """The absolute names of all parameters, sorted."""
+        """Return the absolute names of all parameters, sorted."""
         return sorted(_leaves("", self._tree))
 
 
@@ -87,156 +134,157 @@ def _leaves(prefix: str, branch: dict[str, Any]) -> Iterator[str]:
             yield f"{prefix}/{step}"
 
 
-Records = Callable[[str], bool]
-"""Whether the content of a topic's messages is recorded, by the topic's name."""
-
-
 @dataclass(eq=False)
 class GraphContext:
-    """One graph, seen by its members. ``changed`` is notified whenever somebody comes or goes.
+    """One graph as its nodes see it.
 
-    ``unrecorded``: nothing of it goes to the stream of events. ``as_bytes``: what is sent has made the trip
-    through its bytes.
+    Attributes:
+        tariffs: Prices of each node's calls.
+        route: Path of messages from node to node.
+        records: Topics whose messages are recorded with their content.
+        epoch: ROS time at the kernel's zero, ns.
+        changed: Notified whenever a node, publisher, subscription or service joins or leaves.
+        listen_to_clock: Called for each subscription to ``/clock``.
+        unrecorded: No event of the graph is recorded.
+        as_bytes: Messages are encoded and decoded, as by a transport.
     """
 
     kernel: Kernel
-    price: Price
-    between: Routing
+    tariffs: Tariffs
+    route: Routing
     records: Records
     epoch: Ns
     changed: Signal
     listen_to_clock: Callable[[], None] = lambda: None
     parameters: Parameters = field(default_factory=Parameters)
     topics: dict[str, Topic] = field(default_factory=dict)
-    services: dict[str, EmbeddedService] = field(default_factory=dict)
+    services: dict[str, ServiceEnd] = field(default_factory=dict)
     unrecorded: bool = False
     as_bytes: bool = False
 
     @property
     def record(self) -> Record:
-        """The stream that events go to."""
+        """Receiver of the graph's events."""
         return ignore if self.unrecorded else self.kernel.record
 
-    def sent(self, message: Message) -> Message:
-        """A copy of *message*, as it is sent."""
-        if not self.as_bytes:
-            copied: Message = message.copy()
-            return copied
-        arriving: Message = from_cdr(message.__msgtype__, to_cdr(message))
-        return arriving
+    def copy(self, message: Message) -> Any:
+        """Return a copy of `message` as its receivers get it."""
+        return from_cdr(message.__msgtype__, to_cdr(message)) if self.as_bytes else message.copy()
 
-    def bring(
+    def carry(
         self, sender: NodeContext, receiver: NodeContext, size: int, deliver: Action, lost: Action
     ) -> None:
-        """Bring a request or an answer from node to node, reliably."""
-        way = self.between(sender.id, receiver.id)
-        if way is None:
+        """Transfer a request or an answer of `size` bytes between two nodes, reliably."""
+        route = self.route(sender.id, receiver.id)
+        if route is None:
             deliver()
         else:
-            way(size, True, deliver, lost)
+            route(size, True, deliver, lost)
 
     def stamp(self) -> Ns:
-        """ROS time, without being an interaction point."""
+        """Return ROS time, ns, without being an interaction point."""
         return self.epoch + self.kernel.now()
 
 
-KEEP_UP: Ns = S
-"""How often a node pays for the time that it neither sleeps nor calls."""
+WAIT_PERIOD: Ns = S
+"""Period at which a node is charged for the time in which it neither sleeps nor calls."""
 
-AWAKE: Ns = MS
-"""For so long after it has sent or received something a node's threads, and its caches, are still warm."""
+WARM: Ns = MS
+"""Time after sending or receiving during which a node's threads and caches are still warm."""
 
-_CALLS = ("publish", "sleep", "spin_once")
-_KINDS = {call: f"ros:{call}" for call in _CALLS}
-"""What is charged often, so that its text is made once."""
+_KINDS = {call: f"ros:{call}" for call in ("publish", "sleep", "spin_once")}
+"""Texts of the most frequent charges, made once."""
 
 
 class NodeContext:
-    """A node as its publishers, subscriptions and so on see it: who they act for, and who pays."""
+    """A node as its publishers, subscriptions and services use it: their owner, which is charged."""
 
-    __slots__ = ("_awake", "_free", "_since", "_slept", "_waited", "closed", "context", "id", "name", "place")
+    __slots__ = (
+        "_free", "_last_traffic", "_since", "_slept", "_tariff", "_waited",
+        "closed", "context", "graph", "id", "kernel", "name", "processor",
+    )  # fmt: skip
 
-    def __init__(self, context: GraphContext, name: str, place: ExecutionContext) -> None:
-        processor = place.processor.name if place.processor else ""
-        self.context = context
-        self.id = NodeId(name, place.component, processor)
-        self.name = name
-        self.place = place
-        self._free = context.unrecorded and place.processor is None  # nobody executes it, nobody sees it
+    def __init__(self, graph: GraphContext, name: str, context: ExecutionContext) -> None:
+        self.graph, self.kernel = graph, graph.kernel
+        self.name, self.context, self.processor = name, context, context.processor
+        self.id = NodeId(name, context.component, self.processor.name if self.processor else "")
         self.closed = False
-        self._since = context.kernel.now()
-        self._awake: Ns = -AWAKE
+        self._tariff = graph.tariffs(self.id)
+        self._free = graph.unrecorded and self.processor is None  # neither executed nor recorded
+        self._since = self.kernel.now()
+        self._last_traffic: Ns = -WARM
         self._slept = self._waited = 0.0
 
-    def pay(self, call: str, x: float = 0.0) -> None:
-        """Price a call and have it executed: the caller's part before this returns, the rest beside it.
+    def consume(self, call: str, x: float = 0.0) -> None:
+        """Execute a call into ROS: the caller's part before this returns, the rest in the background.
 
-        House code cannot wait: there all of it goes to the background.
+        A framework callback cannot wait: there all of the call goes to the background.
+
+        Args:
+            call: Name of the call, see ``Tariff``.
+            x: What its price depends on, see ``Tariff``.
         """
         if self._free:
             return
-        context = self.context
-        kernel = context.kernel
-        who = self.id
-        cost = context.price(who, self._priced_as(call), x)
-        caller, background = cost.caller, cost.background
+        kernel = self.kernel
+        now = kernel.now()
+        priced = call
         if call == "sleep":
             self._slept += x
-        kind = _KINDS.get(call) or f"ros:{call}"
-        if not context.unrecorded:
-            kernel.record(Charge(kernel.now(), who.component, who.processor, kind, caller, background, 0.0))
-        if kernel.current() is None:
+        elif call == "publish":
+            if now - self._last_traffic < WARM:
+                priced = "publish_next"
+            self._last_traffic = now
+        caller = background = 0
+        if self._tariff is not None:
+            cost = self._tariff(priced, x)
+            caller, background = cost.caller, cost.background
+        if not self.graph.unrecorded:
+            kind = _KINDS.get(call) or f"ros:{call}"
+            kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
+        if caller and not kernel.consume(caller):
             background += caller
-        elif caller:
-            kernel.consume(caller)
-        if background and self.place.processor is not None:
-            self.place.processor.load(self.place, background)
+        if background and self.processor is not None:
+            self.processor.load(self.context, background)
 
-    def _priced_as(self, call: str) -> str:
-        """Sending wakes the client library's threads, unless they are awake."""
-        if call != "publish":
-            return call
-        now = self.context.kernel.now()
-        awake = now - self._awake < AWAKE
-        self._awake = now
-        return "publish_next" if awake else call
-
-    def bear(self, what: str, x: float = 0.0) -> None:
-        """Have executed what happens to the node beside its calls; nothing where that has no price."""
-        context, who = self.context, self.id
-        if self.place.processor is None:
+    def charge_background(self, what: str, x: float = 0.0) -> None:
+        """Execute in the background a cost beside the calls; see ``Tariff`` for `what` and `x`."""
+        processor = self.processor
+        if processor is None or self._tariff is None:
             return
-        if what == "receive":
-            self._awake = context.kernel.now()
-        cost = context.price(who, what, x)
+        cost = self._tariff(what, x)
         background = cost.caller + cost.background
         if not background:
             return
-        if not context.unrecorded:
-            now = context.kernel.now()
-            context.kernel.record(
-                Charge(now, who.component, who.processor, f"ros:{what}", 0, background, 0.0)
-            )
-        self.place.processor.load(self.place, background)
+        if not self.graph.unrecorded:
+            now, (_, component, name) = self.kernel.now(), self.id
+            self.kernel.record(Charge(now, component, name, f"ros:{what}", 0, background, 0.0))
+        processor.load(self.context, background)
 
-    def keep_up(self) -> None:
-        """Keep the client library's threads going where the node does not sleep: what a sleep costs
-        contains that.
-        """
-        placed = self.place.processor is not None
-        if placed and self.context.price(self.id, "wait", KEEP_UP / US).background:
-            self.context.kernel.every(KEEP_UP, self._wait)
+    def charge_reception(self, now: Ns) -> None:
+        """Execute what a message that has arrived at `now` takes."""
+        self._last_traffic = now
+        self.charge_background("receive")
 
-    def _wait(self) -> None:
+    def start_charging_waits(self) -> None:
+        """Charge the client library's threads while the node does not sleep; a sleep's price has them."""
+        if (
+            self.processor is not None
+            and self._tariff is not None
+            and self._tariff("wait", WAIT_PERIOD / US).background
+        ):
+            self.kernel.every(WAIT_PERIOD, self._charge_wait)
+
+    def _charge_wait(self) -> None:
         if self.closed:
             return
-        lived = (self.context.kernel.now() - self._since) / US
+        lived = (self.kernel.now() - self._since) / US
         waited = lived - self._slept - self._waited
         if waited > 0.0:
             self._waited += waited
-            self.bear("wait", waited)
+            self.charge_background("wait", waited)
 
     def check_open(self) -> None:
-        """``UsageError`` if the node has left the graph."""
+        """Raise ``UsageError`` if the node has left the graph."""
         if self.closed:
             raise UsageError(f"node {self.name} has left the graph")

@@ -1,9 +1,9 @@
-"""What a ROS node can do: the one interface of the embedded graph and of real ROS behind a transport.
+"""The interface of ROS nodes and graphs, implemented by the embedded graph and by the transports to real ROS.
 
-Times are ``int`` nanoseconds. Message and service types go by name (``std_msgs/msg/String`` or
+Times are ``int`` nanoseconds. Message and service types are named (``std_msgs/msg/String`` or
 ``std_msgs/String``). Names follow ROS: absolute (``/a/b``), relative to the node's namespace (``a/b``) or
-private to it (``~a``). Calls block their own flow of control for as long as the call itself computes, and no
-longer, unless it is said.
+private to it (``~a``). A call blocks its task only for its own computing, unless its docstring says
+otherwise.
 """
 
 from __future__ import annotations
@@ -29,12 +29,16 @@ _DURABILITY = (VOLATILE, TRANSIENT_LOCAL, BEST_AVAILABLE)
 
 @dataclass(frozen=True, slots=True)
 class QoS:
-    """Quality of service, in the words of ROS 2. ROS 1 is a special case of it.
+    """Quality of service in the terms of ROS 2, of which ROS 1 is a special case.
 
-    ``depth``: messages kept (a publisher's for those who come late, a subscription's until its callback ran;
-    the oldest is dropped), ``None`` for no bound. ``best_available`` on the subscribing side takes what is
-    offered: that is how a ROS 1 subscriber behaves, and a latched ROS 1 publisher is ``transient_local``
-    with depth 1.
+    A ROS 1 subscriber is ``best_available``: it takes what is offered. A latched ROS 1 publisher is
+    ``transient_local`` with depth 1.
+
+    Attributes:
+        depth: Messages kept, the oldest is dropped; None for no bound. A publisher keeps them for late
+            subscribers, a subscription until its callback has run.
+        reliability: ``reliable``, ``best_effort`` or ``best_available``.
+        durability: ``volatile``, ``transient_local`` or ``best_available``.
     """
 
     depth: int | None = 10
@@ -52,13 +56,13 @@ class QoS:
 
 DEFAULT = QoS()
 AS_OFFERED = QoS(reliability=BEST_AVAILABLE, durability=BEST_AVAILABLE)
-"""What a subscription wants unless it says otherwise: whatever the publisher offers, as in ROS 1."""
+"""Default of a subscription: what the publisher offers, as in ROS 1."""
 SENSOR_DATA = QoS(depth=5, reliability=BEST_EFFORT)
 LATCHED = QoS(depth=1, durability=TRANSIENT_LOCAL)
 
 
 class NodeId(NamedTuple):
-    """Who calls: a node's full name, the component whose code it is, and its processor ('' for none)."""
+    """A caller: the node's full name, the component whose code it is, and its processor ('' for none)."""
 
     name: str
     component: str
@@ -66,50 +70,45 @@ class NodeId(NamedTuple):
 
 
 class Cost(Protocol):
-    """What a call takes on its processor, ns: by the caller before it goes on, and beside it."""
+    """Execution time of a call on the node's processor, ns."""
 
     @property
     def caller(self) -> Ns:
-        """Paid by the calling task before the call has an effect."""
+        """Executed by the calling task before the call takes effect, ns."""
 
     @property
     def background(self) -> Ns:
-        """Executed by the process beside the calling task."""
+        """Executed by the process in the background, ns."""
 
 
-Price = Callable[[NodeId, str, float], Cost]
-"""``price(node, call, x)``. The calls are ``init``, ``node_handle``, ``advertise``, ``subscribe``,
-``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the topic), ``publish_next`` (the
-same where the node has sent or received something a moment ago), ``sleep`` (x = microseconds slept) and
-``spin_once`` (x = 1 for the first of this node, 0 after it). Beside its calls a node meets ``receive`` (a
-message arrives), ``connect`` (a subscription of it finds a publisher), ``accept`` (a publisher of it finds a
-subscription) and ``wait`` (x = microseconds in which it did not sleep)."""
+Tariff = Callable[[str, float], Cost]
+"""``tariff(call, x)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
+``advertise``, ``subscribe``, ``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the
+topic), ``publish_next`` (a ``publish`` less than a millisecond after the node has sent or received),
+``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it). Costs
+beside the calls are ``receive`` (a message arrives), ``connect`` (a subscription is connected to a
+publisher), ``accept`` (a publisher to a subscription) and ``wait`` (x = microseconds without sleep)."""
+
+Tariffs = Callable[[NodeId], Tariff | None]
+"""``tariffs(node)``: the tariff of a node, requested once when it joins; None where calls take no time."""
 
 
-class _NoCost(NamedTuple):
-    caller: Ns = 0
-    background: Ns = 0
-
-
-_NO_COST = _NoCost()
-
-
-def free(node: NodeId, call: str, x: float) -> Cost:
-    """A ``Price``: calls take nothing."""
-    return _NO_COST
+def free(node: NodeId) -> Tariff | None:
+    """Return no tariff: calls take no time."""
+    return None
 
 
 Route = Callable[[int, bool, Callable[[], None], Callable[[], None]], None]
-"""``way(size, reliable, deliver, lost)``: bring *size* bytes along it, then call *deliver*, or *lost* where
-they did not arrive. Never blocks and calls nothing before it has returned."""
+"""``route(size, reliable, deliver, lost)``: transfer `size` bytes, then call `deliver`, or `lost` if they did
+not arrive. Never blocks, and calls neither before it has returned."""
 
 Routing = Callable[[NodeId, NodeId], Route | None]
-"""``between(sender, receiver)``: the way from node to node, asked once; ``None`` where nothing is between
-them, so that what one sends is with the other at once."""
+"""``routing(sender, receiver)``: the route from node to node, requested once per connection; None where no
+network is between them and messages arrive at once."""
 
 
 def no_route(sender: NodeId, receiver: NodeId) -> Route | None:
-    """``Routing``: nothing is."""
+    """Return no route: messages arrive at once."""
     return None
 
 
@@ -124,36 +123,36 @@ class Publisher(Protocol):
     type: str
 
     def publish(self, message: Any) -> None:
-        """Send a copy of *message* as it is now. ``UsageError`` if it is of another type."""
+        """Send a copy of `message` as it is now; raise ``UsageError`` if it has another type."""
 
     def subscribers(self) -> int:
-        """How many subscriptions it is connected to."""
+        """Return the number of subscriptions it is connected to."""
 
     def close(self) -> None:
-        """Advertise no longer."""
+        """Stop publishing."""
 
 
 class Subscription(Protocol):
-    """Receives the messages of a topic; its callback runs when its group spins."""
+    """Receives the messages of a topic; its callback runs when its group is spun."""
 
     topic: str
     type: str
 
     def publishers(self) -> int:
-        """How many publishers it is connected to."""
+        """Return the number of publishers it is connected to."""
 
     def close(self) -> None:
-        """Receive no longer; what still waits is forgotten."""
+        """Stop receiving and drop the waiting messages."""
 
 
 class Service(Protocol):
-    """Answers requests; its handler runs when its group spins."""
+    """Answers requests; its handler runs when its group is spun."""
 
     name: str
     type: str
 
     def close(self) -> None:
-        """Answer no longer."""
+        """Stop serving."""
 
 
 class Client(Protocol):
@@ -163,96 +162,100 @@ class Client(Protocol):
     type: str
 
     def call(self, request: Any, within: Ns | None = None) -> Any:
-        """Block until the answer is there.
+        """Block until the answer has arrived.
 
-        ``ServiceError`` if nobody serves it, the handler raised, or *within* has passed.
+        Args:
+            request: Message of the service's request type.
+            within: Longest wait, ns; None for no limit.
+
+        Raises:
+            ServiceError: no node serves it, the handler raised, or `within` has passed.
         """
 
     def wait(self, within: Ns | None = None) -> bool:
-        """Block until somebody serves it; False if *within* has passed first."""
+        """Block until a node serves it; return False if `within` ns have passed first."""
 
     def ready(self) -> bool:
-        """Whether somebody serves it now."""
+        """Return whether a node serves it now."""
 
 
 class Timer(Protocol):
-    """Calls back each period; the callback runs when its group spins."""
+    """Calls back every period; the callback runs when its group is spun."""
 
     def cancel(self) -> None:
-        """Call back no longer."""
+        """Stop the timer."""
 
 
 class Rate(Protocol):
     """Keeps a loop at a period."""
 
     def sleep(self) -> None:
-        """Block until one period after the last release.
-
-        A late loop goes on at once and does not catch up.
-        """
+        """Block until one period after the last release; return at once if that has passed."""
 
     def remaining(self) -> Ns:
-        """How long until the next release; 0 for a late loop."""
+        """Return the time until the next release, ns; 0 for a late loop."""
 
 
 class Work(NamedTuple):
-    """A callback that is ready: since when, and what runs it (as user code)."""
+    """A callback that is ready: since when, ns, and what runs it, as component code."""
 
     arrived: Ns
     run: Callable[[], None]
 
 
 class Group(Protocol):
-    """A queue of callbacks that are ready; who spins it runs them, one after the other."""
+    """A queue of callbacks that are ready; the task that spins it runs them one after the other."""
 
     def spin_once(self, within: Ns | None = None) -> bool:
-        """Run the next callback, waiting for one up to *within* (``None``: for ever, 0: not at all).
+        """Run the next callback; return False if there was none. Its exceptions are raised here.
 
-        False if there was none. What the callback raises comes out here.
+        Args:
+            within: Longest wait for a callback, ns; None for no limit, 0 to poll.
         """
 
     def spin_available(self) -> None:
         """Run all callbacks that are ready now, as one poll: roscpp's ``spinOnce``."""
 
     def spin(self) -> None:
-        """Run callbacks as they come until the node is closed."""
+        """Run callbacks as they become ready until the node is closed."""
 
     on_ready: Callable[[], None] | None
-    """Called whenever a callback has become ready, for who waits for several groups at once and ``take``s
-    what is there. It must not block."""
+    """Called whenever a callback has become ready, for executors that wait for several groups and ``take``
+    from them. It must not block."""
 
     @property
     def oldest(self) -> Ns | None:
-        """Since when the next callback has been ready; ``None`` if none is."""
+        """Time at which the next callback became ready, ns; None if none is."""
 
     def take(self) -> Work:
-        """The next one: who takes it runs it. ``IndexError`` if none waits."""
+        """Remove and return the next callback, which the caller runs; ``IndexError`` if none is ready."""
 
     def add(self, work: Work) -> None:
-        """A callback of somebody else's has become ready. House code."""
+        """Add a callback that has become ready. A framework callback."""
 
 
 class Node(Protocol):
-    """A member of the graph. Whoever makes one states its name; ``close`` takes it off the graph again."""
+    """A node of a graph, until ``close``."""
 
     name: str
     namespace: str
 
     @property
     def context(self) -> ExecutionContext:
-        """Where its computing is spent."""
+        """Context that its computing is charged to."""
 
     @property
     def closed(self) -> bool:
         """Whether it has left the graph."""
 
     def resolve(self, name: str) -> str:
-        """The absolute name, remappings applied. ``UsageError`` if it is no valid ROS name."""
+        """Return the absolute name, remappings applied; ``UsageError`` if it is no valid ROS name."""
 
     def group(self, start: Callable[[Work], None] | None = None) -> Group:
-        """A new group, for callbacks that are to run beside those of the node's own group.
+        """Return a new group, for callbacks that run concurrently with those of the node's own group.
 
-        With *start* its work waits for no spin: *start* is given it, as house code.
+        Args:
+            start: Called at once, as a framework callback, with each callback that becomes ready.
         """
 
     def advertise(self, topic: str, message_type: str, qos: QoS = DEFAULT) -> Publisher:
@@ -266,28 +269,28 @@ class Node(Protocol):
         qos: QoS = AS_OFFERED,
         group: Group | None = None,
     ) -> Subscription:
-        """Call *callback* with each message of a topic, in *group* (the node's own if none is given)."""
+        """Call `callback` with each message of a topic, in `group` or else the node's own group."""
 
     def serve(self, name: str, service_type: str, handler: Handler, group: Group | None = None) -> Service:
-        """Answer requests: *handler* is given the request and returns the response."""
+        """Answer requests: `handler` gets the request and returns the response."""
 
     def client(self, name: str, service_type: str) -> Client:
-        """Call a service; it need not be there yet."""
+        """Return a client of a service, which need not be served yet."""
 
     def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
-        """Block until somebody serves *name*; False if *within* has passed first."""
+        """Block until a node serves `name`; return False if `within` ns have passed first."""
 
     def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> Timer:
-        """Call back each *period*, for the first time after one."""
+        """Call back every `period` ns, for the first time after one period."""
 
     def rate(self, period: Ns) -> Rate:
-        """Keep the loop of the current task at *period*."""
+        """Return what keeps the loop of the current task at `period` ns."""
 
     def sleep(self, duration: Ns) -> None:
-        """Block the current task for *duration*."""
+        """Block the current task for `duration` ns."""
 
     def now(self) -> Ns:
-        """ROS time: nanoseconds since the epoch of the graph's clock. An interaction point."""
+        """Return ROS time: ns since the epoch of the graph's clock. An interaction point."""
 
     def spin_once(self, within: Ns | None = None) -> bool:
         """``spin_once`` of the node's own group."""
@@ -299,26 +302,27 @@ class Node(Protocol):
         """``spin`` of the node's own group."""
 
     def get_parameter(self, name: str, default: Any = ...) -> Any:
-        """A parameter's value, a ``dict`` for a namespace.
+        """Return a parameter's value, a ``dict`` for a namespace.
 
-        *default* or a ``UsageError`` where there is none.
+        Raises:
+            UsageError: there is no such parameter, and no `default`.
         """
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a parameter, or a whole namespace with a ``dict``."""
+        """Set a parameter, or a whole namespace to a ``dict``."""
 
     def has_parameter(self, name: str) -> bool:
-        """Whether there is such a parameter or namespace."""
+        """Return whether there is such a parameter or namespace."""
 
     def delete_parameter(self, name: str) -> None:
-        """Remove a parameter or a namespace; a ``UsageError`` where there is none."""
+        """Remove a parameter or a namespace; raise ``UsageError`` if there is none."""
 
     def close(self) -> None:
-        """Leave the graph: everything this node has made is gone, who spins it returns."""
+        """Leave the graph with everything that the node has made; tasks that spin it return."""
 
 
 class TopicState(NamedTuple):
-    """A topic as it is: who publishes and who subscribes, by the nodes' names."""
+    """A topic with the names of the nodes that publish and subscribe."""
 
     name: str
     type: str
@@ -327,7 +331,7 @@ class TopicState(NamedTuple):
 
 
 class ServiceState(NamedTuple):
-    """A service as it is: its type, and who serves it by the node's name."""
+    """A service with its type and the name of the node that serves it."""
 
     name: str
     type: str
@@ -335,13 +339,13 @@ class ServiceState(NamedTuple):
 
 
 class RosGraph(Protocol):
-    """A ROS graph as one process sees it: embedded, or a real one behind a transport."""
+    """A ROS graph as one process sees it: the embedded one, or a real one behind a transport."""
 
     kernel: Kernel
 
     @property
     def epoch(self) -> Ns:
-        """What ROS time is at the kernel's zero."""
+        """ROS time at the kernel's zero, ns."""
 
     def node(
         self,
@@ -352,20 +356,27 @@ class RosGraph(Protocol):
         anonymous: bool = False,
         context: ExecutionContext | None = None,
     ) -> Node:
-        """Join the graph as *name*. *anonymous* adds something to the name that makes it unique.
+        """Join the graph.
 
-        *place* is where the node's computing is spent, that of the current task if it is not given.
-        ``UsageError`` for an invalid name or one that is taken.
+        Args:
+            name: Name without slashes.
+            namespace: ``/`` or an absolute name.
+            remaps: Names of topics, services and parameters, and what replaces them.
+            anonymous: Append to the name what makes it unique.
+            context: Context that the node's computing is charged to; the current task's by default.
+
+        Raises:
+            UsageError: the name is not valid or is taken.
         """
 
     def node_names(self) -> list[str]:
-        """Who is there, sorted."""
+        """Return the names of all nodes, sorted."""
 
     def topics(self) -> list[TopicState]:
-        """The topics that somebody publishes or subscribes to, by name."""
+        """Return the topics that have a publisher or a subscription, by name."""
 
     def services(self) -> list[ServiceState]:
-        """The services that somebody serves, by name."""
+        """Return the services that have a server, by name."""
 
     def close(self) -> None:
-        """All nodes made by it leave the graph."""
+        """Close all nodes made by it."""

@@ -1,4 +1,4 @@
-"""Doing what may block outside the house: a thread does it, and the task that asked for it is parked."""
+"""Calls that may block outside the framework: a thread executes them while the requesting task waits."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ PATIENCE: Ns = 10 * S
 _waiting: WeakKeyDictionary[Kernel, list[str]] = WeakKeyDictionary()
 """Names of the tasks that wait for a thread."""
 POLL_S = 0.05
-"""How long after each look one looks again for what the client library does not announce."""
+"""Period of polling for what a client library does not announce, s."""
 
 
 def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns = PATIENCE) -> T:
-    """The result of *work*, which a thread of its own does; what it raises is raised here.
+    """Execute `work` in a thread of its own; return its result or raise its exception.
 
-    In house code, which must not block, it is done on the spot. ``LinkSilent`` if it takes longer than
-    *within*.
+    In a framework callback, which must not block, `work` is executed in place.
+
+    Raises:
+        LinkSilent: it takes longer than `within` ns.
     """
     task = kernel.current()
     if task is None:
@@ -60,28 +62,28 @@ def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns =
 
 
 def pending_calls(kernel: Kernel) -> tuple[str, ...]:
-    """Return the names of the tasks of *kernel* that wait for a thread."""
+    """Return the names of the tasks that wait in ``run_in_thread``."""
     return tuple(_waiting.get(kernel, ()))
 
 
 def poll_in_thread(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:
-    """Block the current task until *holds*, which a thread asks again and again; False after *within*."""
+    """Block the current task until `holds`, which a thread polls; return False if `within` ns pass first."""
     seen = Signal(kernel, what)
     found: list[bool] = []
     given_up = threading.Event()
 
-    def tell() -> None:
+    def announce() -> None:
         found.append(True)
         seen.notify()
 
-    def look() -> None:
+    def poll() -> None:
         while not given_up.is_set():
             if _succeeds(holds):
-                kernel.post(tell)
+                kernel.post(announce)
                 return
             given_up.wait(POLL_S)
 
-    threading.Thread(target=look, name=what, daemon=True).start()
+    threading.Thread(target=poll, name=what, daemon=True).start()
     try:
         return seen.wait_for(lambda: found, within)
     finally:
@@ -92,4 +94,4 @@ def _succeeds(holds: Callable[[], bool]) -> bool:
     try:
         return holds()
     except (OSError, VoleryError):
-        return False  # whoever would know is away; it may come back
+        return False  # the ROS master cannot be reached; it may come back

@@ -1,6 +1,6 @@
-"""What a ROS client library offers to the nodes of a transport. Messages cross as CDR bytes.
+"""What the transports need of a ROS client library. Messages cross as CDR bytes.
 
-Everything here may be called from any thread. Callbacks come from threads of the library and must not block.
+Every method may be called from any thread. Callbacks come from threads of the library and must not block.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from volery.ros.messages import Message, ServiceType
 
 
 class ReceivedMessage(NamedTuple):
-    """A message as it arrived: its bytes, what reads them, and the node it came from ('' if unknown).
+    """A message as it arrived: its bytes, what decodes them, and the sending node ('' if unknown).
 
-    ``read`` raises ``UsageError`` where the bytes are no message of the topic's type.
+    ``read`` raises ``UsageError`` if the bytes are no message of the topic's type.
     """
 
     data: bytes
@@ -26,84 +26,84 @@ class ReceivedMessage(NamedTuple):
 OnMessage = Callable[[ReceivedMessage], None]
 
 OnResponse = Callable[[Message | None, str], None]
-"""The answer, or ``None`` and why there is none."""
+"""Receives the response, or None and the reason why there is none."""
 
 OnRequest = Callable[[Message, OnResponse], None]
-"""A request, and what is to be called with the answer, once, from any thread."""
+"""Receives a request, and what to call with the response, once, from any thread."""
 
 
 class LibraryPublisher(Protocol):
     """Sends to one topic."""
 
     def send(self, data: bytes) -> None:
-        """Send a message's CDR bytes. Never waits for a receiver."""
+        """Send a message's CDR bytes, without waiting for a receiver."""
 
     def connected(self) -> int:
-        """How many subscriptions receive it."""
+        """Return the number of subscriptions that receive it."""
 
     def close(self) -> None:
-        """Send no more."""
+        """Stop sending."""
 
 
 class LibrarySubscription(Protocol):
     """Receives from one topic."""
 
     def connected(self) -> int:
-        """How many publishers it hears."""
+        """Return the number of publishers that it receives from."""
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
 
 
 class LibraryService(Protocol):
     """A service that is offered."""
 
     def close(self) -> None:
-        """Offer it no longer."""
+        """Stop offering it."""
 
 
 class LibraryClient(Protocol):
-    """Calls one service."""
+    """A client of one service."""
 
     def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
-        """Ask; *done* is told the answer. Returns what gives it up."""
+        """Send a request, and call `done` with the response; return what abandons the call."""
 
     def ready(self) -> bool:
-        """Whether somebody serves it; may block for a moment."""
+        """Return whether a node serves it; may block for a moment."""
 
     def close(self) -> None:
-        """Call no more."""
+        """Stop calling."""
 
 
 class LibraryNode(Protocol):
     """One node of the client library. All names are absolute. Every call may block for a moment."""
 
     def advertise(self, topic: str, message_type: str, qos: QoS) -> LibraryPublisher:
-        """Publish to a topic. ``UsageError`` if the topic carries another type."""
+        """Publish to a topic; raise ``UsageError`` if the topic carries another type."""
 
     def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> LibrarySubscription:
-        """Receive a topic. ``UsageError`` if the topic carries another type."""
+        """Receive a topic; raise ``UsageError`` if the topic carries another type."""
 
-    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> LibraryService:
-        """Offer a service. ``UsageError`` if somebody else does."""
+    def serve(self, name: str, kind: ServiceType, requested: OnRequest) -> LibraryService:
+        """Offer a service; raise ``UsageError`` if another node does."""
 
-    def caller(self, name: str, kind: ServiceType) -> LibraryClient:
-        """Call a service."""
+    def client(self, name: str, kind: ServiceType) -> LibraryClient:
+        """Return a client of a service."""
 
     def has_service(self, name: str) -> bool:
-        """Whether somebody serves *name*."""
+        """Return whether a node serves `name`."""
 
     def get_parameter(self, name: str) -> Any:
-        """A parameter's value, a ``dict`` for a namespace; ``KeyError`` where there is none."""
+        """Return a parameter's value, a ``dict`` for a namespace; ``KeyError`` if there is none."""
 
     def set_parameter(self, name: str, value: Any) -> None:
         """Set a parameter or a namespace."""
 
     def delete_parameter(self, name: str) -> None:
-        """Remove a parameter or a namespace; ``KeyError`` where there is none."""
+        """Remove a parameter or a namespace; ``KeyError`` if there is none."""
 
-    def leave(self) -> None:
-        """All it has made is about to be closed, and it itself after that."""
+    def prepare_close(self) -> None:
+        """Prepare for the closing of all that the node has made, and then of the node."""
 
     def close(self) -> None:
         """Leave the graph."""
@@ -112,23 +112,30 @@ class LibraryNode(Protocol):
 class ClientLibrary(Protocol):
     """A ROS client library as one process uses it."""
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> LibraryNode:
-        """Join the graph as the node of that full name; *lost* is told why, should it be thrown out.
+    def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> LibraryNode:
+        """Join the graph as a node.
 
-        ``UsageError`` if the name is taken, ``LinkError`` if the graph cannot be reached.
+        Args:
+            name: Name without slashes.
+            namespace: ``/`` or an absolute name.
+            lost: Called with the reason if the graph removes the node.
+
+        Raises:
+            UsageError: the name is taken.
+            LinkError: the graph cannot be reached.
         """
 
     def node_names(self) -> list[str]:
-        """Who is there, sorted."""
+        """Return the names of all nodes, sorted."""
 
     def topics(self) -> list[TopicState]:
-        """What topics there are, by name."""
+        """Return the topics, by name."""
 
     def services(self) -> list[ServiceState]:
-        """What services there are, by name."""
+        """Return the services, by name."""
 
     def announce_clock(self) -> None:
-        """Nodes that start from now on are to take their time from ``/clock``, where that can be said."""
+        """Let nodes that start from now on take their time from ``/clock``, where the graph supports that."""
 
     def close(self) -> None:
-        """Nothing of it runs any longer."""
+        """Stop the threads and processes of the library."""

@@ -1,6 +1,7 @@
-"""``/clock`` in both directions: telling others our time, and taking theirs.
+"""A real ROS graph as this process sees it, and ``/clock`` in both directions.
 
-A real ROS graph as this process sees it.
+The time of a transport must not run ahead of wall time: the wall clock, a paced virtual one, or one that
+follows ``/clock``.
 """
 
 from __future__ import annotations
@@ -30,57 +31,65 @@ from volery.ros.graph.interface import (
     free,
     no_route,
 )
+from volery.ros.graph.topics import WARNING
 from volery.ros.messages import new, to_cdr
 from volery.ros.transports.blocking_calls import run_in_thread
 from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage
-from volery.ros.transports.transport_node import WARNING, TransportNode
+from volery.ros.transports.transport_node import TransportNode
 from volery.trace.events import Text
 
 if TYPE_CHECKING:
 
     def _is_a(graph: TransportGraph) -> RosGraph:
-        """Checked by the type checker: it has all that a graph has."""
+        """Let the type checker verify that the class implements the protocol."""
         return graph
 
 
 NEWEST = QoS(depth=1, reliability=BEST_AVAILABLE)
 
+Close = Callable[[], None]
+
 
 @runtime_checkable
 class ExternallyClocked(Protocol):
-    """A kernel whose time can be told to go on."""
+    """A kernel whose time is set from outside."""
 
     def advance(self, by: Ns) -> None:
-        """Let time pass."""
+        """Let `by` ns pass."""
 
 
-def publish_clock(context: GraphContext, wire: LibraryNode, period: Ns = CLOCK_PERIOD) -> Callable[[], None]:
-    """Publish the kernel's time as ``/clock`` each *period* of it, whoever listens. Returns what ends it."""
-    outlet = wire.advertise(CLOCK, CLOCK_TYPE, QoS(depth=1))
+def publish_clock(graph: GraphContext, library: LibraryNode, period: Ns = CLOCK_PERIOD) -> Close:
+    """Publish the kernel's time as ``/clock`` every `period` ns of it; return what ends that."""
+    publisher = library.advertise(CLOCK, CLOCK_TYPE, QoS(depth=1))
 
     def tick() -> None:
-        sec, nanosec = divmod(context.stamp(), S)
-        outlet.send(to_cdr(new(CLOCK_TYPE, clock={"sec": sec, "nanosec": nanosec})))
+        sec, nanosec = divmod(graph.stamp(), S)
+        publisher.send(to_cdr(new(CLOCK_TYPE, clock={"sec": sec, "nanosec": nanosec})))
 
-    ticking = context.kernel.every(period, tick)
+    ticking = graph.kernel.every(period, tick)
 
-    def end() -> None:
+    def close() -> None:
         ticking.cancel()
-        outlet.close()
+        publisher.close()
 
-    return end
+    return close
 
 
-def follow_clock(context: GraphContext, wire: LibraryNode, since: Ns | None = None) -> Callable[[], None]:
-    """Let the kernel's time be what ``/clock`` says. Returns what ends it.
+def follow_clock(graph: GraphContext, library: LibraryNode, since: Ns | None = None) -> Close:
+    """Set the kernel's time from ``/clock``; return what ends that.
 
-    *since* is ROS time at the kernel's zero, where that is agreed; else it is what is heard first.
+    The kernel's time never goes back: where ``/clock`` does (a simulation or a recording starts anew), ROS
+    time goes back, and waits continue for the time that is left.
 
-    The kernel's time never goes back: where ``/clock`` does (a simulation or a recording begins anew), ROS
-    time does, and what waits goes on waiting for the time that is left. ``UsageError`` for a kernel whose
-    time passes by itself.
+    Args:
+        graph: Graph whose kernel and epoch are set.
+        library: Node that subscribes to ``/clock``.
+        since: ROS time at the kernel's zero, ns; None takes the first time that is received.
+
+    Raises:
+        UsageError: the kernel's time passes by itself.
     """
-    kernel = context.kernel
+    kernel = graph.kernel
     if not isinstance(kernel, ExternallyClocked):
         raise UsageError(
             f"a {type(kernel).__name__} keeps its own time; to follow {CLOCK} take a FollowingKernel"
@@ -88,22 +97,26 @@ def follow_clock(context: GraphContext, wire: LibraryNode, since: Ns | None = No
     guard = threading.Lock()
     last = [] if since is None else [since]
 
-    def arrived(parcel: ReceivedMessage) -> None:
-        stamp = parcel.read(parcel.data).clock.to_nsec()
+    def arrived(received: ReceivedMessage) -> None:
+        stamp = received.read(received.data).clock.to_nsec()
         with guard:
             if last and stamp >= last[0]:
                 kernel.advance(stamp - last[0])
             else:
-                context.epoch = stamp - context.kernel.now()
+                graph.epoch = stamp - graph.kernel.now()
             last[:] = [stamp]
 
-    return wire.subscribe(CLOCK, CLOCK_TYPE, NEWEST, arrived).close
+    return library.subscribe(CLOCK, CLOCK_TYPE, NEWEST, arrived).close
 
 
 class TransportGraph:
     """The nodes of this process on a real ROS graph.
 
-    *epoch* is what ROS time is at the kernel's zero: by default the Unix time then.
+    Args:
+        kernel: Clock and tasks of the nodes.
+        library: Client library that connects them.
+        records: Topics whose messages are recorded with their content.
+        epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
     """
 
     def __init__(
@@ -118,15 +131,15 @@ class TransportGraph:
         self._since = epoch
         if epoch is None:
             epoch = time_ns() - kernel.now()
-        self._context = GraphContext(kernel, free, no_route, records, epoch, Signal(kernel, "the ROS graph"))
+        self._graph = GraphContext(kernel, free, no_route, records, epoch, Signal(kernel, "the ROS graph"))
         self._library = library
         self._nodes: dict[str, TransportNode] = {}
         self._numbers = 0
 
     @property
     def epoch(self) -> Ns:
-        """What ROS time is at the kernel's zero."""
-        return self._context.epoch
+        """ROS time at the kernel's zero, ns."""
+        return self._graph.epoch
 
     def node(
         self,
@@ -137,29 +150,26 @@ class TransportGraph:
         anonymous: bool = False,
         context: ExecutionContext | None = None,
     ) -> TransportNode:
-        """Join the graph as *name*.
+        """Join the graph; see ``RosGraph.node``. `anonymous` appends the time and a number to the name.
 
-        *anonymous* adds the time and a number to the name. Raises ``UsageError`` for an invalid name or one
-        that is taken, ``LinkError`` if the graph cannot be reached.
+        Raises:
+            UsageError: the name is not valid or is taken.
+            LinkError: the graph cannot be reached.
         """
         if anonymous:
             self._numbers += 1
             name = f"{name}_{time_ns() // 1000}_{self._numbers}"
         task = self.kernel.current()
-        here = context or (task.context if task is not None else ExecutionContext(name))
-        made = TransportNode(self._context, name, namespace, remaps or {}, here)
+        context = context or (task.context if task is not None else ExecutionContext(name))
+        made = TransportNode(self._graph, name, namespace, remaps or {}, context)
         if made.name in self._nodes:
             raise UsageError(
                 f"a node named {made.name} is there already, in this process; choose another name"
             )
-        lost = partial(self._lost, made)
+        join = partial(self._library.join, name, namespace, partial(self._lost, made))
         self._nodes[made.name] = made
         try:
-            made.join(
-                run_in_thread(
-                    self.kernel, f"joining as {made.name}", lambda: self._library.wire(name, namespace, lost)
-                )
-            )
+            made.join(run_in_thread(self.kernel, f"joining as {made.name}", join))
         except BaseException:
             del self._nodes[made.name]
             raise
@@ -167,66 +177,66 @@ class TransportGraph:
         return made
 
     def _lost(self, node: TransportNode, why: str) -> None:
-        """A thread of the client library says that *node* was thrown out."""
+        """Close a node that the graph has removed. Called by a thread of the client library."""
 
-        def tell() -> None:
+        def close() -> None:
             if not node.closed:
                 self.kernel.record(Text(self.kernel.now(), node.name, WARNING, f"{node.name}: {why}"))
-                node.thrown_out(why)
+                node.removed(why)
 
-        self.kernel.post(tell)
+        self.kernel.post(close)
 
     def _leave(self, node: TransportNode) -> None:
         del self._nodes[node.name]
-        node.part()
+        node.library.close()
 
-    def tell_clock(self, node: TransportNode | str = "clock", period: Ns = CLOCK_PERIOD) -> None:
-        """Publish ``/clock`` from *node* (or a new one of that name), for others to use as their time.
+    def publish_clock(self, node: TransportNode | str = "clock", period: Ns = CLOCK_PERIOD) -> None:
+        """Publish ``/clock`` from `node`, or from a new one of that name, as the time of other nodes.
 
-        On ROS 1 ``/use_sim_time`` is set, which nodes read when they start; on ROS 2 each node is told by
-        its own parameter ``use_sim_time``.
+        On ROS 1 ``/use_sim_time`` is set, which nodes read when they start; on ROS 2 each node has its own
+        parameter ``use_sim_time``.
         """
-        self._keep_time(node, partial(publish_clock, period=period), self._library.announce_clock)
+        self._start_clock(node, partial(publish_clock, period=period), self._library.announce_clock)
 
     def follow_clock(self, node: TransportNode | str = "clock_listener") -> None:
-        """Let the kernel's time be what ``/clock`` says, heard by *node* (or a new one of that name).
+        """Set the kernel's time from ``/clock``, received by `node` or by a new one of that name.
 
-        Until it says something, time stands still. ``UsageError`` for a kernel that keeps its own time.
+        Time stands still until the first message. Raises ``UsageError`` for a kernel that keeps its own time.
         """
-        self._keep_time(node, partial(follow_clock, since=self._since))
+        self._start_clock(node, partial(follow_clock, since=self._since))
 
-    def _keep_time(
+    def _start_clock(
         self,
         where: TransportNode | str,
-        way: Callable[[GraphContext, LibraryNode], Callable[[], None]],
+        start: Callable[[GraphContext, LibraryNode], Close],
         before: Callable[[], None] = lambda: None,
     ) -> None:
         node = self.node(where) if isinstance(where, str) else where
 
-        def begin() -> Callable[[], None]:
+        def begin() -> Close:
             before()
-            return way(self._context, node.wire)
+            return start(self._graph, node.library)
 
-        node.keep(run_in_thread(self.kernel, "/clock", begin))
+        node.close_with_node(run_in_thread(self.kernel, "/clock", begin))
 
     def warn(self, text: str) -> None:
-        """Record what the client library says went wrong. From any thread."""
+        """Record a warning of the client library. From any thread."""
         self.kernel.post(lambda: self.kernel.record(Text(self.kernel.now(), "ROS", WARNING, text)))
 
     def node_names(self) -> list[str]:
-        """Who is there, sorted."""
+        """Return the names of all nodes, sorted."""
         return run_in_thread(self.kernel, "the nodes of the graph", self._library.node_names)
 
     def topics(self) -> list[TopicState]:
-        """The topics that somebody publishes or subscribes to, by name."""
+        """Return the topics that have a publisher or a subscription, by name."""
         return run_in_thread(self.kernel, "the topics of the graph", self._library.topics)
 
     def services(self) -> list[ServiceState]:
-        """The services that somebody serves, by name."""
+        """Return the services that have a server, by name."""
         return run_in_thread(self.kernel, "the services of the graph", self._library.services)
 
     def close(self) -> None:
-        """All nodes leave the graph."""
+        """Close all nodes of this process, and the client library."""
         for node in list(self._nodes.values()):
             node.close()
         self._library.close()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from volery.base.position import Position
 from volery.components.instance import Instance
 from volery.components.loader import Loader
-from volery.components.ports import Body, Port, PortList
+from volery.components.ports import ObservedVehicle, Port, PortList
 from volery.components.programs import (
     Program,
     ScriptProgram,
@@ -167,9 +167,7 @@ class Builder:
         self._part = part
         self._truth = fleet.truth if fleet else part.truth if part else None
         self._models = part.instances if part else system.instances
-        self._graph: RosGraph = (
-            part.graph if part else EmbeddedGraph(kernel, platform.price, platform.between)
-        )
+        self._graph: RosGraph = part.graph if part else EmbeddedGraph(kernel, platform.tariff, platform.route)
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._lands: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}
@@ -201,7 +199,7 @@ class Builder:
         return Instance(
             self._kernel,
             model.name,
-            self._platform.seat(model),
+            self._platform.allocation(model),
             self._platform.pricing(model),
             tuple(self._operations(model)),
             self._cpp.meters.get(model.name) or (steps.take if steps else None),
@@ -258,9 +256,9 @@ class Builder:
                 found[connection.port] = bodies if connection.many else bodies[0]
         return found
 
-    def _body(self, vehicle: str) -> Body:
+    def _body(self, vehicle: str) -> ObservedVehicle:
         assert self._fleet is not None, "components of the environment live where the vehicles are"
-        return Body(self._kernel, vehicle, self._fleet.truth(vehicle))
+        return ObservedVehicle(self._kernel, vehicle, self._fleet.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
         other = self._system.instance(callee)

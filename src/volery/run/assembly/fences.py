@@ -15,13 +15,15 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, isinf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from volery.base.errors import UsageError, choices
 from volery.base.position import AMSL, AboveHome
-from volery.model.environment import Environment, Prism
 from volery.vehicles import Fence, Zone
 from volery.vehicles.limits import Corner
+
+if TYPE_CHECKING:
+    from volery.model.environment import Environment, Prism
 
 _MAX_BYTES = 4_000_000
 

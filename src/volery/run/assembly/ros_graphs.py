@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.kernel.wall import WallKernel
-from volery.ros.graph import RosGraph
-from volery.ros.transports.transport_graph import TransportGraph
+
+if TYPE_CHECKING:
+    from volery.ros.graph import RosGraph
+    from volery.ros.transports.transport_graph import TransportGraph
 
 
 def _ros1(kernel: Kernel, start_master: bool, epoch: Ns | None) -> TransportGraph:

@@ -62,7 +62,7 @@ class GraphWire:
         """Apply *faults* to the messages in both directions from now on."""
         self._faults = faults
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Route:
+    def route(self, sender: NodeId, receiver: NodeId) -> Route:
         """Return the route between two nodes. It keeps the order of messages unless faults reorder them.
 
         See ``volery.ros.graph.Routing``.
@@ -112,7 +112,7 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
         wire: Route between each two nodes.
         as_bytes: Encode and decode each message, as a transport does.
     """
-    return EmbeddedGraph(kernel, between=wire.between, unrecorded=True, as_bytes=as_bytes)
+    return EmbeddedGraph(kernel, route=wire.route, unrecorded=True, as_bytes=as_bytes)
 
 
 Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]

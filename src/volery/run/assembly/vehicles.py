@@ -20,10 +20,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.link import Link
 from volery.links.shared_link import SharedLink
-from volery.ros.graph import RosGraph
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
-from volery.run.assembly.simulated_vehicles import HOME, SimulatedVehicle, parse_simulated
-from volery.run.assembly.vehicle_nodes import open_simulated_driver
 from volery.run.progress import VehicleProgress
 from volery.run.result import SAMPLING_PERIOD
 from volery.trace.events import VehicleState
@@ -34,7 +31,9 @@ from volery.vehicles.limits import Bounds
 from volery.vehicles.telemetry import Attitude
 
 if TYPE_CHECKING:
+    from volery.ros.graph import RosGraph
     from volery.run.assembly.simulated_fleet import SimulatedFleet
+    from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 
 EMBEDDED = "graph"
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
@@ -64,14 +63,14 @@ class VehicleSettings:
     Attributes:
         seed: Seed of the simulation.
         pace: Simulated seconds per second, or None for as fast as possible.
-        home: Home position of simulated vehicles.
+        home: Home position of simulated vehicles, or None for the default.
         limits: Limits that every operation must keep.
         fence: Geofence that every operation must keep.
     """
 
     seed: int = 1
     pace: float | None = None
-    home: Position = HOME
+    home: Position | None = None
     limits: Limits | None = None
     fence: Fence | None = None
 
@@ -102,9 +101,11 @@ def _open_simulated(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
     from volery.run.assembly.simulated_fleet import fleet_of
+    from volery.run.assembly.simulated_vehicles import HOME, parse_simulated
 
     wanted = [
-        parse_simulated(address, name, KINDS[kinds[name]], stated.home) for name, address in addresses.items()
+        parse_simulated(address, name, KINDS[kinds[name]], stated.home or HOME)
+        for name, address in addresses.items()
     ]
     for one in wanted:
         _check_home(one, stated.fence)
@@ -128,6 +129,8 @@ def _simulated_vehicle(
     kind: type[Vehicle],
     stated: VehicleSettings,
 ) -> Vehicle:
+    from volery.run.assembly.vehicle_nodes import open_simulated_driver
+
     driver = open_simulated_driver(kernel, fleet, wanted, stated.seed)
     name = wanted.vehicle.name
     return kind(kernel, name, driver, limits=stated.limits, fence=stated.fence, truth=fleet.truth(name))

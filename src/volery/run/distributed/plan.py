@@ -86,9 +86,9 @@ class HostPlatform(Platform):
     def foresee(self) -> None:
         """Do nothing: nothing is priced."""
 
-    def seat(self, instance: Instance) -> Allocation:
+    def allocation(self, instance: Instance) -> Allocation:
         """On no processor of the model's."""
-        return super().seat(replace(instance, processor=None))
+        return super().allocation(replace(instance, processor=None))
 
     def pricing(self, instance: Instance) -> Pricing:
         """Nothing."""

@@ -201,7 +201,7 @@ class DistributedRun:
         for model in self._here:
             desk.serve(model, self._built.instances[model.name])
         period = round(CLOCK_PERIOD * max(1.0, self._settings.pace))  # the same rate in wall time at any pace
-        self.graph.tell_clock(self._node, period)
+        self.graph.publish_clock(self._node, period)
         for model in self._apart:
             order = pipe.WorkerOrder(self._system, model.name, self._settings.graph, self._settings.seed)
             self._processes.append(WorkerProcess(self._kernel, self._ending, order, self._truth))

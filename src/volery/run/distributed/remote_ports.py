@@ -25,7 +25,7 @@ from volery.kernel.waiting import current_task
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
-from volery.ros.graph.callbacks import Work
+from volery.ros.graph.interface import Work
 from volery.ros.messages import Message, request, service
 from volery.run.distributed.plan import NODE, operations, service_name
 
@@ -216,7 +216,7 @@ class PortServer:
         respond = service(CALL).response
         try:
             args, kwargs = self._values.from_text(asked.arguments)
-            with instance.visited(current_task(self._kernel), operation) as thing:
+            with instance.serving(current_task(self._kernel), operation) as thing:
                 result = invoke(instance, thing, operation, tuple(args), kwargs)
             return respond(True, self._values.to_text(result, f"the result of {instance.name}.{operation}"))
         except VoleryError as error:

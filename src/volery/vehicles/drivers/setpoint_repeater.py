@@ -30,6 +30,8 @@ class SetpointRepeater(ABC):
         self, kernel: Kernel, telemetry: Telemetry, mode: str, *, velocity_period: Ns, control_period: Ns
     ) -> None:
         self.held: ManualControl | None = None
+        self.following = False
+        """Whether a velocity is repeated."""
         self._kernel = kernel
         self._telemetry = telemetry
         self._mode = mode
@@ -71,6 +73,7 @@ class SetpointRepeater(ABC):
                 self.end_velocity()
                 self.send_stop()
 
+        self.following = True
         self._velocity_handle = self._kernel.every(self._velocity_period, repeat)
 
     def end_velocity(self) -> None:
@@ -78,6 +81,7 @@ class SetpointRepeater(ABC):
         if self._velocity_handle is not None:
             self._velocity_handle.cancel()
             self._velocity_handle = None
+            self.following = False
 
     def braking_step(self) -> Step:
         """Return a step that sends a velocity of zero until the vehicle is at rest."""

@@ -37,11 +37,11 @@ class OnGraph:
         self.kernel = VirtualKernel(record=self.events.append)
         link, theirs = in_process_pair(self.kernel, MS, "radio", PPRZLINK)
         self.aircraft = peer(self.kernel, theirs)
-        self.graph = EmbeddedGraph(self.kernel, between=self._between)
+        self.graph = EmbeddedGraph(self.kernel, route=self._route)
         if bridged:
             serve_pprzros(self.graph, link, "bee", ExecutionContext("bridge"))
 
-    def _between(self, one: Any, other: Any) -> Any:
+    def _route(self, one: Any, other: Any) -> Any:
         return lambda size, sure, deliver, lost: self.kernel.call_at(self.kernel.now() + MS, deliver)
 
     def fly(self, mission: Callable[[Any], Any], **options: str) -> Any:

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
+from volery.cost import Price
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch
-from volery.ros.graph import Cost, EmbeddedGraph, EmbeddedNode, free
+from volery.ros.graph import EmbeddedGraph, EmbeddedNode
 
 
 class Stage:
@@ -23,15 +24,18 @@ class Stage:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(self.events.append)
         self.priced: list[tuple[str, str]] = []
-        self.graph = EmbeddedGraph(self.kernel, self._price)
+        self.graph = EmbeddedGraph(self.kernel, self._tariff)
         self.launched: dict[str, Launch] = {}
         self.nodes: dict[str, EmbeddedNode] = {}
         self.modules = importable_modules(self.graph, self.launched, self.nodes)
         self.out: list[Any] = []
 
-    def _price(self, node: Any, call: str, x: float) -> Cost:
-        self.priced.append((node.name, call))
-        return free(node, call, x)
+    def _tariff(self, node: Any) -> Any:
+        def price(call: str, x: float) -> Price:
+            self.priced.append((node.name, call))
+            return Price(0, 0)
+
+        return price
 
     def load(self, text: str) -> ModuleType:
         def find(

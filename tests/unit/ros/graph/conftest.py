@@ -32,13 +32,16 @@ class Rig:
         self.graph = self.new_graph()
 
     def new_graph(self, **options: Any) -> EmbeddedGraph:
-        return EmbeddedGraph(self.kernel, self.price, self.between, **options)
+        return EmbeddedGraph(self.kernel, self.tariff, self.route, **options)
+
+    def tariff(self, node: NodeId) -> Callable[[str, float], Price]:
+        return lambda call, x: self.price(node, call, x)
 
     def price(self, node: NodeId, call: str, x: float) -> Price:
         self.asked.append((node.name, call, x))
         return self.prices.get(call, Price(0, 0))
 
-    def between(self, sender: NodeId, receiver: NodeId) -> Route:
+    def route(self, sender: NodeId, receiver: NodeId) -> Route:
         def way(size: int, reliable: bool, deliver: Any, lost: Any) -> None:
             self.carried.append((sender, receiver, size, reliable))
             arrives = lost if self.loses and not reliable else deliver
@@ -47,8 +50,8 @@ class Rig:
         return way
 
     def task(self, body: Callable[[], None], name: str = "component", on_processor: bool = False) -> None:
-        place = ExecutionContext(name, self.processor if on_processor else None)
-        self.kernel.spawn(body, name, place)
+        context = ExecutionContext(name, self.processor if on_processor else None)
+        self.kernel.spawn(body, name, context)
 
     def run(self, *bodies: Callable[[], None], until: int = 100 * S) -> None:
         """Run each body as a component of its own (named after the function)."""

@@ -79,9 +79,12 @@ def test_a_service_is_answered_in_no_time() -> None:
 def test_an_unrecorded_graph_says_nothing_and_asks_for_no_price_of_what_nobody_executes() -> None:
     asked: list[str] = []
 
-    def price(node: Any, call: str, x: float) -> Any:
-        asked.append(call)
-        raise AssertionError(call)
+    def tariff(node: Any) -> Any:
+        def price(call: str, x: float) -> Any:
+            asked.append(call)
+            raise AssertionError(call)
+
+        return price
 
     def both(graph: EmbeddedGraph) -> None:
         node = graph.node("both")
@@ -89,6 +92,6 @@ def test_an_unrecorded_graph_says_nothing_and_asks_for_no_price_of_what_nobody_e
         node.advertise("chat", STRING).publish(messages.new(STRING))
         node.spin_once()
 
-    events = played(both, price=price, unrecorded=True)
+    events = played(both, tariffs=tariff, unrecorded=True)
     assert not [event for event in events if isinstance(event, Charge | Message)]
     assert asked == []

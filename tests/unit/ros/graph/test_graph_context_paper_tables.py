@@ -36,7 +36,7 @@ def ros_time(law: RosLaw, mhz: int) -> tuple[int, int]:
     tariff = law.at(mhz)
     graph = EmbeddedGraph(
         kernel,
-        lambda node, call, x: tariff(call, x),
+        lambda node: tariff,
         lambda sender, receiver, size, reliable, deliver, lost: None,
     )
 

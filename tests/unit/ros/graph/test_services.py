@@ -67,7 +67,7 @@ def test_nobody_serves_it(rig: Any) -> None:
     def client() -> None:
         node = rig.graph.node("client")
         node.serve("switch", SET_BOOL, lambda request: answer())
-        with pytest.raises(ServiceError, match=r"/swich: nobody serves it.*did you mean '/switch'"):
+        with pytest.raises(ServiceError, match=r"/swich: no node serves it.*did you mean '/switch'"):
             node.client("swich", SET_BOOL).call(asked(True))
 
     rig.run(client)

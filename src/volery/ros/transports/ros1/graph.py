@@ -71,7 +71,7 @@ class Ros1Library:
     def _pass_on(self, text: str) -> None:
         self.say(text)
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Node:
+    def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Node:
         """Register a node."""
         made = Ros1Node(self._types, name, namespace, lost)
         with self._guard:

@@ -225,7 +225,7 @@ class Ros1Node:
         ros1_service(kind.name)
         return Ros1ServiceServer(self.rospy, name, kind, asked, self._while_there)
 
-    def caller(self, name: str, kind: ServiceType) -> Ros1ServiceClient:
+    def client(self, name: str, kind: ServiceType) -> Ros1ServiceClient:
         """Call a service."""
         return Ros1ServiceClient(self.rospy, self.master, name, kind)
 
@@ -281,7 +281,7 @@ class Ros1Node:
         if not self.closed:
             _aside(work)
 
-    def leave(self) -> None:
+    def prepare_close(self) -> None:
         """What it has made goes with it."""
         self._closing = True
 

@@ -79,7 +79,7 @@ class Ros2Node:
                 raise UsageError(f"node {self.name}: service {name} is served by {one.server} already")
         return Ros2ServiceServer(self._node, name, kind, asked)
 
-    def caller(self, name: str, kind: ServiceType) -> Ros2ServiceClient:
+    def client(self, name: str, kind: ServiceType) -> Ros2ServiceClient:
         """Call a service."""
         return Ros2ServiceClient(self._node, name, kind)
 
@@ -112,7 +112,7 @@ class Ros2Node:
         of, rest = self._parameters(name)
         of.delete(rest)
 
-    def leave(self) -> None:
+    def prepare_close(self) -> None:
         """Nothing need be known before."""
 
     def close(self) -> None:
@@ -179,7 +179,7 @@ class Ros2Library:
                 said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
                 self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
 
-    def wire(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
+    def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
         """Make a node."""
         full = names.node_name(name, namespace)
         if self._is_taken(full):

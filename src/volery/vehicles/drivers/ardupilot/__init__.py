@@ -1,4 +1,4 @@
-"""ArduPilot: its sequences, written once, and two ways to reach it: a MAVLink link, and MAVROS on a graph."""
+"""ArduPilot: one driver with two backends, a MAVLink link and MAVROS on a graph."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from volery.vehicles.drivers.mavlink.driver import DriverOpeners
 
 __all__ = ["DRIVER", "ArduPilot", "open_driver", "open_mavros"]
 
-_OPENING = DriverOpeners("ardupilot", ArduPilot, ArduPilotMavlink, ArduPilotMavros)
+_OPENERS = DriverOpeners("ardupilot", ArduPilot, ArduPilotMavlink, ArduPilotMavros)
 
-open_driver = _OPENING.on_link
-open_mavros = _OPENING.on_graph
+open_driver = _OPENERS.on_link
+open_mavros = _OPENERS.on_graph
 
 DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
-"""ArduPilot on a MAVLink link; on a graph it goes by MAVROS's names."""

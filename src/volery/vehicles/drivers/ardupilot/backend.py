@@ -1,11 +1,4 @@
-"""What an ArduPilot can be sent, beyond what every MAVLink autopilot can.
-
-What an ArduPilot's messages say beyond those of every MAVLink autopilot.
-
-ArduPilot over a MAVLink link.
-
-ArduPilot over MAVROS.
-"""
+"""What can be sent to an ArduPilot, over MAVLink and over MAVROS, and its telemetry decoder."""
 
 from __future__ import annotations
 
@@ -21,109 +14,109 @@ from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new
 from volery.vehicles.drivers.ardupilot.link_loss import LINK_LOSS_PARAMETERS
-from volery.vehicles.drivers.ardupilot.modes import NUMBERS, mode_name
-from volery.vehicles.drivers.mavlink import backend as key
-from volery.vehicles.drivers.mavlink import decoder
+from volery.vehicles.drivers.ardupilot.modes import NUMBERS, RESTING, mode_name
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
-    LEFT_ALONE,
     POSITION_ONLY,
-    SHORTEST_WAY,
+    SHORTEST_TURN,
+    UNCHANGED_CHANNEL,
     VELOCITY_AND_YAW_RATE,
+    Ack,
     Backend,
-    frame_of,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
-from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, clockwise
+from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
+from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 RELEASED = 0
-"""The pulse width that gives a channel back to the transmitter."""
+"""Pulse width that gives a channel back to the transmitter."""
+CHANNELS = 18
+"""Length of the array in MAVROS's OverrideRCIn."""
+
+ARDUPILOT_FIRMWARE = Firmware(
+    number=constant("MAV_AUTOPILOT_ARDUPILOTMEGA"),
+    name="ArduPilot",
+    called="an ArduPilot",
+    oldest=(4, 0),  # the first version with requests of single messages
+    estimator="EKF_STATUS_REPORT",
+)
 
 
 class ArduPilotBackend(Backend, Protocol):
-    """The port between ArduPilot's sequences and what carries them."""
+    """Commands of ArduPilot beyond those of every MAVLink autopilot."""
 
     def takeoff(self, height: float) -> None:
-        """Climb to metres above home, from the ground, armed, in GUIDED."""
+        """Climb to *height* metres above home, from the ground, armed, in GUIDED."""
 
-    def target(self, goal: Position) -> None:
-        """In GUIDED: go there. Has no answer and no time-out."""
+    def send_target(self, goal: Position) -> None:
+        """Go to *goal* in GUIDED. There is no acknowledgement, and the target does not expire."""
 
-    def follow(self, velocity: Velocity, yaw_rate: float) -> None:
-        """In GUIDED: m/s, and degrees/s clockwise. Has no answer; stands for 3 s."""
+    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Follow a velocity (m/s) and yaw rate (degrees/s, clockwise) in GUIDED for 3 s. Not acknowledged."""
 
     def turn(self, degrees: float) -> None:
-        """In GUIDED: to this heading."""
+        """Turn to a heading in GUIDED."""
 
-    def override(self, channels: Sequence[int | None]) -> None:
-        """Pulse widths of channels 1 to 4 in microseconds; ``RELEASED``, or ``None`` for leave it alone."""
+    def override_channels(self, channels: Sequence[int | None]) -> None:
+        """Override RC channels 1 to 4 with pulse widths in µs; ``RELEASED``, or ``None`` for no change."""
 
     def start_mission(self) -> None:
-        """In AUTO, armed: begin."""
+        """Start the mission in AUTO, armed."""
 
 
-class ArduPilotDecoder(decoder.TelemetryDecoder):
-    """ArduPilot's mode names; its estimator speaks in EKF_STATUS_REPORT."""
+class ArduPilotDecoder(TelemetryDecoder):
+    """Decodes ArduPilot's mode names and its estimator's EKF_STATUS_REPORT."""
 
     autopilot = "ArduPilot"
-    resting = "HOLD"
+    resting = RESTING
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
         super().__init__(kernel, telemetry, record=record)
         self._handlers["EKF_STATUS_REPORT"] = self._estimator
 
     def _mode_name(self, number: int) -> str:
-        return mode_name(self._seen.kind, number)
-
-
-ARDUPILOT_FIRMWARE = Firmware(
-    number=constant("MAV_AUTOPILOT_ARDUPILOTMEGA"),
-    name="ArduPilot",
-    called="an ArduPilot",
-    oldest=(4, 0),  # the first that can be asked for single messages
-    estimator="EKF_STATUS_REPORT",
-)
+        return mode_name(self._telemetry.kind, number)
 
 
 class ArduPilotMavlink(MavlinkClient):
-    """See ``Commands``."""
+    """ArduPilot on a MAVLink link. See ``ArduPilotBackend``."""
 
     firmware = ARDUPILOT_FIRMWARE
 
-    def _listener(self, record: bool) -> ArduPilotDecoder:
+    def _make_decoder(self, record: bool) -> ArduPilotDecoder:
         return ArduPilotDecoder(self._kernel, self.telemetry, record=record)
 
-    def _wanted(self) -> Sequence[str]:
+    def _requested_parameters(self) -> Sequence[str]:
         return LINK_LOSS_PARAMETERS.get(self.telemetry.kind, ())
 
     def set_mode(self, mode: str) -> None:
-        """By DO_SET_MODE."""
+        """Send DO_SET_MODE."""
         number = NUMBERS.get(self.telemetry.kind, {}).get(mode)
         if number is None:
             raise UsageError(f"{self.telemetry.name} has no mode {mode!r}")
         self._command("MAV_CMD_DO_SET_MODE", constant("MAV_MODE_FLAG_CUSTOM_MODE_ENABLED"), number)
 
     def takeoff(self, height: float) -> None:
-        """By NAV_TAKEOFF, whose altitude ArduPilot takes above home."""
+        """Send NAV_TAKEOFF, whose altitude ArduPilot takes as above home."""
         self._command("MAV_CMD_NAV_TAKEOFF", 0, 0, 0, 0, 0, 0, height)
 
-    def target(self, goal: Position) -> None:
-        """By SET_POSITION_TARGET_GLOBAL_INT; a rover's has no altitude."""
+    def send_target(self, goal: Position) -> None:
+        """Send SET_POSITION_TARGET_GLOBAL_INT; a rover's target has no altitude."""
         if self.telemetry.kind != DRONE_KIND:
             goal = Position(goal.latitude, goal.longitude, AboveHome(0.0))
         self._send_to(
             "SET_POSITION_TARGET_GLOBAL_INT",
-            coordinate_frame=INT_FRAMES[frame_of(goal)],
+            coordinate_frame=INT_FRAMES[type(goal.altitude)],
             type_mask=POSITION_ONLY,
             lat_int=round(goal.latitude * 1e7),
             lon_int=round(goal.longitude * 1e7),
             alt=goal.altitude.metres,
         )
 
-    def follow(self, velocity: Velocity, yaw_rate: float) -> None:
-        """By SET_POSITION_TARGET_LOCAL_NED."""
+    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Send SET_POSITION_TARGET_LOCAL_NED."""
         self._send_to(
             "SET_POSITION_TARGET_LOCAL_NED",
             coordinate_frame=constant("MAV_FRAME_LOCAL_NED"),
@@ -135,29 +128,26 @@ class ArduPilotMavlink(MavlinkClient):
         )
 
     def turn(self, degrees: float) -> None:
-        """By CONDITION_YAW."""
-        self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_WAY, 0.0)
+        """Send CONDITION_YAW."""
+        self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_TURN, 0.0)
 
-    def override(self, channels: Sequence[int | None]) -> None:
-        """By RC_CHANNELS_OVERRIDE; the other channels are left alone."""
-        named = {f"chan{number}_raw": LEFT_ALONE for number in range(1, 9)}
+    def override_channels(self, channels: Sequence[int | None]) -> None:
+        """Send RC_CHANNELS_OVERRIDE; the other channels are unchanged."""
+        named = {f"chan{number}_raw": UNCHANGED_CHANNEL for number in range(1, 9)}
         for number, width in enumerate(channels, 1):
             if width is not None:
                 named[f"chan{number}_raw"] = width
         self._send_to("RC_CHANNELS_OVERRIDE", **named)
 
     def start_mission(self) -> None:
-        """By MISSION_START."""
+        """Send MISSION_START."""
         self._command("MAV_CMD_MISSION_START", 0.0, 0.0)
 
 
-CHANNELS = 18
-
-
 class ArduPilotMavros(MavrosBackend):
-    """See ``Commands``."""
+    """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
 
-    behind = FirmwareBehind("ArduPilot", "HOLD")
+    firmware = FirmwareBehind("ArduPilot", RESTING)
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)
@@ -166,19 +156,19 @@ class ArduPilotMavros(MavrosBackend):
         self._override = node.advertise(self._name("rc/override"), "mavros_msgs/msg/OverrideRCIn")
 
     def turn(self, degrees: float) -> None:
-        """``cmd/command`` with CONDITION_YAW."""
-        answer = self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_WAY, 0.0)
-        self._answer(key.HEADING, answer)
+        """Call ``cmd/command`` with CONDITION_YAW."""
+        response = self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_TURN, 0.0)
+        self._note_answer(Ack.HEADING, response)
 
     def start_mission(self) -> None:
-        """``cmd/command`` with MISSION_START."""
-        self._answer(key.START, self._command("MAV_CMD_MISSION_START", 0.0, 0.0))
+        """Call ``cmd/command`` with MISSION_START."""
+        self._note_answer(Ack.START, self._command("MAV_CMD_MISSION_START", 0.0, 0.0))
 
-    def target(self, goal: Position) -> None:
-        """``setpoint_raw/global``: the altitude goes through in the frame that is named."""
+    def send_target(self, goal: Position) -> None:
+        """Publish on ``setpoint_raw/global``; the altitude is passed on in the stated frame."""
         message = new(
             "mavros_msgs/msg/GlobalPositionTarget",
-            coordinate_frame=INT_FRAMES[frame_of(goal)],
+            coordinate_frame=INT_FRAMES[type(goal.altitude)],
             type_mask=POSITION_ONLY,
             latitude=goal.latitude,
             longitude=goal.longitude,
@@ -186,12 +176,12 @@ class ArduPilotMavros(MavrosBackend):
         )
         self._target.publish(message)
 
-    def follow(self, velocity: Velocity, yaw_rate: float) -> None:
-        """``setpoint_raw/local``."""
-        self._publish_velocity(velocity, VELOCITY_AND_YAW_RATE, yaw_rate=clockwise(yaw_rate))
+    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Publish on ``setpoint_raw/local``."""
+        self._publish_velocity(velocity, VELOCITY_AND_YAW_RATE, yaw_rate=to_ros_yaw_rate(yaw_rate))
 
-    def override(self, channels: Sequence[int | None]) -> None:
-        """``rc/override``."""
-        widths = [LEFT_ALONE if width is None else width for width in channels]
-        widths += [LEFT_ALONE] * (CHANNELS - len(widths))
+    def override_channels(self, channels: Sequence[int | None]) -> None:
+        """Publish on ``rc/override``."""
+        widths = [UNCHANGED_CHANNEL if width is None else width for width in channels]
+        widths += [UNCHANGED_CHANNEL] * (CHANNELS - len(widths))
         self._override.publish(new("mavros_msgs/msg/OverrideRCIn", channels=widths))

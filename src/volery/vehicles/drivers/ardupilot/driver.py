@@ -1,11 +1,9 @@
-"""Missions as ArduPilot wants them: item 0 is home, which it fills in itself.
+"""Driver of ArduPilot's Copter and Rover: the steps of each operation.
 
-ArduPilot's sequences, written once: what its Copter and Rover want to be asked, and how one sees it done.
-
-They reach it over ``ArduPilotBackend``. Facts behind them, observed on ArduCopter and ArduRover 4.5: a change of mode
-is accepted on the ground without a position, arming in GUIDED is not; so it waits until the vehicle is ready.
-An accepted command is acknowledged before the heartbeat shows it. A target in GUIDED has no acknowledgement
-and never expires; a velocity stands for 3 s. Sticks fall back on the transmitter after 3 s.
+Facts observed on ArduCopter and ArduRover 4.5: a change of mode is accepted on the ground without a position,
+arming in GUIDED is not; so the driver waits until the vehicle is ready. An accepted command is acknowledged
+before the heartbeat shows its effect. A target in GUIDED is not acknowledged and never expires; a velocity lasts
+3 s. Manual control falls back on the transmitter after 3 s.
 """
 
 from __future__ import annotations
@@ -20,10 +18,9 @@ from volery.kernel.api import Kernel
 from volery.vehicles.driver import ManualControl, Step
 from volery.vehicles.drivers.ardupilot.backend import ArduPilotBackend
 from volery.vehicles.drivers.ardupilot.link_loss import on_link_loss
-from volery.vehicles.drivers.ardupilot.modes import GUIDED
+from volery.vehicles.drivers.ardupilot.modes import GUIDED, RESTING
 from volery.vehicles.drivers.ardupilot.setpoints import ArduPilotSetpoints
-from volery.vehicles.drivers.mavlink import backend as key
-from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Item, item
+from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Ack, Item, mission_item
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
@@ -44,59 +41,32 @@ from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, 
 from volery.vehicles.telemetry import Velocity
 
 
-def items_of(mission: Sequence[MissionItem]) -> list[Item]:
-    """The items on the wire, home first."""
-    items = [item("MAV_CMD_NAV_WAYPOINT")]
-    for one in mission:
-        items += _translated(one)
-    return items
-
-
-def _translated(one: MissionItem) -> list[Item]:
-    if isinstance(one, TakeOff):
-        return [item("MAV_CMD_NAV_TAKEOFF", z=one.height)]
-    if isinstance(one, ChangeSpeed):
-        return [item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED)]
-    if isinstance(one, ReturnHome):
-        return [item("MAV_CMD_NAV_RETURN_TO_LAUNCH")]
-    if isinstance(one, Land):
-        return [item("MAV_CMD_NAV_LAND", at=one.position)]
-    return _waypoint(one)
-
-
-def _waypoint(one: Waypoint) -> list[Item]:
-    point = item("MAV_CMD_NAV_WAYPOINT", one.stay_s, at=one.position)
-    if isnan(one.heading):
-        return [point]
-    return [item("MAV_CMD_CONDITION_YAW", one.heading), point]
-
-
 class ArduPilot(MavlinkDriver):
-    """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
+    """Driver of an ArduPilot. See ``vehicles.driver.Driver`` for the operations."""
 
     obeys = GUIDED
     landing_modes = frozenset({"LAND", "RTL", "SMART_RTL", "AUTO_RTL"})
+    _backend: ArduPilotBackend
 
-    def __init__(self, kernel: Kernel, name: str, commands: ArduPilotBackend) -> None:
-        super().__init__(kernel, name, commands)
-        self._commands = commands
-        self._setpoints = ArduPilotSetpoints(kernel, commands)
+    def __init__(self, kernel: Kernel, name: str, backend: ArduPilotBackend) -> None:
+        super().__init__(kernel, name, backend)
+        self._setpoints = ArduPilotSetpoints(kernel, backend)
 
     def on_link_loss(self) -> str:
-        """From its failsafe for ground stations."""
-        parameters = self._commands.parameters
+        """Return the reaction to a lost link, from the failsafe for ground stations."""
+        parameters = self._backend.parameters
         return on_link_loss(self.telemetry.kind, parameters) if parameters is not None else ""
 
     # -- from the ground
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """Ready, GUIDED, armed, up: within 10 s of each other, or it disarms itself."""
+        """Wait until ready, enter GUIDED, arm and climb; ArduPilot disarms itself 10 s after arming."""
         climb = Step(
             ask=f"climb to {height:g} m",
-            send=lambda: self._commands.takeoff(height),
+            send=lambda: self._backend.takeoff(height),
             done=climbed_to(height),
             within=within,
-            answer=key.TAKEOFF,
+            answer=Ack.TAKEOFF,
             again=2 * S,
             mode=GUIDED,
             armed=True,
@@ -104,47 +74,53 @@ class ArduPilot(MavlinkDriver):
         return (*self._armed_in_guided(), climb)
 
     def _armed_in_guided(self) -> Sequence[Step]:
-        """Whoever changes the mode meanwhile has it: to arm in another one is not what was asked."""
-        armed = (replace(step, mode=GUIDED) for step in self.arm())
-        return (*self.ready(READY_WITHIN), *self._guided(), *armed)
+        """A pilot who changes the mode meanwhile has control: arming in another mode is not intended."""
+        arm = (replace(step, mode=GUIDED) for step in self.arm())
+        return (*self.ready(READY_WITHIN), *self._guided(), *arm)
 
-    # -- by position
+    # -- operations with a position
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """GUIDED, then a target, until it shows that it goes there; a rover is armed on the way."""
+        """Enter GUIDED and send a target until it is reported; a rover is armed first."""
         rover = self.telemetry.kind != DRONE_KIND
         start = self._armed_in_guided() if rover else self._guided()
 
         def send() -> None:
-            self._commands.target(goal)
-            self._commands.watch_target()
+            self._backend.send_target(goal)
+            self._backend.request_target()
 
-        target = TargetMonitor(self.telemetry, self._eviction).reach(goal, send, GUIDED, within, rover=rover)
-        return (*start, *(self._at_speed(speed, GUIDED) if speed is not None else ()), target)
+        monitor = TargetMonitor(self.telemetry, self._takeover)
+        reach = monitor.step(goal, send, GUIDED, within, rover=rover)
+        if speed is None:
+            return (*start, reach)
+        return (*start, self._set_speed(speed, GUIDED), reach)
 
     def hold(self) -> Sequence[Step]:
-        """A rover in HOLD; a drone in GUIDED, first without velocity, then where it has stopped."""
+        """Stop a rover in HOLD; stop a drone in GUIDED by a velocity of zero, then hold that position."""
         if self.telemetry.kind != DRONE_KIND:
-            stand = Step(ask="stand", send=send_nothing, done=at_rest, within=STOPPED_WITHIN, mode="HOLD")
-            return (*self._change("HOLD"), stand)
-        return (*self._guided(), self._setpoints.braking(), immediate_step("stay", self._stay))
+            stand = Step(ask="stand", send=send_nothing, done=at_rest, within=STOPPED_WITHIN, mode=RESTING)
+            return (self._change_mode(RESTING), stand)
+        return (*self._guided(), self._setpoints.braking_step(), immediate_step("stay", self._stay))
+
+    def _stay(self) -> None:
+        here = self.telemetry.position
+        if here is not None and isfinite(self.telemetry.above_home):
+            above = AboveHome(self.telemetry.above_home)
+            self._backend.send_target(Position(here.latitude, here.longitude, above))
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """GUIDED, then repeated until it has lasted long enough; then it stops."""
-        return (
-            *self._guided(),
-            immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting)),
-        )
+        """Enter GUIDED and repeat a velocity for *lasting*, then stop."""
+        follow = immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting))
+        return (*self._guided(), follow)
 
     def heading(self, degrees: float) -> Sequence[Step]:
-        """In GUIDED, on the spot."""
-
+        """Turn in place in GUIDED."""
         turn = Step(
             ask=f"turn to {degrees:g} degrees",
-            send=lambda: self._commands.turn(degrees),
+            send=lambda: self._backend.turn(degrees),
             done=heading_reached(degrees),
             within=TURNED_WITHIN,
-            answer=key.HEADING,
+            answer=Ack.HEADING,
             again=2 * S,
             mode=GUIDED,
             armed=True,
@@ -152,94 +128,114 @@ class ArduPilot(MavlinkDriver):
         return (*self._guided(), turn)
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """RTL. A drone lands and disarms itself; a rover stops near home."""
+        """Enter RTL. A drone lands and disarms itself; a rover stops near home."""
         if self.telemetry.kind == DRONE_KIND:
             return self._until_disarmed("RTL", "return home and land", within)
-
-        come = self._comes_home("RTL", "HOLD", within)
-        return (*self._change("RTL"), immediate_step("let go of the sticks", self._setpoints.release), come)
+        return (self._change_mode("RTL"), self._release_step(), self._reach_home("RTL", RESTING, within))
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """LAND, until it has disarmed itself."""
+        """Enter LAND; done when the autopilot has disarmed itself."""
         return self._until_disarmed("LAND", "land", within)
 
-    # -- by sticks
+    # -- manual flight
 
     def stabilize(self) -> Sequence[Step]:
-        """STABILIZE, with the sticks held. In the air not with an idle throttle: it would fall."""
+        """Enter STABILIZE with manual control repeated; in the air not with an idle throttle."""
         self._setpoints.hold_any()
         check_throttle(self.telemetry, self._setpoints.held)
-        return self._change("STABILIZE")
+        return (self._change_mode("STABILIZE"),)
 
     def altitude_hold(self) -> Sequence[Step]:
-        """ALT_HOLD, with the sticks held."""
+        """Enter ALT_HOLD with manual control repeated."""
         self._setpoints.hold_any()
-        return self._change("ALT_HOLD")
+        return (self._change_mode("ALT_HOLD"),)
 
     def manual(self) -> Sequence[Step]:
-        """MANUAL, with the sticks held."""
+        """Enter MANUAL with manual control repeated."""
         if self._setpoints.held is None:
             self._setpoints.hold(ManualControl(throttle=0.0))
-        return self._change("MANUAL")
+        return (self._change_mode("MANUAL"),)
 
-    def manual_control(self, sticks: ManualControl | None) -> None:
-        """Keep sending them, as long as the mode is ours."""
-        self._setpoints.take(sticks)
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Repeat *control* while the mode is ours; ``None`` ends the repetition."""
+        self._setpoints.set_control(control)
 
     def stop(self) -> None:
-        """No set-point and no stick is repeated any more."""
+        """Stop repeating set-points and manual control."""
         self._setpoints.end()
 
     # -- missions
 
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
-        return items_of(mission)
+        return mission_items(mission)
 
-    def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
-        """Item 0 is home; of one waypoint with a heading the waypoint is the last."""
-        return len(items_of(mission)) - 1 if isinstance(mission[-1], Waypoint) else None
+    def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
+        """Item 0 is home; a waypoint with a heading is two items, of which the waypoint is the last."""
+        return len(mission_items(mission)) - 1 if isinstance(mission[-1], Waypoint) else None
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Ready, GUIDED, armed, AUTO, start; to its end: disarmed, at the last point, or said to be over."""
+        """Wait until ready, arm in GUIDED, enter AUTO and start; done when the mission has ended."""
         begin = Step(
             ask="start the mission",
-            send=self._commands.start_mission,
-            done=lambda seen: key.START in seen.answers and seen.answers[key.START].accepted,
+            send=self._backend.start_mission,
+            done=lambda seen: Ack.START in seen.answers and seen.answers[Ack.START].accepted,
             within=ANSWERED_WITHIN,
-            answer=key.START,
+            answer=Ack.START,
             again=2 * S,
             mode="AUTO",
             armed=True,
         )
-        go_on = self._finish_mission("AUTO", ("HOLD", "RTL"), within)
-        prepare = immediate_step("prepare the mission", self._forget_progress)
-        armed = (*self.ready(READY_WITHIN), *self._guided(), *self.arm())
-        return (*armed, prepare, *self._change("AUTO"), begin, go_on)
+        return (
+            *self.ready(READY_WITHIN),
+            *self._guided(),
+            *self.arm(),
+            immediate_step("prepare the mission", self._forget_progress),
+            self._change_mode("AUTO"),
+            begin,
+            self._finish_mission("AUTO", (RESTING, "RTL"), within),
+        )
 
-    # -- pieces of sequences
+    # -- common steps
 
-    def _asks_for(self, mode: str) -> None:
-        self._setpoints.asked_mode = mode
+    def _note_commanded(self, mode: str) -> None:
+        self._setpoints.commanded_mode = mode
 
-    def _change(self, mode: str) -> Sequence[Step]:
-        self._setpoints.unfollow()
-        return super()._change(mode)
+    def _change_mode(self, mode: str) -> Step:
+        if self._setpoints.following:
+            self._setpoints.end_velocity()
+        return super()._change_mode(mode)
 
     def _guided(self) -> Sequence[Step]:
-        """GUIDED first; only then are the sticks let go."""
-        return (*self._change(GUIDED), immediate_step("let go of the sticks", self._setpoints.release))
+        """Enter GUIDED and only then release manual control."""
+        return (self._change_mode(GUIDED), self._release_step())
+
+    def _release_step(self) -> Step:
+        return immediate_step("let go of the sticks", self._release)
+
+    def _release(self) -> None:
+        if self._setpoints.held is not None:
+            self._setpoints.release()
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        return (
-            *self._change(mode),
-            immediate_step("let go of the sticks", self._setpoints.release),
-            disarmed_step(ask, mode, within),
-        )
+        return (self._change_mode(mode), self._release_step(), disarmed_step(ask, mode, within))
 
-    def _stay(self) -> None:
-        here = self.telemetry.position
-        if here is not None and isfinite(self.telemetry.above_home):
-            above = AboveHome(self.telemetry.above_home)
-            self._commands.target(Position(here.latitude, here.longitude, above))
+
+def mission_items(mission: Sequence[MissionItem]) -> list[Item]:
+    """Return the mission as ArduPilot's items. Item 0 is home, which ArduPilot fills in itself."""
+    items = [mission_item("MAV_CMD_NAV_WAYPOINT")]
+    for one in mission:
+        if isinstance(one, TakeOff):
+            items.append(mission_item("MAV_CMD_NAV_TAKEOFF", z=one.height))
+        elif isinstance(one, ChangeSpeed):
+            items.append(mission_item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED))
+        elif isinstance(one, ReturnHome):
+            items.append(mission_item("MAV_CMD_NAV_RETURN_TO_LAUNCH"))
+        elif isinstance(one, Land):
+            items.append(mission_item("MAV_CMD_NAV_LAND", at=one.position))
+        else:
+            if not isnan(one.heading):
+                items.append(mission_item("MAV_CMD_CONDITION_YAW", one.heading))
+            items.append(mission_item("MAV_CMD_NAV_WAYPOINT", one.stay_s, at=one.position))
+    return items

@@ -1,4 +1,4 @@
-"""ArduPilot's modes by number. Facts of the firmware (``ArduCopter/mode.h``, ``Rover/mode.h``)."""
+"""ArduPilot's modes by number, from the firmware (``ArduCopter/mode.h``, ``Rover/mode.h``)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 
 GUIDED = "GUIDED"
+RESTING = "HOLD"
+"""Mode in which an armed rover stands."""
 
 COPTER: Mapping[int, str] = {
     0: "STABILIZE",
@@ -41,7 +43,7 @@ ROVER: Mapping[int, str] = {
     0: "MANUAL",
     1: "ACRO",
     3: "STEERING",
-    4: "HOLD",
+    4: RESTING,
     5: "LOITER",
     6: "FOLLOW",
     7: "SIMPLE",
@@ -61,5 +63,5 @@ NUMBERS: Mapping[str, Mapping[str, int]] = {
 
 
 def mode_name(kind: str, number: int) -> str:
-    """The name of a mode; its number in words if the firmware is newer than this table."""
+    """Return the name of a mode; a name with its number if the firmware is newer than this table."""
     return MODES.get(kind, {}).get(number, f"MODE {number}")

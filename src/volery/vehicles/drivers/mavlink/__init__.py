@@ -1,4 +1,4 @@
-"""What drivers of MAVLink autopilots share: finding the autopilot, telemetry, commands, missions, parameters.
+"""What drivers of MAVLink autopilots share: client, telemetry, commands, missions and parameters.
 
-What one firmware does differently from another stands in that firmware's own room.
+What differs between firmwares belongs to the package of the firmware.
 """

@@ -1,8 +1,6 @@
-"""MAVLink's numbers that drivers use.
+"""What can be sent to any MAVLink autopilot: the interface of its two backends, mission items, and constants.
 
-The port between a firmware's sequences and what carries them: MAVLink itself, or MAVROS on a graph.
-
-Missions as items of MAVLink's mission protocol.
+A driver reaches its autopilot through a backend: a MAVLink link, or MAVROS topics and services on a graph.
 """
 
 from __future__ import annotations
@@ -11,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from volery.base.errors import CapabilityError, LinkError, UsageError
-from volery.base.position import AMSL, AboveGround, AboveHome, Position
+from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.kernel.api import Action
 from volery.links.mavlink_messages import constant
 from volery.vehicles.telemetry import Telemetry
@@ -27,10 +25,10 @@ FORCE = 21196.0
 GROUND_SPEED = 1.0
 UNCHANGED = -1.0
 OWN_SPEED = -1.0
-"""In DO_CHANGE_SPEED: back to the autopilot's own."""
-SHORTEST_WAY = 0.0
+"""In DO_CHANGE_SPEED: back to the autopilot's own speed."""
+SHORTEST_TURN = 0.0
 
-LEFT_ALONE = 65535
+UNCHANGED_CHANNEL = 65535
 """In RC_CHANNELS_OVERRIDE: this channel stays as it is."""
 
 ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
@@ -39,20 +37,37 @@ FAILSAFE = (constant("MAV_STATE_CRITICAL"), constant("MAV_STATE_EMERGENCY"))
 UNDEFINED = constant("MAV_LANDED_STATE_UNDEFINED")
 ON_GROUND = constant("MAV_LANDED_STATE_ON_GROUND")
 
+GLOBAL = constant("MAV_FRAME_GLOBAL")
+ABOVE_HOME = constant("MAV_FRAME_GLOBAL_RELATIVE_ALT")
+FRAMES: Mapping[type[Altitude], int] = {
+    AMSL: GLOBAL,
+    AboveHome: ABOVE_HOME,
+    AboveGround: constant("MAV_FRAME_GLOBAL_TERRAIN_ALT"),
+}
+"""MAV_FRAME of a global position in degrees, by the kind of its altitude."""
+INT_FRAMES: Mapping[type[Altitude], int] = {
+    AMSL: constant("MAV_FRAME_GLOBAL_INT"),
+    AboveHome: constant("MAV_FRAME_GLOBAL_RELATIVE_ALT_INT"),
+    AboveGround: constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"),
+}
+"""MAV_FRAME of a global position in 1e-7 degrees, by the kind of its altitude."""
 
-# Keys of the acknowledgements in ``Telemetry.answers``.
-MODE = "mode"
-ARM = "arm"
-TAKEOFF = "take-off"
-SPEED = "speed"
-HEADING = "heading"
-TARGET = "target"
-MISSION = "mission"
-START = "mission start"
+
+class Ack:
+    """Keys of acknowledgements in ``Telemetry.answers``."""
+
+    MODE = "mode"
+    ARM = "arm"
+    TAKEOFF = "take-off"
+    SPEED = "speed"
+    HEADING = "heading"
+    TARGET = "target"
+    MISSION = "mission"
+    START = "mission start"
 
 
 class Item(NamedTuple):
-    """A mission item as MAVLink states it: latitude, longitude in degrees, ``z`` in metres of ``frame``."""
+    """A mission item as in MAVLink: latitude and longitude in degrees, ``z`` in metres of ``frame``."""
 
     command: int
     frame: int
@@ -62,11 +77,32 @@ class Item(NamedTuple):
     z: float
 
 
-class Backend(Protocol):
-    """What every MAVLink autopilot can be sent. Answers arrive in ``telemetry.answers`` under the keys above.
+def mission_item(
+    command: str, *parameters: float, at: Position | None = None, z: float = 0.0, frame: int = ABOVE_HOME
+) -> Item:
+    """Return a mission item.
 
-    ``parameters`` are those of the aircraft that its driver wants to know; ``None`` until they are in. With a
-    ``cycle`` the calls block; without, none does.
+    Args:
+        command: name of the MAV_CMD.
+        parameters: up to four parameters; the others are 0.
+        at: place, altitude and frame at once.
+        z: altitude in *frame*, m, for an item without a place.
+        frame: MAV_FRAME of an item without a place.
+    """
+    first, second, third, fourth = (*parameters, 0.0, 0.0, 0.0, 0.0)[:4]
+    given = (first, second, third, fourth)
+    if at is None:
+        return Item(constant(command), frame, given, 0.0, 0.0, z)
+    at_frame = FRAMES.get(type(at.altitude))
+    if at_frame is None:
+        raise UsageError(f"{at}: autopilots take AMSL, AboveHome and AboveGround")
+    return Item(constant(command), at_frame, given, at.latitude, at.longitude, at.altitude.metres)
+
+
+class Backend(Protocol):
+    """Sends commands to a MAVLink autopilot. Acknowledgements arrive in ``telemetry.answers`` under ``Ack``.
+
+    With a ``cycle`` the methods block; without one they do not.
     """
 
     telemetry: Telemetry
@@ -77,10 +113,13 @@ class Backend(Protocol):
 
     @property
     def parameters(self) -> Mapping[str, float] | None:
-        """By name; one that the firmware does not have is missing."""
+        """Parameters that the driver requested, by name; ``None`` until all answers have arrived.
+
+        Parameters that the firmware does not have are missing.
+        """
 
     def poll(self) -> None:
-        """See ``Driver``."""
+        """Process received messages without waiting."""
 
     def set_mode(self, mode: str) -> None:
         """Change the mode, by the firmware's own name."""
@@ -88,58 +127,23 @@ class Backend(Protocol):
     def arm(self, arm: bool, *, force: bool = False) -> None:
         """Arm or disarm; *force* skips the checks, or stops the motors in the air."""
 
-    def speed(self, metres_per_second: float) -> None:
-        """Over ground, from now on, where it goes by position; -1: its own again."""
+    def set_speed(self, speed: float) -> None:
+        """Set the speed over ground, m/s, for movements to a position; -1 means the autopilot's own."""
 
-    def check(self) -> None:
-        """Ask for the texts of the arming checks that fail now."""
+    def request_arming_checks(self) -> None:
+        """Request the texts of the arming checks that fail now."""
 
     def upload(self, items: Sequence[Item]) -> None:
-        """Replace the mission; goes on with an upload that is under way."""
+        """Replace the mission; continues an upload in progress."""
 
-    def watch_mission(self) -> None:
-        """Ask for progress of the mission from now on."""
+    def request_mission_progress(self) -> None:
+        """Request progress of the mission from now on."""
 
-    def watch_target(self) -> None:
-        """Ask from now on where it goes."""
+    def request_target(self) -> None:
+        """Request reports of the autopilot's target from now on."""
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """What is wrong with the way there, or with what is there."""
+        """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""
 
     def close(self) -> None:
-        """Stop talking."""
-
-
-GLOBAL = constant("MAV_FRAME_GLOBAL")
-ABOVE_HOME = constant("MAV_FRAME_GLOBAL_RELATIVE_ALT")
-ABOVE_GROUND = constant("MAV_FRAME_GLOBAL_TERRAIN_ALT")
-
-INT_FRAMES: Mapping[int, int] = {
-    GLOBAL: constant("MAV_FRAME_GLOBAL_INT"),
-    ABOVE_HOME: constant("MAV_FRAME_GLOBAL_RELATIVE_ALT_INT"),
-    ABOVE_GROUND: constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"),
-}
-"""Of a global frame in degrees, the one whose latitude and longitude are whole numbers."""
-
-
-def frame_of(position: Position) -> int:
-    """The MAV_FRAME of a global position, in degrees."""
-    if isinstance(position.altitude, AMSL):
-        return GLOBAL
-    if isinstance(position.altitude, AboveHome):
-        return ABOVE_HOME
-    if isinstance(position.altitude, AboveGround):
-        return ABOVE_GROUND
-    raise UsageError(f"{position}: autopilots take AMSL, AboveHome and AboveGround")
-
-
-def item(
-    command: str, *parameters: float, at: Position | None = None, z: float = 0.0, frame: int = ABOVE_HOME
-) -> Item:
-    """An item; *at* states place, altitude and frame at once."""
-    first, second, third, fourth = (*parameters, 0.0, 0.0, 0.0, 0.0)[:4]
-    stated = (first, second, third, fourth)
-    if at is None:
-        return Item(constant(command), frame, stated, 0.0, 0.0, z)
-    height = at.altitude.metres
-    return Item(constant(command), frame_of(at), stated, at.latitude, at.longitude, height)
+        """Stop all communication."""

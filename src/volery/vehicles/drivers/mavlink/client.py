@@ -1,15 +1,6 @@
-"""Asking for the messages that are used, and again for those that do not come.
+"""Client of one MAVLink autopilot on a link: heartbeats, streams, acknowledgements, missions and parameters.
 
-ArduPilot streams nothing unasked but heartbeats and texts; what is asked for within the first moments of its
-life it acknowledges and forgets.
-
-What is asked for once after the first heartbeat, and again while no answer comes.
-
-MAVLink's mission upload: we tell the count, the autopilot asks for each item and acknowledges the last.
-
-The other end of a MAVLink link: which system it is, heartbeats, streams, answers, missions, parameters.
-
-A firmware's driver adds what it says (its commands) and what it makes of what it hears (its ``TelemetryDecoder``).
+A firmware's backend adds its commands and its ``TelemetryDecoder``.
 """
 
 from __future__ import annotations
@@ -27,116 +18,169 @@ from volery.links.mavlink_conventions import from_bytewise
 from volery.links.mavlink_messages import constant, entry_name, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
-from volery.vehicles.drivers.mavlink import backend as key
-from volery.vehicles.drivers.mavlink.backend import FORCE, GROUND_SPEED, UNCHANGED, Item
+from volery.vehicles.drivers.mavlink.backend import FORCE, GROUND_SPEED, UNCHANGED, Ack, Item
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.telemetry import Answer, Telemetry
 
+GCS_SYSTEM, GCS_COMPONENT = 255, 190
+"""Ids of a ground station: ArduPilot takes manual control only from system 255 (its SYSID_MYGCS)."""
+
+HEARTBEAT_PERIOD: Ns = S
+SILENT_AFTER: Ns = 3 * S
+VERSION = "AUTOPILOT_VERSION"
+
 STREAM_REQUEST_PERIOD: Ns = 3 * S
 MISSED = 3
-"""Periods without a message after which it counts as not coming."""
-
-
-class MessageStreams:
-    """``ask(message, period)`` is called for what does not come. Look at it once a second."""
-
-    def __init__(self, periods: Mapping[str, Ns], ask: Callable[[str, Ns], None]) -> None:
-        self._periods = dict(periods)
-        self._ask = ask
-        self._heard: dict[str, Ns] = {}
-        self._asked: dict[str, Ns] = {}
-
-    def want(self, message: str, period: Ns) -> None:
-        """This, too, from now on."""
-        self._periods[message] = period
-
-    def heard(self, message: str, now: Ns) -> None:
-        """It has come."""
-        if message in self._periods:
-            self._heard[message] = now
-
-    def look(self, now: Ns) -> None:
-        """Ask for what is missing."""
-        for message, period in self._periods.items():
-            heard = self._heard.get(message)
-            comes = heard is not None and now - heard <= MISSED * period + S
-            asked = self._asked.get(message)
-            if not comes and (asked is None or now - asked >= STREAM_REQUEST_PERIOD):
-                self._asked[message] = now
-                self._ask(message, period)
-
-
+"""Number of periods without a message after which the stream counts as missing."""
 PARAMETER_REQUEST_PERIOD: Ns = 2 * S
 TRIES = 5
-"""What was not answered so often does not exist there: firmware does not answer for a parameter it lacks."""
+"""A request without an answer after this many tries has none: firmware does not answer for a parameter that it
+does not have.
+"""
+UPLOAD_STALLED: Ns = 5 * S
+MISSION_TYPE = 0
+
+_IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
+_ACCEPTED = constant("MAV_RESULT_ACCEPTED")
+_NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
+
+_AUTOPILOTS: Mapping[int, str] = {
+    constant("MAV_AUTOPILOT_ARDUPILOTMEGA"): "an ArduPilot",
+    constant("MAV_AUTOPILOT_PX4"): "a PX4",
+    constant("MAV_AUTOPILOT_PPZ"): "a Paparazzi",
+}
+
+ACK_KEYS: Mapping[int, str] = {
+    constant("MAV_CMD_DO_SET_MODE"): Ack.MODE,
+    constant("MAV_CMD_COMPONENT_ARM_DISARM"): Ack.ARM,
+    constant("MAV_CMD_NAV_TAKEOFF"): Ack.TAKEOFF,
+    constant("MAV_CMD_DO_CHANGE_SPEED"): Ack.SPEED,
+    constant("MAV_CMD_CONDITION_YAW"): Ack.HEADING,
+    constant("MAV_CMD_DO_REPOSITION"): Ack.TARGET,
+    constant("MAV_CMD_MISSION_START"): Ack.START,
+}
+
+
+class Firmware(NamedTuple):
+    """What the client needs to know of a firmware.
+
+    Args:
+        number: its MAV_AUTOPILOT.
+        name: name in messages.
+        called: name with its article.
+        oldest: oldest supported version, major and minor.
+        estimator: message with the state of its estimator.
+        bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
+    """
+
+    number: int
+    name: str
+    called: str
+    oldest: tuple[int, int]
+    estimator: str
+    bytewise: bool = False
+
+
+class StreamRequests:
+    """Requests messages, and requests those again that do not arrive. Check it once a second.
+
+    ArduPilot streams only heartbeats and texts without a request. It acknowledges requests in the first moments
+    after its start, and forgets them.
+
+    Args:
+        periods: requested period of each message, ns.
+        request: sends the request for a message.
+    """
+
+    def __init__(self, periods: Mapping[str, Ns], request: Callable[[str, Ns], None]) -> None:
+        self._periods = dict(periods)
+        self._request = request
+        self._received: dict[str, Ns] = {}
+        self._requested: dict[str, Ns] = {}
+
+    def add(self, message: str, period: Ns) -> None:
+        """Request another message from now on."""
+        self._periods[message] = period
+
+    def note_received(self, message: str, now: Ns) -> None:
+        """Note that a message has arrived."""
+        if message in self._periods:
+            self._received[message] = now
+
+    def check(self, now: Ns) -> None:
+        """Request the messages that do not arrive."""
+        for message, period in self._periods.items():
+            received = self._received.get(message)
+            arrives = received is not None and now - received <= MISSED * period + S
+            requested = self._requested.get(message)
+            if not arrives and (requested is None or now - requested >= STREAM_REQUEST_PERIOD):
+                self._requested[message] = now
+                self._request(message, period)
 
 
 class ParameterRequests:
-    """``ask(name)`` is called for each of *names* until ``answered``. Look at it once a second."""
+    """Requests parameters and the version once, and again while no answer arrives. Check it once a second."""
 
-    def __init__(self, ask: Callable[[str], None]) -> None:
-        self._ask = ask
+    def __init__(self, request: Callable[[str], None]) -> None:
+        self._request = request
         self._tries: dict[str, int] = {}
-        self._asked: dict[str, Ns] = {}
+        self._requested: dict[str, Ns] = {}
         self._begun = False
 
     @property
     def settled(self) -> bool:
-        """All were answered, or will not be."""
+        """Whether all requests were answered, or given up."""
         return self._begun and not self._tries
 
     def begin(self, names: Sequence[str]) -> None:
-        """Ask for these, from the next look on."""
+        """Request these from the next check on."""
         self._begun = True
         self._tries = dict.fromkeys(names, TRIES)
 
-    def answered(self, name: str) -> None:
-        """No need to ask again."""
+    def note_answered(self, name: str) -> None:
+        """Note that the answer has arrived."""
         self._tries.pop(name, None)
 
-    def look(self, now: Ns) -> None:
-        """Ask for what is missing."""
+    def check(self, now: Ns) -> None:
+        """Request what has not been answered."""
         for name, left in list(self._tries.items()):
-            asked = self._asked.get(name)
-            if asked is not None and now - asked < PARAMETER_REQUEST_PERIOD:
+            requested = self._requested.get(name)
+            if requested is not None and now - requested < PARAMETER_REQUEST_PERIOD:
                 continue
             if not left:
                 del self._tries[name]
                 continue
             self._tries[name] = left - 1
-            self._asked[name] = now
-            self._ask(name)
-
-
-def value_of(fields: Mapping[str, Any], bytewise: bool) -> float:
-    """The value in a PARAM_VALUE. *bytewise*: whole numbers lie in the four bytes of the float, as in PX4."""
-    value: float = fields["param_value"]
-    return from_bytewise(fields["param_type"], value) if bytewise else value
-
-
-STALLED: Ns = 5 * S
-MISSION_TYPE = 0
+            self._requested[name] = now
+            self._request(name)
 
 
 class MissionUpload:
-    """One upload under way. *send_to* takes a message's name and its fields but for the target."""
+    """One upload by the mission protocol.
+
+    The client sends the number of items; the autopilot requests each item and acknowledges the last one.
+
+    Args:
+        items: items of the mission.
+        send_to: sends a message, given its name and its fields without the target.
+    """
 
     def __init__(self, items: Sequence[Item], send_to: Callable[..., None]) -> None:
         self._items = items
         self._send_to = send_to
-        self._asked: Ns | None = None
+        self._requested_at: Ns | None = None
 
     def begin(self) -> None:
-        """Tell how many there are."""
+        """Send the number of items."""
         self._send_to("MISSION_COUNT", count=len(self._items), mission_type=MISSION_TYPE)
 
     def alive(self, now: Ns) -> bool:
-        """The autopilot goes on asking."""
-        return self._asked is not None and now - self._asked < STALLED
+        """Return whether the autopilot goes on requesting items."""
+        return self._requested_at is not None and now - self._requested_at < UPLOAD_STALLED
 
-    def requested(self, number: int, now: Ns) -> None:
-        """Send an item; whichever it asks for, as often as it asks."""
-        self._asked = now
+    def send_item(self, number: int, now: Ns) -> None:
+        """Send the requested item; the autopilot may request any item any number of times."""
+        self._requested_at = now
         if not 0 <= number < len(self._items):
             return
         item = self._items[number]
@@ -159,51 +203,13 @@ class MissionUpload:
         )
 
 
-GCS_SYSTEM, GCS_COMPONENT = 255, 190
-"""A ground station's ids: ArduPilot takes sticks only from system 255 (its SYSID_MYGCS)."""
-
-HEARTBEAT_PERIOD: Ns = S
-SILENT_AFTER: Ns = 3 * S
-VERSION = "AUTOPILOT_VERSION"
-
-_IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
-_ACCEPTED = constant("MAV_RESULT_ACCEPTED")
-_NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
-
-_AUTOPILOTS: Mapping[int, str] = {
-    constant("MAV_AUTOPILOT_ARDUPILOTMEGA"): "an ArduPilot",
-    constant("MAV_AUTOPILOT_PX4"): "a PX4",
-    constant("MAV_AUTOPILOT_PPZ"): "a Paparazzi",
-}
-
-KEYS: Mapping[int, str] = {
-    constant("MAV_CMD_DO_SET_MODE"): key.MODE,
-    constant("MAV_CMD_COMPONENT_ARM_DISARM"): key.ARM,
-    constant("MAV_CMD_NAV_TAKEOFF"): key.TAKEOFF,
-    constant("MAV_CMD_DO_CHANGE_SPEED"): key.SPEED,
-    constant("MAV_CMD_CONDITION_YAW"): key.HEADING,
-    constant("MAV_CMD_DO_REPOSITION"): key.TARGET,
-    constant("MAV_CMD_MISSION_START"): key.START,
-}
-
-
-class Firmware(NamedTuple):
-    """What is asked of a firmware at once. ``number`` is its MAV_AUTOPILOT, ``called`` has the article.
-
-    ``oldest`` is the oldest version, major and minor, that its driver can fly. ``estimator`` is the message
-    in which its estimator says what it knows. ``bytewise``: see ``value_of``.
-    """
-
-    number: int
-    name: str
-    called: str
-    oldest: tuple[int, int]
-    estimator: str
-    bytewise: bool = False
-
-
 def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, Ns]:
-    """What is asked for, and how often: ``rate_option`` in Hz for the position; ``attitude``, 0 for none."""
+    """Return the requested messages with their periods.
+
+    Args:
+        firmware: firmware of the autopilot.
+        options: ``rate`` of the position and ``attitude`` in Hz (0 for none).
+    """
     attitude = rate_option("attitude", options, 0.0)
     periods = {
         "GLOBAL_POSITION_INT": round(S / rate_option("rate", options, 10.0, least=0.1)),
@@ -219,7 +225,14 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
 
 
 class MavlinkClient:
-    """Talks to the first autopilot of this *firmware* that speaks; see ``options`` for the options."""
+    """Client of the first autopilot of its firmware that sends a heartbeat on the link.
+
+    Args:
+        kernel: clock and record.
+        link: link to the autopilot.
+        name: name of the vehicle.
+        options: see ``MAVLINK_OPTIONS``.
+    """
 
     cycle: Action | None = None
     firmware: Firmware
@@ -230,131 +243,134 @@ class MavlinkClient:
         self._link = link
         self._system = system_option(options)
         self._component = 1
-        self._hearing = self._listener(records_texts(options))
-        self._streams = MessageStreams(stream_periods(self.firmware, options), self._request)
-        self._inquiries = ParameterRequests(self._inquire)
-        self._read: dict[str, float] = {}
+        self._decoder = self._make_decoder(records_texts(options))
+        self._streams = StreamRequests(stream_periods(self.firmware, options), self._request_stream)
+        self._requests = ParameterRequests(self._request_parameter)
+        self._parameters: dict[str, float] = {}
         self._upload: MissionUpload | None = None
-        self._stranger = ""  # another autopilot that answers here
-        self._unfit = ""  # why this one cannot be flown
+        self._other_autopilot = ""  # another autopilot that sends heartbeats on this link
+        self._unsupported = ""  # why this one is not supported
         self._silent = False
         link.receive(self._receive)
-        self._beat = kernel.every(HEARTBEAT_PERIOD, self._tick)
+        self._heartbeat = kernel.every(HEARTBEAT_PERIOD, self._tick)
 
     @abstractmethod
-    def _listener(self, record: bool) -> TelemetryDecoder:
-        """What the firmware's messages are turned into telemetry by."""
+    def _make_decoder(self, record: bool) -> TelemetryDecoder:
+        """Return the firmware's decoder."""
 
     @abstractmethod
-    def _wanted(self) -> Sequence[str]:
-        """The aircraft's parameters that are to be read, now that its kind is known."""
+    def _requested_parameters(self) -> Sequence[str]:
+        """Return the names of the parameters to read, now that the kind of vehicle is known."""
 
-    # -- hearing
+    # -- receiving
 
     def poll(self) -> None:
-        """What arrives is taken in by itself."""
+        """Do nothing: messages are processed as they arrive."""
 
     @property
     def parameters(self) -> Mapping[str, float] | None:
-        """What was read of the aircraft's parameters; ``None`` until all answers are in."""
-        return self._read if self._inquiries.settled else None
+        """Parameters that were read; ``None`` until all answers have arrived."""
+        return self._parameters if self._requests.settled else None
 
     def _receive(self, frame: Frame) -> None:
-        if not self._is_ours(frame):
+        if not self._is_from_autopilot(frame):
             return
         now = self._kernel.now()
         if self._silent:
             self._silent = False
-            self._kernel.record(LinkState(now, self.telemetry.name, "back", "the autopilot is heard again"))
+            self._kernel.record(
+                LinkState(now, self.telemetry.name, "back", "the autopilot is received again")
+            )
         first = self.telemetry.last_message_ns < 0
-        known = self._hearing.hear(frame.name, frame.fields)
-        self._streams.heard(frame.name, now)
+        used = self._decoder.handle_message(frame.name, frame.fields)
+        self._streams.note_received(frame.name, now)
         if first:
-            self._inquiries.begin((VERSION, *self._wanted()))
-            self._streams.look(now)
-            self._inquiries.look(now)
-        if known or self._hear_answer(frame):
+            self._requests.begin((VERSION, *self._requested_parameters()))
+            self._streams.check(now)
+            self._requests.check(now)
+        if used or self._handle_answer(frame):
             self.telemetry.changed.notify()
 
-    def _is_ours(self, frame: Frame) -> bool:
-        """Of our autopilot; the first heartbeat of this firmware tells which system that is."""
+    def _is_from_autopilot(self, frame: Frame) -> bool:
+        """Return whether our autopilot sent it; the first heartbeat of the firmware defines its system id."""
         if self.telemetry.last_message_ns >= 0:
             return frame.system == self._system and frame.component == self._component
         if frame.name != "HEARTBEAT" or frame.fields["autopilot"] == _NO_AUTOPILOT:
             return False
-        if frame.fields["autopilot"] != self.firmware.number:
-            self._stranger = _called(frame.fields["autopilot"])
+        autopilot: int = frame.fields["autopilot"]
+        if autopilot != self.firmware.number:
+            name = entry_name("MAV_AUTOPILOT", autopilot)
+            self._other_autopilot = _AUTOPILOTS.get(autopilot) or f"a {name} autopilot"
             return False
         if self._system is not None and frame.system != self._system:
             return False
         self._system, self._component = frame.system, frame.component
-        self._stranger = ""
+        self._other_autopilot = ""
         self.telemetry.system = frame.system
         return True
 
-    def _hear_answer(self, frame: Frame) -> bool:
+    def _handle_answer(self, frame: Frame) -> bool:
         fields = frame.fields
         if frame.name == "COMMAND_ACK":
-            return self._hear_command_ack(fields)
+            return self._handle_command_ack(fields)
         if frame.name == VERSION:
-            return self._hear_version(fields["flight_sw_version"])
+            return self._handle_version(fields["flight_sw_version"])
         if frame.name == "PARAM_VALUE":
-            return self._hear_parameter(fields)
+            return self._handle_parameter(fields)
         if self._upload is None or not _for_us(fields):
             return False
-        return self._hear_upload(self._upload, frame.name, fields)
-
-    def _hear_upload(self, upload: MissionUpload, name: str, fields: Mapping[str, Any]) -> bool:
-        """PX4 asks for its first item by the older MISSION_REQUEST, ArduPilot for all of them."""
-        if name in {"MISSION_REQUEST", "MISSION_REQUEST_INT"}:
-            upload.requested(fields["seq"], self._kernel.now())
-        elif name == "MISSION_ACK":
+        # PX4 requests its first item by the older MISSION_REQUEST, ArduPilot all of them
+        if frame.name in {"MISSION_REQUEST", "MISSION_REQUEST_INT"}:
+            self._upload.send_item(fields["seq"], self._kernel.now())
+        elif frame.name == "MISSION_ACK":
             result = entry_name("MAV_MISSION_RESULT", fields["type"]).removeprefix("MAV_MISSION_")
-            self._answer(key.MISSION, fields["type"] == 0, result)
+            self._note_answer(Ack.MISSION, fields["type"] == 0, result)
             self._upload = None
         else:
             return False
         return True
 
-    def _hear_command_ack(self, fields: Mapping[str, Any]) -> bool:
+    def _handle_command_ack(self, fields: Mapping[str, Any]) -> bool:
         command, result = fields["command"], fields["result"]
-        if command not in KEYS or result == _IN_PROGRESS or not _for_us(fields):
+        if command not in ACK_KEYS or result == _IN_PROGRESS or not _for_us(fields):
             return False
-        self._answer(KEYS[command], result == _ACCEPTED, entry_name("MAV_RESULT", result))
+        self._note_answer(ACK_KEYS[command], result == _ACCEPTED, entry_name("MAV_RESULT", result))
         return True
 
-    def _hear_parameter(self, fields: Mapping[str, Any]) -> bool:
-        """Somebody else may be listing all of them."""
+    def _handle_parameter(self, fields: Mapping[str, Any]) -> bool:
+        """Another station may list all parameters at the same time."""
         name: str = fields["param_id"]
-        value = value_of(fields, self.firmware.bytewise)
-        if name not in self._wanted() or not isfinite(value):
+        value: float = fields["param_value"]
+        if self.firmware.bytewise:
+            value = from_bytewise(fields["param_type"], value)
+        if name not in self._requested_parameters() or not isfinite(value):
             return False
-        self._read[name] = value
-        self._inquiries.answered(name)
+        self._parameters[name] = value
+        self._requests.note_answered(name)
         return True
 
-    def _hear_version(self, number: int) -> bool:
-        """The number has a byte each for major, minor, patch and kind of release; 0: it does not say."""
-        self._inquiries.answered(VERSION)
+    def _handle_version(self, number: int) -> bool:
+        """The number has one byte each for major, minor, patch and kind of release; 0 means not stated."""
+        self._requests.note_answered(VERSION)
         major, minor, patch = number >> 24, number >> 16 & 0xFF, number >> 8 & 0xFF
         oldest = self.firmware.oldest
         if number and (major, minor) < oldest:
-            self._unfit = (
+            self._unsupported = (
                 f"{self.firmware.name} {major}.{minor}.{patch} flies here; this driver needs "
                 f"{oldest[0]}.{oldest[1]} or newer: update the firmware"
             )
-        return bool(self._unfit)
+        return bool(self._unsupported)
 
-    def _answer(self, which: str, accepted: bool, result: str) -> None:
-        self.telemetry.answers[which] = Answer(self._kernel.now(), accepted, result)
+    def _note_answer(self, key: str, accepted: bool, result: str) -> None:
+        self.telemetry.answers[key] = Answer(self._kernel.now(), accepted, result)
         if not accepted:
-            self._refused(which)
+            self._on_refusal(key)
 
-    def _refused(self, which: str) -> None:
-        """Of what was asked under this key; nothing more to hear of it where reasons come as texts."""
+    def _on_refusal(self, key: str) -> None:
+        """Handle a refusal; nothing to do where the reasons arrive as texts."""
 
     def _tick(self) -> None:
-        """Each second: say that we are there, ask for what does not come, notice silence."""
+        """Send a heartbeat, request messages that do not arrive, and detect silence."""
         self._send(
             "HEARTBEAT",
             type=constant("MAV_TYPE_GCS"),
@@ -362,37 +378,35 @@ class MavlinkClient:
             system_status=constant("MAV_STATE_ACTIVE"),
             mavlink_version=3,
         )
-        heard, now = self.telemetry.last_message_ns, self._kernel.now()
-        if heard < 0:
+        last, now = self.telemetry.last_message_ns, self._kernel.now()
+        if last < 0:
             return
-        self._streams.look(now)
-        self._inquiries.look(now)
-        if now - heard > SILENT_AFTER and not self._silent:
+        self._streams.check(now)
+        self._requests.check(now)
+        if now - last > SILENT_AFTER and not self._silent:
             self._silent = True
-            detail = self._link.problem() or "the autopilot is not heard"
+            detail = self._link.problem() or "the autopilot is not received"
             self._kernel.record(LinkState(now, self.telemetry.name, "silent", detail))
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """Nothing while it is heard; else what is there instead."""
+        """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""
         wrong = self._link.problem()
         if wrong:
-            heard = getattr(self._link, "statistics", None)
-            garbled = isinstance(heard, ReceiveStatistics) and heard.octets > 0 and not heard.frames
-            return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
-        if self._unfit:
-            return CapabilityError(self._unfit)
+            return link_error(self._link, wrong)
+        if self._unsupported:
+            return CapabilityError(self._unsupported)
         if self.telemetry.last_message_ns >= 0:
             return None
-        if self._stranger:
-            return LinkGarbled(f"{self._stranger} speaks here, not {self.firmware.called}")
-        return LinkSilent(f"no {self.firmware.name} was heard")
+        if self._other_autopilot:
+            return LinkGarbled(f"{self._other_autopilot} answers here, not {self.firmware.called}")
+        return LinkSilent(f"no message of {self.firmware.called} was received")
 
     def close(self) -> None:
-        """No more heartbeats; the link is closed."""
-        self._beat.cancel()
+        """Stop the heartbeats and close the link."""
+        self._heartbeat.cancel()
         self._link.close()
 
-    # -- speaking
+    # -- sending
 
     def _send(self, name: str, **fields: Any) -> None:
         self._link.send(Frame(name, fields, GCS_SYSTEM, GCS_COMPONENT))
@@ -404,49 +418,51 @@ class MavlinkClient:
         named = {f"param{number}": float(value) for number, value in enumerate(parameters, 1)}
         self._send_to("COMMAND_LONG", command=constant(command), **named)
 
-    def _request(self, message: str, period: Ns) -> None:
+    def _request_stream(self, message: str, period: Ns) -> None:
         number = float(message_type(message).id)
         self._command("MAV_CMD_SET_MESSAGE_INTERVAL", number, period / 1000.0)
 
-    def _inquire(self, name: str) -> None:
+    def _request_parameter(self, name: str) -> None:
         if name == VERSION:
             self._command("MAV_CMD_REQUEST_MESSAGE", float(message_type(VERSION).id))
         else:
             self._send_to("PARAM_REQUEST_READ", param_id=name, param_index=-1)
 
     def arm(self, arm: bool, *, force: bool = False) -> None:
-        """By COMPONENT_ARM_DISARM."""
+        """Send COMPONENT_ARM_DISARM."""
         self._command("MAV_CMD_COMPONENT_ARM_DISARM", float(arm), FORCE if force else 0.0)
 
-    def speed(self, metres_per_second: float) -> None:
-        """By DO_CHANGE_SPEED."""
-        self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, metres_per_second, UNCHANGED)
+    def set_speed(self, speed: float) -> None:
+        """Send DO_CHANGE_SPEED."""
+        self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, speed, UNCHANGED)
 
-    def check(self) -> None:
-        """By RUN_PREARM_CHECKS: the reasons come as texts."""
+    def request_arming_checks(self) -> None:
+        """Send RUN_PREARM_CHECKS; the reasons arrive as texts."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
     def upload(self, items: Sequence[Item]) -> None:
-        """By the mission protocol; asked again, it begins anew only if the autopilot has fallen silent."""
+        """Upload a mission; a repeated call begins again only if the autopilot has stopped requesting items."""
         if self._upload is None or not self._upload.alive(self._kernel.now()):
             self._upload = MissionUpload(items, self._send_to)
             self._upload.begin()
 
-    def watch_target(self) -> None:
-        """POSITION_TARGET_GLOBAL_INT tells where it goes."""
-        self._streams.want("POSITION_TARGET_GLOBAL_INT", 500 * MS)
+    def request_target(self) -> None:
+        """Request POSITION_TARGET_GLOBAL_INT, which reports the target."""
+        self._streams.add("POSITION_TARGET_GLOBAL_INT", 500 * MS)
 
-    def watch_mission(self) -> None:
-        """MISSION_CURRENT tells the end of missions that do not land."""
-        self._streams.want("MISSION_CURRENT", S)
-        self._streams.look(self._kernel.now())
+    def request_mission_progress(self) -> None:
+        """Request MISSION_CURRENT, which reports the end of missions that do not land."""
+        self._streams.add("MISSION_CURRENT", S)
+        self._streams.check(self._kernel.now())
 
 
-def _called(autopilot: int) -> str:
-    known = _AUTOPILOTS.get(autopilot)
-    return known or f"a {entry_name('MAV_AUTOPILOT', autopilot)} autopilot"
+def link_error(link: Link, wrong: str) -> LinkError:
+    """Return the error for a link: garbled if bytes arrived without a single frame, else silent."""
+    statistics = getattr(link, "statistics", None)
+    received = isinstance(statistics, ReceiveStatistics) and statistics.octets > 0
+    return LinkGarbled(wrong) if received and not statistics.frames else LinkSilent(wrong)
 
 
 def _for_us(fields: Mapping[str, Any]) -> bool:
-    """Older firmware addresses acknowledgements to nobody."""
+    """Older firmware sends acknowledgements without an address."""
     return fields.get("target_system", 0) in {0, GCS_SYSTEM}

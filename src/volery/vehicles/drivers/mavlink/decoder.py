@@ -1,7 +1,4 @@
-"""What a MAV_TYPE is, for those that can be commanded.
-
-What the messages that all MAVLink autopilots send say, as ``Telemetry``. One method for each message.
-"""
+"""Decoder of the messages that all MAVLink autopilots send. One method for each message."""
 
 from __future__ import annotations
 
@@ -21,6 +18,9 @@ from volery.vehicles.drivers.mavlink.backend import ACTIVE, ARMED, FAILSAFE, ON_
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity
 
+Fields = Mapping[str, Any]
+Handler = Callable[[Fields], None]
+
 KINDS: Mapping[int, str] = {
     2: DRONE_KIND,  # quadrotor
     3: DRONE_KIND,  # coaxial helicopter
@@ -33,41 +33,40 @@ KINDS: Mapping[int, str] = {
     10: ROVER_KIND,
     11: ROVER_KIND,  # boat: the same firmware
 }
-
-
-def vehicle_kind(mav_type: int) -> str:
-    """Its kind; for others MAVLink's own word."""
-    return KINDS.get(mav_type) or entry_name("MAV_TYPE", mav_type).lower().replace("_", " ")
-
-
-Fields = Mapping[str, Any]
-Handler = Callable[[Fields], None]
+"""Kind of vehicle by MAV_TYPE."""
 
 PREARM_CHECK = constant("MAV_SYS_STATUS_PREARM_CHECK")
 HORIZONTAL_POSITION = constant("ESTIMATOR_POS_HORIZ_ABS")
 NO_POSITION = constant("ESTIMATOR_CONST_POS_MODE")
-"""The same bits stand in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
+"""The same bits are used in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
 COMPLETE = constant("MISSION_STATE_COMPLETE")
 _UNKNOWN_16 = 65535
 _UNKNOWN = -1
 
 
 class TelemetryDecoder(ABC):
-    """Turns messages into telemetry. ``hear`` one; it says whether it was of interest.
+    """Decodes MAVLink messages into telemetry.
 
-    ``autopilot`` is the firmware's name, ``resting`` the mode in which an armed rover stands, ``beat`` when
-    the last heartbeat came. *record*: the autopilot's texts go into the trace, too.
+    Attributes:
+        autopilot: name of the firmware.
+        resting: mode in which an armed rover stands.
+        last_heartbeat_ns: time of the last heartbeat; -1 before the first.
+
+    Args:
+        kernel: clock and record.
+        telemetry: written by the decoder.
+        record: whether the autopilot's texts are recorded.
     """
 
     autopilot = ""
     resting = ""
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
-        self.beat: Ns = -1
+        self.last_heartbeat_ns: Ns = -1
         self._kernel = kernel
-        self._seen = telemetry
+        self._telemetry = telemetry
         self._records = record
-        self._texts = StatusTextAssembler(self.say)
+        self._texts = StatusTextAssembler(self.add_text)
         self._landed_state = UNDEFINED
         self._estimates_position = False
         self._handlers: dict[str, Handler] = {
@@ -84,9 +83,9 @@ class TelemetryDecoder(ABC):
             "MISSION_CURRENT": self._mission_current,
         }
 
-    def hear(self, name: str, fields: Fields) -> bool:
-        """Take note of a message of our autopilot. One that puts it off the globe is left unheard."""
-        self._seen.last_message_ns = self._kernel.now()
+    def handle_message(self, name: str, fields: Fields) -> bool:
+        """Decode a message; return whether it was used. Positions off the globe are discarded."""
+        self._telemetry.last_message_ns = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False
@@ -96,96 +95,92 @@ class TelemetryDecoder(ABC):
             return False
         return True
 
+    def add_text(self, severity: int, text: str) -> None:
+        """Add a text of the autopilot."""
+        now = self._kernel.now()
+        self._telemetry.texts.append(StatusText(now, severity, text))
+        if self._records:
+            self._kernel.record(Text(now, self._telemetry.name, severity, text))
+
     @abstractmethod
     def _mode_name(self, number: int) -> str:
-        """The firmware's name of a ``custom_mode``."""
+        """Return the firmware's name of a ``custom_mode``."""
 
-    def _judge_ready(self) -> None:
-        """It could arm now, and the estimator has a position."""
-        self._seen.ready = self._seen.armable and self._estimates_position
+    def _update_ready(self) -> None:
+        """Ready means: it could arm now, and the estimator has a position."""
+        self._telemetry.ready = self._telemetry.armable and self._estimates_position
 
     def _heartbeat(self, fields: Fields) -> None:
-        seen = self._seen
-        self.beat = self._kernel.now()
-        seen.kind = vehicle_kind(fields["type"])
-        seen.autopilot = self.autopilot
-        seen.mode = self._mode_name(fields["custom_mode"])
-        seen.armed = bool(fields["base_mode"] & ARMED)
+        telemetry = self._telemetry
+        self.last_heartbeat_ns = self._kernel.now()
+        mav_type: int = fields["type"]
+        telemetry.kind = KINDS.get(mav_type) or entry_name("MAV_TYPE", mav_type).lower().replace("_", " ")
+        telemetry.autopilot = self.autopilot
+        telemetry.mode = self._mode_name(fields["custom_mode"])
+        telemetry.armed = bool(fields["base_mode"] & ARMED)
         status: int = fields["system_status"]
-        seen.status = entry_name("MAV_STATE", status).lower()
-        seen.failsafe = status in FAILSAFE
-        self._judge_flying(status)
-
-    def _judge_flying(self, status: int) -> None:
-        """The landed state says it, where it is sent; a rover rests in one mode, else is off once armed."""
-        seen = self._seen
-        if seen.kind != DRONE_KIND:
-            seen.flying = seen.armed and seen.mode != self.resting
+        telemetry.status = entry_name("MAV_STATE", status).lower()
+        telemetry.failsafe = status in FAILSAFE
+        # drones send a landed state; a rover rests in one mode, and else drives once it is armed
+        if telemetry.kind != DRONE_KIND:
+            telemetry.flying = telemetry.armed and telemetry.mode != self.resting
         elif self._landed_state == UNDEFINED:
-            seen.flying = seen.armed and status == ACTIVE
+            telemetry.flying = telemetry.armed and status == ACTIVE
 
     def _extended_state(self, fields: Fields) -> None:
         self._landed_state = fields["landed_state"]
-        if self._landed_state != UNDEFINED and self._seen.kind == DRONE_KIND:
-            self._seen.flying = self._landed_state != ON_GROUND
+        if self._landed_state != UNDEFINED and self._telemetry.kind == DRONE_KIND:
+            self._telemetry.flying = self._landed_state != ON_GROUND
 
     def _global_position(self, fields: Fields) -> None:
         """Before there is an estimate, ArduPilot sends zeros and PX4 nothing."""
         latitude, longitude = fields["lat"], fields["lon"]
         if latitude == 0 and longitude == 0:
             return
-        seen = self._seen
-        seen.position = Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0))
-        seen.above_home = fields["relative_alt"] / 1000.0
-        seen.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
+        telemetry = self._telemetry
+        telemetry.position = Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0))
+        telemetry.above_home = fields["relative_alt"] / 1000.0
+        telemetry.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
         heading: int = fields["hdg"]
         if heading != _UNKNOWN_16:
-            roll, pitch, _ = seen.attitude
-            seen.attitude = Attitude(roll, pitch, heading / 100.0)
+            roll, pitch, _ = telemetry.attitude
+            telemetry.attitude = Attitude(roll, pitch, heading / 100.0)
 
     def _sys_status(self, fields: Fields) -> None:
-        seen = self._seen
-        seen.armable = bool(fields["onboard_control_sensors_health"] & PREARM_CHECK)
+        self._telemetry.armable = bool(fields["onboard_control_sensors_health"] & PREARM_CHECK)
         volts, amperes = fields["voltage_battery"], fields["current_battery"]
         remaining: int = fields["battery_remaining"]
-        seen.battery = Battery(
+        self._telemetry.battery = Battery(
             nan if remaining == _UNKNOWN else remaining / 100.0,
             nan if volts == _UNKNOWN_16 else volts / 1000.0,
             nan if amperes == _UNKNOWN else amperes / 100.0,
         )
-        self._judge_ready()
+        self._update_ready()
 
     def _estimator(self, fields: Fields) -> None:
         flags: int = fields["flags"]
         self._estimates_position = bool(flags & HORIZONTAL_POSITION) and not flags & NO_POSITION
-        self._judge_ready()
+        self._update_ready()
 
     def _home_position(self, fields: Fields) -> None:
         altitude = AMSL(fields["altitude"] / 1000.0)
-        self._seen.home = Position(fields["latitude"] / 1e7, fields["longitude"] / 1e7, altitude)
+        self._telemetry.home = Position(fields["latitude"] / 1e7, fields["longitude"] / 1e7, altitude)
 
     def _target(self, fields: Fields) -> None:
         altitude = AMSL(fields["alt"])
-        self._seen.target = Position(fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, altitude)
+        self._telemetry.target = Position(fields["lat_int"] / 1e7, fields["lon_int"] / 1e7, altitude)
 
     def _gps(self, fields: Fields) -> None:
-        self._seen.fix = entry_name("GPS_FIX_TYPE", fields["fix_type"]).lower()
-        self._seen.satellites = fields["satellites_visible"]
+        self._telemetry.fix = entry_name("GPS_FIX_TYPE", fields["fix_type"]).lower()
+        self._telemetry.satellites = fields["satellites_visible"]
 
     def _attitude(self, fields: Fields) -> None:
         heading = degrees(fields["yaw"]) % 360.0
-        self._seen.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
+        self._telemetry.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
 
     def _reached(self, fields: Fields) -> None:
-        self._seen.mission_reached = fields["seq"]
+        self._telemetry.mission_reached = fields["seq"]
 
     def _mission_current(self, fields: Fields) -> None:
-        self._seen.mission_item = fields["seq"]
-        self._seen.mission_ended = fields["mission_state"] == COMPLETE
-
-    def say(self, severity: int, text: str) -> None:
-        """The autopilot says this."""
-        now = self._kernel.now()
-        self._seen.texts.append(StatusText(now, severity, text))
-        if self._records:
-            self._kernel.record(Text(now, self._seen.name, severity, text))
+        self._telemetry.mission_item = fields["seq"]
+        self._telemetry.mission_ended = fields["mission_state"] == COMPLETE

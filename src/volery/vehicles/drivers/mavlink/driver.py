@@ -1,7 +1,4 @@
-"""How a MAVLink autopilot's driver is opened: on a link, or behind a vehicle node with MAVROS's names.
-
-Sequences of steps that are the same for every MAVLink autopilot. A firmware's driver adds its own.
-"""
+"""Steps that are the same for every MAVLink autopilot, and how such a driver is opened."""
 
 from __future__ import annotations
 
@@ -18,12 +15,13 @@ from volery.links.link import Link
 from volery.ros.graph import Node
 from volery.vehicles.address import MAVLINK_OPTIONS, check_options
 from volery.vehicles.driver import Capability, Repeat, Step
-from volery.vehicles.drivers.mavlink import backend as key
-from volery.vehicles.drivers.mavlink.backend import Backend, Item
+from volery.vehicles.drivers.mavlink.backend import Ack, Backend, Item
 from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     ARMED_WITHIN,
+    DRONE_KIND,
+    ROVER_KIND,
     ROVER_NEAR_M,
     Takeover,
     at_rest,
@@ -34,37 +32,7 @@ from volery.vehicles.drivers.steps import (
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 
-D = TypeVar("D")
-
-
-@dataclass(frozen=True)
-class DriverOpeners(Generic[D]):
-    """Of the autopilot called ``name``: its ``driver``, and what carries it over either way."""
-
-    name: str
-    driver: Callable[[Kernel, str, Any], D]
-    mavlink: Callable[[Kernel, Link, str, Mapping[str, str]], Any]
-    mavros: Callable[[Kernel, Node, str, str, Geoid], Any]
-
-    def on_link(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> D:
-        """One behind a MAVLink *link*. It begins to listen and to send heartbeats at once.
-
-        Options: ``rate`` of the position and ``attitude`` in Hz, ``system`` id; and ``texts=unrecorded``
-        where the autopilot records its texts itself, as a simulated one does.
-        """
-        check_options(self.name, options, *MAVLINK_OPTIONS)
-        return self.driver(kernel, name, self.mavlink(kernel, link, name, options))
-
-    def on_graph(self, kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> D:
-        """One behind a vehicle node with MAVROS's names, commanded by *node*.
-
-        Options: ``namespace`` of the vehicle node (else ``/`` and *name*), ``geoid``: ``egm96`` or metres.
-        """
-        where = namespace_and_geoid(self.name, name, options)
-        return self.driver(kernel, name, self.mavros(kernel, node, name, *where))
-
-
-CHECKS_PERIOD: Ns = 10 * S
+ARMING_CHECKS_PERIOD: Ns = 10 * S
 
 ROVER_CAPABILITIES = frozenset(
     {
@@ -84,92 +52,132 @@ DRONE_CAPABILITIES = ROVER_CAPABILITIES | {
     Capability.STABILIZE,
     Capability.ALTITUDE_HOLD,
 }
-_CAPABILITIES = {"drone": DRONE_CAPABILITIES, "rover": ROVER_CAPABILITIES}
+_CAPABILITIES = {DRONE_KIND: DRONE_CAPABILITIES, ROVER_KIND: ROVER_CAPABILITIES}
 _NONE: frozenset[Capability] = frozenset()
+
+D = TypeVar("D")
+
+
+@dataclass(frozen=True)
+class DriverOpeners(Generic[D]):
+    """Opens the driver of one firmware on a link or on a graph.
+
+    Args:
+        name: name of the driver in addresses.
+        driver: constructor of the driver.
+        mavlink: constructor of its backend on a MAVLink link.
+        mavros: constructor of its backend over MAVROS.
+    """
+
+    name: str
+    driver: Callable[[Kernel, str, Any], D]
+    mavlink: Callable[[Kernel, Link, str, Mapping[str, str]], Any]
+    mavros: Callable[[Kernel, Node, str, str, Geoid], Any]
+
+    def on_link(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> D:
+        """Open a vehicle on a MAVLink link; heartbeats are sent from now on.
+
+        Args:
+            kernel: clock and tasks.
+            link: link to the autopilot.
+            name: name of the vehicle.
+            options: see ``MAVLINK_OPTIONS``.
+        """
+        check_options(self.name, options, *MAVLINK_OPTIONS)
+        return self.driver(kernel, name, self.mavlink(kernel, link, name, options))
+
+    def on_graph(self, kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> D:
+        """Open a vehicle behind MAVROS names.
+
+        Args:
+            kernel: clock and tasks.
+            node: the node that commands the vehicle.
+            name: name of the vehicle.
+            options: see ``namespace_and_geoid``.
+        """
+        where = namespace_and_geoid(self.name, name, options)
+        return self.driver(kernel, name, self.mavros(kernel, node, name, *where))
 
 
 class MavlinkDriver:
-    """What drivers over a ``Backend`` share. See ``vehicles.driver.Driver`` for what the methods mean."""
+    """What drivers with a MAVLink ``Backend`` share. See ``vehicles.driver.Driver`` for the operations."""
 
     obeys = ""
-    """The mode in which the firmware obeys a computer."""
+    """Mode in which the firmware obeys a computer."""
 
-    def __init__(self, kernel: Kernel, name: str, carrier: Backend) -> None:
+    def __init__(self, kernel: Kernel, name: str, backend: Backend) -> None:
         self.name = name
-        self.telemetry = carrier.telemetry
-        self._carrier = carrier
-        self._eviction = Takeover(kernel, carrier.telemetry, self.obeys)
-        self._last_item: int | None = None  # where the mission on board ends in the air
+        self.telemetry = backend.telemetry
+        self.cycle: Action | None = backend.cycle
+        self._backend = backend
+        self._takeover = Takeover(kernel, backend.telemetry, self.obeys)
+        self._last_item: int | None = None  # the item at which the mission on board ends in the air
 
     @property
     def capabilities(self) -> frozenset[Capability]:
-        """By the kind of vehicle; none until it has been heard."""
+        """Capabilities of the kind of vehicle; none before the first message."""
         return _CAPABILITIES.get(self.telemetry.kind, _NONE)
 
     @property
     def offboard_mode(self) -> str:
-        """The mode in which it obeys; words that are no mode while somebody else has it there."""
-        return self._eviction.offboard_mode
-
-    @property
-    def cycle(self) -> Action | None:
-        """The carrier's."""
-        return self._carrier.cycle
+        """Mode in which it obeys; words that are no mode while another station has control in that mode."""
+        return self._takeover.offboard_mode
 
     def poll(self) -> None:
-        """Take in what has arrived."""
-        self._carrier.poll()
+        """Process received messages without waiting."""
+        self._backend.poll()
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """What is wrong with the way to the autopilot, or with what is there."""
-        return self._carrier.problem()
+        """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""
+        return self._backend.problem()
 
     @abstractmethod
     def stop(self) -> None:
-        """Let go of sticks and of set-points that are being repeated."""
+        """Stop repeating manual control and set-points."""
 
     def close(self) -> None:
-        """Stop talking and let go of the link."""
+        """Stop all communication and release the link."""
         self.stop()
-        self._eviction.end()
-        self._carrier.close()
+        self._takeover.end()
+        self._backend.close()
 
     # -- on the ground
 
     def ready(self, within: Ns) -> Sequence[Step]:
-        """Until the arming checks pass and there is a position."""
+        """Wait until the arming checks pass and there is a position."""
         advice = "give it a view of the sky, stand it still and level, and look at its arming checks"
-        return (ready_step(within, advice, Repeat(CHECKS_PERIOD, self._carrier.check)),)
+        keep = Repeat(ARMING_CHECKS_PERIOD, self._backend.request_arming_checks)
+        return (ready_step(within, advice, keep),)
 
     def arm(self) -> Sequence[Step]:
-        """In the mode it is in."""
+        """Arm in the present mode."""
+
+        def send() -> None:
+            problem = self._backend.problem()  # the firmware has reported its version by now
+            if isinstance(problem, CapabilityError):
+                raise CapabilityError(f"{self.name}: {problem}")
+            self._backend.arm(True)
+
         step = Step(
             ask="arm",
-            send=self._arm,
+            send=send,
             done=lambda seen: seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=key.ARM,
+            answer=Ack.ARM,
             again=2 * S,
         )
         return (step,)
 
-    def _arm(self) -> None:
-        """By now its firmware has told its version."""
-        problem = self._carrier.problem()
-        if isinstance(problem, CapabilityError):
-            raise CapabilityError(f"{self.name}: {problem}")
-        self._carrier.arm(True)
-
     def disarm(self, force: bool) -> Sequence[Step]:
-        """In the air it is refused without *force*."""
+        """Disarm; in the air the autopilot refuses without *force*."""
         step = Step(
             ask="disarm",
-            send=lambda: self._carrier.arm(False, force=force),
+            send=lambda: self._backend.arm(False, force=force),
             done=lambda seen: not seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=key.ARM,
+            answer=Ack.ARM,
             again=2 * S,
         )
         return (step,)
@@ -178,32 +186,37 @@ class MavlinkDriver:
 
     @abstractmethod
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
-        """The mission as the firmware wants it."""
+        """Return the mission as items of the firmware."""
+
+    @abstractmethod
+    def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
+        """Return the number of the item at which the mission ends in the air; ``None`` if it lands."""
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """By MAVLink's mission protocol."""
+        """Replace the mission on board by MAVLink's mission protocol."""
         items = self._items(mission)
         step = Step(
             ask=f"take a mission of {len(items)} items",
-            send=lambda: self._carrier.upload(items),
-            done=lambda seen: key.MISSION in seen.answers and seen.answers[key.MISSION].accepted,
+            send=lambda: self._backend.upload(items),
+            done=lambda seen: _accepted(seen, Ack.MISSION),
             within=30 * S + len(items) * S,
-            answer=key.MISSION,
+            answer=Ack.MISSION,
             again=2 * S,
         )
-        self._last_item = self._ends_at(mission)
+        self._last_item = self._end_in_air(mission)
         return (step,)
 
-    @abstractmethod
-    def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
-        """The number on the wire of the item with which it ends in the air; ``None`` if it ends otherwise."""
-
     def _finish_mission(self, mode: str, leads_to: tuple[str, ...], within: Ns) -> Step:
-        """To its end: disarmed, at the last point, or said to be over."""
+        """Return a step that ends when disarmed, at the last item, or when the mission is reported as ended."""
+
+        def over(seen: Telemetry) -> bool:
+            last = self._last_item
+            return not seen.armed or seen.mission_ended or (last is not None and seen.mission_reached >= last)
+
         return Step(
             ask="finish the mission",
-            send=self._carrier.watch_mission,
-            done=self._mission_over,
+            send=self._backend.request_mission_progress,
+            done=over,
             within=within,
             mode=mode,
             leads_to=leads_to,
@@ -213,61 +226,65 @@ class MavlinkDriver:
         self.telemetry.mission_reached = -1
         self.telemetry.mission_ended = False
 
-    def _mission_over(self, seen: Telemetry) -> bool:
-        last = self._last_item
-        return not seen.armed or seen.mission_ended or (last is not None and seen.mission_reached >= last)
-
-    # -- pieces of sequences
+    # -- common steps
 
     @abstractmethod
-    def _asks_for(self, mode: str) -> None:
-        """This mode is about to be commanded."""
+    def _note_commanded(self, mode: str) -> None:
+        """Note that this program commands *mode*."""
 
-    def _change(self, mode: str) -> Sequence[Step]:
+    def _change_mode(self, mode: str) -> Step:
+        """Return a step that enters *mode*."""
+
         def send() -> None:
-            self._asks_for(mode)
-            self._carrier.set_mode(mode)
+            self._note_commanded(mode)
+            self._backend.set_mode(mode)
 
         if self.telemetry.mode == mode:
-            self._asks_for(mode)  # the step will be skipped
-        step = Step(
+            self._note_commanded(mode)  # the step will be skipped
+        return Step(
             ask=f"change to {mode}",
             send=send,
             done=lambda seen: seen.mode == mode,
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=key.MODE,
+            answer=Ack.MODE,
             again=S,
             enters=mode,
         )
-        return (step,)
 
-    def _comes_home(self, mode: str, resting: str, within: Ns) -> Step:
-        """A rover in *mode*, until it stands near home; there it may go over to *resting*."""
+    def _reach_home(self, mode: str, resting: str, within: Ns) -> Step:
+        """Return a step that waits until a rover rests near home; there it may change to *resting*."""
 
         def home(seen: Telemetry) -> bool:
             return (
-                seen.home is not None and horizontal_distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
+                seen.home is not None
+                and horizontal_distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
+                and at_rest(seen)
             )
 
         return Step(
             ask="return home",
             send=send_nothing,
-            done=lambda seen: home(seen) and at_rest(seen),
+            done=home,
             within=within,
             mode=mode,
             leads_to=(resting,),
             armed=True,
         )
 
-    def _at_speed(self, speed: float, mode: str) -> Sequence[Step]:
-        step = Step(
+    def _set_speed(self, speed: float, mode: str) -> Step:
+        """Return a step that sets the speed over ground, m/s."""
+        return Step(
             ask=f"go at {speed:g} m/s",
-            send=lambda: self._carrier.speed(speed),
-            done=lambda seen: key.SPEED in seen.answers and seen.answers[key.SPEED].accepted,
+            send=lambda: self._backend.set_speed(speed),
+            done=lambda seen: _accepted(seen, Ack.SPEED),
             within=ANSWERED_WITHIN,
-            answer=key.SPEED,
+            answer=Ack.SPEED,
             again=S,
             mode=mode,
         )
-        return (step,)
+
+
+def _accepted(seen: Telemetry, key: str) -> bool:
+    answer = seen.answers.get(key)
+    return answer is not None and answer.accepted

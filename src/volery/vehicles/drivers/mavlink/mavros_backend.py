@@ -1,13 +1,11 @@
-"""What MAVROS's topics say, as ``Telemetry``. One method for each topic that is listened to.
+"""Backend over MAVROS: an autopilot behind topics and services of a graph, as a commanding node uses them.
 
-An autopilot over MAVROS: topics and services of a graph, as a node that commands a vehicle uses them.
+The node's own loop, at 10 Hz, is run by the task that waits: process what has arrived (one ``spinOnce``), then
+sleep. All execution time is therefore charged to the component whose node this is. Nothing runs in the
+background: a set-point is repeated by that loop, or by the caller.
 
-The node's own loop, at 10 Hz, is run by whoever waits: take in what has arrived (one ``spinOnce``), sleep. So
-all that driving takes is charged to the component whose node this is. Nothing goes on in the background: a
-set-point that is to be repeated is repeated by that loop, or by the caller.
-
-MAVROS does not pass on everything: it does not say what kind of vehicle it is (``Drone`` or ``Rover`` tells),
-nor the result of the arming checks. Here a vehicle is ready once it has a local position, a fix and a home.
+MAVROS does not pass on everything: neither the kind of vehicle (``Drone`` or ``Rover`` states it) nor the result
+of the arming checks. Here a vehicle is ready once it has a local position, a fix and a home.
 """
 
 from __future__ import annotations
@@ -25,10 +23,9 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, ServiceError
-from volery.ros.graph.callbacks import Work
+from volery.ros.graph.interface import Work
 from volery.ros.messages import message_class, new, request
 from volery.vehicles.address import check_options
-from volery.vehicles.drivers.mavlink import backend as key
 from volery.vehicles.drivers.mavlink.backend import (
     ACTIVE,
     FAILSAFE,
@@ -37,31 +34,49 @@ from volery.vehicles.drivers.mavlink.backend import (
     ON_GROUND,
     UNCHANGED,
     UNDEFINED,
+    Ack,
     Item,
 )
+from volery.vehicles.drivers.steps import ROVER_KIND
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
+PERIOD: Ns = 100 * MS
+ANSWERED_WITHIN: Ns = 6 * S
+"""A vehicle node waits up to 5 s for the autopilot's acknowledgement."""
+
+MAVROS_OPTIONS = ("geoid", "namespace")
 NO_FIX = -1
 
 Handler = Callable[[Any], None]
 
 
-class MavrosDecoder:
-    """Turns messages into telemetry. ``node_seen``: somebody publishes the state, be it of no autopilot.
+class FirmwareBehind(NamedTuple):
+    """The firmware behind the vehicle node: its name, and the mode in which its rovers rest."""
 
-    *autopilot* is what flies behind the vehicle node, *resting* the mode in which its armed rovers stand;
-    ``beat`` is when the last state came.
+    autopilot: str
+    resting: str
+
+
+class MavrosDecoder:
+    """Decodes messages of MAVROS topics into telemetry. One method for each topic.
+
+    Attributes:
+        node_seen: the state topic is published, with or without an autopilot.
+        last_heartbeat_ns: time of the last state of a connected autopilot; -1 before the first.
+
+    Args:
+        kernel: clock.
+        telemetry: written by the decoder.
+        geoid: geoid of the altitudes, which MAVROS states above the ellipsoid.
+        firmware: the firmware behind the vehicle node.
     """
 
-    def __init__(
-        self, kernel: Kernel, telemetry: Telemetry, geoid: Geoid, autopilot: str, resting: str
-    ) -> None:
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, geoid: Geoid, firmware: FirmwareBehind) -> None:
         self.node_seen = False
-        self.beat: Ns = -1
-        self._autopilot = autopilot
-        self._resting = resting
+        self.last_heartbeat_ns: Ns = -1
+        self._firmware = firmware
         self._kernel = kernel
-        self._seen = telemetry
+        self._telemetry = telemetry
         self._geoid = geoid
         self._landed_state = UNDEFINED
         self._active = False
@@ -69,7 +84,7 @@ class MavrosDecoder:
         self._has_local_position = False
 
     def topics(self) -> Mapping[str, tuple[str, Handler]]:
-        """Type and handler of each topic."""
+        """Return type and handler of each topic."""
         return {
             "state": ("mavros_msgs/msg/State", self._state),
             "extended_state": ("mavros_msgs/msg/ExtendedState", self._extended_state),
@@ -83,116 +98,108 @@ class MavrosDecoder:
             "mission/reached": ("mavros_msgs/msg/WaypointReached", self._reached),
         }
 
-    def _heard(self) -> None:
-        self._seen.last_message_ns = self._kernel.now()
-        self._seen.changed.notify()
+    def update_flying(self) -> None:
+        """Update ``flying``; it depends on the kind of vehicle, which may become known later."""
+        telemetry = self._telemetry
+        if telemetry.kind == ROVER_KIND:
+            telemetry.flying = telemetry.armed and telemetry.mode != self._firmware.resting
+        elif self._landed_state == UNDEFINED:
+            telemetry.flying = telemetry.armed and self._active
+        else:
+            telemetry.flying = self._landed_state != ON_GROUND
+
+    def _note_message(self) -> None:
+        self._telemetry.last_message_ns = self._kernel.now()
+        self._telemetry.changed.notify()
 
     def _state(self, message: Any) -> None:
         self.node_seen = True
         if not message.connected:
             return
-        seen = self._seen
-        self.beat = self._kernel.now()
-        seen.autopilot = self._autopilot
-        seen.mode = message.mode
-        seen.armed = bool(message.armed)
-        seen.status = entry_name("MAV_STATE", message.system_status).lower()
-        seen.failsafe = message.system_status in FAILSAFE
+        telemetry = self._telemetry
+        self.last_heartbeat_ns = self._kernel.now()
+        telemetry.autopilot = self._firmware.autopilot
+        telemetry.mode = message.mode
+        telemetry.armed = bool(message.armed)
+        telemetry.status = entry_name("MAV_STATE", message.system_status).lower()
+        telemetry.failsafe = message.system_status in FAILSAFE
         self._active = message.system_status == ACTIVE
-        self._heard()
+        self._note_message()
 
     def _extended_state(self, message: Any) -> None:
         self._landed_state = message.landed_state
-        self._heard()
-
-    def judge_flying(self) -> None:
-        """By what was heard, and by its kind, which is told by others and maybe later than that."""
-        seen = self._seen
-        if seen.kind == "rover":
-            seen.flying = seen.armed and seen.mode != self._resting
-        elif self._landed_state == UNDEFINED:
-            seen.flying = seen.armed and self._active
-        else:
-            seen.flying = self._landed_state != ON_GROUND
+        self._note_message()
 
     def _global(self, message: Any) -> None:
         self._has_fix = message.status.status > NO_FIX
         if message.latitude != 0.0 or message.longitude != 0.0:
-            self._seen.position = self._position(message)
-        self._judge_ready()
-        self._heard()
+            self._telemetry.position = self._to_position(message)
+        self._update_ready()
+        self._note_message()
 
-    def _position(self, place: Any) -> Position:
+    def _to_position(self, place: Any) -> Position:
         latitude, longitude = place.latitude, place.longitude
         return Position(latitude, longitude, AMSL(self._geoid.to_amsl(latitude, longitude, place.altitude)))
 
     def _relative_altitude(self, message: Any) -> None:
-        self._seen.above_home = message.data
+        self._telemetry.above_home = message.data
 
     def _heading(self, message: Any) -> None:
-        self._seen.attitude = self._seen.attitude._replace(heading=message.data)
+        self._telemetry.attitude = self._telemetry.attitude._replace(heading=message.data)
 
     def _velocity(self, message: Any) -> None:
         linear = message.twist.linear
         north, east, down = enu_to_ned((linear.x, linear.y, linear.z))
-        self._seen.velocity = Velocity(north, east, -down)
+        self._telemetry.velocity = Velocity(north, east, -down)
         self._has_local_position = True
-        self._judge_ready()
+        self._update_ready()
 
     def _home(self, message: Any) -> None:
-        self._seen.home = self._position(message.geo)
-        self._judge_ready()
+        self._telemetry.home = self._to_position(message.geo)
+        self._update_ready()
 
-    def _judge_ready(self) -> None:
-        seen = self._seen
-        placed = seen.position is not None and seen.home is not None
-        seen.ready = seen.armable = self._has_fix and self._has_local_position and placed
+    def _update_ready(self) -> None:
+        telemetry = self._telemetry
+        located = telemetry.position is not None and telemetry.home is not None
+        telemetry.ready = telemetry.armable = self._has_fix and self._has_local_position and located
 
     def _battery(self, message: Any) -> None:
-        """ROS counts a current that discharges as negative."""
+        """In ROS the current of a discharge is negative."""
         amperes = -message.current if message.current == message.current else nan
-        self._seen.battery = Battery(message.percentage, message.voltage, amperes)
+        self._telemetry.battery = Battery(message.percentage, message.voltage, amperes)
 
     def _text(self, message: Any) -> None:
-        self._seen.texts.append(StatusText(self._kernel.now(), message.severity, message.text))
+        self._telemetry.texts.append(StatusText(self._kernel.now(), message.severity, message.text))
 
     def _reached(self, message: Any) -> None:
-        self._seen.mission_reached = message.wp_seq
-
-
-PERIOD: Ns = 100 * MS
-ANSWERED_WITHIN: Ns = 6 * S
-"""A vehicle node waits up to 5 s for the autopilot's acknowledgement."""
-
-MAVROS_OPTIONS = ("geoid", "namespace")
-
-
-class FirmwareBehind(NamedTuple):
-    """What flies behind the vehicle node: the firmware's name, and the mode in which its rovers rest."""
-
-    autopilot: str
-    resting: str
+        self._telemetry.mission_reached = message.wp_seq
 
 
 class MavrosBackend:
-    """See ``Carrier``. *namespace* is where the vehicle node's names begin: ``/drone_1``.
+    """See ``Backend``. The constructor joins the graph, which takes execution time of the calling task.
 
-    Making it joins the graph: it computes, in the task that makes it.
+    Args:
+        kernel: clock and tasks.
+        node: the node that commands the vehicle.
+        name: name of the vehicle.
+        namespace: namespace of the vehicle node, such as ``/drone_1``.
+        geoid: geoid of the altitudes.
     """
 
-    behind: FirmwareBehind
+    firmware: FirmwareBehind
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         self.telemetry = Telemetry(kernel, name)
+        self.cycle: Action | None = self._spin
         self._kernel = kernel
         self._node = node
         self._namespace = namespace.rstrip("/")
-        self._hearing = MavrosDecoder(kernel, self.telemetry, geoid, *self.behind)
+        self._decoder = MavrosDecoder(kernel, self.telemetry, geoid, self.firmware)
         self._wrong = ""
         self._arrived: deque[Work] = deque()
         self._spinner = node.group()
         inbox = node.group(self._arrived.append)
-        for topic, (message_type, handler) in self._hearing.topics().items():
+        for topic, (message_type, handler) in self._decoder.topics().items():
             node.subscribe(self._name(topic), message_type, handler, group=inbox)
         self._velocity = node.advertise(self._name("setpoint_raw/local"), "mavros_msgs/msg/PositionTarget")
         self._set_mode = node.client(self._name("set_mode"), "mavros_msgs/srv/SetMode")
@@ -207,44 +214,39 @@ class MavrosBackend:
 
     # -- the node's loop
 
-    @property
-    def cycle(self) -> Action | None:
-        """Spin once, sleep."""
-        return self._go_round
-
-    def _go_round(self) -> None:
+    def _spin(self) -> None:
         self.poll()
         self._rate.sleep()
 
-    @property
-    def parameters(self) -> Mapping[str, float] | None:
-        """Not read over a graph."""
-        return None
-
     def poll(self) -> None:
-        """One ``spinOnce``: it is paid once, and runs the callbacks of all that has arrived."""
+        """Process received messages; all of them are charged as one ``spinOnce``."""
         self._spinner.spin_once(0)
         while self._arrived:
             self._arrived.popleft().run()
-        self._hearing.judge_flying()
+        self._decoder.update_flying()
+
+    @property
+    def parameters(self) -> Mapping[str, float] | None:
+        """Always ``None``: parameters are not read over a graph."""
+        return None
 
     def problem(self) -> LinkError | None:
-        """What is wrong on the way, as far as it shows."""
+        """Return what is wrong with the link, as an error to raise."""
         if self._wrong:
             return LinkSilent(self._wrong)
         if self.telemetry.last_message_ns >= 0:
             return None
-        if self._hearing.node_seen:
-            return LinkSilent(f"the vehicle node at {self._namespace} hears no autopilot")
+        if self._decoder.node_seen:
+            return LinkSilent(f"the vehicle node at {self._namespace} receives no autopilot")
         return LinkSilent(f"no vehicle node publishes {self._name('state')}")
 
     def close(self) -> None:
-        """Commands no more; the node is its owner's."""
+        """Do nothing: the node belongs to its component."""
 
     # -- services
 
     def _call(self, client: Any, asked: Any) -> Any | None:
-        """The response; ``None`` if there was none, which is not the autopilot's refusal."""
+        """Return the response; ``None`` if there was none, which is not a refusal by the autopilot."""
         try:
             response = client.call(asked, within=ANSWERED_WITHIN)
         except ServiceError as error:
@@ -253,67 +255,65 @@ class MavrosBackend:
         self._wrong = ""
         return response
 
-    def _answer(self, which: str, response: Any | None) -> None:
+    def _note_answer(self, key: str, response: Any | None) -> None:
         if response is not None:
             result = entry_name("MAV_RESULT", response.result)
-            self.telemetry.answers[which] = Answer(self._kernel.now(), response.success, result)
+            self.telemetry.answers[key] = Answer(self._kernel.now(), response.success, result)
 
     def _command(self, command: str, *parameters: float) -> Any | None:
-        kind = "mavros_msgs/srv/CommandLong"
         named = {f"param{number}": float(value) for number, value in enumerate(parameters, 1)}
-        return self._call(self._long, request(kind, command=constant(command), **named))
+        asked = request("mavros_msgs/srv/CommandLong", command=constant(command), **named)
+        return self._call(self._long, asked)
 
     def set_mode(self, mode: str) -> None:
-        """``set_mode``: MAVROS says that it was sent, not that it was done."""
-        kind = "mavros_msgs/srv/SetMode"
-        self._call(self._set_mode, request(kind, custom_mode=mode))
+        """Call ``set_mode``; the response states that the command was sent, not that it was obeyed."""
+        self._call(self._set_mode, request("mavros_msgs/srv/SetMode", custom_mode=mode))
 
     def arm(self, arm: bool, *, force: bool = False) -> None:
-        """``cmd/arming``; by force as a command of its own."""
+        """Call ``cmd/arming``, or ``cmd/command`` by force."""
         if force:
-            self._answer(key.ARM, self._command("MAV_CMD_COMPONENT_ARM_DISARM", float(arm), FORCE))
-            return
-        kind = "mavros_msgs/srv/CommandBool"
-        self._answer(key.ARM, self._call(self._arming, request(kind, value=arm)))
+            response = self._command("MAV_CMD_COMPONENT_ARM_DISARM", float(arm), FORCE)
+        else:
+            response = self._call(self._arming, request("mavros_msgs/srv/CommandBool", value=arm))
+        self._note_answer(Ack.ARM, response)
 
     def takeoff(self, altitude: float) -> None:
-        """``cmd/takeoff``: the altitude is what the firmware takes it for."""
-        kind = "mavros_msgs/srv/CommandTOL"
-        asked = request(kind, altitude=altitude, **self._take_off_from())
-        self._answer(key.TAKEOFF, self._call(self._takeoff, asked))
+        """Call ``cmd/takeoff``; the meaning of *altitude* (m) depends on the firmware."""
+        asked = request("mavros_msgs/srv/CommandTOL", altitude=altitude, **self._takeoff_fields())
+        self._note_answer(Ack.TAKEOFF, self._call(self._takeoff, asked))
 
-    def _take_off_from(self) -> Mapping[str, float]:
-        """The place and the heading with which to take off; none is the place where it stands."""
+    def _takeoff_fields(self) -> Mapping[str, float]:
+        """Return place and heading of the take-off; without these the firmware takes off in place."""
         return {}
 
-    def speed(self, metres_per_second: float) -> None:
-        """``cmd/command`` with DO_CHANGE_SPEED."""
-        answer = self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, metres_per_second, UNCHANGED)
-        self._answer(key.SPEED, answer)
+    def set_speed(self, speed: float) -> None:
+        """Call ``cmd/command`` with DO_CHANGE_SPEED."""
+        response = self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, speed, UNCHANGED)
+        self._note_answer(Ack.SPEED, response)
 
-    def check(self) -> None:
-        """``cmd/command`` with RUN_PREARM_CHECKS."""
+    def request_arming_checks(self) -> None:
+        """Call ``cmd/command`` with RUN_PREARM_CHECKS."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
-    def watch_target(self) -> None:
-        """It would be a topic more, and one more subscription to pay for."""
+    def request_target(self) -> None:
+        """Do nothing: the target would need another subscription, with its execution time."""
 
-    def watch_mission(self) -> None:
-        """``mission/reached`` comes anyhow."""
+    def request_mission_progress(self) -> None:
+        """Do nothing: ``mission/reached`` is subscribed to already."""
 
     def upload(self, items: Sequence[Item]) -> None:
-        """``mission/push``."""
-        kind = "mavros_msgs/srv/WaypointPush"
+        """Call ``mission/push``."""
         waypoints = [_waypoint(item, number == 0) for number, item in enumerate(items)]
-        response = self._call(self._push, request(kind, start_index=0, waypoints=waypoints))
+        asked = request("mavros_msgs/srv/WaypointPush", start_index=0, waypoints=waypoints)
+        response = self._call(self._push, asked)
         if response is not None:
             result = "ACCEPTED" if response.success else f"{response.wp_transfered} items went over"
-            self.telemetry.answers[key.MISSION] = Answer(self._kernel.now(), response.success, result)
+            self.telemetry.answers[Ack.MISSION] = Answer(self._kernel.now(), response.success, result)
 
     # -- topics
 
     def _publish_velocity(self, velocity: Velocity, mask: int, **yaw: float) -> None:
-        """``setpoint_raw/local``: east, north, up; *yaw* as the message has it, anticlockwise."""
+        """Publish on ``setpoint_raw/local``: east, north, up; *yaw* as in the message, anticlockwise."""
         message = new(
             "mavros_msgs/msg/PositionTarget",
             coordinate_frame=constant("MAV_FRAME_LOCAL_NED"),
@@ -325,8 +325,8 @@ class MavrosBackend:
         self._velocity.publish(message)
 
 
-def clockwise(degrees: float) -> float:
-    """A yaw rate in degrees/s clockwise, as ROS has it: in rad/s anticlockwise."""
+def to_ros_yaw_rate(degrees: float) -> float:
+    """Convert a yaw rate from degrees/s clockwise to rad/s anticlockwise (REP 103)."""
     return -radians(degrees)
 
 
@@ -349,9 +349,12 @@ def _waypoint(item: Item, current: bool) -> Any:
 
 
 def namespace_and_geoid(driver: str, name: str, options: Mapping[str, str]) -> tuple[str, Geoid]:
-    """What the options of an address say of the vehicle node called *name*.
+    """Return the namespace of a vehicle node and the geoid of its altitudes.
 
-    ``geoid``: MAVROS counts altitudes from the ellipsoid, by EGM96; else metres.
+    Args:
+        driver: name of the driver, for errors.
+        name: name of the vehicle.
+        options: ``namespace``, by default ``/`` and *name*; ``geoid``: ``egm96`` (default) or metres.
     """
     check_options(driver, options, *MAVROS_OPTIONS)
     return options.get("namespace", f"/{name}"), parse_geoid(options.get("geoid", EGM96_NAME))

@@ -1,4 +1,4 @@
-"""PX4: its sequences, written once, and two ways to reach it: a MAVLink link, and MAVROS on a graph."""
+"""PX4: one driver with two backends, a MAVLink link and MAVROS on a graph."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from volery.vehicles.drivers.px4.driver import PX4
 
 __all__ = ["DRIVER", "PX4", "open_driver", "open_mavros"]
 
-_OPENING = DriverOpeners("px4", PX4, PX4Mavlink, PX4Mavros)
+_OPENERS = DriverOpeners("px4", PX4, PX4Mavlink, PX4Mavros)
 
-open_driver = _OPENING.on_link
-open_mavros = _OPENING.on_graph
+open_driver = _OPENERS.on_link
+open_mavros = _OPENERS.on_graph
 
 DRIVER = DriverFactory(on_link=open_driver, on_graph=open_mavros)
-"""PX4 on a MAVLink link; on a graph it goes by MAVROS's names."""

@@ -1,10 +1,9 @@
-"""PX4's events: what it says instead of texts, as numbers.
+"""Decoder of PX4: mode names, estimator status, and events.
 
-An event's number is made of its name: the component (1, the autopilot) in the high byte, and below it 24
-bits of the name's FNV-1a hash. What an event means stands only in the firmware's sources; here are those of
-PX4 1.14 that were recorded, and the arming checks that a user meets. Others are shown as their number.
-
-What a PX4's messages say beyond those of every MAVLink autopilot.
+PX4 reports arming checks and state changes as numbered events. The number consists of the component (1, the
+autopilot) in the high byte and the 24 low bits of the FNV-1a hash of the event's name. The meanings stand only in
+the firmware's sources; here are the recorded events of PX4 1.14 and the arming checks that users meet. Others are
+shown as their number.
 """
 
 from __future__ import annotations
@@ -13,14 +12,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from volery.kernel.api import Kernel
-from volery.vehicles.drivers.mavlink import decoder
-from volery.vehicles.drivers.mavlink.decoder import Fields
+from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, MODES, mode_name
 from volery.vehicles.telemetry import Telemetry
 
 ALL_MODES = 0xFFFFFFFF
-ERROR = 3
-"""Log levels are those of syslog; an arming check for all modes that is no error is but a warning."""
+ERROR, WARNING = 3, 4
+"""Log levels of syslog. An arming check for all modes that is not an error is only a warning."""
 NOT_FOR_PEOPLE = 8
 
 _BASIS, _PRIME = 0x811C9DC5, 0x01000193
@@ -28,7 +26,7 @@ _AUTOPILOT = 1 << 24
 
 
 def event_id(name: str) -> int:
-    """The number of the autopilot's event *name*."""
+    """Return the number of the autopilot's event *name*."""
     value = _BASIS
     for octet in name.encode():
         value = (value ^ octet) * _PRIME & 0xFFFFFFFF
@@ -36,7 +34,7 @@ def event_id(name: str) -> int:
 
 
 class Event(NamedTuple):
-    """``modes`` is a set of bits, one for each mode's ``state``: of a check, those that it forbids."""
+    """An event. Of an arming check, ``modes`` has a bit for the ``state`` of each mode that it forbids."""
 
     id: int
     severity: int
@@ -45,9 +43,9 @@ class Event(NamedTuple):
 
 REPORT_BEGINS = event_id("commander_arming_check_summary")
 REPORT_ENDS = event_id("commander_health_summary")
-"""Between these two stand the arming checks that fail, all of them each time one of them changes."""
+"""Between these two events PX4 sends all failing arming checks, each time one of them changes."""
 
-NO_STICKS = event_id("check_modes_manual_control")
+NO_MANUAL_CONTROL = event_id("check_modes_manual_control")
 
 CHECKS: Mapping[int, str] = {
     event_id(name): words
@@ -111,7 +109,7 @@ KNOWN_EVENTS: Mapping[int, str] = {
         "mavlink_rcv_sp_target_invalid": "set-point that sets nothing",
     }.items()
 }
-"""Other events. Of those that were recorded most come as texts, too."""
+"""Other events. Most of those that were recorded are also sent as texts."""
 
 WITHOUT_TEXT = frozenset(
     event_id(name)
@@ -125,27 +123,27 @@ WITHOUT_TEXT = frozenset(
 
 
 def event_text(number: int) -> str:
-    """What it says; its number if that is not known."""
+    """Return the text of an event; its number if the event is not known."""
     return CHECKS.get(number) or KNOWN_EVENTS.get(number) or f"event {number:#010x}"
 
 
 def event_of(fields: Mapping[str, Any]) -> Event:
-    """An EVENT message. Its low four bits of ``log_levels`` are the severity that is meant for people."""
+    """Return the event of an EVENT message; the low four bits of ``log_levels`` are its external severity."""
     arguments: Sequence[int] = fields["arguments"]
     modes = int.from_bytes(bytes(arguments[:4]), "little")
     return Event(fields["id"], fields["log_levels"] & 0x0F, modes)
 
 
 class ArmingChecks:
-    """Those that fail now, put together from reports."""
+    """The arming checks that fail now, collected from reports."""
 
     def __init__(self) -> None:
         self.reported = False
         self._failing: tuple[Event, ...] = ()
         self._report: list[Event] | None = None
 
-    def hear(self, event: Event) -> bool:
-        """Take note of it; whether it belongs to a report."""
+    def handle_event(self, event: Event) -> bool:
+        """Process an event; return whether it belongs to a report."""
         if event.id == REPORT_BEGINS:
             self._report = []
             return True
@@ -162,27 +160,24 @@ class ArmingChecks:
         return True
 
     def reasons(self, mode: str) -> list[str]:
-        """Why it cannot arm in this mode."""
+        """Return why the vehicle cannot arm in *mode*."""
         return [event_text(event.id) for event in self._failing if _forbids(event, mode)]
 
 
 def _forbids(event: Event, mode: str) -> bool:
-    """Missing sticks are a warning for all modes, and forbid those that need them."""
-    if event.id == NO_STICKS:
+    """Missing manual control is a warning for all modes, and forbids the modes that need it."""
+    if event.id == NO_MANUAL_CONTROL:
         return mode in MANUAL_MODES
     if event.modes == ALL_MODES:
         return event.severity <= ERROR
     return bool(event.modes >> MODES[mode].state & 1) if mode in MODES else True
 
 
-WARNING = 4
+class PX4Decoder(TelemetryDecoder):
+    """Decodes PX4's mode names, ESTIMATOR_STATUS, and events.
 
-
-class PX4Decoder(decoder.TelemetryDecoder):
-    """PX4's mode names, its estimator's ESTIMATOR_STATUS, and its events.
-
-    PX4 says nearly all events as a text, too, as long as it hears a ground station; that text ends with a
-    tabulator. So an event is said here only if it has no text, or is a warning that is not known here.
+    PX4 sends nearly all events also as a text, which ends with a tabulator, while it receives a ground station.
+    So an event becomes a text here only if it has none, or is an unknown warning.
     """
 
     autopilot = "PX4"
@@ -191,38 +186,39 @@ class PX4Decoder(decoder.TelemetryDecoder):
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
         super().__init__(kernel, telemetry, record=record)
         self._checks = ArmingChecks()
-        self._estimator_heard = False
+        self._estimator_reports = False
         self._handlers["ESTIMATOR_STATUS"] = self._estimator_status
         self._handlers["EVENT"] = self._event
 
     def _mode_name(self, number: int) -> str:
         return mode_name(number)
 
-    def _judge_ready(self) -> None:
-        """It flies to altitudes above home by its own home: without one it is not ready."""
-        seen = self._seen
-        placed = seen.position is not None and seen.home is not None
-        seen.ready = seen.armable and placed and (self._estimates_position or not self._estimator_heard)
+    def _update_ready(self) -> None:
+        """PX4 converts altitudes above home by its own home: without a home it is not ready."""
+        telemetry = self._telemetry
+        located = telemetry.position is not None and telemetry.home is not None
+        estimates = self._estimates_position or not self._estimator_reports
+        telemetry.ready = telemetry.armable and located and estimates
 
     def _estimator_status(self, fields: Fields) -> None:
-        self._estimator_heard = True
+        self._estimator_reports = True
         self._estimator(fields)
 
-    def say(self, severity: int, text: str) -> None:
-        """The autopilot says this."""
-        super().say(severity, text.rstrip("\t"))
+    def add_text(self, severity: int, text: str) -> None:
+        """Add a text of the autopilot, without the final tabulator."""
+        super().add_text(severity, text.rstrip("\t"))
 
     def _event(self, fields: Fields) -> None:
         event = event_of(fields)
-        if self._checks.hear(event) or event.severity >= NOT_FOR_PEOPLE:
+        if self._checks.handle_event(event) or event.severity >= NOT_FOR_PEOPLE:
             return
         unknown = event.id not in KNOWN_EVENTS and event.severity <= WARNING
         if event.id in WITHOUT_TEXT or unknown:
-            self.say(event.severity, event_text(event.id))
+            self.add_text(event.severity, event_text(event.id))
 
-    def say_failing_checks(self) -> None:
-        """It refused to arm: PX4 says why in its last report, which may have come long before."""
+    def add_failing_checks(self) -> None:
+        """Add the reasons of a refusal to arm as texts, from the last report, which may be old."""
         if not self._checks.reported:
-            self.say(WARNING, "Arming check: not all are done yet")
-        for reason in self._checks.reasons(self._seen.mode):
-            self.say(WARNING, f"Arming check: {reason}")
+            self.add_text(WARNING, "Arming check: not all are done yet")
+        for reason in self._checks.reasons(self._telemetry.mode):
+            self.add_text(WARNING, f"Arming check: {reason}")

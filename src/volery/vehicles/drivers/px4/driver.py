@@ -1,26 +1,20 @@
-"""Missions as PX4 wants them: no item for home; what has no place is in MAVLink's mission frame.
+"""Driver of PX4: the steps of each operation.
 
-As recorded of PX4 1.14, which refuses commands without a place in a global frame, and flies to latitude and
-longitude 0 of an item that does not state them.
+Facts observed on PX4 1.14: a heartbeat arrives once a second, so a mode is acknowledged in milliseconds and seen
+up to a second later. On the ground every mode is accepted, even one that is not entered, so only the heartbeat
+counts. Arming checks are those of the present mode.
 
-PX4's sequences, written once: what it wants to be asked, and how one sees it done.
+To go to a position the driver sends DO_REPOSITION, which is flown in AUTO.LOITER: one command, after which PX4
+needs no commander, like ArduPilot's target in GUIDED. Only velocities and turns need OFFBOARD and its stream (see
+``OffboardStream``).
 
-They reach it over ``PX4Backend``. Facts behind them, observed on PX4 1.14: a heartbeat comes once a second, so
-a mode is acknowledged in milliseconds and seen up to a second later; on the ground every mode is accepted,
-even one that does not come to pass, so the heartbeat is believed. Arming checks are those of the mode it is
-in.
+NAV_TAKEOFF takes an altitude AMSL and ends up to a metre below it: a take-off to 10 m ended at 8.97 m. The driver
+then sends the drone by DO_REPOSITION to the stated height above the place of take-off.
 
-By position it goes by DO_REPOSITION, in AUTO.LOITER: one command, after which it needs no commander, as an
-ArduPilot's target in GUIDED. Only a velocity and a turn need OFFBOARD and its stream (see ``offboard``).
-
-NAV_TAKEOFF takes an altitude AMSL and ends up to a metre short of it: of "10 m" at 8.97. So when it has
-ended, the drone is sent to the stated height above the place where it took off, by DO_REPOSITION, which it
-meets as well as any other goal; only then has it taken off.
-
-A pilot hands over by AUTO.LOITER, PX4's Hold. One who takes an OFFBOARD flight into Hold has it, too: until
-he has chosen another mode in between, Hold then means his. So has one who sends it elsewhere by
-DO_REPOSITION, which is also how a ground station has it pause. To ask for AUTO.LOITER while it flies there
-changes nothing: it goes on to its target.
+A pilot hands over by AUTO.LOITER, PX4's Hold. A pilot who ends an OFFBOARD flight by Hold has control until another
+mode has been selected in between, because Hold is then the pilot's. The same holds for a station that sends the
+drone elsewhere by DO_REPOSITION, which is also how ground stations pause a vehicle. Commanding AUTO.LOITER while it
+flies in it changes nothing: it continues to its target.
 """
 
 from __future__ import annotations
@@ -35,14 +29,25 @@ from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.vehicles.driver import ManualControl, Repeat, Step
-from volery.vehicles.drivers.mavlink import backend as key
-from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, OWN_SPEED, UNCHANGED, Item, item
+from volery.vehicles.drivers.mavlink.backend import (
+    GROUND_SPEED,
+    OWN_SPEED,
+    UNCHANGED,
+    Ack,
+    Item,
+    mission_item,
+)
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
 from volery.vehicles.drivers.px4.link_loss import on_link_loss
 from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD
-from volery.vehicles.drivers.px4.setpoints import SETPOINT_PERIOD, STILL, ManualControlStream, OffboardStream
+from volery.vehicles.drivers.px4.setpoints import (
+    SETPOINT_PERIOD,
+    STILL,
+    ManualControlStream,
+    OffboardStream,
+)
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
     READY_WITHIN,
@@ -61,58 +66,29 @@ from volery.vehicles.drivers.steps import (
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
 
-NO_PLACE = constant("MAV_FRAME_MISSION")
-WITHIN_M = 2.0
-"""A waypoint counts as reached so near; PX4's own NAV_ACC_RAD is the same."""
-
-
-def items_of(mission: Sequence[MissionItem], here: Position) -> list[Item]:
-    """The items on the wire for a mission that begins at *here*."""
-    items: list[Item] = []
-    at = here
-    for one in mission:
-        items.append(_translated(one, at))
-        at = getattr(one, "position", None) or at
-    return items
-
-
-def _translated(one: MissionItem, at: Position) -> Item:
-    if isinstance(one, TakeOff):
-        up = Position(at.latitude, at.longitude, AboveHome(one.height))
-        return item("MAV_CMD_NAV_TAKEOFF", 0.0, 0.0, 0.0, nan, at=up)
-    if isinstance(one, ChangeSpeed):
-        return item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED, frame=NO_PLACE)
-    if isinstance(one, ReturnHome):
-        return item("MAV_CMD_NAV_RETURN_TO_LAUNCH", frame=NO_PLACE)
-    if isinstance(one, Land):
-        down = one.position or Position(at.latitude, at.longitude, AboveHome(0.0))
-        return item("MAV_CMD_NAV_LAND", 0.0, 0.0, 0.0, nan, at=down)
-    return _waypoint(one)
-
-
-def _waypoint(one: Waypoint) -> Item:
-    return item("MAV_CMD_NAV_WAYPOINT", one.stay_s, WITHIN_M, 0.0, one.heading, at=one.position)
-
-
 TAKEOFF_SHORT_M = 1.5
 """NAV_TAKEOFF ended up to 1.03 m below its altitude."""
 LEVELLED_WITHIN: Ns = MINUTE
 REPEATED_FOR: Ns = 1500 * MS
 """MISSION_ITEM_REACHED was repeated eleven times, for a second."""
 
+NO_PLACE = constant("MAV_FRAME_MISSION")
+WAYPOINT_RADIUS_M = 2.0
+"""A waypoint counts as reached at this distance, like PX4's own NAV_ACC_RAD."""
+
 
 class PX4(MavlinkDriver):
-    """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
+    """Driver of a PX4. See ``vehicles.driver.Driver`` for the operations."""
 
     obeys = HOLD
     landing_modes = frozenset({modes.LAND, modes.RTL, "AUTO.PRECLAND"})
+    _backend: PX4Backend
 
-    def __init__(self, kernel: Kernel, name: str, commands: PX4Backend) -> None:
-        super().__init__(kernel, name, commands)
+    def __init__(self, kernel: Kernel, name: str, backend: PX4Backend) -> None:
+        super().__init__(kernel, name, backend)
         self._kernel = kernel
-        self._commands = commands
-        self._offboard = OffboardStream(kernel, commands, self._eviction)
-        self._sticks = ManualControlStream(kernel, commands)
+        self._offboard = OffboardStream(kernel, backend, self._takeover)
+        self._manual = ManualControlStream(kernel, backend)
         self._at_own_speed = True
         self._lifted_at: Position | None = None
         self._stream = Repeat(SETPOINT_PERIOD, self._offboard.repeat)
@@ -120,107 +96,104 @@ class PX4(MavlinkDriver):
     @property
     def offboard_mode(self) -> str:
         """AUTO.LOITER; words that are no mode while AUTO.LOITER is a pilot's."""
-        self._offboard.look()
-        return self._eviction.offboard_mode
+        self._offboard.check()
+        return self._takeover.offboard_mode
 
     def on_link_loss(self) -> str:
-        """From its failsafes for the ground station, for OFFBOARD and for sticks."""
-        parameters = self._commands.parameters
+        """Return the reaction to a lost link, from the failsafes for ground station, OFFBOARD and RC."""
+        parameters = self._backend.parameters
         return on_link_loss(parameters) if parameters is not None else ""
 
     # -- from the ground
 
     def ready(self, within: Ns) -> Sequence[Step]:
-        """In a mode that could take off, as its checks are those of the mode: on the ground in Hold."""
+        """Wait until ready; on the ground in Hold, because the arming checks are those of the mode."""
         seen = self.telemetry
-        waits = super().ready(within)
+        wait = super().ready(within)
         if seen.armed or seen.ready or seen.mode.startswith("AUTO."):
-            return waits
-        return (*self._change(HOLD), *waits)
+            return wait
+        return (self._change_mode(HOLD), *wait)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """Hold, ready, armed, up, and then to the stated height; at once, or it disarms itself after 10 s."""
+        """Enter Hold, wait until ready, arm, climb and level; PX4 disarms itself 10 s after arming."""
 
         def risen(seen: Telemetry) -> bool:
             enough = max(height - TAKEOFF_SHORT_M, height / 2.0)
             return seen.flying and seen.mode == HOLD and seen.above_home >= enough
 
+        def send() -> None:
+            self._lifted_at = self._here("take off")
+            self._note_commanded(modes.TAKEOFF)
+            self._backend.takeoff(self._amsl(AboveHome(height)))
+
+        def level() -> Position:
+            over = self._lifted_at or self._here("take off")
+            return Position(over.latitude, over.longitude, AboveHome(height))
+
         climb = Step(
             ask=f"climb to {height:g} m",
-            send=lambda: self._take_off(height),
+            send=send,
             done=risen,
             within=within,
-            answer=key.TAKEOFF,
+            answer=Ack.TAKEOFF,
             again=2 * S,
             enters=modes.TAKEOFF,
             leads_to=(HOLD,),
             armed=True,
         )
-        return (*self._armed_in_hold(), climb, self._levelled(height))
-
-    def _take_off(self, height: float) -> None:
-        self._lifted_at = self._here("take off")
-        self._asks_for(modes.TAKEOFF)
-        self._commands.takeoff(self._amsl(AboveHome(height)))
-
-    def _levelled(self, height: float) -> Step:
-        """At the stated height above the place where it took off."""
-
-        def goal() -> Position:
-            over = self._lifted_at or self._here("take off")
-            return Position(over.latitude, over.longitude, AboveHome(height))
-
-        level = self._target(goal, LEVELLED_WITHIN)
-        return replace(level, ask=f"rise to {height:g} m")
+        return (
+            *self._armed_in_hold(),
+            climb,
+            self._reposition_step(f"rise to {height:g} m", level, LEVELLED_WITHIN),
+        )
 
     def _armed_in_hold(self) -> Sequence[Step]:
-        """Whoever changes the mode meanwhile has it: to arm in another one is not what was asked."""
-        armed = (replace(step, mode=HOLD) for step in self.arm())
-        return (*self._let_go(), *self._change(HOLD), *self.ready(READY_WITHIN), *armed)
+        """A pilot who changes the mode meanwhile has control: arming in another mode is not intended."""
+        arm = (replace(step, mode=HOLD) for step in self.arm())
+        return (*self._end_manual_control(), self._change_mode(HOLD), *self.ready(READY_WITHIN), *arm)
 
-    # -- by position
+    # -- operations with a position
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """DO_REPOSITION; a rover is armed on the way."""
+        """Send DO_REPOSITION; a rover is armed first."""
         if isinstance(goal.altitude, AboveGround):
             raise UsageError(f"{self.name}: {goal}: PX4 takes AMSL and AboveHome")
-        start = self._armed_in_hold() if self.telemetry.kind == ROVER_KIND else self._let_go()
-        reach = replace(self._target(lambda: goal, within), ask=f"reach {goal}")
-        return (*start, *self._paced(speed), reach)
-
-    def _paced(self, speed: float | None) -> Sequence[Step]:
-        """A speed that was stated stands until another is; PX4 may forget it when the mode changes."""
-        if speed is None and self._at_own_speed:
-            return ()
-        self._at_own_speed = speed is None
-        return (*self._change(HOLD), *self._at_speed(OWN_SPEED if speed is None else speed, HOLD))
-
-    def _target(self, goal: Callable[[], Position], within: Ns) -> Step:
-        """DO_REPOSITION to *goal*, until it is there."""
         rover = self.telemetry.kind == ROVER_KIND
-        aim = TargetMonitor(self.telemetry, self._eviction)
+        start = self._armed_in_hold() if rover else self._end_manual_control()
+        reach = self._reposition_step(f"reach {goal}", lambda: goal, within)
+        # a stated speed is kept until another one is set; PX4 may forget it when the mode changes
+        if speed is None and self._at_own_speed:
+            return (*start, reach)
+        self._at_own_speed = speed is None
+        set_speed = self._set_speed(OWN_SPEED if speed is None else speed, HOLD)
+        return (*start, self._change_mode(HOLD), set_speed, reach)
+
+    def _reposition_step(self, ask: str, goal: Callable[[], Position], within: Ns) -> Step:
+        """Return a step that sends DO_REPOSITION to *goal* and ends on arrival."""
+        rover = self.telemetry.kind == ROVER_KIND
+        monitor = TargetMonitor(self.telemetry, self._takeover)
 
         def send() -> None:
-            aim.set(self._reposition(goal()))
-            self._commands.watch_target()
+            monitor.set(self._reposition(goal()))
+            self._backend.request_target()
 
         return Step(
-            ask="reach it",
+            ask=ask,
             send=send,
             done=lambda seen: seen.mode == HOLD and arrived_at(goal(), rover)(seen),
             within=within,
-            answer=key.TARGET,
+            answer=Ack.TARGET,
             again=2 * S,
             enters=HOLD,
             armed=True,
-            lost=aim.lost,
+            lost=monitor.lost,
         )
 
     def _reposition(self, goal: Position) -> Position:
-        """The place as it was sent."""
-        self._asks_for(HOLD)
+        """Send DO_REPOSITION and return the target as it was sent."""
+        self._note_commanded(HOLD)
         target = Position(goal.latitude, goal.longitude, AMSL(self._amsl(goal.altitude)))
-        self._commands.reposition(target)
+        self._backend.reposition(target)
         return target
 
     def _here(self, asked: str) -> Position:
@@ -232,7 +205,7 @@ class PX4(MavlinkDriver):
         return here
 
     def _amsl(self, altitude: Altitude) -> float:
-        """Metres. Home is where its own two altitudes say; a rover goes at the altitude it has."""
+        """Return metres AMSL, with home taken from PX4's own two altitudes; a rover keeps its altitude."""
         here = self._here("go by position").altitude.metres
         if self.telemetry.kind != DRONE_KIND:
             return here
@@ -241,35 +214,34 @@ class PX4(MavlinkDriver):
         return altitude.metres
 
     def hold(self) -> Sequence[Step]:
-        """It is sent to where it is: that stops it in AUTO.LOITER as well as in any other mode.
+        """Send the vehicle to its present position, which stops it in any mode, AUTO.LOITER included.
 
-        Once more when it stands, for by then it has gone a bit further.
+        The command is repeated when it is at rest, because it has moved on meanwhile.
         """
-        stop = self._stopped("stop")
-        stay = self._stopped("stay")
-        return (*self._let_go(), stop, stay)
+        start = self._end_manual_control()
+        return (*start, self._stop_step("stop"), self._stop_step("stay"))
 
-    def _stopped(self, ask: str) -> Step:
+    def _stop_step(self, ask: str) -> Step:
+        def send() -> None:
+            self._reposition(self._here("hold"))
+
         return Step(
             ask=ask,
-            send=self._stay,
+            send=send,
             done=lambda seen: seen.mode == HOLD and at_rest(seen),
             within=STOPPED_WITHIN,
-            answer=key.TARGET,
+            answer=Ack.TARGET,
             again=2 * S,
             enters=HOLD,
             armed=self.telemetry.kind == DRONE_KIND,
         )
 
-    def _stay(self) -> None:
-        self._reposition(self._here("hold"))
-
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """OFFBOARD, streamed until it has lasted long enough; then AUTO.LOITER."""
+        """Stream a velocity in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
         return self._streamed(Setpoint(velocity, yaw_rate), lasting)
 
     def heading(self, degrees: float) -> Sequence[Step]:
-        """In OFFBOARD, on the spot; then AUTO.LOITER, which keeps the heading."""
+        """Turn in place in OFFBOARD, then enter AUTO.LOITER, which keeps the heading."""
         turn = Step(
             ask=f"turn to {degrees:g} degrees",
             send=send_nothing,
@@ -279,121 +251,162 @@ class PX4(MavlinkDriver):
             armed=True,
             keep=self._stream,
         )
-        return (*self._streamed(STILL._replace(heading=degrees), None), turn, *self._change(HOLD))
+        return (*self._streamed(STILL._replace(heading=degrees), None), turn, self._change_mode(HOLD))
 
     def _streamed(self, setpoint: Setpoint, lasting: Ns | None) -> Sequence[Step]:
-        """The stream first: without it PX4 does not enter. Over a failsafe one must first get to Hold."""
+        """Start the stream, without which PX4 does not enter OFFBOARD; leave a failsafe by way of Hold."""
         seen = self.telemetry
-        first = self._change(HOLD) if seen.failsafe and seen.mode not in {HOLD, OFFBOARD} else ()
+        in_failsafe = seen.failsafe and seen.mode not in {HOLD, OFFBOARD}
+        first = (self._change_mode(HOLD),) if in_failsafe else ()
         begin = immediate_step("stream set-points", lambda: self._offboard.begin(setpoint, lasting))
         if self._offboard.holds:
             return (begin,)
         enter = replace(
-            self._change(OFFBOARD)[0],
+            self._change_mode(OFFBOARD),
             done=lambda _: self._offboard.entered(),
             skippable=False,
             leads_to=(HOLD,),
             keep=self._stream,
         )
-        return (*first, *self._let_go(), begin, enter)
+        return (*first, *self._end_manual_control(), begin, enter)
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """AUTO.RTL. A drone lands and disarms itself; a rover stops near home."""
+        """Enter AUTO.RTL. A drone lands and disarms itself; a rover stops near home."""
         if self.telemetry.kind == DRONE_KIND:
             return self._until_disarmed(modes.RTL, "return home and land", within)
-
-        come = self._comes_home(modes.RTL, HOLD, within)
-        return (*self._let_go(), *self._change(modes.RTL), come)
+        reach = self._reach_home(modes.RTL, HOLD, within)
+        return (*self._end_manual_control(), self._change_mode(modes.RTL), reach)
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """AUTO.LAND, until it has disarmed itself. Without a position it descends where the wind takes it."""
+        """Enter AUTO.LAND; done when disarmed. Without a position it drifts with the wind while it descends."""
         return self._until_disarmed(modes.LAND, "land", within)
 
-    # -- by sticks
+    # -- manual flight
 
     def stabilize(self) -> Sequence[Step]:
-        """STABILIZED, with the sticks held. In the air not with an idle throttle: it would fall."""
-        self._sticks.hold_any()
-        check_throttle(self.telemetry, self._sticks.held)
-        return self._change(modes.STABILIZED)
+        """Enter STABILIZED with manual control repeated; in the air not with an idle throttle."""
+        self._manual.hold_any()
+        check_throttle(self.telemetry, self._manual.held)
+        return (self._change_mode(modes.STABILIZED),)
 
     def altitude_hold(self) -> Sequence[Step]:
-        """ALTCTL, with the sticks held."""
-        self._sticks.hold_any()
-        return self._change(modes.ALTCTL)
+        """Enter ALTCTL with manual control repeated."""
+        self._manual.hold_any()
+        return (self._change_mode(modes.ALTCTL),)
 
     def manual(self) -> Sequence[Step]:
-        """MANUAL, with the sticks held."""
-        self._sticks.hold_any()
-        return self._change(modes.MANUAL)
+        """Enter MANUAL with manual control repeated."""
+        self._manual.hold_any()
+        return (self._change_mode(modes.MANUAL),)
 
-    def manual_control(self, sticks: ManualControl | None) -> None:
-        """Keep sending them, as long as the mode is ours."""
-        if sticks is None:
-            self._sticks.centre()
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Repeat *control* while the mode is ours; ``None`` centres it."""
+        if control is None:
+            self._manual.centre()
         else:
-            self._sticks.hold(sticks)
+            self._manual.hold(control)
 
-    def _let_go(self) -> Sequence[Step]:
-        """Sticks still count as moving for a moment after they were centred."""
-        if self._sticks.held is None:
+    def _end_manual_control(self) -> Sequence[Step]:
+        """Centre manual control and wait, because it counts as moving for a moment after it was centred."""
+        if self._manual.held is None:
             return ()
+
+        def keep() -> None:
+            self._manual.repeat()
+            self.telemetry.changed.notify()
+
         centre = Step(
             ask="centre the sticks",
-            send=self._sticks.centre,
-            done=lambda _: self._sticks.settled(),
+            send=self._manual.centre,
+            done=lambda _: self._manual.settled(),
             within=5 * S,
-            keep=Repeat(SETPOINT_PERIOD, self._centring),
+            keep=Repeat(SETPOINT_PERIOD, keep),
         )
         return (centre,)
 
-    def _centring(self) -> None:
-        self._sticks.repeat()
-        self.telemetry.changed.notify()
-
     def stop(self) -> None:
-        """No set-point and no stick is repeated any more."""
+        """Stop repeating set-points and manual control."""
         self._offboard.stop()
-        self._sticks.stop()
+        self._manual.stop()
 
     # -- missions
 
     def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
-        return items_of(mission, self._here("upload a mission"))
+        return mission_items(mission, self._here("upload a mission"))
 
-    def _ends_at(self, mission: Sequence[MissionItem]) -> int | None:
-        """PX4 1.14 does not say that a mission is over: it is when its last place is reached."""
+    def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
+        """PX4 1.14 does not report the end of a mission: it ends when its last place is reached."""
         if isinstance(mission[-1], Land | ReturnHome):
             return None
         places = [number for number, one in enumerate(mission) if isinstance(one, TakeOff | Waypoint)]
         return places[-1] if places else None
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Ready, AUTO.MISSION, armed; to its end."""
+        """Wait until ready, enter AUTO.MISSION and arm; done when the mission has ended."""
         began = self._kernel.now()
         repeats = self.telemetry.mission_reached >= 0
-        ready = () if self.telemetry.armed else (*self._change(HOLD), *self.ready(READY_WITHIN))
-        quiet = Step(
+        ready = () if self.telemetry.armed else (self._change_mode(HOLD), *self.ready(READY_WITHIN))
+        rewind = Step(
             ask="prepare the mission",
-            send=self._commands.rewind,
+            send=self._backend.rewind_mission,
             done=lambda _: not repeats or self._kernel.now() - began >= REPEATED_FOR,
             within=5 * S,
         )
-        forget = immediate_step("begin anew", self._forget_progress)
-        armed = (replace(step, mode=modes.MISSION) for step in self.arm())
-        go_on = self._finish_mission(modes.MISSION, (modes.RTL,), within)
-        return (*self._let_go(), *ready, quiet, forget, *self._change(modes.MISSION), *armed, go_on)
+        return (
+            *self._end_manual_control(),
+            *ready,
+            rewind,
+            immediate_step("begin anew", self._forget_progress),
+            self._change_mode(modes.MISSION),
+            *(replace(step, mode=modes.MISSION) for step in self.arm()),
+            self._finish_mission(modes.MISSION, (modes.RTL,), within),
+        )
 
-    # -- pieces of sequences
+    # -- common steps
 
-    def _asks_for(self, mode: str) -> None:
-        self._sticks.asks_for(mode)
+    def _note_commanded(self, mode: str) -> None:
+        self._manual.note_commanded(mode)
         if mode == OFFBOARD:
-            self._offboard.asks()
+            self._offboard.note_commanded()
         else:
             self._offboard.leave()
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:
             return ()
-        return (*self._let_go(), *self._change(mode), disarmed_step(ask, mode, within))
+        centre = self._end_manual_control()
+        return (*centre, self._change_mode(mode), disarmed_step(ask, mode, within))
+
+
+def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:
+    """Return the mission as PX4's items, without one for home; items without a place use the mission frame.
+
+    As recorded, PX4 1.14 refuses commands without a place in a global frame, and flies to latitude and longitude
+    0 for an item that states none.
+
+    Args:
+        mission: items of the mission.
+        here: position at its start.
+    """
+    items: list[Item] = []
+    at = here
+    for one in mission:
+        items.append(_wire_item(one, at))
+        at = getattr(one, "position", None) or at
+    return items
+
+
+def _wire_item(one: MissionItem, at: Position) -> Item:
+    if isinstance(one, TakeOff):
+        up = Position(at.latitude, at.longitude, AboveHome(one.height))
+        return mission_item("MAV_CMD_NAV_TAKEOFF", 0.0, 0.0, 0.0, nan, at=up)
+    if isinstance(one, ChangeSpeed):
+        return mission_item("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, one.speed, UNCHANGED, frame=NO_PLACE)
+    if isinstance(one, ReturnHome):
+        return mission_item("MAV_CMD_NAV_RETURN_TO_LAUNCH", frame=NO_PLACE)
+    if isinstance(one, Land):
+        down = one.position or Position(at.latitude, at.longitude, AboveHome(0.0))
+        return mission_item("MAV_CMD_NAV_LAND", 0.0, 0.0, 0.0, nan, at=down)
+    return mission_item(
+        "MAV_CMD_NAV_WAYPOINT", one.stay_s, WAYPOINT_RADIUS_M, 0.0, one.heading, at=one.position
+    )

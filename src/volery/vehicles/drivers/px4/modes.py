@@ -1,4 +1,4 @@
-"""PX4's modes: names as MAVROS and PX4's documentation have them, numbers as in ``px4_custom_mode.h``."""
+"""PX4's modes: names as in MAVROS and in PX4's documentation, numbers from ``px4_custom_mode.h``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HOLD, TAKEOFF, LAND, RTL, MISSION = "AUTO.LOITER", "AUTO.TAKEOFF", "AUTO.LAND", 
 
 
 class Mode(NamedTuple):
-    """``state`` is the number by which arming checks name it (``nav_state`` of ``VehicleStatus.msg``)."""
+    """A mode. ``state`` is its number in arming checks (``nav_state`` of ``VehicleStatus.msg``)."""
 
     main: int
     sub: int
@@ -19,7 +19,7 @@ class Mode(NamedTuple):
 
     @property
     def number(self) -> int:
-        """As a heartbeat's ``custom_mode``."""
+        """Number in a heartbeat's ``custom_mode``."""
         return self.sub << 24 | self.main << 16
 
 
@@ -42,14 +42,14 @@ MODES: Mapping[str, Mode] = {
     STABILIZED: Mode(7, 0, 15),
     "RATTITUDE": Mode(8, 0, 16),
 }
-"""By name."""
+"""Modes by name."""
 
 MANUAL_MODES = frozenset({MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO, "POSCTL.ORBIT", "RATTITUDE"})
-"""Modes in which the sticks steer it."""
+"""Modes that are flown by manual control."""
 
 _NAMES = {mode.number: name for name, mode in MODES.items()}
 
 
 def mode_name(number: int) -> str:
-    """The name of a ``custom_mode``; its number in words if the firmware is newer than this table."""
+    """Return the name of a ``custom_mode``; a name with its number if the firmware is newer than this table."""
     return _NAMES.get(number) or f"MODE {number:#010x}"

@@ -1,16 +1,7 @@
-"""The stream of set-points that keeps PX4 in OFFBOARD.
+"""Streams that PX4 needs: set-points in OFFBOARD, and manual control.
 
-House code repeats it, so it survives a component that is busy. It ends as soon as the mode is seen to be
-another: PX4 returns to OFFBOARD by itself when a stream resumes that it had missed (observed: even from RTL
-and LAND), so whoever went on streaming after a takeover would steal the aircraft back. For the same reason
-it pauses while the autopilot is not heard, until a heartbeat says that the mode is still OFFBOARD.
-
-The stream of sticks, which PX4 wants more than twice a second (COM_RC_LOSS_T).
-
-Once PX4 has had sticks it misses them in every mode: half a second after the last ones it holds, then
-returns home, even in AUTO.LOITER. So they go on, centred, after they were used. Sticks that *move* in a mode
-that flies by itself take the aircraft over into POSCTL; so in such modes only centred ones are sent, and
-they are centred before such a mode is asked for.
+Both are repeated by framework callbacks, so they survive a component that is busy; with a backend that has a
+cycle the node's own loop repeats them.
 """
 
 from __future__ import annotations
@@ -18,97 +9,108 @@ from __future__ import annotations
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Handle, Kernel
 from volery.vehicles.driver import ManualControl
-from volery.vehicles.drivers.mavlink import backend as key
+from volery.vehicles.drivers.mavlink.backend import Ack
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, OFFBOARD
-from volery.vehicles.drivers.steps import Takeover
+from volery.vehicles.drivers.steps import ROVER_KIND, Takeover
 from volery.vehicles.telemetry import Velocity
 
 SETPOINT_PERIOD: Ns = 100 * MS
-"""PX4 wants more than 2 Hz; at 1.2 Hz it stayed in OFFBOARD, at 0.8 Hz it left and returned."""
-
-DEAF_AFTER: Ns = S
-"""A PX4 that has not heard the stream for so long has left OFFBOARD (COM_OF_LOSS_T); so it may be with us."""
-
+"""PX4 needs more than 2 Hz; at 1.2 Hz it stayed in OFFBOARD, at 0.8 Hz it left OFFBOARD and returned."""
+LINK_IN_DOUBT_AFTER: Ns = S
+"""A PX4 that has not received the stream for this time has left OFFBOARD (COM_OF_LOSS_T); our own silence may
+mean that it receives nothing either.
+"""
 ENTERED_WITHIN: Ns = 7 * S
 
+MANUAL_CONTROL_PERIOD: Ns = 50 * MS
+SETTLED: Ns = 500 * MS
+"""Time after which centred manual control no longer counts as moving."""
+
 STILL = Setpoint(Velocity(0.0, 0.0, 0.0))
+CENTRED = ManualControl()
+_ROVER_CENTRED = ManualControl(throttle=0.0)
 
 
 class OffboardStream:
-    """One stream. Where the carrier has a cycle, ``repeat`` is the loop's and the caller's business."""
+    """Stream of set-points that keeps PX4 in OFFBOARD.
 
-    def __init__(self, kernel: Kernel, commands: PX4Backend, eviction: Takeover) -> None:
-        self._eviction = eviction
-        self._streaming = False
+    The stream ends as soon as another mode is seen. PX4 returns to OFFBOARD by itself when a missing stream
+    resumes (observed even from RTL and LAND), so a stream that continued after a takeover would take the
+    aircraft back. For the same reason the stream pauses while nothing is received from the autopilot, until a
+    heartbeat reports that the mode is still OFFBOARD.
+    """
+
+    def __init__(self, kernel: Kernel, backend: PX4Backend, takeover: Takeover) -> None:
         self._kernel = kernel
-        self._commands = commands
-        self._seen = commands.telemetry
+        self._backend = backend
+        self._takeover = takeover
+        self._telemetry = backend.telemetry
         self._setpoint = STILL
         self._until: Ns | None = None
         self._began: Ns = 0
-        self._asked: Ns | None = None
-        self._entered = False
-        self._leaving = False
-        self._asked_to_hold: Ns = 0
-        self._in_doubt: Ns = -1  # when it was last silent
+        self._commanded_at: Ns | None = None  # when OFFBOARD was commanded
+        self._hold_commanded_at: Ns = 0
+        self._streaming = self._entered = self._leaving = False
+        self._in_doubt_at: Ns = -1  # when the link was silent last
         self._timer: Handle | None = None
 
-    def look(self) -> None:
-        """Notice at once that the mode was taken, not with the next set-point only."""
-        if self._streaming and self._entered and self._seen.mode != OFFBOARD:
+    def check(self) -> None:
+        """Detect at once, not only with the next set-point, that another has changed the mode."""
+        if self._streaming and self._entered and self._telemetry.mode != OFFBOARD:
             self._end()
 
     @property
     def holds(self) -> bool:
-        """The mode is ours, and stays."""
-        return self._streaming and self._entered and not self._leaving and self._seen.mode == OFFBOARD
+        """Whether OFFBOARD is ours and stays."""
+        entered = self._streaming and self._entered and not self._leaving
+        return entered and self._telemetry.mode == OFFBOARD
 
     def entered(self) -> bool:
-        """It is in OFFBOARD because it was asked: a heartbeat that is younger than its consent says so."""
-        if not self._entered and self._seen.mode == OFFBOARD:
-            agreed = self._agreed()
-            self._entered = agreed is not None and self._commands.beat > agreed
+        """Return whether OFFBOARD was entered by our command.
+
+        It was if a heartbeat that is younger than the acknowledgement reports it. MAVROS passes on no
+        acknowledgement; there the time of the command is used.
+        """
+        if not self._entered and self._telemetry.mode == OFFBOARD:
+            agreed = self._commanded_at
+            if self._backend.cycle is None:
+                answer = self._telemetry.answers.get(Ack.MODE)
+                agreed = answer.at if answer is not None and answer.accepted else None
+            self._entered = agreed is not None and self._backend.last_heartbeat_ns > agreed
         return self._entered
 
-    def _agreed(self) -> Ns | None:
-        """MAVROS passes no answer on: there it is when the mode was asked for."""
-        if self._commands.cycle is not None:
-            return self._asked
-        answer = self._seen.answers.get(key.MODE)
-        return answer.at if answer is not None and answer.accepted else None
-
-    def asks(self) -> None:
-        """OFFBOARD is being commanded."""
-        self._asked = self._kernel.now()
+    def note_commanded(self) -> None:
+        """Note that OFFBOARD is being commanded."""
+        self._commanded_at = self._kernel.now()
 
     def begin(self, setpoint: Setpoint, lasting: Ns | None = None) -> None:
-        """Stream it from now on; after *lasting* let it hold its place, in AUTO.LOITER."""
+        """Stream *setpoint*; after *lasting* enter AUTO.LOITER."""
         now = self._kernel.now()
         self._setpoint = setpoint
         self._until = None if lasting is None else now + lasting
         if not self.holds:
             self._entered = False
             self._began = now
-            self._asked = None
+            self._commanded_at = None
         self._leaving = False
         self._streaming = True
-        self._commands.setpoint(setpoint)
-        if self._timer is None and self._commands.cycle is None:
-            self._in_doubt = -1
+        self._backend.send_setpoint(setpoint)
+        if self._timer is None and self._backend.cycle is None:
+            self._in_doubt_at = -1
             self._timer = self._kernel.every(SETPOINT_PERIOD, self._tick)
 
     def repeat(self) -> None:
-        """Once more, in the loop of a node."""
-        if self._commands.cycle is not None:
-            self._commands.setpoint(self._setpoint)
+        """Send the set-point again, from the loop of a node."""
+        if self._backend.cycle is not None:
+            self._backend.send_setpoint(self._setpoint)
 
     def leave(self) -> None:
-        """Another mode is being commanded: it goes on until that is seen, lest PX4 misses it meanwhile."""
+        """Note that another mode is being commanded; the stream goes on until that mode is seen."""
         self._leaving = True
 
     def stop(self) -> None:
-        """No set-point any more."""
+        """Stop the stream."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -120,90 +122,86 @@ class OffboardStream:
             if now - self._began > ENTERED_WITHIN:
                 self.stop()
                 return
-        elif self._seen.mode != OFFBOARD:
+        elif self._telemetry.mode != OFFBOARD:
             self._end()
             return
-        if now - self._seen.last_message_ns > DEAF_AFTER:
-            self._in_doubt = now
-        if self._entered and self._commands.beat <= self._in_doubt:
+        if now - self._telemetry.last_message_ns > LINK_IN_DOUBT_AFTER:
+            self._in_doubt_at = now
+        if self._entered and self._backend.last_heartbeat_ns <= self._in_doubt_at:
             return
         if self._until is not None and now >= self._until:
-            self._hold_its_place(now)
-        self._commands.setpoint(self._setpoint)
+            self._command_hold(now)
+        self._backend.send_setpoint(self._setpoint)
 
-    def _hold_its_place(self, now: Ns) -> None:
-        if not self._leaving or now - self._asked_to_hold >= S:
+    def _command_hold(self, now: Ns) -> None:
+        if not self._leaving or now - self._hold_commanded_at >= S:
             self._leaving = True
-            self._asked_to_hold = now
+            self._hold_commanded_at = now
             self._setpoint = STILL
-            self._commands.set_mode(HOLD)
+            self._backend.set_mode(HOLD)
 
     def _end(self) -> None:
-        """The mode is another one: ours, or somebody's. A failsafe's is told by its status. Somebody who took
-        it into the one in which it would obey us has it.
-        """
-        taken = not self._leaving and not self._seen.failsafe and self._seen.mode == HOLD
+        """End the stream in another mode; a pilot who entered AUTO.LOITER, which obeys us, has control."""
+        taken = not self._leaving and not self._telemetry.failsafe and self._telemetry.mode == HOLD
         self.stop()
         if taken:
-            self._eviction.begin()
-
-
-MANUAL_CONTROL_PERIOD: Ns = 50 * MS
-SETTLED: Ns = 500 * MS
-"""After so long sticks that were centred count no longer as moving."""
-
-CENTRED = ManualControl()
-_ROVER_CENTRED = ManualControl(throttle=0.0)
+            self._takeover.begin()
 
 
 class ManualControlStream:
-    """Repeats the sticks for as long as the mode is ours."""
+    """Stream of manual control, which PX4 needs more than twice a second (COM_RC_LOSS_T).
 
-    def __init__(self, kernel: Kernel, commands: PX4Backend) -> None:
+    Once PX4 has received manual control, a failsafe acts in every mode if it ends: half a second after the last
+    sample it holds, then it returns home, even in AUTO.LOITER. So the stream goes on, centred, after manual
+    flight. Manual control that moves in an autonomous mode makes PX4 change to POSCTL; so in such modes only
+    centred samples are sent, and the stream is centred before such a mode is commanded.
+    """
+
+    def __init__(self, kernel: Kernel, backend: PX4Backend) -> None:
         self.held: ManualControl | None = None
         self._kernel = kernel
-        self._commands = commands
-        self._seen = commands.telemetry
-        self._asked_mode = ""
+        self._backend = backend
+        self._telemetry = backend.telemetry
+        self._commanded_mode = ""
         self._mode_before = ""
         self._centred_at: Ns = 0
         self._timer: Handle | None = None
 
-    def asks_for(self, mode: str) -> None:
-        """This mode is being commanded."""
-        if mode != self._asked_mode:
-            self._mode_before = self._seen.mode
-        self._asked_mode = mode
+    def note_commanded(self, mode: str) -> None:
+        """Note that *mode* is being commanded."""
+        if mode != self._commanded_mode:
+            self._mode_before = self._telemetry.mode
+        self._commanded_mode = mode
 
-    def hold(self, sticks: ManualControl) -> None:
-        """Keep sending these."""
-        self.held = sticks
+    def hold(self, control: ManualControl) -> None:
+        """Send *control* at once and repeat it."""
+        self.held = control
         self._send()
-        if self._timer is None and self._commands.cycle is None and self.held is not None:
+        if self._timer is None and self._backend.cycle is None and self.held is not None:
             self._timer = self._kernel.every(MANUAL_CONTROL_PERIOD, self._send)
 
     def hold_any(self) -> None:
-        """Sticks that were never set are centred in the air, and idle on the ground."""
+        """Repeat neutral control if none was ever set: centred in the air, idle throttle on the ground."""
         if self.held is None:
-            self.hold(self._centre if self._seen.flying else ManualControl(throttle=0.0))
+            self.hold(self._centre if self._telemetry.flying else ManualControl(throttle=0.0))
 
     def centre(self) -> None:
-        """Let go of them: from now on centred, if they were ever used."""
+        """Repeat centred control if manual control was ever set."""
         if self.held is not None and self.held != self._centre:
             self._centred_at = self._kernel.now()
             self.hold(self._centre)
 
     def repeat(self) -> None:
-        """Once more, in the loop of a node."""
-        if self._commands.cycle is not None:
+        """Send again, from the loop of a node."""
+        if self._backend.cycle is not None:
             self._send()
 
     def settled(self) -> bool:
-        """Centred for so long that they do not count as moving."""
+        """Return whether the stream has been centred long enough not to count as moving."""
         return self.held is None or self._kernel.now() - self._centred_at >= SETTLED
 
     def stop(self) -> None:
-        """No sticks any more."""
+        """Stop the stream."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -211,16 +209,16 @@ class ManualControlStream:
 
     @property
     def _centre(self) -> ManualControl:
-        return _ROVER_CENTRED if self._seen.kind == "rover" else CENTRED
+        return _ROVER_CENTRED if self._telemetry.kind == ROVER_KIND else CENTRED
 
     def _send(self) -> None:
         if self.held is None:
             return
-        mode, flying = self._seen.mode, self._seen.flying
-        by_sticks = mode in MANUAL_MODES
-        if mode == self._asked_mode:
+        mode, flying = self._telemetry.mode, self._telemetry.flying
+        is_manual = mode in MANUAL_MODES
+        if mode == self._commanded_mode:
             self._mode_before = ""
-        if flying and by_sticks and mode not in {self._asked_mode, self._mode_before}:
-            self.stop()  # somebody else flies it now, by their own sticks
+        if flying and is_manual and mode not in {self._commanded_mode, self._mode_before}:
+            self.stop()  # a pilot flies it now
             return
-        self._commands.manual_control(self.held if by_sticks or not flying else self._centre)
+        self._backend.send_manual_control(self.held if is_manual or not flying else self._centre)
