@@ -43,7 +43,7 @@ $(BIN)/python:
 
 $(VENV)/volery.stamp: pyproject.toml | $(BIN)/python
 	@echo "setting up $(VENV): volery and what it needs"
-	@$(PIP) install -e .
+	@$(PIP) install -e '.[all]'
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/volery.stamp

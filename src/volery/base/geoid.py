@@ -116,7 +116,8 @@ class LevelGeoid(Geoid):
     def __post_init__(self) -> None:
         if not LOWEST_SEPARATION <= self.metres <= HIGHEST_SEPARATION:
             raise UsageError(
-                f"a geoid {self.metres:g} m above the ellipsoid: on Earth it is {LOWEST_SEPARATION:g} to {HIGHEST_SEPARATION:g} m"
+                f"a geoid {self.metres:g} m above the ellipsoid: on Earth it is {LOWEST_SEPARATION:g} to "
+                f"{HIGHEST_SEPARATION:g} m"
             )
 
     def separation(self, latitude: float, longitude: float) -> float:

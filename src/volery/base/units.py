@@ -36,7 +36,7 @@ _PREFIXES = {
 _DEGREE = Fraction(math.pi) / 180
 
 
-class QuantityError(ValueError):  # noqa: N818 - the field's errors are ModelError and UsageError, which quote this one
+class QuantityError(ValueError):
     """A text that is no quantity, or one of another kind than is expected. The message says what would do."""
 
 

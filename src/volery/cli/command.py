@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import typer
 
 from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
+from volery.base.extras import missing_extra
 from volery.cli.console import Output
 from volery.cli.options import Debug, Json, Quiet
 
@@ -109,6 +110,11 @@ def exit_status(output: Output, command: Callable[[], int]) -> int:
             output.notes.print_exception()
         output.complain(f"volery: {error}")
         return BAD_INPUT if isinstance(error, BAD_INPUT_ERRORS) else FAILED
+    except ModuleNotFoundError as error:
+        if output.debug:
+            output.notes.print_exception()
+        output.complain(f"volery: {missing_extra(error) or error}; `volery doctor` lists every part")
+        return BAD_INPUT
     except KeyboardInterrupt:
         output.complain("volery: interrupted")
         return FAILED

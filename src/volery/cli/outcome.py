@@ -40,6 +40,8 @@ def show_outcome(output: Output, run: Run) -> int:
     for name, found in run.record.requirements.items():
         if found.met is False:
             output.complain(f"volery: {unmet(name, found)}")
+    for note in run.notes:
+        output.note(f"volery: {note}")
     for problem in run.problems:
         output.complain(f"volery: {problem}")
     for name in run.left:

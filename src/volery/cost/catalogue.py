@@ -7,10 +7,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
+from volery.base.extras import require_extra
 from volery.cost.code_laws import CodeLaw, CoreLaw, check_range
 from volery.cost.figures import PowerLaw, WithProvenance
 from volery.cost.ros_law import RosLaw
@@ -126,6 +125,10 @@ class Catalogue(BaseModel):
 
 def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
     """Parse a catalogue from YAML text; raise ``ModelError`` naming the place of what is wrong."""
+    require_extra("model", "catalogues of processors")
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
     try:
         data = YAML(typ="safe").load(text)
     except YAMLError as error:

@@ -21,8 +21,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from ruamel.yaml import YAML
-
+from volery.base.extras import require_extra
 from volery.cost.figures import WithProvenance
 
 Operations = Iterator[tuple[str, int]]
@@ -310,4 +309,7 @@ class OperationTable(WithProvenance):
 def operation_table() -> OperationTable:
     """Return the table that counted Python is priced by. It was measured on a server processor."""
     text = files("volery.cost").joinpath("python.yaml").read_text(encoding="utf-8")
+    require_extra("model", "the table of operations")
+    from ruamel.yaml import YAML
+
     return OperationTable.model_validate(YAML(typ="safe").load(text))

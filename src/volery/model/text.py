@@ -13,11 +13,16 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
-from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
-
 from volery.base.errors import Location, ModelError, choices, did_you_mean
+from volery.base.extras import require_extra
+
+try:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
+    from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+except ModuleNotFoundError:
+    require_extra("model", "models")
+    raise
 
 Path = tuple[str | int, ...]
 """A path in the model: keys and list positions from the top."""

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
 from rich.console import RenderableType
 
 from volery.base.errors import UsageError
-from volery.report.digest import Digest, Json
+from volery.base.extras import require_extra
 from volery.report.comparison import all_comparisons
+from volery.report.digest import Digest, Json
 from volery.report.grids import (
     Cell,
     CellStatus,
@@ -55,6 +54,13 @@ from volery.trace.events import Record, Verdict
 from volery.trace.mcap_writer import OUTCOME
 from volery.trace.reader import Reading
 from volery.trace.timeline import TimelineWriter
+
+try:
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+    from markupsafe import Markup
+except ModuleNotFoundError:
+    require_extra("report", "HTML reports")
+    raise
 
 TRACE_FILE = "trace.mcap"
 REPORT_FILE = "report.html"

@@ -18,7 +18,6 @@ from volery.components.programs import load_function
 from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.run.assembly.simulated_vehicles import HOME
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
 from volery.run.progress import LostLinkReporter, ProgressReporter
@@ -183,7 +182,14 @@ class _Flight:
             self._opened.leave()
             self._states.record_states()
             record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
-        return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
+        return Run(
+            record,
+            self._recording.folder,
+            ending.error,
+            tuple(left),
+            tuple(self._recording.problems),
+            tuple(self._recording.notes),
+        )
 
     def _fly(self, vehicle: Vehicle) -> None:
         try:
@@ -228,10 +234,10 @@ def names_of(urls: Sequence[str]) -> dict[str, str]:
     return {f"{parse(url).driver}_{number}": url for number, url in enumerate(urls, 1)}
 
 
-def home_of(mission: Mission) -> Position:
-    """Return the home of simulated vehicles: ``HOME`` of the mission's file, or the default."""
-    home = getattr(mission, "__globals__", {}).get("HOME", HOME)
-    if not isinstance(home, Position) or not isinstance(home.altitude, AMSL):
+def home_of(mission: Mission) -> Position | None:
+    """Return the home of simulated vehicles: ``HOME`` of the mission's file, or None."""
+    home = getattr(mission, "__globals__", {}).get("HOME")
+    if home is not None and not (isinstance(home, Position) and isinstance(home.altitude, AMSL)):
         raise UsageError(f"HOME is {home!r}; write Position(LATITUDE, LONGITUDE, AMSL(METRES))")
     return home
 

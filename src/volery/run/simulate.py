@@ -197,7 +197,14 @@ class _Simulation:
             self._recording.stream(Text(now, WHO, WARNING, warning))
         verdicts = self._observers.verdicts(now)
         record = self._recording.finish(ending.status, ending.reason, now, verdicts)
-        return Run(record, self._recording.folder, ending.error, tuple(left), tuple(self._recording.problems))
+        return Run(
+            record,
+            self._recording.folder,
+            ending.error,
+            tuple(left),
+            tuple(self._recording.problems),
+            tuple(self._recording.notes),
+        )
 
 
 class _OnGraph(_Simulation):

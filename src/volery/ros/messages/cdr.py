@@ -6,10 +6,8 @@ import struct
 from functools import cache
 from typing import Any
 
-from rosbags.interfaces import Msgdef, Nodetype
-from rosbags.serde import SerdeError
-
 from volery.base.errors import UsageError
+from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.message import Message
 from volery.ros.messages.store import message_class, message_name, store
 
@@ -17,7 +15,7 @@ _HEADER = b"\x00\x01\x00\x00"
 
 
 @cache
-def _codec(name: str) -> Msgdef[object]:
+def _codec(name: str) -> rosbags.Msgdef[object]:
     message_class(name)
     return store().get_msgdef(name)
 
@@ -26,9 +24,9 @@ def _codec(name: str) -> Msgdef[object]:
 def _has_lists(name: str) -> bool:
     """Whether lists or arrays are anywhere in the type, so that a message may need to be made ready first."""
     for _, (kind, detail) in store().fielddefs[name][1]:
-        if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
             return True
-        if kind == Nodetype.NAME and _has_lists(str(detail)):
+        if kind == rosbags.Nodetype.NAME and _has_lists(str(detail)):
             return True
     return False
 
@@ -48,7 +46,7 @@ def copied_to_cdr(message: Message) -> bytes:
         raw = bytearray(4 + codec.getsize_cdr(0, message, store()))
         raw[0:4] = _HEADER
         codec.serialize_cdr_le(memoryview(raw)[4:], 0, message, store())
-    except (struct.error, SerdeError, TypeError, ValueError, AttributeError) as error:
+    except (struct.error, rosbags.SerdeError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{name}: {_culprit(message)}: {error}") from error
     return bytes(raw)
 
@@ -65,13 +63,13 @@ def _culprit(message: Message) -> str:
     """The first field whose value cannot be encoded, in words."""
     for label, (kind, detail) in store().fielddefs[message.__msgtype__][1]:
         value: Any = getattr(message, label, None)
-        if kind == Nodetype.NAME:
+        if kind == rosbags.Nodetype.NAME:
             if getattr(value, "__msgtype__", None) != detail and not isinstance(value, Message):
                 return f"{label} is {value!r}, not a {detail}"
             deeper = _culprit(value)
             if deeper != _UNKNOWN:
                 return f"{label}.{deeper}"
-        elif kind == Nodetype.BASE and not _fits(str(detail[0]), value):
+        elif kind == rosbags.Nodetype.BASE and not _fits(str(detail[0]), value):
             return f"{label} is {value!r}, not a {detail[0]}"
     return _UNKNOWN
 
@@ -99,5 +97,5 @@ def from_cdr(name: str, data: bytes | memoryview) -> Any:
     _codec(full)
     try:
         return store().deserialize_cdr(data, full)
-    except SerdeError as error:
+    except rosbags.SerdeError as error:
         raise UsageError(f"these {len(data)} bytes are no {full}: {error}") from error

@@ -13,12 +13,8 @@ from functools import cache
 from hashlib import md5
 from typing import Any, NamedTuple
 
-from rosbags.interfaces import Nodetype
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
-
 from volery.base.errors import UsageError
+from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.cdr import from_cdr, to_cdr
 from volery.ros.messages.message import Message
 from volery.ros.messages.packages import ROS1_SPELLING
@@ -47,12 +43,12 @@ class Ros1Service(NamedTuple):
 
 
 @cache
-def _noetic() -> Typestore:
+def _noetic() -> rosbags.Typestore:
     """The definitions of ROS 1 Noetic; what it lacks is added from ours when it is asked for."""
-    return get_typestore(Stores.ROS1_NOETIC)
+    return rosbags.get_typestore(rosbags.Stores.ROS1_NOETIC)
 
 
-def definition_store(full: str) -> Typestore:
+def definition_store(full: str) -> rosbags.Typestore:
     """Noetic's store with type *full* in it. ``UsageError`` if Noetic's differs from ours in its layout."""
     ours, noetic = store(), _noetic()
     for _, what in ours.fielddefs[full][1]:
@@ -68,21 +64,21 @@ def definition_store(full: str) -> Typestore:
 
 def _nested(what: Any) -> str:
     kind, detail = what
-    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         return _nested(detail[0])
-    return str(detail) if kind == Nodetype.NAME else ""
+    return str(detail) if kind == rosbags.Nodetype.NAME else ""
 
 
-def _layout(of: Typestore, full: str) -> list[Any]:
+def _layout(of: rosbags.Typestore, full: str) -> list[Any]:
     """The types of the fields; ``seq`` of a header apart, their names do not matter to the bytes."""
     return [_plain(what) for name, what in of.fielddefs[full][1] if not (full == _HEADER and name == "seq")]
 
 
 def _plain(what: Any) -> Any:
     kind, detail = what
-    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-        return kind, _plain(detail[0]), detail[1] if kind == Nodetype.ARRAY else 0
-    return detail[0] if kind == Nodetype.BASE else detail
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
+        return kind, _plain(detail[0]), detail[1] if kind == rosbags.Nodetype.ARRAY else 0
+    return detail[0] if kind == rosbags.Nodetype.BASE else detail
 
 
 def ros1_name(name: str) -> str:
@@ -134,14 +130,14 @@ def _hashed(full: str) -> str:
 
 def _hashed_type(what: Any) -> str:
     kind, detail = what
-    if kind == Nodetype.BASE:
+    if kind == rosbags.Nodetype.BASE:
         return str(detail[0])
-    if kind == Nodetype.NAME:
+    if kind == rosbags.Nodetype.NAME:
         return _TIMES.get(detail) or ros1_type(detail).md5
     inner, count = detail
-    if inner[0] == Nodetype.NAME and inner[1] not in _TIMES:
+    if inner[0] == rosbags.Nodetype.NAME and inner[1] not in _TIMES:
         return _hashed_type(inner)  # sums carry no brackets
-    return f"{_hashed_type(inner)}[{count if kind == Nodetype.ARRAY else ''}]"
+    return f"{_hashed_type(inner)}[{count if kind == rosbags.Nodetype.ARRAY else ''}]"
 
 
 def to_ros1(message: Message) -> bytes:
@@ -162,7 +158,7 @@ def from_ros1(name: str, data: bytes | memoryview) -> Any:
     message_class(full)
     try:
         return from_cdr(full, store().ros1_to_cdr(data, full))
-    except (SerdeError, IndexError) as error:
+    except (rosbags.SerdeError, IndexError) as error:
         raise UsageError(f"these {len(data)} bytes are no {full} of ROS 1: {error}") from error
 
 
@@ -216,9 +212,9 @@ def ros1_layout(name: str) -> Layout:
 
 def _field(owner: str, name: str, what: Any) -> FieldLayout:
     kind, detail = what
-    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         inner, count = detail
-        return _field(owner, name, inner)._replace(length=count if kind == Nodetype.ARRAY else 0)
-    if kind == Nodetype.NAME:
+        return _field(owner, name, inner)._replace(length=count if kind == rosbags.Nodetype.ARRAY else 0)
+    if kind == rosbags.Nodetype.NAME:
         return FieldLayout(name, nested=str(detail))
     return FieldLayout(name, base=str(detail[0]), carried=(owner, name) != ("std_msgs/msg/Header", "seq"))

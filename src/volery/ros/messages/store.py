@@ -12,12 +12,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
-from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.base import TypesysError, normalize_fieldname
-from rosbags.typesys.store import Typestore
-
 from volery.base.errors import UsageError, choices, did_you_mean
+from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.message import Field, Header, Message, Nothing, make_class
 from volery.ros.messages.stamp import DurationValue, TimeValue
 
@@ -76,9 +72,9 @@ class ServiceType(NamedTuple):
 
 
 @cache
-def store() -> Typestore:
+def store() -> rosbags.Typestore:
     """The types of ROS 2 Humble and those of ``definitions/``. For this room only."""
-    humble = get_typestore(Stores.ROS2_HUMBLE)
+    humble = rosbags.get_typestore(rosbags.Stores.ROS2_HUMBLE)
     texts: dict[str, str] = {}
     written_out = files("volery.ros.messages").joinpath("definitions").iterdir()
     for file in sorted(written_out, key=lambda file: file.name):
@@ -90,14 +86,14 @@ def store() -> Typestore:
     return humble
 
 
-def _register(into: Typestore, texts: dict[str, str]) -> None:
+def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
     parsed = {}
     for name, text in texts.items():
         try:
             # a service's halves read as messages, so that unqualified types are looked for among them
             read_as = name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
-            [parsed[name]] = get_types_from_msg(text, read_as).values()
-        except TypesysError as error:
+            [parsed[name]] = rosbags.get_types_from_msg(text, read_as).values()
+        except rosbags.TypesysError as error:
             raise UsageError(f"{name}: not a ROS message definition: {error}") from error
     for name, (_, fields) in parsed.items():
         for label, what in fields:
@@ -106,16 +102,16 @@ def _register(into: Typestore, texts: dict[str, str]) -> None:
                 raise UsageError(f"{name}.{label}: no message type named {inner!r}; define it first")
     try:
         into.register(parsed)
-    except TypesysError as error:
+    except rosbags.TypesysError as error:
         raise UsageError(str(error)) from error
 
 
 def _inner_type(what: Any) -> str:
     """The message type that a field is made of; empty for numbers and strings."""
     kind, detail = what
-    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         return _inner_type(detail[0])
-    return str(detail) if kind == Nodetype.NAME else ""
+    return str(detail) if kind == rosbags.Nodetype.NAME else ""
 
 
 def define(name: str, text: str) -> None:
@@ -203,8 +199,10 @@ def message_class(name: str) -> type[Message]:
     full = message_name(name)
     if full not in _classes:
         constants, fields = store().fielddefs[full]
-        described = [_describe(normalize_fieldname(key), what) for key, what in fields if key != _FILLER]
-        named = {normalize_fieldname(label): value for label, _, value in constants}
+        described = [
+            _describe(rosbags.normalize_fieldname(key), what) for key, what in fields if key != _FILLER
+        ]
+        named = {rosbags.normalize_fieldname(label): value for label, _, value in constants}
         made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
         _classes[full] = made
         store().types[full] = made  # what bytes are decoded to
@@ -235,14 +233,14 @@ def _introduce(made: Any) -> None:
 
 def _describe(name: str, what: Any) -> Field:
     kind, detail = what
-    if kind == Nodetype.BASE:
+    if kind == rosbags.Nodetype.BASE:
         return Field(name, detail[0], None, None)
-    if kind == Nodetype.NAME:
+    if kind == rosbags.Nodetype.NAME:
         return Field(name, "", message_class(detail), None)
     (inner_kind, inner), count = detail
-    if kind == Nodetype.SEQUENCE:
+    if kind == rosbags.Nodetype.SEQUENCE:
         count = 0  # a bound, if the definition states one, is not kept
-    if inner_kind == Nodetype.BASE:
+    if inner_kind == rosbags.Nodetype.BASE:
         return Field(name, inner[0], None, count)
     return Field(name, "", message_class(inner), count)
 
@@ -279,7 +277,7 @@ def new(name: str, /, **fields: Any) -> Any:
 
 def _nested(cls: type[Message], key: str, value: dict[str, Any]) -> Any:
     for label, what in store().fielddefs[cls.__msgtype__][1]:
-        if normalize_fieldname(label) == key and what[0] == Nodetype.NAME:
+        if rosbags.normalize_fieldname(label) == key and what[0] == rosbags.Nodetype.NAME:
             return new(str(what[1]), **value)
     return value
 
@@ -313,19 +311,19 @@ def nested_types(name: str) -> tuple[str, ...]:
 
 def _inner(what: Any) -> str:
     kind, detail = what
-    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         return _inner(detail[0])
-    return str(detail) if kind == Nodetype.NAME else ""
+    return str(detail) if kind == rosbags.Nodetype.NAME else ""
 
 
 def _spell(what: Any) -> str:
     kind, detail = what
-    if kind == Nodetype.NAME:
+    if kind == rosbags.Nodetype.NAME:
         return str(detail).replace("/msg/", "/")
-    if kind == Nodetype.BASE:
+    if kind == rosbags.Nodetype.BASE:
         base, bound = detail
         return f"{base}<{bound}>" if bound else _SPELLED.get(base, base)
     inner, count = detail
-    if kind == Nodetype.ARRAY:
+    if kind == rosbags.Nodetype.ARRAY:
         return f"{_spell(inner)}[{count}]"
     return f"sequence<{_spell(inner)}{f', {count}' if count else ''}>"

@@ -185,7 +185,7 @@ def test_a_vehicle_without_a_link_is_refused():
     bird = Vehicle("bird", "multirotor", "dji", PAD)
     cut = LinkCut(vehicle="bird", **FAULT)
     with pytest.raises(
-        ModelError, match="trouble.vehicle: a simulated dji has no link"
+        ModelError, match=r"trouble\.vehicle: a simulated dji has no link"
     ):
         with_faulty_links(Environment(vehicles=(bird,), faults=(cut,)))
 
