@@ -1,8 +1,8 @@
-"""ROS 1: nodes on a real master, by the real rospy.
+"""ROS 1: nodes on a real master, through the installed rospy.
 
-rospy knows one node in a process; here each node has a copy of it (``rospy_copy``), so that a process may
-hold as many as on the embedded graph. Messages are built from our own definitions: no message package need
-be installed, only rospy itself.
+rospy supports one node per process. Each node has its own copy of rospy here (``rospy_copy``), so that a
+process may have as many nodes as on the embedded graph. Message classes are built from volery's definitions:
+only rospy itself must be installed, no message packages.
 """
 
 from volery.ros.transports.ros1.graph import ros1_graph

@@ -1,4 +1,4 @@
-"""The graph that a ROS master keeps."""
+"""The graph of a ROS master."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ LOGGERS = ("rosout", "rospy")
 
 
 class _ToTrace(logging.Handler):
-    """rospy says in its log alone that, for instance, a peer's type does not match."""
+    """Handler that reports rospy's warnings, such as a peer's other type, which only its log has."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         super().__init__(logging.WARNING)
         self._say = say
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Pass it on, without the traceback that rospy may have put behind it."""
+        """Report the text of a record without its traceback."""
         text = record.getMessage().strip().partition("Traceback")[0].rstrip(": \n")
         topic = record.threadName or ""  # what connects a subscriber is named after its topic
         self._say(f"{topic}: {text}" if topic.startswith("/") else text)
@@ -47,8 +47,8 @@ class _ToTrace(logging.Handler):
 class Ros1Library:
     """See ``volery.ros.transports.client_library.ClientLibrary``.
 
-    A thread watches the master: one that comes back after its death has forgotten everything, and is told
-    again who is here.
+    A thread watches the master: after a restart the master has lost all registrations, and the nodes of this
+    process register again.
     """
 
     def __init__(self, master: Master, core: Roscore | None) -> None:
@@ -61,7 +61,7 @@ class Ros1Library:
         self.say: Callable[[str], None] = lambda text: None
 
     def start(self) -> None:
-        """Watch the master, and rospy's log."""
+        """Start watching the master and rospy's log."""
         self._log = _ToTrace(self._pass_on)
         for name in LOGGERS:
             logging.getLogger(name).addHandler(self._log)
@@ -72,7 +72,7 @@ class Ros1Library:
         self.say(text)
 
     def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Node:
-        """Register a node."""
+        """Create and register a node."""
         made = Ros1Node(self._types, name, namespace, lost)
         with self._guard:
             self._wires.append(made)
@@ -86,9 +86,9 @@ class Ros1Library:
                 self.say(f"the ROS master at {self._master.uri} does not answer any more")
             there = found
             if found:
-                self._reintroduce()
+                self._register_again()
 
-    def _reintroduce(self) -> None:
+    def _register_again(self) -> None:
         with self._guard:
             self._wires = [wire for wire in self._wires if not wire.closed]
             wires = list(self._wires)
@@ -105,12 +105,12 @@ class Ros1Library:
         return kinds, self._master.value("getSystemState")
 
     def node_names(self) -> list[str]:
-        """Whoever is registered for anything."""
+        """Return the nodes that are registered for anything, sorted."""
         _, state = self._state()
         return sorted({node for part in state for _, nodes in part for node in nodes})
 
     def topics(self) -> list[TopicState]:
-        """What is registered."""
+        """Return the registered topics, by name."""
         kinds, (publishers, subscribers, _) = self._state()
         sending = {name: tuple(sorted(nodes)) for name, nodes in publishers}
         hearing = {name: tuple(sorted(nodes)) for name, nodes in subscribers}
@@ -120,16 +120,16 @@ class Ros1Library:
         ]
 
     def services(self) -> list[ServiceState]:
-        """What is registered. The master does not know the types of services: they are empty here."""
+        """Return the registered services, by name; their types are empty, since the master has none."""
         _, (_, _, services) = self._state()
         return [ServiceState(name, "", nodes[0] if nodes else "") for name, nodes in sorted(services)]
 
     def announce_clock(self) -> None:
-        """By the parameter that every node reads when it starts."""
+        """Set ``/use_sim_time``, which every node reads when it starts."""
         self._master.value("setParam", "/use_sim_time", True)
 
     def close(self) -> None:
-        """Stop watching, and the roscore if it is ours."""
+        """Stop watching the master, and the roscore if this process started it."""
         self._over.set()
         if self._log is not None:
             for name in LOGGERS:
@@ -146,10 +146,18 @@ def ros1_graph(
     records: Records = record_all,
     epoch: Ns | None = None,
 ) -> TransportGraph:
-    """The graph of the ROS master at *master* (``ROS_MASTER_URI`` or ROS's default if it is empty).
+    """Return the graph of a ROS master.
 
-    If none answers there and *start_master* says so, ``roscore`` is started, and stopped by ``close``; else
-    that is a ``LinkSilent``. A process can have one master: another one later is a ``UsageError``.
+    Args:
+        kernel: Clock and tasks of the nodes.
+        master: URI of the master; empty for ``ROS_MASTER_URI`` or ROS's default.
+        start_master: Start ``roscore`` if no master answers, and stop it in ``close``.
+        records: Topics whose messages are recorded with their content.
+        epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
+
+    Raises:
+        LinkSilent: no master answers, and none is to be started.
+        UsageError: this process uses another master already.
     """
     uri = master or uri_of_master()
     _claim(uri)
@@ -171,7 +179,7 @@ _claimed: list[str] = []
 
 
 def _claim(uri: str) -> None:
-    """rospy reads the master's address from the environment each time it asks it."""
+    """Set the master's address for rospy, which reads it from the environment at each request."""
     if _claimed and _claimed[0] != uri:
         raise UsageError(
             f"this process is on the ROS master at {_claimed[0]}; rospy cannot talk to {uri} as well: "

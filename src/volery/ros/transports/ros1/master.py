@@ -1,6 +1,8 @@
-"""Asking the master. Every answer comes within seconds or is a ``LinkError``: rospy itself waits for ever.
+"""Requests to a ROS master with a time-out, and ``roscore`` as a child process.
 
-``roscore`` as a process of ours: own port, own pid, loopback, stopped at the end.
+rospy itself waits for a master without limit; here every request ends within seconds, or with a
+``LinkError``. A roscore of this process has its own port, listens on the loopback interface, and is stopped
+at the end.
 """
 
 from __future__ import annotations
@@ -33,33 +35,33 @@ FRESH_S = 0.5
 
 
 class _Impatient(Transport):
-    """HTTP that gives up."""
+    """HTTP transport with a time-out."""
 
     def __init__(self, patience_s: float) -> None:
         super().__init__()
         self._patience_s = patience_s
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """A connection with a time-out."""
+        """Return a connection with the time-out."""
         connection = super().make_connection(host)
         connection.timeout = self._patience_s
         return connection
 
 
 def uri_of_master() -> str:
-    """The master's address: ``ROS_MASTER_URI``, or ROS's default."""
+    """Return the master's URI: ``ROS_MASTER_URI``, or ROS's default."""
     return os.environ.get(URI_VARIABLE) or DEFAULT_URI
 
 
 class Master:
-    """The master at *uri*, asked in the name of *caller*."""
+    """The master at `uri`; requests are made in the name of the node `caller`."""
 
     def __init__(self, uri: str, caller: str, patience_s: float = PATIENCE_S) -> None:
         self.uri, self.caller = uri, caller
         self._patience_s = patience_s
 
     def ask(self, method: str, *arguments: Any) -> tuple[int, str, Any]:
-        """Status code (1: well), its text, and the value. ``LinkError`` if nobody answers."""
+        """Return status code (1: success), its text, and the value; ``LinkError`` if there is no answer."""
         with self._errors():
             proxy = ServerProxy(self.uri, transport=_Impatient(self._patience_s))
             answer: Any = getattr(proxy, method)(self.caller, *arguments)
@@ -67,14 +69,14 @@ class Master:
         return code, text, value
 
     def value(self, method: str, *arguments: Any) -> Any:
-        """The value. ``LinkError`` if the master says no."""
+        """Return the value of a request; ``LinkError`` if the master reports a failure."""
         code, text, value = self.ask(method, *arguments)
         if code != FOUND:
             raise LinkError(f"ROS master {self.uri}: {method}: {text}")
         return value
 
     def find(self, method: str, *arguments: Any) -> Any:
-        """The value, ``None`` if the master knows none."""
+        """Return the value of a request; None if the master reports a failure."""
         code, _, value = self.ask(method, *arguments)
         return value if code == FOUND else None
 
@@ -91,7 +93,7 @@ class Master:
 
 
 class TopicTypes:
-    """What type each topic carries, asked for as a whole: so it is kept for a moment."""
+    """Types of all topics, requested together and cached for `FRESH_S`."""
 
     def __init__(self, master: Master) -> None:
         self.master = master
@@ -100,7 +102,7 @@ class TopicTypes:
         self._asked = -FRESH_S
 
     def of(self, topic: str) -> str:
-        """Its type, empty for a topic that nobody has."""
+        """Return the type of `topic`; empty for a topic without registrations."""
         with self._guard:
             if time.monotonic() - self._asked > FRESH_S:
                 self._known = dict(self.master.value("getTopicTypes"))
@@ -108,13 +110,13 @@ class TopicTypes:
             return self._known.get(topic, "")
 
     def note(self, topic: str, kind: str) -> None:
-        """Somebody here carries *kind* on it from now on."""
+        """Store that a node of this process uses `topic` with type `kind`."""
         with self._guard:
             self._known.setdefault(topic, kind)
 
 
 def is_alive(node_uri: str) -> bool:
-    """Whether a node answers at its own address."""
+    """Return whether a node answers at its URI."""
     try:
         return Master(node_uri, "/volery").ask("getPid")[0] == FOUND
     except LinkError:
@@ -125,7 +127,7 @@ READY_S, GONE_S, GLANCE_S = 20.0, 5.0, 0.05
 
 
 def master_answers(uri: str) -> bool:
-    """Whether a ROS master answers at *uri*."""
+    """Return whether a ROS master answers at `uri`."""
     try:
         Master(uri, "/volery").value("getPid")
     except LinkError:
@@ -134,7 +136,7 @@ def master_answers(uri: str) -> bool:
 
 
 def environment(uri: str) -> dict[str, str]:
-    """Of a ROS program that talks to the master at *uri* on this machine: without our virtual environment."""
+    """Return the environment of a ROS program of the master at `uri`, without this virtual environment."""
     kept = {key: value for key, value in os.environ.items() if key not in ("VIRTUAL_ENV", "PYTHONPATH")}
     ours = str(Path(sys.executable).parent)
     path = [one for one in kept.get("PATH", "").split(os.pathsep) if one and one != ours]
@@ -142,10 +144,11 @@ def environment(uri: str) -> dict[str, str]:
 
 
 class Roscore:
-    """A master and rosout at *uri*; ``with`` starts and stops it.
+    """A master and rosout at `uri`; ``with`` starts and stops them.
 
-    ``UsageError`` where no roscore is installed, ``LinkSilent`` if it does not come up in time, with the end
-    of its log.
+    Raises:
+        UsageError: roscore is not installed.
+        LinkSilent: it is not ready in time; the message has the end of its log.
     """
 
     def __init__(self, uri: str = DEFAULT_URI, extra: Mapping[str, str] | None = None) -> None:
@@ -157,7 +160,7 @@ class Roscore:
 
     @property
     def pid(self) -> int:
-        """Its process; 0 while it does not run."""
+        """Process id; 0 while it does not run."""
         return self._process.pid if self._process is not None else 0
 
     def __enter__(self) -> Self:
@@ -170,7 +173,7 @@ class Roscore:
         self.stop()
 
     def start(self) -> None:
-        """Start it and wait until it answers."""
+        """Start roscore and wait until it answers."""
         program = shutil.which("roscore")
         if program is None:
             raise UsageError("no roscore on this machine: on Debian install python3-roslaunch and rosout")
@@ -187,7 +190,7 @@ class Roscore:
             )
         try:
             self._wait(log)
-        except BaseException:  # Ctrl-C as well: nobody else knows of it yet
+        except BaseException:  # Ctrl-C as well: no other code can stop it yet
             self.stop()
             raise
 
@@ -197,20 +200,20 @@ class Roscore:
         while not self._ready():
             over = self._process.poll() is not None
             if over or time.monotonic() > end:
-                said = log.read_text(errors="replace")[-1000:]
+                output = log.read_text(errors="replace")[-1000:]
                 what = "ended" if over else f"did not answer within {READY_S:g} s"
-                raise LinkSilent(f"roscore at {self.uri} {what}; it said: {said}")
+                raise LinkSilent(f"roscore at {self.uri} {what}; its output: {output}")
             time.sleep(GLANCE_S)
 
     def _ready(self) -> bool:
-        """With rosout, which is the last to come."""
+        """Return whether rosout, which starts last, is registered."""
         try:
             return Master(self.uri, "/volery").find("lookupNode", "/rosout") is not None
         except LinkError:
             return False
 
     def stop(self, how: int = signal.SIGINT) -> None:
-        """Stop it (roscpp's rosout says good-bye at SIGINT only), harder if it takes long."""
+        """Stop roscore with a signal (rosout unregisters at SIGINT only), then by force."""
         process, self._process = self._process, None
         if process is not None:
             _end(process, how)
@@ -220,7 +223,7 @@ class Roscore:
 
 
 def _end(process: subprocess.Popen[bytes], how: int) -> None:
-    """End the process and what it has started: each in a session of its own, so they are looked up first."""
+    """End a process and its descendants, which have sessions of their own and are looked up first."""
     started = _descendants(process.pid)
     with suppress(ProcessLookupError):
         process.send_signal(how)
@@ -233,7 +236,7 @@ def _end(process: subprocess.Popen[bytes], how: int) -> None:
 
 
 def _descendants(pid: int) -> list[int]:
-    """The processes that *pid* has started, and those that they have started."""
+    """Return the process ids of the descendants of `pid`."""
     children: list[int] = []
     for listed in Path(f"/proc/{pid}/task").glob("*/children"):
         with suppress(OSError):

@@ -1,5 +1,6 @@
-"""A package of interfaces for ROS 1's own tools: definitions, and the Python modules that rostopic and
-rosservice import. For packages that no distribution has any more, such as roscopter.
+"""Export of an interface package for ROS 1: definitions, and modules that rostopic and rosservice import.
+
+For packages that no distribution has any more, such as roscopter.
 """
 
 from __future__ import annotations
@@ -19,18 +20,23 @@ _MANIFEST = """<?xml version="1.0"?>
   <name>{name}</name>
   <version>1.0.0</version>
   <description>Interfaces of {name}, written out.</description>
-  <maintainer email="nobody@example.com">nobody</maintainer>
+  <maintainer email="maintainer@example.com">volery</maintainer>
   <license>Apache-2.0</license>
 </package>
 """
 
 
 def write_package(package: str, folder: Path) -> Path:
-    """Write *package* below *folder* and return its place.
+    """Write an interface package and return its folder.
 
-    With *folder* on ``PYTHONPATH`` and ``ROS_PACKAGE_PATH`` it is as if it were installed. Raises
-    ``UsageError`` for a package that is not known here, if genpy is not there, and for a folder that cannot
-    be written.
+    With `folder` on ``PYTHONPATH`` and ``ROS_PACKAGE_PATH``, ROS finds the package as if it were installed.
+
+    Args:
+        package: Name of a package that volery defines.
+        folder: Parent of the package's folder.
+
+    Raises:
+        UsageError: the package is unknown, genpy is not installed, or the folder cannot be written.
     """
     messages = [name for name in types() if name.startswith(f"{package}/")]
     services = [name for name in service_types() if name.startswith(f"{package}/")]
@@ -84,19 +90,19 @@ def _write_services(made: Path, names: list[str]) -> None:
 
 
 def _own(kind: Ros1Type) -> str:
-    """The type's own definition, without those of what it is made of."""
+    """Return the type's own definition, without those of its nested types."""
     return kind.text.partition(_NEXT)[0].rstrip("\n") + "\n"
 
 
 def _inner(kind: Ros1Type) -> Iterator[tuple[str, str]]:
-    """Names and definitions of what it is made of."""
+    """Yield names and definitions of the nested types."""
     for section in kind.text.split(_NEXT)[1:]:
         name, _, text = section.partition("\n")
         yield name.strip(), text
 
 
 def _context(*kinds: Ros1Type) -> Any:
-    """genmsg's, which knows all that the types are made of: it looks for no files."""
+    """Return a genmsg context with all nested types, so that genmsg reads no files."""
     loader = import_module("genmsg.msg_loader")
     context = import_module("genmsg").MsgContext.create_default()
     for kind in kinds:

@@ -1,10 +1,8 @@
-"""A rospy for each node.
+"""A copy of rospy for each node, and message classes for rospy that carry bytes.
 
-rospy keeps its node in module globals, so a process can have one. Importing its modules anew gives another
-set of globals that shares nothing with the first but the message classes; the modules hold on to each other
-from their import on, so both work side by side.
-
-Our message types as classes that rospy takes: they carry a message's bytes as they are.
+rospy keeps its node in module globals, so a process can have one. Importing its modules again gives another
+set of globals that shares only the message classes with the first; the modules reference each other from
+their import on, so both sets work side by side.
 """
 
 from __future__ import annotations
@@ -33,12 +31,12 @@ _MISSING = (
 
 
 def available() -> bool:
-    """Whether rospy can be imported."""
+    """Return whether rospy can be imported."""
     return find_spec("rospy") is not None and find_spec("genpy") is not None
 
 
 def rospy_copy() -> Any:
-    """A rospy of one's own, its logging left to whoever has set it up. ``UsageError`` where there is none."""
+    """Return a new copy of rospy that does not configure logging; ``UsageError`` if there is no rospy."""
     if not available():
         raise UsageError(_MISSING)
     with _importing:
@@ -55,8 +53,8 @@ def rospy_copy() -> Any:
     return made
 
 
-class Listening:
-    """The servers of a copy's node, whose threads rospy leaves behind when it ends, one of them busy."""
+class CopyServers:
+    """The servers of a copy's node, whose threads rospy does not end at shutdown, one of them busy."""
 
     def __init__(self, rospy: Any) -> None:
         self._rospy = rospy
@@ -77,7 +75,7 @@ class Listening:
         rospy.impl.init.start_node = start_and_keep
 
     def end(self) -> None:
-        """Accept no more connections; what is left of the copy may go."""
+        """Close the server sockets and release the copy."""
         server = self._rospy.impl.tcpros_base._tcpros_server
         accepting = server.tcp_ros_server if server is not None else None
         if accepting is not None and accepting.server_sock is not None:
@@ -95,12 +93,12 @@ def _take_out() -> dict[str, ModuleType]:
 
 
 @cache
-def _carrier() -> Any:
-    """The base of all of them. Made when first asked for, as genpy may not be there."""
+def _raw_base() -> Any:
+    """Return the base of all raw classes; created on demand, since genpy may not be installed."""
     genpy = import_module("genpy")
 
-    class Carrier(genpy.Message):  # type: ignore[misc,name-defined]  # genpy carries no types
-        """Bytes of ROS 1 under a type's name."""
+    class RawMessage(genpy.Message):  # type: ignore[misc,name-defined]  # genpy carries no types
+        """A message as ROS 1 bytes under its type's name."""
 
         __slots__ = ["data"]
         _slot_types: tuple[str, ...] = ()
@@ -114,28 +112,28 @@ def _carrier() -> Any:
             buff.write(self.data)
 
         def deserialize(self, data: bytes) -> Any:
-            """Keep the bytes."""
+            """Store the bytes."""
             self.data = bytes(data)
             return self
 
-    return Carrier
+    return RawMessage
 
 
 def _made(kind: Ros1Type) -> Any:
-    base = _carrier()
+    base = _raw_base()
     names = {"__slots__": [], "_type": kind.name, "_md5sum": kind.md5, "_full_text": kind.text}
     return type(kind.name.replace("/", "_"), (base,), names)
 
 
 @cache
 def raw_message_class(name: str) -> Any:
-    """The class that carries messages of type *name*. ``UsageError`` if ROS 1 has no such type."""
+    """Return the class that carries messages of type `name`; ``UsageError`` if ROS 1 has no such type."""
     return _made(ros1_type(name))
 
 
 @cache
 def raw_service_class(kind: ServiceType) -> Any:
-    """The class that rospy takes for a service type."""
+    """Return the class that carries requests and responses of a service type."""
     described = ros1_service(kind.name)
     names = {
         "_type": described.name,

@@ -1,4 +1,4 @@
-"""One node of ROS 1, as rospy makes it."""
+"""One node of ROS 1 with its publishers, subscriptions, services and clients, made by a copy of rospy."""
 
 from __future__ import annotations
 
@@ -16,17 +16,22 @@ from volery.ros.messages import Message, ServiceType, from_ros1, ros1_service, r
 from volery.ros.messages.ros1 import cdr_to_ros1
 from volery.ros.transports.client_library import OnMessage, OnRequest, OnResponse, ReceivedMessage
 from volery.ros.transports.ros1.master import Master, TopicTypes, is_alive
-from volery.ros.transports.ros1.rospy_copy import Listening, raw_message_class, raw_service_class, rospy_copy
+from volery.ros.transports.ros1.rospy_copy import (
+    CopyServers,
+    raw_message_class,
+    raw_service_class,
+    rospy_copy,
+)
 
 GOODBYE_S = 2.0
 Aside = Callable[[Callable[[], object]], None]
-"""Has something done beside the caller, who must not wait for a master that may be gone."""
+"""Executes something in a thread: the caller must not wait for a master that may be gone."""
 ANY = "*"
-"""The type of a subscriber that takes whatever comes."""
+"""Type of a subscriber that accepts every type."""
 
 
 class Ros1Publisher:
-    """A rospy publisher. ROS 1 latches the last message only, whatever the depth."""
+    """A rospy publisher. ROS 1 latches the last message only, for any depth."""
 
     def __init__(self, rospy: Any, topic: str, message_type: str, qos: QoS, aside: Aside) -> None:
         self._aside = aside
@@ -50,7 +55,7 @@ class Ros1Publisher:
         self._publisher.publish(self._class(raw))
 
     def connected(self) -> int:
-        """How many connections there are."""
+        """Return the number of connections."""
         return int(self._publisher.get_num_connections())
 
     def close(self) -> None:
@@ -65,14 +70,14 @@ class Ros1Subscription:
         self._aside = aside
         read = partial(from_ros1, message_type)
 
-        def take(carrier: Any) -> None:
-            sender = carrier._connection_header.get("callerid", "")
-            arrived(ReceivedMessage(carrier.data, read, sender))
+        def take(raw: Any) -> None:
+            sender = raw._connection_header.get("callerid", "")
+            arrived(ReceivedMessage(raw.data, read, sender))
 
         self._subscriber = rospy.Subscriber(topic, raw_message_class(message_type), take, tcp_nodelay=True)
 
     def connected(self) -> int:
-        """How many connections there are."""
+        """Return the number of connections."""
         return int(self._subscriber.get_num_connections())
 
     def close(self) -> None:
@@ -83,10 +88,10 @@ class Ros1Subscription:
 class Ros1ServiceServer:
     """A rospy service: each request holds a thread of rospy until it is answered."""
 
-    def __init__(self, rospy: Any, name: str, kind: ServiceType, asked: OnRequest, aside: Aside) -> None:
+    def __init__(self, rospy: Any, name: str, kind: ServiceType, requested: OnRequest, aside: Aside) -> None:
         self._aside = aside
-        carrier = raw_service_class(kind)
-        wanted, given = kind.request.__msgtype__, carrier._response_class
+        cls = raw_service_class(kind)
+        wanted, given = kind.request.__msgtype__, cls._response_class
 
         def handle(request: Any) -> Any:
             ended = threading.Event()
@@ -97,7 +102,7 @@ class Ros1ServiceServer:
                 ended.set()
 
             try:
-                asked(from_ros1(wanted, request.data), done)
+                requested(from_ros1(wanted, request.data), done)
             except UsageError as error:
                 raise rospy.ServiceException(str(error)) from error
             ended.wait()
@@ -106,7 +111,7 @@ class Ros1ServiceServer:
                 raise rospy.ServiceException(problem)
             return given(to_ros1(answer))
 
-        self._service = rospy.Service(name, carrier, handle)
+        self._service = rospy.Service(name, cls, handle)
 
     def close(self) -> None:
         """Unregister."""
@@ -118,44 +123,44 @@ class Ros1ServiceClient:
 
     def __init__(self, rospy: Any, master: Master, name: str, kind: ServiceType) -> None:
         self._rospy, self._master, self._name, self._kind = rospy, master, name, kind
-        self._carrier = raw_service_class(kind)
+        self._class = raw_service_class(kind)
         self._answer = kind.response.__msgtype__
 
     def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
-        """Ask in a thread of its own; giving up closes its connection."""
-        proxy = self._rospy.ServiceProxy(self._name, self._carrier)
-        wanted = self._carrier._request_class(to_ros1(request))
+        """Send the request in a thread of its own; abandoning the call closes its connection."""
+        proxy = self._rospy.ServiceProxy(self._name, self._class)
+        wanted = self._class._request_class(to_ros1(request))
 
         def ask() -> None:
             try:
                 answer = from_ros1(self._answer, proxy.call(wanted).data)
-            except Exception as error:  # rospy raises what it likes, e.g. for a socket that was closed
-                done(None, _in_words(error))
+            except Exception as error:  # rospy raises many types, e.g. for a closed socket
+                done(None, _error_text(error))
             else:
                 done(answer, "")
 
         threading.Thread(target=ask, name=f"call {self._name}", daemon=True).start()
-        return partial(_hang_up, proxy)
+        return partial(_close_connection, proxy)
 
     def ready(self) -> bool:
-        """Whether the master knows a server."""
+        """Return whether the master has a server registered."""
         return self._master.find("lookupService", self._name) is not None
 
     def close(self) -> None:
-        """Nothing is kept between calls."""
+        """Do nothing: there is no state between calls."""
 
 
-def _hang_up(proxy: Any) -> None:
+def _close_connection(proxy: Any) -> None:
     transport = proxy.transport
     if transport is not None:
         with suppress(OSError, AttributeError):
             transport.socket.shutdown(2)  # wakes the thread that reads from it
 
 
-def _in_words(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     text = str(error)
     if "unavailable" in text or "unable to contact" in text or "unable to connect" in text.lower():
-        return f"nobody serves it: {text}"
+        return f"no node serves it: {text}"
     # rospy wraps the server's words in bytes
     return text.replace("b'", "'").replace('b"', '"')
 
@@ -173,18 +178,18 @@ class Ros1Node:
         self.master = Master(master.uri, self.name)
         self._check_free()
         self.rospy = rospy = rospy_copy()
-        # what rospy would read from its command line: the namespace that the node's name is resolved in
+        # rospy reads the namespace of the node's name from its command line
         rospy.names._set_caller_id(names.join(namespace, "unnamed"))
-        listening = Listening(rospy)
+        servers = CopyServers(rospy)
         rospy.init_node(name, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
         self._closing = False
         self._gone = threading.Event()
-        rospy.core.add_preshutdown_hook(lambda reason: None if self._closing else lost(_thrown_out(reason)))
+        rospy.core.add_preshutdown_hook(lambda reason: None if self._closing else lost(_why(reason)))
         rospy.core.add_preshutdown_hook(lambda reason: self._gone.set())  # runs when all is unregistered
-        rospy.core.add_preshutdown_hook(lambda reason: listening.end())
+        rospy.core.add_preshutdown_hook(lambda reason: servers.end())
 
     def _check_free(self) -> None:
-        """A second node of a name would make the master end the first."""
+        """Raise if the name is taken: a second node of a name would make the master end the first."""
         other = self.master.find("lookupNode", self.name)
         if other is not None and is_alive(other):
             raise UsageError(
@@ -210,11 +215,11 @@ class Ros1Node:
         return Ros1Publisher(self.rospy, topic, message_type, qos, self._while_there)
 
     def subscribe(self, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> Ros1Subscription:
-        """Receive a topic. All that ROS 1 knows of QoS is the depth, which the house keeps."""
+        """Receive a topic. ROS 1 supports only the depth of the QoS, which the caller's queue implements."""
         self._check_type(topic, message_type)
         return Ros1Subscription(self.rospy, topic, message_type, arrived, self._while_there)
 
-    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> Ros1ServiceServer:
+    def serve(self, name: str, kind: ServiceType, requested: OnRequest) -> Ros1ServiceServer:
         """Offer a service."""
         self.master.value("getPid")
         if self.master.find("lookupService", name) is not None:
@@ -223,47 +228,47 @@ class Ros1Node:
             if any(is_alive(self.master.find("lookupNode", user) or "") for user in users):
                 raise UsageError(f"node {self.name}: service {name} is served by {', '.join(users)} already")
         ros1_service(kind.name)
-        return Ros1ServiceServer(self.rospy, name, kind, asked, self._while_there)
+        return Ros1ServiceServer(self.rospy, name, kind, requested, self._while_there)
 
     def client(self, name: str, kind: ServiceType) -> Ros1ServiceClient:
-        """Call a service."""
+        """Return a client of a service."""
         return Ros1ServiceClient(self.rospy, self.master, name, kind)
 
     def has_service(self, name: str) -> bool:
-        """Whether the master knows a server."""
+        """Return whether the master has a server registered."""
         return self.master.find("lookupService", name) is not None
 
     def get_parameter(self, name: str) -> Any:
-        """From the parameter server."""
+        """Access a parameter of the parameter server; ``KeyError`` if there is none."""
         code, _, value = self.master.ask("getParam", name)
         if code != 1:
             raise KeyError(name)
         return value
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """At the parameter server."""
+        """Set a parameter of the parameter server."""
         try:
             self.master.value("setParam", name, value)
         except (OverflowError, TypeError) as error:
             raise UsageError(f"parameter {name}: ROS 1 cannot carry {value!r}: {error}") from error
 
     def delete_parameter(self, name: str) -> None:
-        """From the parameter server."""
+        """Access a parameter of the parameter server; ``KeyError`` if there is none."""
         code, _, _ = self.master.ask("deleteParam", name)
         if code != 1:
             raise KeyError(name)
 
     @property
     def closed(self) -> bool:
-        """Whether it has left, or was thrown out."""
+        """Whether it has left the graph or was removed."""
         return self._closing or bool(self.rospy.core.is_shutdown_requested())
 
     def known(self) -> bool:
-        """Whether the master knows this node at its present address."""
+        """Return whether the master has this node registered at its present URI."""
         return bool(self.master.find("lookupNode", self.name) == self.rospy.core.get_node_uri())
 
     def register_again(self) -> None:
-        """Tell a master that has forgotten everything what this node has."""
+        """Register everything of this node again at a master that has restarted."""
         registration = self.rospy.impl.registration
         topics, services = registration.get_topic_manager(), registration.get_service_manager()
         uri = self.rospy.core.get_node_uri()
@@ -277,29 +282,29 @@ class Ros1Node:
                 listener.publisher_update(topic, publishers)
 
     def _while_there(self, work: Callable[[], object]) -> None:
-        """Unregister one thing. A node that leaves unregisters all by itself, and not twice at a time."""
+        """Unregister one thing in a thread, unless the node is leaving, which unregisters everything."""
         if not self.closed:
             _aside(work)
 
     def prepare_close(self) -> None:
-        """What it has made goes with it."""
+        """Let the node's shutdown unregister everything."""
         self._closing = True
 
     def close(self) -> None:
-        """Leave the graph: at once for this process, for the others as soon as the master answers."""
+        """Leave the graph: at once for this process, for others as soon as the master answers."""
         self._closing = True
         _aside(partial(self.rospy.core.signal_shutdown, "closed"))
         self._gone.wait(GOODBYE_S)
 
 
-def _thrown_out(reason: str) -> str:
+def _why(reason: str) -> str:
     if "new node registered" in reason:
         return "another node has taken its name, and the master ended this one"
     return f"it was shut down from outside: {reason}"
 
 
 def is_reachable(master: Master) -> bool:
-    """Whether the master answers."""
+    """Return whether the master answers."""
     try:
         master.value("getPid")
     except LinkError:
