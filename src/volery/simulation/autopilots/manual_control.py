@@ -45,7 +45,7 @@ class ChannelRange(NamedTuple):
         return 0.0
 
     def share(self, pulse: float) -> float:
-        """Return a pulse width [us] as 0..1 between the ends: a throttle, with the dead zone at its low end."""
+        """Return a pulse width [us] as 0..1 between the ends, with the dead zone at the low end."""
         start = self.low + self.dead
         if self.high <= start:
             return 0.0

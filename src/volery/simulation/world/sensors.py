@@ -368,9 +368,7 @@ def sensor_suite(name: str) -> SensorSuite:
         raise UsageError(f"no sensor set named {name!r}{hint}; there is {choices(SENSOR_SUITES)}")
     found = sensors.load(name)
     if not isinstance(found, SensorSuite):
-        raise UsageError(
-            f"{name!r} is a single sensor, not a suite: list it under the vehicle's added sensors"
-        )
+        raise UsageError(f"{name!r} is one sensor, not a suite: list it under the vehicle's added sensors")
     return found
 
 

@@ -1,13 +1,13 @@
-"""A DJI aircraft behind the topics and services of its onboard SDK: a dialect of the simulated stack.
+"""Simulated DJI aircraft behind the topics and services of its onboard SDK.
 
-The protocol is from public definitions; how the aircraft behaves beyond them is assumed: see ``assumed`` and,
-for figures, ``parameters``.
+The protocol follows public definitions. All other behaviour is assumed: see ``firmware.ASSUMED`` and
+``parameters``.
 """
 
 from volery.simulation.autopilots.dji.firmware import COPTER
 from volery.simulation.autopilots.firmware import FirmwareFamily
 
 FIRMWARE = FirmwareFamily("dji", {"multirotor": COPTER}, codec=None)
-"""The firmware, by kind of vehicle. It has no links: it is reached over a graph."""
+"""Entry point of the firmware. There is no codec: the aircraft is reached over a ROS graph."""
 
 __all__ = ["FIRMWARE"]

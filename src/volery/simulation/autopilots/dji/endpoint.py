@@ -1,9 +1,6 @@
-"""What the node publishes: topics, types, rates, and how a message is made of what the aircraft knows.
+"""The ROS node of a DJI aircraft (``dji_sdk`` 3.8 or the vehicle node of ``dji_osdk_ros``) and its topics.
 
-The node through which a DJI aircraft is reached: ``dji_sdk`` 3.8, or the vehicle node of ``dji_osdk_ros``.
-
-It publishes only what somebody has subscribed to: who does not listen cannot tell, and a simulation is spared
-hundreds of messages a second.
+Only topics with subscribers are built and published, which saves hundreds of messages a second.
 """
 
 from __future__ import annotations
@@ -26,22 +23,22 @@ from volery.simulation.autopilots.dji.services import Services
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
-FAST, USUAL, SLOW = 10 * MS, 20 * MS, 200 * MS
-"""Periods of the node's three packages of data: 100, 50 and 5 Hz."""
+FAST, NORMAL, SLOW = 10 * MS, 20 * MS, 200 * MS
+"""Periods of the node's three groups of topics: 100, 50 and 5 Hz."""
 
 EARTH_M = 6_378_137.0
-"""Radius of the flat-earth conversion of the local position."""
+"""Earth radius of the flat-earth conversion of the local position [m]."""
 
 FIX, NO_FIX, GPS = 0, -1, 1
 SWITCH_SCALE = 8000.0 / 500.0
-"""From pulse widths to the numbers that the mode switch shows as: -8000 P, 0 A, 8000 F. Assumed."""
+"""Scale from pulse widths to the mode switch in ``rc``: -8000 P, 0 A, 8000 F. Assumed."""
 
 Builder = Callable[[FlightController, Ns], Any]
-"""The message now, stamped with a ROS time; ``None`` while there is none."""
+"""Returns a message stamped with a ROS time, or None while there is none."""
 
 
 class Topic(NamedTuple):
-    """One topic."""
+    """Name, type, period, builder and QoS of one topic."""
 
     name: str
     type: str
@@ -100,7 +97,7 @@ def _byte(value: int) -> Any:
 
 
 def _display_mode(controller: FlightController, _stamp: Ns) -> Any:
-    """An M100 has none."""
+    """Return the display mode; an M100 has none."""
     return None if controller.aircraft == M100 else _byte(controller.mode)
 
 
@@ -112,7 +109,7 @@ def _fix(stamp: Ns, place: tuple[float, float, float], good: bool) -> Any:
 
 
 def _gps_position(controller: FlightController, stamp: Ns) -> Any:
-    """Altitude above the sea."""
+    """Return the position with its altitude AMSL."""
     vehicle = controller.vehicle
     if not vehicle.estimate.position_ok:
         return _fix(stamp, (0.0, 0.0, 0.0), good=False)
@@ -120,7 +117,7 @@ def _gps_position(controller: FlightController, stamp: Ns) -> Any:
 
 
 def _local_position(controller: FlightController, stamp: Ns) -> Any:
-    """East, north, up of the reference."""
+    """Return the position, east-north-up about the reference."""
     reference = controller.reference
     if reference is None:
         return None
@@ -142,7 +139,7 @@ def _height(controller: FlightController, _stamp: Ns) -> Any:
 
 
 def _rc(controller: FlightController, stamp: Ns) -> Any:
-    """Roll, pitch, yaw, throttle in -1..1, mode switch, gear."""
+    """Return roll, pitch, yaw, throttle (-1..1), mode switch and gear."""
     pulses = controller.vehicle.rc.pulses()
     roll, pitch, throttle, yaw, switch = ((pulse - 1500) / 500.0 for pulse in pulses[:5])
     axes = [roll, pitch, yaw, throttle, switch * 500.0 * SWITCH_SCALE, 0.0]
@@ -150,7 +147,7 @@ def _rc(controller: FlightController, stamp: Ns) -> Any:
 
 
 def _battery(controller: FlightController, stamp: Ns) -> Any:
-    """Millivolts, milliamperes and percent, as the flight controller gives them."""
+    """Return the battery state in mV, mA and percent, as the flight controller sends it."""
     estimate = controller.vehicle.estimate
     made: Any = message_class("sensor_msgs/msg/BatteryState")(_header(stamp, ""))
     made.voltage = estimate.battery_volts * 1000.0
@@ -170,67 +167,67 @@ TOPICS: tuple[Topic, ...] = (
     Topic("imu", "sensor_msgs/msg/Imu", FAST, _imu),
     Topic("angular_velocity_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _rates),
     Topic("acceleration_ground_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _acceleration),
-    Topic("flight_status", "std_msgs/msg/UInt8", USUAL, lambda one, _: _byte(one.status)),
-    Topic("display_mode", "std_msgs/msg/UInt8", USUAL, _display_mode),
-    Topic("gps_health", "std_msgs/msg/UInt8", USUAL, lambda one, _: _byte(one.gps_health)),
-    Topic("gps_position", "sensor_msgs/msg/NavSatFix", USUAL, _gps_position),
-    Topic("local_position", "geometry_msgs/msg/PointStamped", USUAL, _local_position),
-    Topic("height_above_takeoff", "std_msgs/msg/Float32", USUAL, _height),
-    Topic("velocity", "geometry_msgs/msg/Vector3Stamped", USUAL, _velocity),
-    Topic("rc", "sensor_msgs/msg/Joy", USUAL, _rc),
-    Topic("rc_connection_status", "std_msgs/msg/UInt8", USUAL, lambda _one, _stamp: _byte(1)),
+    Topic("flight_status", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.status)),
+    Topic("display_mode", "std_msgs/msg/UInt8", NORMAL, _display_mode),
+    Topic("gps_health", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.gps_health)),
+    Topic("gps_position", "sensor_msgs/msg/NavSatFix", NORMAL, _gps_position),
+    Topic("local_position", "geometry_msgs/msg/PointStamped", NORMAL, _local_position),
+    Topic("height_above_takeoff", "std_msgs/msg/Float32", NORMAL, _height),
+    Topic("velocity", "geometry_msgs/msg/Vector3Stamped", NORMAL, _velocity),
+    Topic("rc", "sensor_msgs/msg/Joy", NORMAL, _rc),
+    Topic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, lambda _one, _stamp: _byte(1)),
     Topic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
 )
-"""All that is repeated, but for ``flight_anomaly``, whose type depends on the names."""
+"""All periodic topics except ``flight_anomaly``, whose type depends on the package."""
 
 REFERENCE = Topic("local_frame_ref", "sensor_msgs/msg/NavSatFix", 0, _local_frame_ref, LATCHED)
 
 
 def topics(package: str) -> tuple[Topic, ...]:
-    """All that is repeated, with the types of *package*."""
+    """Return all periodic topics with the types of a package."""
     kind = f"{package}/msg/FlightAnomaly"
-    return (*TOPICS, Topic("flight_anomaly", kind, USUAL, lambda one, _: _anomaly(one, package)))
+    return (*TOPICS, Topic("flight_anomaly", kind, NORMAL, lambda one, _: _anomaly(one, package)))
 
 
-LOOK_EVERY: Ns = 200 * MS
-"""How often it is looked who listens."""
+SUBSCRIBER_CHECK_PERIOD: Ns = 200 * MS
+"""Interval at which the node checks which topics have subscribers."""
 
 JOY = "sensor_msgs/msg/Joy"
 
 
-class _Package:
+class _TopicGroup:
     """Topics of one period."""
 
     def __init__(self, face: DjiEndpoint, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
         self._face = face
-        self._looks_every = max(1, LOOK_EVERY // period)
+        self._check_every = max(1, SUBSCRIBER_CHECK_PERIOD // period)
         self._listed = listed
-        self._wanted: list[tuple[Topic, Publisher]] = []
+        self._subscribed: list[tuple[Topic, Publisher]] = []
         self._round = 0
 
     def publish(self) -> None:
-        """What is wanted, once. House code."""
-        if self._round % self._looks_every == 0:
-            self._wanted = [one for one in self._listed if one[1].subscribers()]
+        """Publish the topics that have subscribers, as a framework callback."""
+        if self._round % self._check_every == 0:
+            self._subscribed = [one for one in self._listed if one[1].subscribers()]
         self._round += 1
-        if not self._wanted or not self._face.speaks:
+        if not self._subscribed or not self._face.is_active:
             return
         stamp = self._face.stamp()
-        for topic, publisher in self._wanted:
+        for topic, publisher in self._subscribed:
             message = topic.build(self._face.controller, stamp)
             if message is not None:
                 publisher.publish(message)
 
 
 class DjiEndpoint:
-    """See ``Face`` and ``GraphFace``."""
+    """Protocol endpoint of one aircraft on a ROS graph."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
         self._on = False
         self._clocks: list[Handle] = []
-        self._packages: dict[Ns, _Package] = {}
+        self._packages: dict[Ns, _TopicGroup] = {}
         self._graph: RosGraph | None = None
         self._node: Node | None = None
         self._reference: Publisher | None = None
@@ -238,23 +235,30 @@ class DjiEndpoint:
 
     @property
     def controller(self) -> FlightController:
-        """What it speaks for."""
+        """Flight controller behind the node."""
         return controller_of(self._vehicle)
 
     @property
-    def speaks(self) -> bool:
-        """It is switched on and has booted."""
+    def is_active(self) -> bool:
+        """Whether the aircraft is on and has booted."""
         return self._on and self._vehicle.uptime() >= self._vehicle.rules.startup.ready_after
 
     def stamp(self) -> Ns:
-        """ROS time."""
+        """Return the present ROS time."""
         return (self._graph.epoch if self._graph else 0) + self._kernel.now()
 
     # -- the graph
 
     def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
-        """Serve under *namespace*: ``/dji_sdk``, ``/drone_1/dji_sdk``, or one that ends in ``dji_osdk_ros``
-        for the names of 4.1. The node's computing is spent at *place*.
+        """Serve on a graph.
+
+        Args:
+            graph: The ROS graph.
+            namespace: Such as ``/drone_1/dji_sdk``; one that ends in ``dji_osdk_ros`` has the names of 4.1.
+            place: Execution context that is charged for the node's computing.
+
+        Raises:
+            UsageError: If the namespace ends in another name, or the aircraft is on a graph already.
         """
         above, _, package = namespace.rstrip("/").rpartition("/")
         if package not in (OLD_NAMES, NEW_NAMES):
@@ -276,11 +280,11 @@ class DjiEndpoint:
             self.start()
 
     def _advertise(self, node: Node, package: str) -> None:
-        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {FAST: [], USUAL: [], SLOW: []}
+        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {FAST: [], NORMAL: [], SLOW: []}
         for topic in topics(package):
             publisher = node.advertise(f"{package}/{topic.name}", topic.type, topic.qos)
             listed[topic.period].append((topic, publisher))
-        self._packages = {period: _Package(self, period, some) for period, some in listed.items()}
+        self._packages = {period: _TopicGroup(self, period, some) for period, some in listed.items()}
         self._reference = node.advertise(f"{package}/{REFERENCE.name}", REFERENCE.type, REFERENCE.qos)
 
     def _publish_reference(self) -> None:
@@ -289,7 +293,7 @@ class DjiEndpoint:
             self._reference.publish(message)
 
     def _listen(self, node: Node, package: str) -> None:
-        """Set-points are taken as they come. The vehicle node of 4.1 takes them by a service."""
+        """Subscribe to the set-point topics. The node of 4.1 has a service instead."""
         if package == NEW_NAMES:
             return
         group = node.group(lambda work: work.run())
@@ -299,15 +303,15 @@ class DjiEndpoint:
 
     def _setpoint(self, flag: int, message: Any) -> None:
         with self._kernel.guard:
-            if self.speaks:
-                self.controller.obey(tuple(float(axis) for axis in message.axes[:4]), flag)
+            if self.is_active:
+                self.controller.handle_setpoint(tuple(float(axis) for axis in message.axes[:4]), flag)
 
     def _generic(self, message: Any) -> None:
         if len(message.axes) >= 5 and 0.0 <= message.axes[4] < 256.0:
             self._setpoint(int(message.axes[4]), message)
 
     def _start(self, work: Work) -> None:
-        """Each request has a task of its own."""
+        """Start a task for a request."""
         self._kernel.spawn(work.run, f"{self._vehicle.name} (service)", self._place, self._kernel.root)
 
     def _answer(self, answer: Any, request: Any) -> Any:
@@ -317,14 +321,14 @@ class DjiEndpoint:
     # -- the aircraft
 
     def start(self) -> None:
-        """It was switched on."""
+        """Start publishing after power-on."""
         self.stop()
         self._on = True
         every = self._kernel.every
         self._clocks = [every(period, package.publish) for period, package in self._packages.items()]
 
     def stop(self) -> None:
-        """Fall silent."""
+        """Stop publishing."""
         self._on = False
         for clock in self._clocks:
             clock.cancel()
@@ -337,24 +341,24 @@ class DjiEndpoint:
             self._node = None
 
     def send_text(self, severity: int, text: str) -> None:
-        """There is no topic for words: they go to the trace."""
+        """Record the text; there is no topic for it."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
 
     def parameter_changed(self, name: str) -> None:
-        """Nobody is told."""
+        """Send nothing: the protocol has no parameters."""
 
     def mode_changed(self) -> None:
-        """It shows at the next round."""
+        """Send nothing: the mode is published periodically."""
 
     def home_changed(self) -> None:
-        """Nobody is told."""
+        """Send nothing: the protocol has no home position."""
 
     def send_message(self, message: str) -> None:
-        """There is nothing to announce."""
+        """Send nothing: all messages are periodic."""
 
     def send_event(self, message: str, fields: dict[str, Any]) -> None:
-        """There are no such events."""
+        """Send nothing: the protocol has no events."""
 
     def after_reply(self, action: Action) -> None:
-        """At once."""
+        """Execute the action at once."""
         action()

@@ -1,8 +1,6 @@
-"""A DJI multirotor: its modes and its habits, put together as a dialect.
+"""A DJI multirotor: modes, boot and failsafes, composed as a firmware, and the list of assumptions.
 
-What the simulated DJI aircraft does where the public definitions are silent: one table.
-
-Figures that somebody may want to try others of are parameters instead: see ``parameters``.
+Figures that a user may want to vary are parameters instead.
 """
 
 from __future__ import annotations
@@ -13,22 +11,22 @@ from volery.base.time import MS, S, to_seconds
 from volery.ros.messages.dji_constants import GO_HOME_ALTITUDES, DisplayMode
 from volery.simulation.autopilots.dji.endpoint import SWITCH_SCALE, DjiEndpoint
 from volery.simulation.autopilots.dji.flight_controller import (
+    ENGINE_START_TIME,
     F_ABOVE,
-    FEWEST,
-    FINISHED,
-    MOST,
+    FINISHED_LANDING_TIME,
+    MAX_WAYPOINTS,
+    MIN_WAYPOINTS,
     P_BELOW,
-    STARTING,
-    STAY,
+    STAY_ACTION,
     SWITCH,
     FlightController,
     controller_of,
 )
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters, tuning
 from volery.simulation.autopilots.dji.sdk_setpoints import (
-    LIFTS_ABOVE_M,
-    LIFTS_ABOVE_M_S,
-    LIFTS_ABOVE_PERCENT,
+    LIFT_OFF_M,
+    LIFT_OFF_M_S,
+    LIFT_OFF_PERCENT,
     SdkControl,
 )
 from volery.simulation.autopilots.dji.services import ACCEPTED, REFUSED
@@ -53,10 +51,10 @@ from volery.simulation.autopilots.vehicle_state import (
 )
 
 READY, ORIGIN, POSITION = 3 * S, 15 * S, 25 * S
-"""After it was switched on: when it speaks, when it knows where it is, when that may be trusted. Assumed."""
+"""Uptimes at which the node publishes, the position is known, and the position is trusted. Assumed."""
 
 NO_BITS = 0
-"""There is no heartbeat whose bits a mode could set."""
+"""There is no heartbeat."""
 
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
@@ -89,8 +87,8 @@ MODES = {
 }
 
 
-def ready(vehicle: Vehicle) -> None:
-    """It stands, and speaks from now on."""
+def finish_boot(vehicle: Vehicle) -> None:
+    """Put the aircraft on the ground in P_GPS."""
     vehicle.ground.landed = True
     controller_of(vehicle).reset()
     vehicle.enter_mode(MODES[DisplayMode.P_GPS])
@@ -109,7 +107,7 @@ def _below(percent: str) -> Failsafe:
 
 
 def own_parameters(_system: int, _flight: Flight) -> dict[str, float]:
-    """None follow from the vehicle."""
+    """Return no parameters: none follow from the vehicle."""
     return {}
 
 
@@ -126,7 +124,8 @@ COPTER = Firmware(
         firmware_state=FlightController,
     ),
     boot=BootSequence(
-        (BootEvent(READY, ready), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())), ready
+        (BootEvent(READY, finish_boot), BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin())),
+        finish_boot,
     ),
     periodic=PeriodicWork(on_step=lambda vehicle: controller_of(vehicle).step()),
     failsafes=(_below("LOW_BATTERY"), _below("CRITICAL_BATTERY")),
@@ -142,21 +141,22 @@ ASSUMED: Mapping[str, str] = {
     "mode switch": f"channel {SWITCH} of the transmitter: F above {F_ABOVE}, P below {P_BELOW}, A between; "
     f"`rc` shows {-500 * SWITCH_SCALE:g} at P, 0 at A, {500 * SWITCH_SCALE:g} at F; any move of "
     "it takes the authority, and in the air it hovers",
-    "start of the motors": f"shows ENGINE_START for {to_seconds(STARTING):g} s; home is there",
-    "an M100": f"has no `display_mode`, and shows FINISHED_LANDING for {to_seconds(FINISHED):g} s",
+    "start of the motors": f"shows ENGINE_START for {to_seconds(ENGINE_START_TIME):g} s; home is there",
+    "an M100": "has no `display_mode`, and shows FINISHED_LANDING for "
+    f"{to_seconds(FINISHED_LANDING_TIME):g} s",
     "`gps_health`": "is 5 once the position may be trusted, 3 with a fix before that, else 0",
     "set-points": "have no effect during a take-off, and while it goes home or lands by its own decision; "
     "they end what a program has asked for",
-    "set-points on the ground": f"lift it off above {LIFTS_ABOVE_M:g} m, {LIFTS_ABOVE_M_S:g} m/s or "
-    f"{LIFTS_ABOVE_PERCENT:g} % of thrust",
+    "set-points on the ground": f"lift it off above {LIFT_OFF_M:g} m, {LIFT_OFF_M_S:g} m/s or "
+    f"{LIFT_OFF_PERCENT:g} % of thrust",
     "set-points not flown": "angular rates, and thrust with anything but angles",
     "without a position": "set-points about the ground are hovering level; P_GPS becomes ATTITUDE",
-    "missions": f"have {FEWEST} to {MOST} waypoints; action {STAY} is staying for so many milliseconds; they "
-    "start in the air only",
+    "missions": f"have {MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints; action {STAY_ACTION} is staying for so "
+    "many milliseconds; they start in the air only",
     "`ack_data`": f"is {ACCEPTED} where it is accepted, {REFUSED} where it is refused",
     "altitude for going home": f"is taken from {GO_HOME_ALTITUDES.lowest:g} to "
     f"{GO_HOME_ALTITUDES.highest:g} m",
     "battery": "is measured without error; once low it goes home, once critical it lands, and "
     "set-points do not end that",
 }
-"""What, and what is taken for true."""
+"""Subject and assumption, as in docs/dji.md."""

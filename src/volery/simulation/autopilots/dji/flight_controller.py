@@ -1,8 +1,6 @@
-"""What a DJI flight controller allows and does: authority, motors, tasks, set-points, missions, batteries.
+"""Decisions of a DJI flight controller: SDK authority, motors, tasks, set-points, missions, batteries.
 
-It says yes or no; it knows neither topics nor services.
-
-Waypoint missions: what is taken, and how it lies on board as items of the flight stack.
+Requests return whether they are accepted. Topics and services are not known here.
 """
 
 from __future__ import annotations
@@ -18,23 +16,23 @@ from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-FEWEST, MOST = 2, 99
-"""Waypoints of a mission: assumed."""
-STAY = 0
-"""A waypoint's action: stay for so many milliseconds. The number is assumed."""
+MIN_WAYPOINTS, MAX_WAYPOINTS = 2, 99
+"""Number of waypoints of a mission: assumed."""
+STAY_ACTION = 0
+"""Action of a waypoint: stay for a number of milliseconds. The number of the action is assumed."""
 NO_ACTION, GO_HOME_AT_END, LAND_AT_END, TO_FIRST, NO_EXIT = range(5)
-"""What is done at the end of a mission."""
+"""Actions at the end of a mission."""
 YAW_LOCKED, YAW_BY_WAYPOINT = 1, 3
-STOPS_S = 0.1
-"""Flown from point to point it stands at each of them; coordinated it does not."""
+STOP_S = 0.1
+"""Stop at each waypoint, unless turns are coordinated [s]."""
 
 
 def mission_refusal(task: Any) -> str:
-    """Why a mission is not taken; empty if it is."""
+    """Return why a mission is refused, or an empty text."""
     points = task.mission_waypoint
     low, high = MISSION_SPEEDS
-    if not FEWEST <= len(points) <= MOST:
-        return f"{len(points)} waypoints; {FEWEST} to {MOST}"
+    if not MIN_WAYPOINTS <= len(points) <= MAX_WAYPOINTS:
+        return f"{len(points)} waypoints; {MIN_WAYPOINTS} to {MAX_WAYPOINTS}"
     if not (low <= task.velocity_range <= high and low <= task.idle_velocity <= task.velocity_range):
         return f"speeds {task.idle_velocity:g} and {task.velocity_range:g} m/s; {low:g} to {high:g}"
     for number, point in enumerate(points, start=1):
@@ -45,7 +43,7 @@ def mission_refusal(task: Any) -> str:
 
 
 def mission_items(task: Any) -> list[MissionItem]:
-    """The items of a mission that is taken."""
+    """Return the items of an accepted mission."""
     once = [_item(point, coordinated=task.trace_mode == 1) for point in task.mission_waypoint]
     items = once * max(1, min(2, task.mission_exec_times))
     return [*items, items[0]] if task.action_on_finish == TO_FIRST else items
@@ -56,7 +54,7 @@ def _item(point: Any, coordinated: bool) -> MissionItem:
     return MissionItem(
         WAYPOINT,
         GLOBAL_RELATIVE,
-        param1=stay or (0.0 if coordinated else STOPS_S),
+        param1=stay or (0.0 if coordinated else STOP_S),
         x=round(point.latitude * 1e7),
         y=round(point.longitude * 1e7),
         z=point.altitude,
@@ -64,25 +62,25 @@ def _item(point: Any, coordinated: bool) -> MissionItem:
 
 
 def _stay(point: Any) -> float:
-    """Seconds that its actions have it stay."""
+    """Return how long the actions of a waypoint stay [s]."""
     action = point.waypoint_action
     count = action.action_repeat & 0x0F if point.has_action else 0
     listed = zip(action.command_list[:count], action.command_parameter[:count], strict=True)
-    return sum(int(milliseconds) for command, milliseconds in listed if command == STAY) / 1000.0
+    return sum(int(milliseconds) for command, milliseconds in listed if command == STAY_ACTION) / 1000.0
 
 
 INFO, WARNING = 6, 4
 """Severities as in syslog."""
 
 SWITCH, F_ABOVE, P_BELOW = 5, 1700, 1300
-"""The channel of the transmitter's mode switch, and its pulse widths for F and P; A is between them."""
+"""Channel of the mode switch, and its pulse widths [us] for F and P; A is between them."""
 
-STARTING: Ns = 2 * S
-"""So long after the start of the motors it shows ENGINE_START: assumed."""
-FINISHED: Ns = 3 * S
-"""So long after a landing an M100 shows FINISHED_LANDING: assumed."""
+ENGINE_START_TIME: Ns = 2 * S
+"""Time after the start of the motors in which ENGINE_START is shown: assumed."""
+FINISHED_LANDING_TIME: Ns = 3 * S
+"""Time after a landing in which an M100 shows FINISHED_LANDING: assumed."""
 
-BY_ITSELF = frozenset(
+AUTONOMOUS_MODES = frozenset(
     {
         DisplayMode.AUTO_TAKEOFF,
         DisplayMode.AUTO_LANDING,
@@ -91,49 +89,54 @@ BY_ITSELF = frozenset(
     }
 )
 """Modes that set-points do not end while the aircraft itself has chosen them."""
-COMING_DOWN = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
+LANDING_MODES = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
 
 
 class FlightController:
-    """One aircraft's. ``sdk`` says that a program on board has the authority."""
+    """State that only this firmware keeps about a vehicle (``Vehicle.firmware_state``).
+
+    ``has_authority`` tells whether an onboard program has the SDK authority.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        self._activates_itself = False
+        self._activates_at_power_on = False
         self.reset()
 
     def reset(self) -> None:
-        """As it is switched on."""
-        self.activated = self._activates_itself
-        self.sdk = False
+        """Reset to the state after power-on."""
+        self.activated = self._activates_at_power_on
+        self.has_authority = False
         self.reference: tuple[float, float, float] | None = None
-        """Degrees and metres AMSL about which the local position counts."""
+        """Origin of the local position [deg, m AMSL], or None."""
         self.task: Any = None
-        """The waypoint mission on board, as it was uploaded."""
+        """Waypoint mission as uploaded, or None."""
         self.anomalies = 0
         self._switch = "F"
-        self._set_at: Ns = NEVER
-        self._asked_by_sdk = False
+        self._last_setpoint_ns: Ns = NEVER
+        self._requested_by_sdk = False
 
     # -- what it shows
 
     @property
     def aircraft(self) -> str:
-        """A3, M100 and so on."""
+        """Type of the aircraft, such as A3 or M100."""
         return AIRCRAFT[min(len(AIRCRAFT) - 1, max(0, round(self.vehicle.parameters["AIRCRAFT"])))]
 
     @property
     def mode(self) -> int:
-        """The display mode."""
+        """Display mode."""
         vehicle = self.vehicle
         starting = (
-            vehicle.armed and vehicle.landed and vehicle.kernel.now() - vehicle.arming.armed_at < STARTING
+            vehicle.armed
+            and vehicle.landed
+            and vehicle.kernel.now() - vehicle.arming.armed_at < ENGINE_START_TIME
         )
         return DisplayMode.ENGINE_START if starting else vehicle.mode.number
 
     @property
     def status(self) -> int:
-        """The flight status, in the numbers of this aircraft."""
+        """Flight status, in the numbering of this type of aircraft."""
         vehicle = self.vehicle
         if self.aircraft == M100:
             return self._m100_status()
@@ -148,16 +151,16 @@ class FlightController:
                 return M100Status.TAKING_OFF
             landed = (
                 vehicle.ground.landed_at != NEVER
-                and vehicle.kernel.now() - vehicle.ground.landed_at < FINISHED
+                and vehicle.kernel.now() - vehicle.ground.landed_at < FINISHED_LANDING_TIME
             )
             return M100Status.FINISHED_LANDING if landed else M100Status.ON_GROUND
         if self._is(DisplayMode.AUTO_TAKEOFF):
             return M100Status.TAKING_OFF
-        return M100Status.LANDING if vehicle.mode.number in COMING_DOWN else M100Status.IN_AIR
+        return M100Status.LANDING if vehicle.mode.number in LANDING_MODES else M100Status.IN_AIR
 
     @property
     def gps_health(self) -> int:
-        """0 to 5."""
+        """GPS health, 0 to 5."""
         vehicle = self.vehicle
         if vehicle.has_position:
             return 5
@@ -169,26 +172,26 @@ class FlightController:
     # -- what a program may ask
 
     def activate(self) -> bool:
-        """Any key will do."""
+        """Accept any activation key."""
         self.activated = True
         return True
 
-    def activate_by_itself(self) -> None:
-        """Its node activates whenever it is switched on."""
-        self._activates_itself = self.activated = True
+    def activate_at_power_on(self) -> None:
+        """Activate now and after each power-on, as the node of 4.1 does."""
+        self._activates_at_power_on = self.activated = True
 
-    def obtain(self, wanted: bool) -> bool:
-        """Give a program the authority, or take it back. The pilot's switch decides."""
+    def set_authority(self, wanted: bool) -> bool:
+        """Give the authority to a program or take it back; the pilot's mode switch may refuse it."""
         if wanted and (self._switch != "F" or not self.activated):
             return False
-        self.sdk = wanted
+        self.has_authority = wanted
         if not wanted and self._is(DisplayMode.NAVI_SDK_CTRL):
             self.hover()
         return True
 
     def motors(self, on: bool) -> bool:
-        """Start or stop them, in the air as well."""
-        if not self.sdk:
+        """Start or stop the motors, also in flight."""
+        if not self.has_authority:
             return False
         if on:
             return self.vehicle.armed or self._start_motors()
@@ -196,10 +199,10 @@ class FlightController:
         return True
 
     def kill(self) -> bool:
-        """Stop the motors wherever it is."""
+        """Stop the motors, also in flight."""
         if self.vehicle.armed:
             self.vehicle.disarm()
-            self._rest()
+            self._report_stopped_motors()
         return True
 
     def _start_motors(self) -> bool:
@@ -213,7 +216,7 @@ class FlightController:
         return True
 
     def take_off(self) -> bool:
-        """Start the motors and climb to the fixed height."""
+        """Start the motors and climb to TAKEOFF_HEIGHT."""
         vehicle = self.vehicle
         if not vehicle.landed or not vehicle.has_position:
             return False
@@ -223,7 +226,7 @@ class FlightController:
         return True
 
     def go_home(self, by_sdk: bool = True) -> bool:
-        """Climb, go home, land. Near home it lands at once."""
+        """Climb, fly home and land; near home, land at once."""
         vehicle = self.vehicle
         home = vehicle.home
         if vehicle.landed or home is None or not vehicle.has_position:
@@ -234,15 +237,15 @@ class FlightController:
         return True
 
     def land(self, by_sdk: bool = True) -> bool:
-        """Straight down."""
+        """Land at the present position."""
         if self.vehicle.landed:
             return False
         self._enter(DisplayMode.AUTO_LANDING, by_sdk=by_sdk)
         return True
 
     def interrupt(self, *modes: DisplayMode) -> bool:
-        """Hover instead of these modes, if a program has asked for them."""
-        if self.vehicle.mode.number not in modes or not self._asked_by_sdk:
+        """Hover if one of these modes is flown on request of a program."""
+        if self.vehicle.mode.number not in modes or not self._requested_by_sdk:
             return False
         self.hover()
         return True
@@ -255,38 +258,43 @@ class FlightController:
         return True
 
     def hover(self) -> None:
-        """As the pilot's switch says, sticks in the middle."""
+        """Enter P_GPS, or ATTITUDE without a position or with the mode switch at A."""
         by_position = self._switch != "A" and self.vehicle.has_position
         self._enter(DisplayMode.P_GPS if by_position else DisplayMode.ATTITUDE)
 
-    def refer(self) -> bool:
-        """From now on the local position counts from here."""
+    def set_reference(self) -> bool:
+        """Set the origin of the local position here."""
         if not self.vehicle.has_position:
             return False
         self.reference = self.vehicle.estimate.geodetic
         return True
 
-    def obey(self, numbers: tuple[float, ...], flag: int) -> None:
-        """A set-point. Without the authority, or with motors that stand, it has no effect."""
+    def handle_setpoint(self, numbers: tuple[float, ...], flag: int) -> None:
+        """Follow a set-point; without authority or running motors it has no effect.
+
+        Args:
+            numbers: x, y, z and yaw as ``flag`` defines them.
+            flag: Control flag of the onboard SDK.
+        """
         vehicle = self.vehicle
-        if not self.sdk or not vehicle.armed:
+        if not self.has_authority or not vehicle.armed:
             return
-        if vehicle.mode.number in BY_ITSELF and not (self._asked_by_sdk and not vehicle.landed):
+        if vehicle.mode.number in AUTONOMOUS_MODES and not (self._requested_by_sdk and not vehicle.landed):
             return
         if self._is(DisplayMode.AUTO_TAKEOFF):
             return
         command = sdk_command(numbers, flag, vehicle.estimate.position)
         if command is None:
-            self._once(f"set-points with flag 0x{flag:02X} are not flown here, or its numbers are none")
+            self._warn_once(f"set-points with flag 0x{flag:02X} are not flown here, or its numbers are none")
             return
-        self._set_at = vehicle.kernel.now()
+        self._last_setpoint_ns = vehicle.kernel.now()
         if not self._is(DisplayMode.NAVI_SDK_CTRL):
             self._enter(DisplayMode.NAVI_SDK_CTRL, by_sdk=True)
         if isinstance(vehicle.manoeuvre, SdkControl):
             vehicle.manoeuvre.command = command
             vehicle.run_manoeuvre()
 
-    def _once(self, text: str) -> None:
+    def _warn_once(self, text: str) -> None:
         if text not in self.vehicle.reports.sent_once:
             self.vehicle.reports.sent_once.add(text)
             self.vehicle.send_text(WARNING, text)
@@ -294,7 +302,7 @@ class FlightController:
     # -- missions
 
     def upload(self, task: Any) -> bool:
-        """Replace the mission on board, if it makes sense."""
+        """Replace the mission if it is valid."""
         found = mission_refusal(task)
         if found:
             self.vehicle.send_text(WARNING, f"mission refused: {found}")
@@ -303,12 +311,12 @@ class FlightController:
         self.vehicle.mission.replace(mission_items(task))
         return True
 
-    def start_mission(self, *, anew: bool) -> bool:
-        """From its first point, or from where it was left; in the air only."""
+    def start_mission(self, *, from_start: bool) -> bool:
+        """Start the mission from its first point, or resume it; in flight only."""
         vehicle = self.vehicle
         if self.task is None or vehicle.landed or not vehicle.has_position:
             return False
-        if anew:
+        if from_start:
             vehicle.mission.restart()
         elif vehicle.mission.complete:
             return False
@@ -319,14 +327,14 @@ class FlightController:
         return True
 
     def leave_mission(self) -> bool:
-        """Hover where it is."""
+        """Hover instead of the mission."""
         if not self._is(DisplayMode.NAVI_MISSION):
             return False
         self.hover()
         return True
 
     def mission_speed(self, metres_per_second: float) -> bool:
-        """From now on."""
+        """Set the speed of the mission [m/s]."""
         if self.task is None:
             return False
         self.task.idle_velocity = metres_per_second
@@ -335,13 +343,13 @@ class FlightController:
         return True
 
     def item_begins(self, number: int, _item: MissionItem) -> None:
-        """Turn to the waypoint's heading, where the mission says so."""
+        """Turn to the heading of the waypoint, if the mission defines headings."""
         if self.task is not None and self.task.yaw_mode == YAW_BY_WAYPOINT:
             point = self.task.mission_waypoint[number % len(self.task.mission_waypoint)]
             self.vehicle.commanded.yaw = radians(point.target_yaw)
 
     def mission_ended(self) -> None:
-        """What the mission says is to follow."""
+        """Execute the action at the end of the mission."""
         finish = self.task.action_on_finish if self.task is not None else NO_ACTION
         if finish == GO_HOME_AT_END:
             self.go_home()
@@ -353,51 +361,51 @@ class FlightController:
     # -- what it does by itself
 
     def step(self) -> None:
-        """Ten times a second."""
-        self._look_at_switch()
+        """Run the automatic actions, ten times a second."""
+        self._read_switch()
         if not self.vehicle.armed:
             return
         if self.vehicle.landed:
-            self._stop_motors_by_itself()
+            self._stop_motors_automatically()
         else:
-            self._go_on()
+            self._update_flight()
 
-    def _look_at_switch(self) -> None:
-        """The pilot always wins: with the switch out of F the program has lost."""
+    def _read_switch(self) -> None:
+        """Read the mode switch; any change withdraws the authority, and in flight the aircraft hovers."""
         pulse = self.vehicle.rc[SWITCH]
         now = "F" if pulse > F_ABOVE else "P" if pulse < P_BELOW else "A"
         if now == self._switch:
             return
         self._switch = now
-        self.sdk = False
+        self.has_authority = False
         self.vehicle.send_text(INFO, f"the mode switch is at {now}")
         if self.vehicle.armed and not self.vehicle.landed:
             self.hover()
 
-    def _go_on(self) -> None:
+    def _update_flight(self) -> None:
         vehicle = self.vehicle
         number, manoeuvre = vehicle.mode.number, vehicle.manoeuvre
         timeout = from_seconds(vehicle.parameters["SETPOINT_TIMEOUT"])
         if number == DisplayMode.NAVI_SDK_CTRL:
-            if vehicle.kernel.now() - self._set_at > timeout:
+            if vehicle.kernel.now() - self._last_setpoint_ns > timeout:
                 self.hover()
         elif number == DisplayMode.AUTO_TAKEOFF:
             if vehicle.height > vehicle.parameters["TAKEOFF_HEIGHT"] - 0.1:
                 self.hover()
         elif number == DisplayMode.NAVI_GO_HOME:
             if manoeuvre.landing:
-                self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._asked_by_sdk)
+                self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._requested_by_sdk)
         elif number == DisplayMode.P_GPS and not vehicle.has_position:
             vehicle.send_text(WARNING, "position lost")
             self.hover()
         elif number == DisplayMode.ATTITUDE and vehicle.has_position and self._switch != "A":
             self.hover()
 
-    def _stop_motors_by_itself(self) -> None:
+    def _stop_motors_automatically(self) -> None:
         vehicle = self.vehicle
         now, parameters = vehicle.kernel.now(), vehicle.parameters
         number = vehicle.mode.number
-        if number in COMING_DOWN and now - vehicle.ground.landed_at >= from_seconds(
+        if number in LANDING_MODES and now - vehicle.ground.landed_at >= from_seconds(
             parameters["LANDED_STOP"]
         ):
             self.kill()
@@ -408,28 +416,28 @@ class FlightController:
             self.kill()
 
     def low_battery(self) -> None:
-        """Go home."""
+        """Report a low battery and go home."""
         self.vehicle.send_text(WARNING, "battery low")
-        if self.vehicle.armed and self.vehicle.mode.number not in COMING_DOWN:
+        if self.vehicle.armed and self.vehicle.mode.number not in LANDING_MODES:
             self.go_home(by_sdk=False)
 
     def critical_battery(self) -> None:
-        """Land where it is."""
+        """Report a critical battery and land."""
         self.vehicle.send_text(WARNING, "battery critical")
         if self.vehicle.armed and not self.vehicle.landed:
             self._enter(DisplayMode.FORCE_AUTO_LANDING)
 
-    def _rest(self) -> None:
-        """The motors stand."""
+    def _report_stopped_motors(self) -> None:
+        """Report that the motors stopped."""
         self.vehicle.send_text(INFO, "motors stopped")
         self.hover()
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
-        self._asked_by_sdk = by_sdk
+        self._requested_by_sdk = by_sdk
         self.vehicle.enter_mode(self.vehicle.rules.modes[mode])
 
 
 def controller_of(vehicle: Vehicle) -> FlightController:
-    """The flight controller of a vehicle of this dialect."""
+    """Return the flight controller of a vehicle."""
     controller: FlightController = vehicle.firmware_state
     return controller

@@ -1,6 +1,6 @@
-"""What is assumed of a DJI aircraft, as parameters: the public definitions state none of these figures.
+"""Assumed figures of a DJI aircraft, as parameters: the public definitions state none of them.
 
-Their names are ours; an aircraft of DJI has no parameters that a program could read.
+The names are ours; a DJI aircraft has no parameters that a program could read.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from volery.simulation.autopilots.autopilot_parameters import (
 )
 
 AIRCRAFT = tuple(HARDWARE)
-"""By the value of the parameter AIRCRAFT."""
+"""Types of aircraft by value of the parameter AIRCRAFT."""
 
 _ASSUMED: tuple[tuple[str, int, float, str], ...] = (
     ("AIRCRAFT", INT8, 0.0, "0 A3, 1 N3, 2 M100, 3 M600: what it says it is, and which numbers it uses"),
@@ -39,21 +39,21 @@ _ASSUMED: tuple[tuple[str, int, float, str], ...] = (
 )
 
 SUPPORTED: Mapping[str, str] = {name: what for name, _, _, what in _ASSUMED}
-"""All of them."""
+"""Meaning of each parameter; all have an effect."""
 
 SDK_TILT = radians(35.0)
-"""Documented: angles of set-points are at most 35 degrees."""
+"""Documented limit of angles in set-points [rad]."""
 SDK_SPEED, SDK_CLIMB = 30.0, 5.0
-"""Documented: velocities of set-points in the plane and vertically [m/s]."""
+"""Documented limits of horizontal and vertical velocities in set-points [m/s]."""
 
 
 def parameters() -> tuple[Parameter, ...]:
-    """The list."""
+    """Return the default parameters."""
     return tuple(Parameter(name, kind, quantised(kind, value)) for name, kind, value, _ in _ASSUMED)
 
 
 def tuning(parameters: Parameters) -> Tuning:
-    """The figures that manoeuvres fly by."""
+    """Return the tuning that follows from the parameters."""
     p = parameters
     return Tuning(
         speed=max(0.1, p["MAX_SPEED"]),

@@ -1,7 +1,7 @@
-"""Set-points of a program on board: four numbers and a byte that says how they are meant.
+"""Set-points of an onboard program: four numbers and a flag that defines their meaning.
 
-All is in the conventions of the ROS node: east, north, up, or forward, left, up; anticlockwise; radians. The
-height is above the point of take-off.
+They follow the conventions of the ROS node: east-north-up or forward-left-up, anticlockwise, radians. Heights
+count from the place of take-off.
 """
 
 from __future__ import annotations
@@ -20,15 +20,13 @@ from volery.simulation.autopilots.vehicle_state import Manoeuvre
 if TYPE_CHECKING:
     from volery.simulation.autopilots.vehicle_state import Vehicle
 
-LIFTS_ABOVE_M, LIFTS_ABOVE_M_S, LIFTS_ABOVE_PERCENT = 0.5, 0.1, 20.0
-"""A set-point of more than that takes an aircraft that stands with turning motors off the ground: assumed."""
+LIFT_OFF_M, LIFT_OFF_M_S, LIFT_OFF_PERCENT = 0.5, 0.1, 20.0
+"""Set-points above these values take a standing aircraft with running motors off the ground: assumed."""
 
 
 @dataclass(frozen=True)
 class SdkCommand:
-    """A set-point that makes sense. *anchor* is where the aircraft was when it came: offsets count from there
-    [north, east, down m].
-    """
+    """Valid set-point. Offsets count from ``anchor``, the position at its arrival (north-east-down) [m]."""
 
     flag: int
     x: float
@@ -39,30 +37,31 @@ class SdkCommand:
 
     @property
     def horizontal(self) -> int:
-        """What ``x`` and ``y`` are."""
+        """Meaning of ``x`` and ``y``."""
         return self.flag & HORIZONTAL
 
     @property
     def vertical(self) -> int:
-        """What ``z`` is."""
+        """Meaning of ``z``."""
         return self.flag & VERTICAL
 
     @property
     def needs_position(self) -> bool:
-        """It is about the ground."""
+        """Whether ``x`` and ``y`` are relative to the ground."""
         return self.horizontal in (Flag.HORIZONTAL_VELOCITY, Flag.HORIZONTAL_POSITION)
 
     @property
     def lifts(self) -> bool:
-        """It takes the aircraft off the ground."""
+        """Whether the set-point takes the aircraft off the ground."""
         if self.vertical == Flag.VERTICAL_POSITION:
-            return self.z > LIFTS_ABOVE_M
-        return self.z > (LIFTS_ABOVE_PERCENT if self.vertical == Flag.VERTICAL_THRUST else LIFTS_ABOVE_M_S)
+            return self.z > LIFT_OFF_M
+        return self.z > (LIFT_OFF_PERCENT if self.vertical == Flag.VERTICAL_THRUST else LIFT_OFF_M_S)
 
 
 def sdk_command(numbers: tuple[float, ...], flag: int, anchor: Vector) -> SdkCommand | None:
-    """The command that four numbers and a flag are; ``None`` for what is not flown here: angular rates,
-    thrust with anything but angles, numbers that are none.
+    """Return the set-point of four numbers and a flag, or None if it is invalid or not supported.
+
+    Not supported are angular rates, and thrust with anything but angles.
     """
     if len(numbers) < 4 or not all(isfinite(number) for number in numbers[:4]):
         return None
@@ -77,30 +76,33 @@ def sdk_command(numbers: tuple[float, ...], flag: int, anchor: Vector) -> SdkCom
 
 
 class SdkControl(Manoeuvre):
-    """Fly the command that came last. Without a position, what is about the ground is hovering level."""
+    """NAVI_SDK_CTRL: follow the last set-point.
+
+    Without a position, ground-relative set-points hover level.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self.command: SdkCommand | None = None
 
     def takeoff_requested(self) -> bool:
-        """If the command lifts it."""
+        """Return whether the set-point takes the aircraft off the ground."""
         return self.command is not None and self.command.lifts
 
     def step(self) -> None:
-        """Hand it to the inner loops."""
+        """Command the set-point."""
         command, vehicle = self.command, self.vehicle
         if command is None or (command.needs_position and not vehicle.has_position):
             vehicle.drive(Setpoint(Control.CLIMB, accel_z=vehicle.tuning.accel_z))
         elif command.horizontal == Flag.HORIZONTAL_POSITION:
-            vehicle.drive(self._to_point(command))
+            vehicle.drive(self._position_setpoint(command))
         elif command.horizontal == Flag.HORIZONTAL_VELOCITY:
-            vehicle.drive(self._along(command))
+            vehicle.drive(self._velocity_setpoint(command))
         else:
-            vehicle.drive(self._leaning(command))
+            vehicle.drive(self._attitude_setpoint(command))
 
-    def _plane(self, command: SdkCommand) -> tuple[float, float]:
-        """``x`` and ``y`` as north and east."""
+    def _north_east(self, command: SdkCommand) -> tuple[float, float]:
+        """Return ``x`` and ``y`` as north and east."""
         if not command.flag & Flag.BODY:
             return command.y, command.x
         heading = self.vehicle.estimate.attitude[2]
@@ -120,13 +122,13 @@ class SdkControl(Manoeuvre):
         return min(SDK_CLIMB, max(-SDK_CLIMB, command.z))
 
     def _turn(self, command: SdkCommand) -> tuple[float | None, float | None]:
-        """Where the nose is to point and how fast to turn, clockwise; one of them is ``None``."""
+        """Return heading [rad] or yaw rate [rad/s], clockwise; the other is None."""
         if command.flag & Flag.YAW_RATE:
             return None, -command.yaw
         return pi / 2.0 - command.yaw, None
 
-    def _to_point(self, command: SdkCommand) -> Setpoint:
-        north, east = self._plane(command)
+    def _position_setpoint(self, command: SdkCommand) -> Setpoint:
+        north, east = self._north_east(command)
         tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
         by_height = command.vertical == Flag.VERTICAL_POSITION
         return Setpoint(
@@ -143,8 +145,8 @@ class SdkControl(Manoeuvre):
             tilt=tuning.tilt,
         )
 
-    def _along(self, command: SdkCommand) -> Setpoint:
-        north, east = self._plane(command)
+    def _velocity_setpoint(self, command: SdkCommand) -> Setpoint:
+        north, east = self._north_east(command)
         tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
         by_height = command.vertical == Flag.VERTICAL_POSITION
         return Setpoint(
@@ -161,7 +163,7 @@ class SdkControl(Manoeuvre):
             tilt=tuning.tilt,
         )
 
-    def _leaning(self, command: SdkCommand) -> Setpoint:
+    def _attitude_setpoint(self, command: SdkCommand) -> Setpoint:
         tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
         by_thrust = command.vertical == Flag.VERTICAL_THRUST
         share = min(1.0, max(0.0, command.z / 100.0))

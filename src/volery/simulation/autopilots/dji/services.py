@@ -1,7 +1,7 @@
-"""The services of the two nodes of DJI's onboard SDK, answered by a flight controller.
+"""The services of the two nodes of DJI's onboard SDK.
 
-``dji_sdk`` 3.8 has all of its names below its prefix. The vehicle node of ``dji_osdk_ros`` 4.1 has its own
-beside it, and those of waypoint missions below it.
+``dji_sdk`` 3.8 has all names below its prefix. The vehicle node of ``dji_osdk_ros`` 4.1 has its names beside
+it, and those of waypoint missions below it.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from volery.simulation.autopilots.dji.flight_controller import FlightController
 START, STOP, PAUSE, RESUME = range(4)
 """Actions on a mission."""
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
-"""Tasks of both."""
+"""Tasks of both packages."""
 
 ACCEPTED, REFUSED = 0, 1
-"""``ack_data``: assumed; the public definitions do not list it."""
+"""Values of ``ack_data``: assumed; the public definitions do not list them."""
 
 
 class Served(NamedTuple):
-    """One service: its name in the node's namespace, its type, and what answers."""
+    """One service: its name in the node's namespace, its type, and its handler."""
 
     name: str
     type: str
@@ -42,7 +42,7 @@ class Served(NamedTuple):
 
 
 def _response(kind: str, result: bool) -> Any:
-    """A response: its result, and the acknowledgement where it has one."""
+    """Return a response with its result and, where the type has one, its acknowledgement."""
     cls = message_class(f"{kind}_Response")
     if "ack_data" in cls.__match_args__:
         return cls(result=result, ack_data=ACCEPTED if result else REFUSED)
@@ -50,46 +50,46 @@ def _response(kind: str, result: bool) -> Any:
 
 
 class Services:
-    """What one aircraft is asked. *referred* is called once there is a local reference."""
+    """Services of one aircraft. ``on_reference`` is called once there is a local reference."""
 
-    def __init__(self, controller: FlightController, referred: Callable[[], None]) -> None:
+    def __init__(self, controller: FlightController, on_reference: Callable[[], None]) -> None:
         self._controller = controller
-        self._referred = referred
+        self._on_reference = on_reference
         self._joystick = 0  # the flag that set_joystick_mode has stated
 
     def table(self, package: str) -> tuple[Served, ...]:
-        """The services of the node of that package."""
-        own = self._new() if package == NEW_NAMES else self._old()
+        """Return the services of the node of a package."""
+        own = self._services_4_1() if package == NEW_NAMES else self._services_3_8()
         below = f"{package}/"
         return (*own, *(Served(below + name, kind, answer) for name, kind, answer in self._missions(package)))
 
-    def _yes_no(self, name: str, kind: str, do: Callable[[Any], bool]) -> Served:
+    def _served(self, name: str, kind: str, do: Callable[[Any], bool]) -> Served:
         return Served(name, kind, lambda request: _response(kind, do(request)))
 
     # -- 3.8
 
-    def _old(self) -> tuple[Served, ...]:
-        asked, package = self._controller, f"{OLD_NAMES}/srv"
-        yes_no = self._yes_no
+    def _services_3_8(self) -> tuple[Served, ...]:
+        controller, package = self._controller, f"{OLD_NAMES}/srv"
+        served = self._served
         below = f"{OLD_NAMES}/"
         return (
-            yes_no(f"{below}activation", f"{package}/Activation", lambda _: asked.activate()),
-            yes_no(
+            served(f"{below}activation", f"{package}/Activation", lambda _: controller.activate()),
+            served(
                 f"{below}sdk_control_authority",
                 f"{package}/SDKControlAuthority",
-                lambda request: asked.obtain(bool(request.control_enable)),
+                lambda request: controller.set_authority(bool(request.control_enable)),
             ),
-            yes_no(
+            served(
                 f"{below}drone_arm_control",
                 f"{package}/DroneArmControl",
-                lambda request: asked.motors(bool(request.arm)),
+                lambda request: controller.motors(bool(request.arm)),
             ),
-            yes_no(
+            served(
                 f"{below}drone_task_control",
                 f"{package}/DroneTaskControl",
                 lambda request: self._task(request.task),
             ),
-            yes_no(f"{below}set_local_pos_ref", f"{package}/SetLocalPosRef", lambda _: self._refer()),
+            served(f"{below}set_local_pos_ref", f"{package}/SetLocalPosRef", lambda _: self._set_reference()),
             Served(f"{below}query_drone_version", f"{package}/QueryDroneVersion", self._version),
         )
 
@@ -98,59 +98,59 @@ class Services:
         return message_class(f"{OLD_NAMES}/srv/QueryDroneVersion_Response")(HARDWARE[name], name)
 
     def _task(self, task: int) -> bool:
-        asked = self._controller
-        tasks = {GO_HOME: asked.go_home, TAKE_OFF: asked.take_off, LAND: asked.land}
+        controller = self._controller
+        tasks = {GO_HOME: controller.go_home, TAKE_OFF: controller.take_off, LAND: controller.land}
         return task in tasks and tasks[task]()
 
-    def _refer(self) -> bool:
-        done = self._controller.refer()
+    def _set_reference(self) -> bool:
+        done = self._controller.set_reference()
         if done:
-            self._referred()
+            self._on_reference()
         return done
 
     # -- 4.1
 
-    def _new(self) -> tuple[Served, ...]:
-        asked, package = self._controller, f"{NEW_NAMES}/srv"
-        yes_no = self._yes_no
-        asked.activate_by_itself()
+    def _services_4_1(self) -> tuple[Served, ...]:
+        controller, package = self._controller, f"{NEW_NAMES}/srv"
+        served = self._served
+        controller.activate_at_power_on()
         return (
-            yes_no("flight_task_control", f"{package}/FlightTaskControl", self._flight_task),
-            yes_no(
+            served("flight_task_control", f"{package}/FlightTaskControl", self._flight_task),
+            served(
                 "obtain_release_control_authority",
                 f"{package}/ObtainControlAuthority",
-                lambda request: asked.obtain(request.enable_obtain),
+                lambda request: controller.set_authority(request.enable_obtain),
             ),
-            yes_no(
+            served(
                 "kill_switch",
                 f"{package}/KillSwitch",
-                lambda request: asked.kill() if request.enable else True,
+                lambda request: controller.kill() if request.enable else True,
             ),
-            yes_no("emergency_brake", f"{package}/EmergencyBrake", lambda _: asked.brake()),
-            yes_no("set_local_pos_reference", f"{package}/SetLocalPosRef", lambda _: self._refer()),
-            yes_no("set_joystick_mode", f"{package}/SetJoystickMode", self._joystick_mode),
-            yes_no("joystick_action", f"{package}/JoystickAction", self._joystick_action),
-            yes_no("set_go_home_altitude", f"{package}/SetGoHomeAltitude", self._go_home_altitude),
-            yes_no("set_home_point", f"{package}/SetHomePoint", self._home_point),
+            served("emergency_brake", f"{package}/EmergencyBrake", lambda _: controller.brake()),
+            served("set_local_pos_reference", f"{package}/SetLocalPosRef", lambda _: self._set_reference()),
+            served("set_joystick_mode", f"{package}/SetJoystickMode", self._joystick_mode),
+            served("joystick_action", f"{package}/JoystickAction", self._joystick_action),
+            served("set_go_home_altitude", f"{package}/SetGoHomeAltitude", self._go_home_altitude),
+            served("set_home_point", f"{package}/SetHomePoint", self._home_point),
         )
 
     def _flight_task(self, request: Any) -> bool:
-        asked = self._controller
+        controller = self._controller
         tasks: Mapping[int, Callable[[], bool]] = {
-            request.TASK_GOHOME: asked.go_home,
-            request.TASK_GOHOME_AND_CONFIRM_LANDING: asked.go_home,
-            request.TASK_TAKEOFF: asked.take_off,
-            request.TASK_LAND: asked.land,
-            request.TASK_FORCE_LANDING: asked.land,
-            request.TASK_FORCE_LANDING_AVOID_GROUND: asked.land,
-            request.START_MOTOR: lambda: asked.motors(True),
-            request.STOP_MOTOR: lambda: self._vehicle_stands() and asked.motors(False),
-            request.TASK_EXIT_GO_HOME: lambda: asked.interrupt(DisplayMode.NAVI_GO_HOME),
-            request.TASK_EXIT_LANDING: lambda: asked.interrupt(DisplayMode.AUTO_LANDING),
+            request.TASK_GOHOME: controller.go_home,
+            request.TASK_GOHOME_AND_CONFIRM_LANDING: controller.go_home,
+            request.TASK_TAKEOFF: controller.take_off,
+            request.TASK_LAND: controller.land,
+            request.TASK_FORCE_LANDING: controller.land,
+            request.TASK_FORCE_LANDING_AVOID_GROUND: controller.land,
+            request.START_MOTOR: lambda: controller.motors(True),
+            request.STOP_MOTOR: lambda: self._on_ground() and controller.motors(False),
+            request.TASK_EXIT_GO_HOME: lambda: controller.interrupt(DisplayMode.NAVI_GO_HOME),
+            request.TASK_EXIT_LANDING: lambda: controller.interrupt(DisplayMode.AUTO_LANDING),
         }
         return request.task in tasks and tasks[request.task]()
 
-    def _vehicle_stands(self) -> bool:
+    def _on_ground(self) -> bool:
         return self._controller.vehicle.landed
 
     def _joystick_mode(self, request: Any) -> bool:
@@ -164,7 +164,7 @@ class Services:
         return True
 
     def _joystick_action(self, request: Any) -> bool:
-        """North, east, up or forward, right, up; clockwise; degrees: as the flight controller has them."""
+        """Handle joystick_action: north-east-up or forward-right-up, clockwise, degrees."""
         command, flag = request.joystickCommand, self._joystick
         angles, body = not flag & HORIZONTAL, bool(flag & Flag.BODY)
         if angles:
@@ -173,7 +173,7 @@ class Services:
             x, y = (command.x, -command.y) if body else (command.y, command.x)
         rate = bool(flag & Flag.YAW_RATE)
         yaw = -radians(command.yaw) if rate else heading_to_yaw(radians(command.yaw) % (2.0 * pi))
-        self._controller.obey((x, y, command.z, yaw), flag)
+        self._controller.handle_setpoint((x, y, command.z, yaw), flag)
         return True
 
     def _go_home_altitude(self, request: Any) -> bool:
@@ -192,42 +192,46 @@ class Services:
     # -- missions, alike in both
 
     def _missions(self, package: str) -> tuple[Served, ...]:
-        asked, kinds = self._controller, f"{package}/srv"
+        controller, kinds = self._controller, f"{package}/srv"
         upload, action = f"{kinds}/MissionWpUpload", f"{kinds}/MissionWpAction"
         get_info, get_speed = f"{kinds}/MissionWpGetInfo", f"{kinds}/MissionWpGetSpeed"
         set_speed, status = f"{kinds}/MissionWpSetSpeed", f"{kinds}/MissionStatus"
         return (
-            self._yes_no(
-                "mission_waypoint_upload", upload, lambda request: asked.upload(request.waypoint_task.copy())
+            self._served(
+                "mission_waypoint_upload",
+                upload,
+                lambda request: controller.upload(request.waypoint_task.copy()),
             ),
-            self._yes_no("mission_waypoint_action", action, self._mission_action),
+            self._served("mission_waypoint_action", action, self._mission_action),
             Served(
                 "mission_waypoint_getInfo",
                 get_info,
                 lambda _: message_class(f"{get_info}_Response")(
-                    asked.task or message_class(f"{package}/msg/MissionWaypointTask")()
+                    controller.task or message_class(f"{package}/msg/MissionWaypointTask")()
                 ),
             ),
             Served(
                 "mission_waypoint_getSpeed",
                 get_speed,
                 lambda _: message_class(f"{get_speed}_Response")(
-                    asked.task.idle_velocity if asked.task else 0.0
+                    controller.task.idle_velocity if controller.task else 0.0
                 ),
             ),
-            self._yes_no("mission_waypoint_setSpeed", set_speed, self._set_speed),
+            self._served("mission_waypoint_setSpeed", set_speed, self._set_speed),
             Served(
                 "mission_status",
                 status,
-                lambda _: message_class(f"{status}_Response")(int(asked.task is not None), 0),
+                lambda _: message_class(f"{status}_Response")(int(controller.task is not None), 0),
             ),
         )
 
     def _mission_action(self, request: Any) -> bool:
-        asked = self._controller
+        controller = self._controller
         if request.action in (STOP, PAUSE):
-            return asked.leave_mission()
-        return request.action in (START, RESUME) and asked.start_mission(anew=request.action == START)
+            return controller.leave_mission()
+        return request.action in (START, RESUME) and controller.start_mission(
+            from_start=request.action == START
+        )
 
     def _set_speed(self, request: Any) -> bool:
         low, high = MISSION_SPEEDS

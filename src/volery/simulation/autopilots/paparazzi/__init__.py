@@ -1,6 +1,6 @@
-"""Paparazzi's rotorcraft firmware as a dialect of the simulated flight stack, behind pprzlink 2.0.
+"""Simulated rotorcraft firmware of Paparazzi behind pprzlink 2.0.
 
-The protocol and the firmware's rules are from public definitions; none of it was compared with a flight.
+Protocol and rules follow public definitions; nothing was compared with a flight.
 """
 
 from volery.links.pprzlink_codec import PPRZLINK
@@ -8,11 +8,11 @@ from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
 from volery.simulation.autopilots.paparazzi.firmware import ROTORCRAFT
 
 GROUND_SEGMENT = DefaultLink("udp://127.0.0.1:4242?from=4243")
-"""Paparazzi's ground segment hears aircraft at port 4242 and speaks to their port 4243."""
+"""Paparazzi's ground segment receives at port 4242, and sends to port 4243 of the aircraft."""
 
 FIRMWARE = FirmwareFamily(
     "paparazzi", {"multirotor": ROTORCRAFT}, codec=PPRZLINK, default_links=(GROUND_SEGMENT,)
 )
-"""The firmware. Rovers are built from another firmware, which is not simulated."""
+"""Entry point of the firmware. Rovers use another firmware, which is not simulated."""
 
 __all__ = ["FIRMWARE"]

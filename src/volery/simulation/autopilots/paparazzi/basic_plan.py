@@ -1,8 +1,7 @@
 """The flight plan of the simulated rotorcraft: Paparazzi's stock plan (``rotorcraft_basic``).
 
-Names, order and waypoints are those of ``links.pprz_aircraft.stock_aircraft``, by which a ground station
-knows them; what the blocks do stands here. Waypoints lie about the local origin, which is where the vehicle
-stood in block Geo init.
+Names, order and waypoints are those of ``links.paparazzi_aircraft.stock_aircraft``, which a ground station
+also uses. Waypoints count from the local origin, which is set in block Geo init.
 """
 
 from __future__ import annotations
@@ -29,40 +28,40 @@ from volery.simulation.autopilots.paparazzi.modes import NAV, in_flight, set_mot
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import fix_is_valid
 
 HEIGHT_M = 5.0
-"""Of waypoints above the local origin."""
+"""Height of waypoints above the local origin."""
 HEIGHTS_M = {"CAM": 2.0}
-"""Of those that have one of their own."""
+"""Heights of the waypoints that differ."""
 SETTLED_S = 10.0
-"""In block Geo init."""
+"""Duration of block Geo init."""
 AWAY_FROM_GROUND_M = 2.0
 TURNS = range(1, 17)
 """Quarter turns of block test yaw."""
 
 
 def motors(nav: Navigation, on: bool) -> None:
-    """NavResurrect and NavKillThrottle: they act in NAV only."""
+    """NavResurrect and NavKillThrottle, which act in NAV only."""
     if nav.vehicle.mode.number == NAV:
         set_motors(nav.vehicle, on)
 
 
 def set_ground_reference(nav: Navigation) -> None:
-    """NavSetGroundReferenceHere: the local origin, and home, are where it stands. Not in the air."""
+    """NavSetGroundReferenceHere: set local origin and home position here, unless in flight."""
     if not in_flight(nav.vehicle):
         nav.vehicle.flight.set_origin()
         nav.vehicle.set_home_here()
 
 
 def on_ground(nav: Navigation) -> bool:
-    """NavDetectGround."""
+    """Return whether the vehicle is on the ground (NavDetectGround)."""
     return nav.vehicle.estimate.landed
 
 
-def passed(seconds: float) -> partial[bool]:
-    """Whether the stage has lasted so long."""
-    return partial(_passed, seconds)
+def stage_lasted(seconds: float) -> partial[bool]:
+    """Return a condition that holds once the stage has lasted for that many seconds."""
+    return partial(_stage_lasted, seconds)
 
 
-def _passed(seconds: float, nav: Navigation) -> bool:
+def _stage_lasted(seconds: float, nav: Navigation) -> bool:
     return nav.stage_time > seconds
 
 
@@ -90,7 +89,12 @@ PLAN = FlightPlan(
         Block("go_p2", (Go("p2"), Deroute("stay_p1"))),
         Block(
             "line_p1_p2",
-            (Go("p2", start="p1"), Stay("p2", until=passed(10.0)), Go("p1", start="p2"), Deroute("stay_p1")),
+            (
+                Go("p2", start="p1"),
+                Stay("p2", until=stage_lasted(10.0)),
+                Go("p1", start="p2"),
+                Deroute("stay_p1"),
+            ),
         ),
         Block(
             "route",
@@ -101,7 +105,7 @@ PLAN = FlightPlan(
             "test yaw",
             (
                 Go("p1"),
-                *(Heading(90.0 * turn, "p1", passed(3.0)) for turn in TURNS),
+                *(Heading(90.0 * turn, "p1", stage_lasted(3.0)) for turn in TURNS),
                 Deroute("Standby"),
             ),
         ),

@@ -1,7 +1,7 @@
-"""What a rotorcraft does with the messages that the ground sends it.
+"""Handlers of the messages from the ground segment.
 
-A message for another aircraft is not looked at. Nothing is acknowledged: a setting answers with its value,
-a moved waypoint with its place, everything else is seen on the telemetry or not at all.
+Nothing is acknowledged: a setting is answered by its value, a moved waypoint by its position; everything else
+shows in the telemetry only.
 """
 
 from __future__ import annotations
@@ -27,37 +27,37 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 Fields = dict[str, Any]
 
 KILL_ALL, STANDBY, LAND = range(3)
-"""EMERGENCY_CMD.cmd."""
+"""Values of EMERGENCY_CMD.cmd."""
 MANUAL_BELOW, AUTO2_ABOVE = -FULL // 2, FULL // 2
-"""Of the mode switch."""
+"""Limits of the mode switch."""
 
 
 def on_ping(vehicle: Vehicle, _fields: Fields) -> None:
-    """PING."""
+    """Handle PING."""
     vehicle.output.send_event("PONG", {})
 
 
 def on_setting(vehicle: Vehicle, fields: Fields) -> None:
-    """SETTING: write, and say what it is now."""
+    """Handle SETTING: write, and send the new value."""
     value = parameters.write_setting(vehicle, fields["index"], fields["value"])
     if value is not None:
         vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_get_setting(vehicle: Vehicle, fields: Fields) -> None:
-    """GET_SETTING."""
+    """Handle GET_SETTING."""
     value = parameters.read_setting(vehicle, fields["index"])
     if value is not None:
         vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_block(vehicle: Vehicle, fields: Fields) -> None:
-    """BLOCK: in any mode; it is flown in NAV."""
+    """Handle BLOCK, which changes the block in any mode; only NAV flies it."""
     state_of(vehicle).navigation.jump(fields["block_id"])
 
 
 def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
-    """MOVE_WP: degrees 1e-7, millimetres above mean sea level. Ignored while there is no local frame."""
+    """Handle MOVE_WP (1e-7 deg, mm AMSL), which is ignored without a local frame."""
     if not vehicle.estimate.position_ok:
         return
     place = vehicle.flight.to_ned(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
@@ -66,7 +66,7 @@ def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
 
 
 def on_guided(vehicle: Vehicle, fields: Fields) -> None:
-    """GUIDED_SETPOINT_NED: silently ignored in every mode but GUIDED."""
+    """Handle GUIDED_SETPOINT_NED, which is ignored in every mode but GUIDED."""
     manoeuvre = vehicle.manoeuvre
     values = fields["x"], fields["y"], fields["z"]
     if isinstance(manoeuvre, Guided) and all(map(isfinite, (*values, fields["yaw"]))):
@@ -74,7 +74,7 @@ def on_guided(vehicle: Vehicle, fields: Fields) -> None:
 
 
 def on_emergency(vehicle: Vehicle, fields: Fields) -> None:
-    """EMERGENCY_CMD: motors off, block Standby, or down where it is."""
+    """Handle EMERGENCY_CMD: motors off, block Standby, or FAILSAFE."""
     command = fields["cmd"]
     if command == KILL_ALL:
         modes.set_mode(vehicle, modes.KILL)
@@ -89,8 +89,8 @@ def on_emergency(vehicle: Vehicle, fields: Fields) -> None:
 
 
 def on_sticks(vehicle: Vehicle, fields: Fields) -> None:
-    """RC_4CH: counts of 1/128; the switch is 0, 1 or 2."""
-    _hear(
+    """Handle RC_4CH: counts of 1/128; the switch is 0, 1 or 2."""
+    _receive(
         vehicle,
         StickFrame(
             bounded(PER_COUNT * fields["roll"]),
@@ -103,30 +103,33 @@ def on_sticks(vehicle: Vehicle, fields: Fields) -> None:
 
 
 def on_channels(vehicle: Vehicle, fields: Fields) -> None:
-    """RC_UP: the same as channels roll, pitch, yaw, throttle, mode; fewer are no frame."""
+    """Handle RC_UP: channels roll, pitch, yaw, throttle, mode; a shorter frame is ignored."""
     channels = fields["channels"]
     if len(channels) >= len(StickFrame._fields):
         roll, pitch, yaw, throttle, mode = (PER_COUNT * channel for channel in channels[:5])
         frame = StickFrame(bounded(roll), bounded(pitch), bounded(yaw), bounded(throttle, 0), bounded(mode))
-        _hear(vehicle, frame)
+        _receive(vehicle, frame)
 
 
 def on_joystick(vehicle: Vehicle, fields: Fields) -> None:
-    """JOYSTICK_RAW: the sticks themselves, the switch at AUTO2."""
+    """Handle JOYSTICK_RAW, with the mode switch at AUTO2."""
     roll, pitch, yaw = (bounded(fields[name]) for name in ("roll", "pitch", "yaw"))
-    _hear(vehicle, StickFrame(roll, pitch, yaw, bounded(fields["throttle"], 0), FULL))
+    _receive(vehicle, StickFrame(roll, pitch, yaw, bounded(fields["throttle"], 0), FULL))
 
 
-def _hear(vehicle: Vehicle, frame: StickFrame) -> None:
-    """A frame of radio control: the switch first, then the sticks."""
-    state_of(vehicle).radio.hear(vehicle, frame)
+def _receive(vehicle: Vehicle, frame: StickFrame) -> None:
+    """Apply a frame of radio control: first the mode switch, then the sticks."""
+    state_of(vehicle).radio.receive(vehicle, frame)
     _switch(vehicle, frame.mode)
     if vehicle.armed and vehicle.mode.pilot:
         vehicle.run_manoeuvre()
 
 
 def _switch(vehicle: Vehicle, position: int) -> None:
-    """MANUAL always; the other positions not out of HOME or FAILSAFE; NAV not without a fix."""
+    """Apply the mode switch.
+
+    MANUAL always counts, the other positions not in HOME or FAILSAFE, and NAV not without a GPS fix.
+    """
     manual = position < MANUAL_BELOW
     name = MANUAL_SWITCH if manual else AUTO2_SWITCH if position > AUTO2_ABOVE else AUTO1_SWITCH
     wanted = round(vehicle.parameters[name])
@@ -148,4 +151,4 @@ HANDLERS: Mapping[str, Callable[[Vehicle, Fields], None]] = {
     "RC_UP": on_channels,
     "SETTING": on_setting,
 }
-"""By name of the message."""
+"""Handlers by name of the message."""

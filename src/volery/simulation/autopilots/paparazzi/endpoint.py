@@ -1,4 +1,4 @@
-"""pprzlink as a vehicle's face: regular telemetry to every link, and an ear for the ground."""
+"""The pprzlink endpoint of a rotorcraft: periodic telemetry on every link, and messages from the ground."""
 
 from __future__ import annotations
 
@@ -10,127 +10,131 @@ from volery.kernel.api import Action, Handle
 from volery.links.link import Frame, Link
 from volery.simulation.autopilots.paparazzi.commands import HANDLERS
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
-from volery.simulation.autopilots.paparazzi.telemetry import REGULAR, Regular, rotorcraft_status
+from volery.simulation.autopilots.paparazzi.telemetry import (
+    PERIODIC_MESSAGES,
+    PeriodicMessage,
+    rotorcraft_status,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
 ANSWER_DELAY: Ns = 5 * MS
-"""Between a message's arrival and what it does."""
+"""Time between the arrival of a message and its effect."""
 PHASE: Ns = 20 * MS
-"""Between the first messages of two kinds."""
+"""Offset between the first messages of two kinds."""
 AUTOPILOT = 0
-"""Component of the sender."""
+"""Component id of the sender."""
 
 
 class PaparazziEndpoint:
-    """One vehicle's ``Outlet``, and its ear."""
+    """Protocol endpoint of one vehicle."""
 
     banner = b""
-    """It says nothing but frames."""
+    """Empty: the firmware sends frames only."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
         self._links: list[Link] = []
         self._clocks: list[Handle] = []
-        self._listens = False
+        self._active = False
 
     # -- links
 
     def connect(self, link: Link, use: str = "") -> None:
-        """Listen to and speak on this link, too. All links are alike, whatever their *use*."""
+        """Serve a link. All links are equal, whatever their use."""
         del use
         self._links.append(link)
-        link.receive(partial(self._hear, link))
+        link.receive(partial(self._receive, link))
 
     def disconnect(self, link: Link) -> None:
-        """Nobody is there any more."""
+        """Stop serving a link."""
         self._links = [other for other in self._links if other is not link]
 
     def close(self) -> None:
-        """Serve nobody any more."""
+        """Stop serving all links."""
         self._links.clear()
 
     # -- the clock
 
     def start(self) -> None:
-        """Regular telemetry begins when the firmware is up, one kind after the other."""
+        """Start periodic telemetry when the firmware is ready, one kind of message after the other."""
         self.stop()
         vehicle = self._vehicle
         ready = max(0, vehicle.rules.startup.ready_after - vehicle.uptime())
-        self._after(ready, self._listen)
-        for place, regular in enumerate(REGULAR):
-            self._after(ready + place * PHASE, partial(self._begin, regular))
+        self._after(ready, self._activate)
+        for place, periodic in enumerate(PERIODIC_MESSAGES):
+            self._after(ready + place * PHASE, partial(self._begin, periodic))
 
     def _after(self, delay: Ns, action: Action) -> None:
         self._clocks.append(self._kernel.call_at(self._kernel.now() + delay, action))
 
-    def _listen(self) -> None:
-        self._listens = True
+    def _activate(self) -> None:
+        self._active = True
 
-    def _begin(self, regular: Regular) -> None:
-        send = partial(self._send_regular, regular)
+    def _begin(self, periodic: PeriodicMessage) -> None:
+        send = partial(self._send_periodic, periodic)
         send()
-        self._clocks.append(self._kernel.every(regular.period, send))
+        self._clocks.append(self._kernel.every(periodic.period, send))
 
-    def _send_regular(self, regular: Regular) -> None:
+    def _send_periodic(self, periodic: PeriodicMessage) -> None:
         if self._links:
-            fields = regular.build(self._vehicle)
+            fields = periodic.build(self._vehicle)
             if fields is not None:
-                self.send_event(regular.name, fields)
+                self.send_event(periodic.name, fields)
 
     def stop(self) -> None:
-        """Fall silent and deaf."""
+        """Stop sending and receiving."""
         for clock in self._clocks:
             clock.cancel()
         self._clocks.clear()
-        self._listens = False
+        self._active = False
 
     # -- speaking
 
     def send_text(self, severity: int, text: str) -> None:
-        """INFO_MSG to everyone, and to the trace."""
+        """Send INFO_MSG on all links and record it."""
         self._kernel.record(Text(self._kernel.now(), self._vehicle.name, severity, text))
         self.send_event("INFO_MSG", {"msg": text})
 
     def parameter_changed(self, name: str) -> None:
-        """A setting answers for itself."""
+        """Send nothing: settings are sent periodically."""
 
     def mode_changed(self) -> None:
-        """ROTORCRAFT_STATUS at once."""
-        if self._listens:
+        """Send ROTORCRAFT_STATUS at once."""
+        if self._active:
             self.send_event("ROTORCRAFT_STATUS", rotorcraft_status(self._vehicle))
 
     def home_changed(self) -> None:
-        """INS_REF comes in its turn."""
+        """Send nothing: INS_REF is sent periodically."""
 
     def send_message(self, message: str) -> None:
-        """Send that regular message now."""
-        for regular in REGULAR:
-            if regular.name == message:
-                self._send_regular(regular)
+        """Send a periodic message now."""
+        for periodic in PERIODIC_MESSAGES:
+            if periodic.name == message:
+                self._send_periodic(periodic)
 
     def send_event(self, message: str, fields: dict[str, Any]) -> None:
-        """That message to everyone."""
+        """Send a message on all links."""
         state_of(self._vehicle).downlink_messages += 1
         for link in self._links:
             link.send(Frame(message, fields, self._vehicle.system, AUTOPILOT))
 
     def after_reply(self, action: Action) -> None:
-        """Nothing is answered: at once."""
+        """Execute the action at once: the protocol has no acknowledgements."""
         action()
 
     # -- hearing
 
-    def _hear(self, link: Link, frame: Frame) -> None:
+    def _receive(self, link: Link, frame: Frame) -> None:
         self._kernel.call_at(self._kernel.now() + ANSWER_DELAY, partial(self._handle, link, frame))
 
     def _handle(self, link: Link, frame: Frame) -> None:
-        if not self._listens or link not in self._links:
+        if not self._active or link not in self._links:
             return
-        kept, vehicle = state_of(self._vehicle), self._vehicle
-        kept.uplink_at = self._kernel.now()
-        kept.uplink_messages += 1
+        state, vehicle = state_of(self._vehicle), self._vehicle
+        state.last_uplink_ns = self._kernel.now()
+        state.uplink_messages += 1
         handler = HANDLERS.get(frame.name)
         if handler is not None and frame.fields.get("ac_id", vehicle.system) == vehicle.system:
             handler(vehicle, frame.fields)

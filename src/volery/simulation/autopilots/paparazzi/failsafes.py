@@ -1,7 +1,7 @@
-"""What the rotorcraft does by itself when something is lost: facts of the static autopilot, in its order.
+"""Automatic reactions of the rotorcraft to losses, in the order of Paparazzi's static autopilot.
 
-Each watch names a mode in which it acts, so it ends as soon as it has acted, and begins again if somebody
-goes back while the reason is still there.
+Each failsafe names the modes in which it acts. It therefore ends as soon as it has acted, and begins again if
+the mode is entered while the cause persists.
 """
 
 from __future__ import annotations
@@ -28,70 +28,70 @@ def _navigates(vehicle: Vehicle) -> bool:
 
 
 def too_far(vehicle: Vehicle) -> bool:
-    """In NAV, further from HOME than the plan allows."""
+    """Return whether the vehicle in NAV is further from HOME than MAX_DIST_FROM_HOME."""
     if not _navigates(vehicle):
         return False
     return state_of(vehicle).navigation.from_home() > vehicle.parameters["MAX_DIST_FROM_HOME"]
 
 
 def too_high(vehicle: Vehicle) -> bool:
-    """In NAV, above GEOFENCE_MAX_ALTITUDE, if there is one."""
+    """Return whether the vehicle in NAV is above GEOFENCE_MAX_ALTITUDE, if that is set."""
     limit = vehicle.parameters["GEOFENCE_MAX_ALTITUDE"]
     return limit > 0.0 and _navigates(vehicle) and state_of(vehicle).navigation.position[2] > limit
 
 
 def datalink_lost(vehicle: Vehicle) -> bool:
-    """In NAV, the ground silent for GEOFENCE_DATALINK_LOST_TIME, if there is one."""
+    """Return whether the ground is silent in NAV for GEOFENCE_DATALINK_LOST_TIME, if that is set."""
     seconds = vehicle.parameters["GEOFENCE_DATALINK_LOST_TIME"]
     if seconds <= 0.0 or not _navigates(vehicle):
         return False
-    return vehicle.kernel.now() - state_of(vehicle).uplink_at > from_seconds(seconds)
+    return vehicle.kernel.now() - state_of(vehicle).last_uplink_ns > from_seconds(seconds)
 
 
 def go_home(vehicle: Vehicle) -> None:
-    """HOME; too far even for that, FAILSAFE."""
+    """Enter HOME; FAILSAFE beyond FAILSAFE_MODE_DISTANCE."""
     far = state_of(vehicle).navigation.from_home() > vehicle.parameters["FAILSAFE_MODE_DISTANCE"]
     set_mode(vehicle, FAILSAFE if far else HOME)
 
 
 def radio_lost(vehicle: Vehicle) -> bool:
-    """In a mode that sticks fly, no sticks any more."""
+    """Return whether radio control is lost in a mode that needs it."""
     if vehicle.mode.number in UNSUPERVISED:
         return False
     return state_of(vehicle).radio.status(vehicle) == RADIO_REALLY_LOST
 
 
 def satellites_lost(vehicle: Vehicle) -> bool:
-    """In NAV or HOME, motors on, no fix any more."""
+    """Return whether the GPS fix is lost in NAV or HOME with running motors."""
     return vehicle.armed and vehicle.mode.number in (NAV, HOME) and rotorcraft_state.gps_lost(vehicle)
 
 
-def battery_gone(vehicle: Vehicle) -> bool:
-    """The battery is critical, where the airframe makes that a failsafe."""
+def battery_failed(vehicle: Vehicle) -> bool:
+    """Return whether the battery is critical, if the airframe makes that a failsafe."""
     return vehicle.mode.number not in (KILL, FAILSAFE) and battery_critical(vehicle)
 
 
-def come_down(vehicle: Vehicle) -> None:
-    """FAILSAFE."""
+def enter_failsafe(vehicle: Vehicle) -> None:
+    """Enter FAILSAFE."""
     set_mode(vehicle, FAILSAFE)
 
 
-def came_down(vehicle: Vehicle) -> bool:
-    """In FAILSAFE, and not in flight."""
+def landed_in_failsafe(vehicle: Vehicle) -> bool:
+    """Return whether the vehicle is in FAILSAFE and not in flight."""
     return vehicle.mode.number == FAILSAFE and not in_flight(vehicle)
 
 
 def stop_motors(vehicle: Vehicle) -> None:
-    """KILL."""
+    """Enter KILL."""
     set_mode(vehicle, KILL)
 
 
-WATCHES = (
+FAILSAFES = (
     Failsafe("too far from home", too_far, go_home),
     Failsafe("too high", too_high, go_home),
     Failsafe("datalink", datalink_lost, go_home),
-    Failsafe("radio", radio_lost, come_down),
-    Failsafe("battery", battery_gone, come_down),
-    Failsafe("satellites", satellites_lost, come_down),
-    Failsafe("on the ground", came_down, stop_motors),
+    Failsafe("radio", radio_lost, enter_failsafe),
+    Failsafe("battery", battery_failed, enter_failsafe),
+    Failsafe("satellites", satellites_lost, enter_failsafe),
+    Failsafe("on the ground", landed_in_failsafe, stop_motors),
 )

@@ -1,12 +1,7 @@
-"""Paparazzi's rotorcraft firmware: its modes and habits, put together as a dialect.
+"""Paparazzi's rotorcraft firmware: modes and boot, composed as a firmware, and the list of assumptions.
 
-From public definitions of the protocol and the static autopilot; not compared with a flight. What had to be
-assumed stands in docs/paparazzi.md.
-
-What had to be assumed of Paparazzi's rotorcraft firmware: one table.
-
-Protocol and rules are from public definitions and sources. No recording of a flight exists to compare with.
-Figures that an airframe file would define stand in ``airframe.FIGURES``.
+Protocol and rules follow public definitions and sources of the static autopilot; there is no recording of a
+flight to compare with. The figures of an airframe file stand in ``parameters.FIGURES``.
 """
 
 from __future__ import annotations
@@ -19,16 +14,16 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
 from volery.simulation.autopilots.paparazzi import parameters
 from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
 from volery.simulation.autopilots.paparazzi.endpoint import PaparazziEndpoint
-from volery.simulation.autopilots.paparazzi.failsafes import WATCHES
+from volery.simulation.autopilots.paparazzi.failsafes import FAILSAFES
 from volery.simulation.autopilots.paparazzi.flight_modes import (
     Direct,
+    FailsafeDescent,
     FlyHome,
     FlyPlan,
     Guided,
     HoldHeight,
     HoldPlace,
     Killed,
-    Sink,
 )
 from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
 from volery.simulation.autopilots.paparazzi.modes import HOME, in_flight, set_mode
@@ -49,7 +44,7 @@ from volery.simulation.autopilots.vehicle_state import (
 )
 
 TICK: Ns = S // 16
-"""Navigation runs sixteen times a second; so does everything else here."""
+"""Navigation and all other periodic work run at 16 Hz."""
 
 READY: Ns = 2 * S
 HOLDING_POINT = PLAN.block_number("Holding point")
@@ -58,7 +53,7 @@ MODES = {
     mode.number: mode
     for mode in (
         Mode(0, "KILL", 0, Killed),
-        Mode(1, "FAILSAFE", 0, Sink),
+        Mode(1, "FAILSAFE", 0, FailsafeDescent),
         Mode(2, "HOME", 0, FlyHome, needs_position=True),
         Mode(4, "ATTITUDE_DIRECT", 0, Direct, pilot=True, manual_throttle=True),
         Mode(6, "ATTITUDE_RC_CLIMB", 0, AltitudeHold, pilot=True),
@@ -68,28 +63,28 @@ MODES = {
         Mode(19, "GUIDED", 0, Guided, needs_position=True),
     )
 }
-"""Those that this firmware was built with. Bits of heartbeats are MAVLink's: none here."""
+"""The modes of this build of the firmware. Heartbeat bits are MAVLink's and stay 0."""
 
 
 def rotorcraft_state(vehicle: Vehicle) -> RotorcraftState:
-    """A flight plan at its beginning, no sticks."""
+    """Return a flight plan at its start without radio control."""
     return RotorcraftState(Navigation(vehicle, PLAN))
 
 
-def ready(vehicle: Vehicle) -> None:
-    """The firmware is up, on the ground, in its start-up mode."""
+def finish_boot(vehicle: Vehicle) -> None:
+    """Put the vehicle on the ground in its start-up mode."""
     vehicle.ground.landed = True
     set_mode(vehicle, round(vehicle.parameters["MODE_STARTUP"]))
 
 
-def warm(vehicle: Vehicle) -> None:
-    """Its flight plan has come to the holding point."""
-    ready(vehicle)
+def start_warm(vehicle: Vehicle) -> None:
+    """Start at block Holding point."""
+    finish_boot(vehicle)
     state_of(vehicle).navigation.jump(HOLDING_POINT)
 
 
 def on_step(vehicle: Vehicle) -> None:
-    """Satellites, flight plan, flight time; without motors on the ground it stands."""
+    """Run GPS, flight plan and flight time; without motors on the ground the vehicle counts as landed."""
     update_fix(vehicle)
     navigation = state_of(vehicle).navigation
     if vehicle.mode.number == HOME:
@@ -119,9 +114,9 @@ ROTORCRAFT = Firmware(
         rc=RcDefaults((1500, 1500, 1000, 1500)),
         firmware_state=rotorcraft_state,
     ),
-    boot=BootSequence((BootEvent(READY, ready),), warm, Vehicle.set_home_here),
+    boot=BootSequence((BootEvent(READY, finish_boot),), start_warm, Vehicle.set_home_here),
     periodic=PeriodicWork(tick=TICK, on_step=on_step, failsafe_ticks=1),
-    failsafes=WATCHES,
+    failsafes=FAILSAFES,
     endpoint=PaparazziEndpoint,
 )
 
@@ -165,4 +160,4 @@ ASSUMED: Mapping[str, str] = {
     "sea level": "and ellipsoid are one surface",
     "battery": "is measured without error; only FAILSAFE_ON_BAT_CRITICAL makes it count",
 }
-"""What, and what is taken for true."""
+"""Subject and assumption, as in docs/paparazzi.md."""

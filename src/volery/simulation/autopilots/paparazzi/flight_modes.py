@@ -1,6 +1,6 @@
-"""What the modes of the rotorcraft fly, but for GUIDED.
+"""Manoeuvres of the rotorcraft's modes.
 
-GUIDED: set-points of another computer, each axis a position or a velocity. None ever expires.
+Set-points of GUIDED are a position or a velocity for each axis, and never expire.
 """
 
 from __future__ import annotations
@@ -15,44 +15,44 @@ from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
-LIFT_OFF_M = 0.3
-"""Standing on the ground it lifts off for a height that far above."""
+LIFT_OFF_M, LIFT_OFF_M_S = 0.3, 0.1
+"""Height [m] and climb rate [m/s] above which a set-point takes a standing vehicle off the ground."""
 
 
 class Killed(Manoeuvre):
-    """Motors off: nothing to fly."""
+    """KILL: motors off."""
 
     def step(self) -> None:
-        """Motors cannot be on in this mode."""
+        """Idle: motors cannot run in this mode."""
         self.idle()
 
 
-class Sink(Manoeuvre):
-    """FAILSAFE: level, down at FAILSAFE_DESCENT_SPEED, wherever the wind carries it."""
+class FailsafeDescent(Manoeuvre):
+    """FAILSAFE: level descent at FAILSAFE_DESCENT_SPEED, drifting with the wind."""
 
     landing = True
 
     def step(self) -> None:
-        """Sink."""
+        """Command the descent."""
         speed = self.vehicle.parameters["FAILSAFE_DESCENT_SPEED"]
         tuning = self.vehicle.tuning
         self.drive(Setpoint(Control.CLIMB, climb=-speed, speed_down=max(0.1, speed), accel_z=tuning.accel_z))
 
 
 class FlyPlan(Manoeuvre):
-    """NAV: whatever the flight plan demands."""
+    """NAV: fly what the flight plan demands."""
 
     def enter(self) -> None:
-        """Keep the heading that it has."""
+        """Keep the present heading."""
         state_of(self.vehicle).navigation.heading = self.vehicle.estimate.attitude[2]
 
     @property
     def demand(self) -> Demand:
-        """What is to be flown now."""
+        """Present demand of the flight plan."""
         return state_of(self.vehicle).navigation.demand
 
     def takeoff_requested(self) -> bool:
-        """When it is to climb, or to be above where it stands."""
+        """Return whether the plan climbs or flies above the vehicle."""
         demand = self.demand
         if demand.vertical is Vertical.CLIMB:
             return demand.climb > 0.0
@@ -60,7 +60,7 @@ class FlyPlan(Manoeuvre):
         return demand.vertical is Vertical.ALTITUDE and demand.target[2] > here[2] + LIFT_OFF_M
 
     def step(self) -> None:
-        """Drive there."""
+        """Command the demand."""
         demand, tuning = self.demand, self.vehicle.tuning
         self.landing = demand.vertical is Vertical.CLIMB and demand.climb < 0.0
         self.target = None if demand.vertical is Vertical.THROTTLE else enu_to_ned(demand.goal)
@@ -85,43 +85,43 @@ class FlyPlan(Manoeuvre):
 
 
 class FlyHome(FlyPlan):
-    """HOME: to the waypoint HOME at its height, and stay there."""
+    """HOME: fly to the waypoint HOME at its height and stay there."""
 
     def enter(self) -> None:
-        """Straight there."""
+        """Fly straight to HOME."""
         super().enter()
         state_of(self.vehicle).navigation.fly_home()
 
 
 class Direct(Stabilize):
-    """ATTITUDE_DIRECT: sticks are lean angles, turn rate and thrust, in proportion."""
+    """ATTITUDE_DIRECT: sticks command lean angles, yaw rate and thrust."""
 
     def thrust(self, throttle: float) -> float:
-        """As the stick says."""
+        """Return the thrust of the stick without a mapping."""
         return throttle
 
 
 class HoldHeight(AltitudeHold):
-    """ATTITUDE_Z_HOLD: sticks are lean angles and turn rate; the height at which it began is held."""
+    """ATTITUDE_Z_HOLD: sticks command lean angles and yaw rate; the height is held."""
 
     def climb(self, throttle: float) -> float:
-        """The throttle stick commands no climb."""
+        """Return 0: the throttle stick commands no climb."""
         return 0.0
 
 
 class HoldPlace(ManualFlight):
-    """HOVER_Z_HOLD: it stays where it began; the sticks turn it only."""
+    """HOVER_Z_HOLD: hold the position; the sticks command the yaw rate only."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._place: Vector = (0.0, 0.0, 0.0)
 
     def enter(self) -> None:
-        """Stay here."""
+        """Hold the present position."""
         self._place = self.vehicle.estimate.position
 
     def step(self) -> None:
-        """Stay."""
+        """Command position and yaw rate."""
         tuning = self.vehicle.tuning
         self.drive(
             Setpoint(
@@ -140,13 +140,10 @@ OFFSET_PLANE, BODY, OFFSET_HEIGHT, OFFSET_YAW = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 VELOCITY_PLANE, VELOCITY_HEIGHT, YAW_RATE = 1 << 5, 1 << 6, 1 << 7
 """Flags of GUIDED_SETPOINT_NED."""
 
-LIFTS_M, LIFTS_M_S = 0.3, 0.1
-"""Standing on the ground it lifts off for a height that far above, or a climb that fast."""
-
 
 @dataclass(frozen=True)
 class GuidedSetpoint:
-    """North, east: metres about the local origin, or m/s; likewise down; radians clockwise, or rad/s."""
+    """Set-point of GUIDED: north, east, down [m or m/s] and yaw clockwise [rad or rad/s]."""
 
     north: float
     east: float
@@ -158,7 +155,7 @@ class GuidedSetpoint:
 
 
 class Guided(Manoeuvre):
-    """Hold what was asked for last; at first the place where it began."""
+    """GUIDED: hold the last set-point; at first the position where the mode was entered."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
@@ -169,7 +166,7 @@ class Guided(Manoeuvre):
         return GuidedSetpoint(*estimate.position, estimate.attitude[2])
 
     def enter(self) -> None:
-        """Hold this place and heading."""
+        """Hold the present position and heading."""
         self._hold(self._here())
 
     def _hold(self, setpoint: GuidedSetpoint) -> None:
@@ -185,17 +182,22 @@ class Guided(Manoeuvre):
         return self.vehicle.estimate.position
 
     def takeoff_requested(self) -> bool:
-        """When it is asked to be above where it stands, or to climb."""
+        """Return whether the set-point climbs or is above the vehicle."""
         setpoint = self._setpoint
         if setpoint.height_is_velocity:
-            return setpoint.down < -LIFTS_M_S
-        return setpoint.down < self._position[2] - LIFTS_M
+            return setpoint.down < -LIFT_OFF_M_S
+        return setpoint.down < self._position[2] - LIFT_OFF_M
 
     def follow(self, flags: int, values: Vector, yaw: float) -> None:
-        """GUIDED_SETPOINT_NED: *values* north, east, down as the flags mean them.
+        """Apply GUIDED_SETPOINT_NED.
 
-        Offsets count from where the vehicle is now, in its body's axes where flagged, and are ignored, axis
-        by axis, while there is no local frame.
+        Offsets count from the present position, in body axes where flagged. Without a local frame they are
+        ignored, axis by axis.
+
+        Args:
+            flags: Flags of the message.
+            values: North, east, down as the flags define them [m or m/s].
+            yaw: Heading, offset or rate, clockwise [rad or rad/s].
         """
         setpoint = self._plane(flags, values[0], values[1])
         setpoint = self._height(setpoint, flags, values[2])
@@ -234,7 +236,7 @@ class Guided(Manoeuvre):
         return replace(now, yaw=wrap(yaw), yaw_is_rate=False)
 
     def step(self) -> None:
-        """Drive there."""
+        """Command the set-point."""
         wanted, tuning = self._setpoint, self.vehicle.tuning
         self.drive(
             Setpoint(
@@ -254,7 +256,7 @@ class Guided(Manoeuvre):
         )
 
     def carrot(self) -> tuple[Vector, float]:
-        """Where it is led: north, east, down [m], and the heading [rad]."""
+        """Return the target point, north-east-down [m], and the heading [rad], for telemetry."""
         wanted, here = self._setpoint, self.vehicle.estimate
         plane = here.position[:2] if wanted.plane_is_velocity else (wanted.north, wanted.east)
         return (*plane, self._target_down()), here.attitude[2] if wanted.yaw_is_rate else wanted.yaw
@@ -266,4 +268,4 @@ _CONTROLS = {
     (True, False): Control.VELOCITY_HEIGHT,
     (True, True): Control.VELOCITY,
 }
-"""By whether the plane, and the height, is a velocity."""
+"""Control by whether plane and height are velocities."""

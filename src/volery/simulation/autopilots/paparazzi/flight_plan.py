@@ -1,13 +1,9 @@
-"""A flight plan as data: waypoints, and blocks of stages. ``Navigation`` runs it.
+"""Flight plans as data (waypoints, blocks of stages), and ``Navigation``, which runs them at 16 Hz.
 
-Stages, exceptions and calls mean what they mean in Paparazzi's flight plans: one stage is looked at each time
-navigation runs; a stage that is done gives way to the next; the last one to the next block; an exception is
-looked at before the stage and leads to another block.
-
-Runs a flight plan, sixteen times a second, and says what is to be flown: a target, and how high.
-
-It runs in every mode but HOME, as in the firmware: only NAV flies what it says. Coordinates are metres east,
-north, up about the local origin.
+Stages, exceptions and calls have the meaning of Paparazzi's flight plans. Each run of the navigation executes
+one stage; a finished stage is followed by the next one, the last stage by the next block. Exceptions are
+checked before the stage and lead to another block. The navigation runs in every mode but HOME, as in the
+firmware; only NAV flies its demand. Coordinates are east-north-up about the local origin [m].
 """
 
 from __future__ import annotations
@@ -30,7 +26,7 @@ Call = Callable[["Navigation"], None]
 
 
 def never(_navigation: Navigation) -> bool:
-    """Until somebody jumps to another block."""
+    """Return False: the stage lasts until another block is entered."""
     return False
 
 
@@ -38,52 +34,52 @@ class Stage(Protocol):
     """One element of a block."""
 
     def run(self, nav: Navigation) -> bool:
-        """Say what is to be flown now; True once it is done."""
+        """Set the demand, and return whether the stage is done."""
 
 
 @dataclass(frozen=True)
 class While:
-    """Wait as long as *condition* holds."""
+    """Wait while a condition holds."""
 
     condition: Condition
 
     def run(self, nav: Navigation) -> bool:
-        """Nothing is flown."""
+        """Return whether the condition has ended."""
         return not self.condition(nav)
 
 
 @dataclass(frozen=True)
 class Once:
-    """Do something."""
+    """Call a function once."""
 
     call: Call
 
     def run(self, nav: Navigation) -> bool:
-        """Done at once."""
+        """Call the function, and return True."""
         self.call(nav)
         return True
 
 
 @dataclass(frozen=True)
 class Idle:
-    """Level, with the throttle closed: motors that are on turn slowly."""
+    """Level with closed throttle: running motors idle."""
 
     def run(self, nav: Navigation) -> bool:
-        """Until somebody jumps to another block."""
+        """Close the throttle; the stage lasts until another block is entered."""
         nav.close_throttle()
         return False
 
 
 @dataclass(frozen=True)
 class Stay:
-    """Over a waypoint at its height; with *climb* (a parameter: m/s up), climbing or sinking instead."""
+    """Stay over a waypoint at its height, or climb at the rate of the parameter ``climb`` [m/s]."""
 
     waypoint: str
     climb: str | None = None
     until: Condition = never
 
     def run(self, nav: Navigation) -> bool:
-        """Stay."""
+        """Stay until the condition holds."""
         if self.until(nav):
             return True
         nav.fly_to(self.waypoint, climb=self.climb)
@@ -92,13 +88,13 @@ class Stay:
 
 @dataclass(frozen=True)
 class Go:
-    """To a waypoint, straight, or along the line from another."""
+    """Fly to a waypoint, straight or along the line from another waypoint."""
 
     waypoint: str
     start: str | None = None
 
     def run(self, nav: Navigation) -> bool:
-        """Until it is near or has passed it."""
+        """Fly until the waypoint is near or passed."""
         if nav.approaching(self.waypoint, self.start):
             return True
         if self.start is None:
@@ -110,14 +106,14 @@ class Go:
 
 @dataclass(frozen=True)
 class Circle:
-    """About a waypoint, with the radius that a parameter states; clockwise if it is positive."""
+    """Circle a waypoint with the radius of a parameter; clockwise if positive."""
 
     waypoint: str
     radius: str = "DEFAULT_CIRCLE_RADIUS"
     until: Condition = never
 
     def run(self, nav: Navigation) -> bool:
-        """Circle."""
+        """Circle until the condition holds."""
         if self.until(nav):
             return True
         nav.fly_circle(nav.point(self.waypoint), nav.vehicle.parameters[self.radius])
@@ -133,21 +129,21 @@ class Oval:
     radius: str = "DEFAULT_CIRCLE_RADIUS"
 
     def run(self, nav: Navigation) -> bool:
-        """Until somebody jumps to another block."""
+        """Fly the oval; the stage lasts until another block is entered."""
         nav.fly_oval(nav.point(self.first), nav.point(self.second), nav.vehicle.parameters[self.radius])
         return False
 
 
 @dataclass(frozen=True)
 class Heading:
-    """Turn the nose to a course [degrees clockwise from north] over a waypoint."""
+    """Point the nose to a course [deg clockwise from north] over a waypoint."""
 
     course: float
     waypoint: str
     until: Condition
 
     def run(self, nav: Navigation) -> bool:
-        """Until the condition holds."""
+        """Hold the heading until the condition holds."""
         if self.until(nav):
             return True
         nav.head_for(self.course)
@@ -157,19 +153,19 @@ class Heading:
 
 @dataclass(frozen=True)
 class Deroute:
-    """Go on with another block."""
+    """Continue with another block."""
 
     block: str
 
     def run(self, nav: Navigation) -> bool:
-        """Jump."""
+        """Enter the block."""
         nav.go_to_block(self.block)
         return False
 
 
 @dataclass(frozen=True)
 class Block:
-    """Stages in order. ``exceptions``: when, and which block then."""
+    """Stages in order, and exceptions as pairs of condition and block."""
 
     name: str
     stages: tuple[Stage, ...]
@@ -178,38 +174,38 @@ class Block:
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """Waypoints are numbered from 1 in order, as east, north, up about the local origin [m]."""
+    """Waypoints (numbered from 1 in order) and blocks."""
 
     waypoints: dict[str, Vector]
     blocks: tuple[Block, ...]
 
     def block_number(self, name: str) -> int:
-        """Where the block of that name stands."""
+        """Return the number of a block."""
         return next(number for number, block in enumerate(self.blocks) if block.name == name)
 
     def waypoint_number(self, name: str) -> int:
-        """The number of the waypoint of that name."""
+        """Return the number of a waypoint."""
         return 1 + list(self.waypoints).index(name)
 
 
 CARROT_M = 12.0
-"""So far ahead on a line or a circle lies the point that it flies to."""
+"""Distance of the target point ahead on a line or circle (Paparazzi's carrot) [m]."""
 WAYPOINT, ROUTE, CIRCLE, ATTITUDE = range(4)
-"""ROTORCRAFT_NAV_STATUS.horizontal_mode."""
+"""Values of ROTORCRAFT_NAV_STATUS.horizontal_mode."""
 HOME_WAYPOINT = "HOME"
 
 
 class Vertical(Enum):
-    """What holds the height."""
+    """What controls the height."""
 
     ALTITUDE = "altitude"
     CLIMB = "climb"
     THROTTLE = "throttle"
-    """Closed."""
+    """Closed throttle."""
 
 
 class Demand(NamedTuple):
-    """What the plan wants flown now. ``goal`` is the waypoint behind the target; ``climb`` m/s up."""
+    """Demand of the flight plan: target, the waypoint behind it, and climb rate [m/s]."""
 
     horizontal: int
     vertical: Vertical
@@ -222,13 +218,13 @@ CLOSED = Demand(ATTITUDE, Vertical.THROTTLE)
 
 
 class Navigation:
-    """One vehicle's flight plan and where it is in it."""
+    """One vehicle's flight plan and its progress."""
 
     def __init__(self, vehicle: Vehicle, plan: FlightPlan) -> None:
         self.vehicle = vehicle
         self.plan = plan
         self.waypoints: list[Vector] = [(0.0, 0.0, 0.0), *plan.waypoints.values()]
-        """By number; there is no number 0."""
+        """By number; number 0 is unused."""
         self.block = 0
         self.stage = 0
         self.demand = CLOSED
@@ -240,7 +236,7 @@ class Navigation:
     # -- the plan
 
     def step(self) -> None:
-        """Look at exceptions, then at the stage."""
+        """Check the exceptions, then run the stage."""
         block = self.plan.blocks[self.block]
         for condition, instead in block.exceptions:
             if condition(self):
@@ -254,14 +250,14 @@ class Navigation:
             self.jump(self.block + 1)
 
     def jump(self, number: int) -> None:
-        """Go on with that block; a number that the plan does not have changes nothing."""
+        """Enter a block by number; an invalid number has no effect."""
         if 0 <= number < len(self.plan.blocks):
             self.block, self.stage = number, 0
             self._block_at = self.vehicle.kernel.now()
             self._begin_stage()
 
     def go_to_block(self, name: str) -> None:
-        """Go on with the block of that name."""
+        """Enter a block by name."""
         self.jump(self.plan.block_number(name))
 
     def _begin_stage(self) -> None:
@@ -270,49 +266,49 @@ class Navigation:
 
     @property
     def block_time(self) -> float:
-        """Seconds in this block."""
+        """Time in this block [s]."""
         return to_seconds(self.vehicle.kernel.now() - self._block_at)
 
     @property
     def stage_time(self) -> float:
-        """Seconds in this stage."""
+        """Time in this stage [s]."""
         return to_seconds(self.vehicle.kernel.now() - self._stage_at)
 
     # -- places
 
     @property
     def position(self) -> Vector:
-        """East, north, up about the local origin [m]."""
+        """Estimated position, east-north-up about the local origin [m]."""
         return ned_to_enu(self.vehicle.estimate.position)
 
     def point(self, name: str) -> Vector:
-        """A waypoint as it stands now."""
+        """Return the present position of a waypoint."""
         return self.waypoints[self.plan.waypoint_number(name)]
 
     def move(self, number: int, point: Vector) -> bool:
-        """Put that waypoint elsewhere; False if there is none of that number."""
+        """Move a waypoint, and return whether it exists."""
         if not 1 <= number < len(self.waypoints):
             return False
         self.waypoints[number] = point
         return True
 
     def set_here(self, name: str) -> None:
-        """Put a waypoint where the vehicle is, at its own height."""
+        """Move a waypoint to the vehicle, at the height of the waypoint."""
         east, north, _ = self.position
         self.move(self.plan.waypoint_number(name), (east, north, self.point(name)[2]))
 
     def from_home(self) -> float:
-        """Metres in the plane from the waypoint HOME."""
+        """Return the horizontal distance from the waypoint HOME [m]."""
         return dist(self.position[:2], self.point(HOME_WAYPOINT)[:2])
 
     def from_goal(self) -> float:
-        """Metres in the plane from the waypoint that it flies to; 0 where it flies to none."""
+        """Return the horizontal distance from the present waypoint [m]; 0 without one."""
         if self.demand.vertical is Vertical.THROTTLE:
             return 0.0
         return dist(self.position[:2], self.demand.goal[:2])
 
     def approaching(self, name: str, start: str | None) -> bool:
-        """Near the waypoint, or past it on the way from *start*."""
+        """Return whether the waypoint is near, or passed on the way from ``start``."""
         goal, here = self.point(name), self.position
         east, north = goal[0] - here[0], goal[1] - here[1]
         if hypot(east, north) < self.vehicle.tuning.waypoint_radius:
@@ -325,11 +321,11 @@ class Navigation:
     # -- what is to be flown
 
     def close_throttle(self) -> None:
-        """Level, motors idle."""
+        """Demand level flight with idling motors."""
         self.demand = CLOSED
 
     def fly_to(self, name: str, climb: str | None = None) -> None:
-        """To a waypoint at its height, or over it climbing at the speed that a parameter states."""
+        """Demand a waypoint at its height, or over it a climb at the rate of a parameter."""
         goal = self.point(name)
         if climb is None:
             self.demand = Demand(WAYPOINT, Vertical.ALTITUDE, goal, goal)
@@ -338,15 +334,15 @@ class Navigation:
             self.demand = Demand(WAYPOINT, Vertical.CLIMB, goal, goal, speed)
 
     def fly_home(self) -> None:
-        """To the waypoint HOME."""
+        """Demand the waypoint HOME."""
         self.fly_to(HOME_WAYPOINT)
 
     def head_for(self, course: float) -> None:
-        """Turn the nose there: degrees clockwise from north."""
+        """Set the heading [deg clockwise from north]."""
         self.heading = wrap(radians(course))
 
     def fly_route(self, start: Vector, end: Vector) -> None:
-        """Along a line: to a point ahead on it."""
+        """Demand a line: a target point ahead on it."""
         self.demand = Demand(ROUTE, Vertical.ALTITUDE, self._on_line(start, end), end)
 
     def _on_line(self, start: Vector, end: Vector) -> Vector:
@@ -360,7 +356,7 @@ class Navigation:
         return start[0] + east * share, start[1] + north * share, end[2]
 
     def fly_circle(self, centre: Vector, radius: float) -> None:
-        """About a point: to a point ahead on the circle. Clockwise if *radius* is positive."""
+        """Demand a circle: a target point ahead on it; clockwise if ``radius`` [m] is positive."""
         here, size = self.position, max(0.1, abs(radius))
         ahead = min(pi / 4.0, max(pi / 16.0, CARROT_M / size))
         angle = atan2(here[1] - centre[1], here[0] - centre[0]) - (ahead if radius > 0.0 else -ahead)
@@ -368,7 +364,7 @@ class Navigation:
         self.demand = Demand(CIRCLE, Vertical.ALTITUDE, target, centre)
 
     def fly_oval(self, first: Vector, second: Vector, radius: float) -> None:
-        """A leg to the left of the line, half a circle, the other leg, half a circle."""
+        """Demand an oval: leg left of the line, half circle, other leg, half circle."""
         east, north = second[0] - first[0], second[1] - first[1]
         length = hypot(east, north) or 1.0
         aside = -north / length * radius, east / length * radius
@@ -380,13 +376,13 @@ class Navigation:
             self.fly_route(start, end)
         else:
             centre, end = (second, back[0]) if self._oval_leg == 1 else (first, there[0])
-            done = self._faces(centre, end)
+            done = self._is_towards(centre, end)
             self.fly_circle(centre, radius)
         if done:
             self._oval_leg = (self._oval_leg + 1) % 4
 
-    def _faces(self, centre: Vector, end: Vector) -> bool:
-        """Whether it is in the direction of *end*, seen from the centre of a circle: within 26 degrees."""
+    def _is_towards(self, centre: Vector, end: Vector) -> bool:
+        """Return whether the vehicle is within 26 degrees of the direction from ``centre`` to ``end``."""
         away = self.position[0] - centre[0], self.position[1] - centre[1]
         towards = end[0] - centre[0], end[1] - centre[1]
         return away[0] * towards[0] + away[1] * towards[1] > 0.9 * hypot(*away) * hypot(*towards)

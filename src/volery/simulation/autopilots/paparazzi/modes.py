@@ -1,8 +1,8 @@
-"""Modes by number, who may set them, and motors on and off.
+"""Modes by number, the sources that may set them, and starting and stopping the motors.
 
-Facts of the static rotorcraft autopilot: KILL, FAILSAFE and HOME may always be set by datalink; NAV, GUIDED
-and the two others without sticks only while there is no radio control; what a transmitter's switch means is
-three settings. A refusal is silence: the mode in the telemetry stays what it was.
+Rules of the static rotorcraft autopilot: KILL, FAILSAFE and HOME may always be set by datalink; NAV, GUIDED,
+MODULE and FLIP only without radio control; three settings define the positions of a transmitter's mode
+switch. A refusal is not reported: the mode in the telemetry stays the same.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ NAV, MODULE, FLIP, GUIDED = 13, 17, 18, 19
 ALWAYS = (KILL, FAILSAFE, HOME)
 WITHOUT_RADIO = (NAV, MODULE, FLIP, GUIDED)
 UNSUPERVISED = (KILL, HOME, FAILSAFE, *WITHOUT_RADIO)
-"""Modes in which nothing happens when the radio control is lost."""
+"""Modes in which lost radio control has no effect."""
 
 NO_RC, WAITING, ARMED, KILLED, UNARMED_IN_AUTO, NOT_ALIGNED, LOW_BATTERY = 0, 1, 3, 5, 9, 15, 17
-"""ROTORCRAFT_STATUS.arming_status, those that occur here."""
+"""Values of ROTORCRAFT_STATUS.arming_status that occur here."""
 
 
 ALIGNED_AFTER: Ns = 4 * S
-"""Uptime until which the attitude is being aligned."""
+"""Uptime at which the attitude is aligned."""
 
 
 def aligned(vehicle: Vehicle) -> bool:
-    """The attitude is known."""
+    """Return whether the attitude is aligned."""
     return vehicle.uptime() >= ALIGNED_AFTER and vehicle.estimate.attitude_ok
 
 
 def in_flight(vehicle: Vehicle) -> bool:
-    """As the firmware counts it: motors on, and off the ground."""
+    """Return whether the motors run and the vehicle is off the ground, as the firmware counts it."""
     return vehicle.armed and not vehicle.landed
 
 
 def set_mode(vehicle: Vehicle, number: int) -> bool:
-    """Fly that mode, whoever wants it; False if this firmware was built without it.
+    """Enter a mode, and return False if this build of the firmware lacks it.
 
-    Before the attitude is aligned only the start-up mode is flown. KILL stops the motors, wherever it is.
+    Before the attitude is aligned, only the start-up mode is entered. KILL stops the motors, also in flight.
     """
     if not aligned(vehicle):
         number = round(vehicle.parameters["MODE_STARTUP"])
@@ -56,23 +56,25 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
 
 
 def set_mode_by_datalink(vehicle: Vehicle, number: int) -> None:
-    """The setting ``mode``."""
+    """Apply the setting ``mode``, if the datalink may set that mode."""
     if number in ALWAYS or (number in WITHOUT_RADIO and state_of(vehicle).radio.status(vehicle) != RADIO_OK):
         set_mode(vehicle, number)
 
 
 def set_motors(vehicle: Vehicle, on: bool) -> None:
-    """Motors on or off. They stay off in KILL, before the attitude is aligned, and with a critical battery
-    where that is a failsafe; why is the arming status.
+    """Start or stop the motors.
+
+    They do not start in KILL, before the attitude is aligned, or with a critical battery that is a failsafe.
+    The arming status shows the reason.
     """
-    kept = state_of(vehicle)
+    state = state_of(vehicle)
     if not on:
-        kept.refused = None
+        state.refused = None
         if vehicle.armed:
             vehicle.disarm()
         return
-    kept.refused = _refusal(vehicle)
-    if kept.refused is None and not vehicle.armed:
+    state.refused = _refusal(vehicle)
+    if state.refused is None and not vehicle.armed:
         vehicle.arm()
 
 
@@ -85,18 +87,18 @@ def _refusal(vehicle: Vehicle) -> int | None:
 
 
 def battery_critical(vehicle: Vehicle) -> bool:
-    """Below CRITIC_BAT_LEVEL, where the airframe makes that a failsafe."""
+    """Return whether the battery is below CRITIC_BAT_LEVEL, if the airframe makes that a failsafe."""
     wanted = vehicle.parameters["FAILSAFE_ON_BAT_CRITICAL"] > 0.0
     return wanted and vehicle.estimate.battery_volts < vehicle.parameters["CRITIC_BAT_LEVEL"]
 
 
 def arming_status(vehicle: Vehicle) -> int:
-    """ROTORCRAFT_STATUS.arming_status."""
-    kept = state_of(vehicle)
+    """Return ROTORCRAFT_STATUS.arming_status."""
+    state = state_of(vehicle)
     if vehicle.armed:
         return ARMED
-    if kept.refused is not None:
-        return kept.refused
-    if kept.radio.status(vehicle) != RADIO_OK:
+    if state.refused is not None:
+        return state.refused
+    if state.radio.status(vehicle) != RADIO_OK:
         return NO_RC
     return UNARMED_IN_AUTO if not vehicle.mode.pilot else WAITING

@@ -1,12 +1,9 @@
-"""The figures of the airframe: what an airframe file defines for the rotorcraft firmware, as parameters.
+"""Figures of the airframe as parameters, and settings that a ground station reads and writes by number.
 
-Names are the firmware's own where it has one. None is recorded: the values are the firmware's documented
-defaults where those make sense for the simulated body, and assumptions else (docs/paparazzi.md).
-
-Settings: variables of the firmware that a ground station reads and writes by number.
-
-The numbers are those of the stock rotorcraft (``links.pprz_aircraft``). A value outside a setting's bounds
-is taken as it comes, as in the firmware: the bounds are the ground station's.
+Names are the firmware's own where it has one. No value is recorded: they are documented defaults of the
+firmware, or assumptions (docs/paparazzi.md). The numbers of settings are those of the stock rotorcraft.
+Values outside the bounds of a setting are accepted, as in the firmware: only the ground station checks the
+bounds.
 """
 
 from __future__ import annotations
@@ -23,16 +20,16 @@ from volery.simulation.autopilots.paparazzi.modes import set_mode_by_datalink, s
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 MANUAL_SWITCH, AUTO1_SWITCH, AUTO2_SWITCH = "MODE_MANUAL", "MODE_AUTO1", "MODE_AUTO2"
-"""What the three positions of a transmitter's mode switch mean."""
+"""Parameters that define the positions of a transmitter's mode switch."""
 
 CRITICAL_CELL_VOLTS = 3.1
 FARTHEST_M = stock_aircraft().farthest or 150.0
-"""From HOME in NAV, by the flight plan."""
+"""Largest distance from HOME in NAV, by the flight plan [m]."""
 SLOWEST = 0.1
 
 
 class Figure(NamedTuple):
-    """A figure of the airframe, and what it is."""
+    """Value and meaning of a figure of the airframe."""
 
     value: float
     what: str
@@ -67,23 +64,23 @@ FIGURES: Mapping[str, Figure] = {
     "NAV_DESCEND_VSPEED": Figure(-0.8, "m/s up in block flare"),
     "DEFAULT_CIRCLE_RADIUS": Figure(5.0, "m; clockwise if positive"),
 }
-"""By name. The model's ``default_parameters`` of a vehicle replace them."""
+"""Figures by name. A model's ``parameters`` of a vehicle replace their values."""
 
 _FULL = ChannelRange(1000.0, 1500.0, 2000.0, 0.0)
 
 
 def default_parameters() -> tuple[Parameter, ...]:
-    """All of them."""
+    """Return the default parameters."""
     return tuple(Parameter(name, REAL32, figure.value) for name, figure in FIGURES.items())
 
 
 def own_parameters(_system: int, flight: Flight) -> dict[str, float]:
-    """What follows from the battery."""
+    """Return the parameters that follow from the battery."""
     return {"CRITIC_BAT_LEVEL": CRITICAL_CELL_VOLTS * flight.spec.battery.cells}
 
 
 def tuning(parameters: Parameters) -> Tuning:
-    """What manoeuvres fly by."""
+    """Return the tuning that follows from the parameters."""
     p = parameters
     up, down = _moving(p["GUIDANCE_V_REF_MAX_CLIMB"]), _moving(p["GUIDANCE_V_REF_MAX_DESCENT"])
     accel_z = _moving(p["GUIDANCE_V_REF_MAX_ACCEL"])
@@ -104,12 +101,12 @@ def tuning(parameters: Parameters) -> Tuning:
 
 
 def _moving(value: float) -> float:
-    """A speed, an acceleration or a distance that is not none."""
+    """Return a speed, acceleration or distance that is not 0."""
     return max(SLOWEST, value)
 
 
 class Variable(NamedTuple):
-    """How one is read and written."""
+    """Access to one setting."""
 
     read: Callable[[Vehicle], float]
     write: Callable[[Vehicle, float], None]
@@ -123,7 +120,7 @@ def _parameter(name: str) -> Variable:
 
 
 def _nothing(_vehicle: Vehicle, _value: float) -> None:
-    """There is no such hardware."""
+    """Ignore a write: the simulation has no such hardware."""
 
 
 VARIABLES = {
@@ -137,19 +134,19 @@ VARIABLES = {
         lambda vehicle, value: set_mode_by_datalink(vehicle, int(value)),
     ),
 }
-"""By the name that the stock rotorcraft gives them."""
+"""Settings by the names of the stock rotorcraft."""
 
 NUMBERED = {one.number: VARIABLES[one.name] for one in stock_aircraft().settings}
 
 
 def read_setting(vehicle: Vehicle, number: int) -> float | None:
-    """Its value; ``None`` if there is none of that number."""
+    """Return the value of a setting, or None if the number is unknown."""
     variable = NUMBERED.get(number)
     return None if variable is None else variable.read(vehicle)
 
 
 def write_setting(vehicle: Vehicle, number: int, value: float) -> float | None:
-    """Set it, and return what it is then; ``None`` if there is none of that number."""
+    """Write a setting, and return its new value, or None if the number is unknown."""
     variable = NUMBERED.get(number)
     if variable is None:
         return None

@@ -1,7 +1,7 @@
-"""The messages that a rotorcraft sends regularly: what they hold now, and how often they go out.
+"""Periodic messages of a rotorcraft: their fields and periods.
 
-Periods are the default rotorcraft telemetry's. Scales: positions 2^-8 m, velocities 2^-19 m/s, angles
-2^-12 rad; ecef cm, degrees 1e-7, altitudes mm. Mean sea level and ellipsoid are one surface here.
+Periods are those of the default rotorcraft telemetry. Scales: positions 2^-8 m, velocities 2^-19 m/s, angles
+2^-12 rad; ECEF cm, degrees 1e-7, altitudes mm. Mean sea level and ellipsoid coincide here.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Fields = dict[str, Any]
 POSITION, SPEED, ANGLE = 1 << 8, 1 << 19, 1 << 12
 """Counts in a metre, in a metre per second, in a radian."""
 MAIN_LOOP_HZ = 512 // 4
-"""ROTORCRAFT_STATUS.frame_rate, of the sensors."""
+"""Value of ROTORCRAFT_STATUS.frame_rate."""
 MD5SUM = tuple(range(0x10, 0x20))
-"""ALIVE: of the configuration. Of none here."""
+"""Placeholder for the checksum of the configuration in ALIVE."""
 GUIDANCE = {
     modes.KILL: (0, 0),
     modes.FAILSAFE: (0, 3),
@@ -39,42 +39,42 @@ GUIDANCE = {
     modes.NAV: (2, 5),
     modes.GUIDED: (3, 8),
 }
-"""By mode: ROTORCRAFT_STATUS.ap_h_mode and ap_v_mode."""
+"""ROTORCRAFT_STATUS.ap_h_mode and ap_v_mode by mode."""
 
 
-def counts(value: float, scale: float, bits: int = 32) -> int:
-    """In counts, at the end of the range where the field has no room."""
+def to_counts(value: float, scale: float, bits: int = 32) -> int:
+    """Return a value in counts, limited to the range of a signed field."""
     most = (1 << bits - 1) - 1
     return round(min(float(most), max(-float(most), value * scale)))
 
 
-def whole(value: float, bits: int = 16) -> int:
-    """An unsigned field."""
+def to_unsigned(value: float, bits: int = 16) -> int:
+    """Return a value limited to the range of an unsigned field."""
     return int(min(float((1 << bits) - 1), max(0.0, value)))
 
 
 def rotorcraft_fp(vehicle: Vehicle) -> Fields:
-    """Where it is, and where it is led."""
+    """Return ROTORCRAFT_FP: estimated state and target."""
     estimate = vehicle.estimate
     fields: Fields = {}
     for axis, metres, speed in zip(
         ("east", "north", "up"), ned_to_enu(estimate.position), ned_to_enu(estimate.velocity), strict=True
     ):
-        fields[axis] = counts(metres, POSITION)
-        fields[f"v{axis}"] = counts(speed, SPEED)
+        fields[axis] = to_counts(metres, POSITION)
+        fields[f"v{axis}"] = to_counts(speed, SPEED)
     for name, angle in zip(("phi", "theta", "psi"), estimate.attitude, strict=True):
-        fields[name] = counts(angle, ANGLE)
+        fields[name] = to_counts(angle, ANGLE)
     carrot, heading = _carrot(vehicle)
     for axis, metres in zip(("east", "north", "up"), ned_to_enu(carrot), strict=True):
-        fields[f"carrot_{axis}"] = counts(metres, POSITION)
-    fields["carrot_psi"] = counts(heading, ANGLE)
+        fields[f"carrot_{axis}"] = to_counts(metres, POSITION)
+    fields["carrot_psi"] = to_counts(heading, ANGLE)
     fields["thrust"] = round(estimate.throttle * FULL) if vehicle.armed else 0
-    fields["flight_time"] = whole(to_seconds(vehicle.ground.flight_time))
+    fields["flight_time"] = to_unsigned(to_seconds(vehicle.ground.flight_time))
     return fields
 
 
 def _carrot(vehicle: Vehicle) -> tuple[Vector, float]:
-    """North, east, down, and the heading."""
+    """Return the target point, north-east-down [m], and the heading [rad]."""
     manoeuvre, navigation = vehicle.manoeuvre, state_of(vehicle).navigation
     if isinstance(manoeuvre, Guided):
         return manoeuvre.carrot()
@@ -85,29 +85,29 @@ def _carrot(vehicle: Vehicle) -> tuple[Vector, float]:
 
 
 def attitude(vehicle: Vehicle) -> Fields:
-    """ATTITUDE."""
+    """Return ATTITUDE."""
     roll, pitch, yaw = vehicle.estimate.attitude
     return {"phi": roll, "psi": yaw, "theta": pitch}
 
 
 def _centimetres(name: str, vector: Vector, fields: Fields) -> None:
     for axis, value in zip("xyz", vector, strict=True):
-        fields[name.format(axis)] = counts(value, 100.0)
+        fields[name.format(axis)] = to_counts(value, 100.0)
 
 
 def gps_int(vehicle: Vehicle) -> Fields:
-    """The receiver's last fix; without one what it was."""
+    """Return GPS_INT: the last fix of the receiver."""
     fix = vehicle.estimate.gps
     kind = rotorcraft_state.fix_type(vehicle)
     fields: Fields = {
-        "lat": counts(fix.latitude, 1e7),
-        "lon": counts(fix.longitude, 1e7),
-        "alt": counts(fix.amsl, 1000.0),
-        "hmsl": counts(fix.amsl, 1000.0),
-        "pacc": whole(fix.h_acc * 100.0, 32),
-        "sacc": whole(fix.speed_acc * 100.0, 32),
-        "tow": whole(vehicle.uptime() // MS, 32),
-        "pdop": whole(fix.eph * 100.0),
+        "lat": to_counts(fix.latitude, 1e7),
+        "lon": to_counts(fix.longitude, 1e7),
+        "alt": to_counts(fix.amsl, 1000.0),
+        "hmsl": to_counts(fix.amsl, 1000.0),
+        "pacc": to_unsigned(fix.h_acc * 100.0, 32),
+        "sacc": to_unsigned(fix.speed_acc * 100.0, 32),
+        "tow": to_unsigned(vehicle.uptime() // MS, 32),
+        "pdop": to_unsigned(fix.eph * 100.0),
         "numsv": fix.satellites if kind else 0,
         "fix": kind,
     }
@@ -117,7 +117,7 @@ def gps_int(vehicle: Vehicle) -> Fields:
 
 
 def _to_ecef(ned: Vector, latitude: float, longitude: float) -> Vector:
-    """A vector north, east, down at a place along the axes of the earth."""
+    """Rotate a north-east-down vector at a place [deg] to ECEF axes."""
     north, east, down = ned
     sin_lat, cos_lat = sin(radians(latitude)), cos(radians(latitude))
     sin_lon, cos_lon = sin(radians(longitude)), cos(radians(longitude))
@@ -130,15 +130,15 @@ def _to_ecef(ned: Vector, latitude: float, longitude: float) -> Vector:
 
 
 def ins_ref(vehicle: Vehicle) -> Fields | None:
-    """The local origin, once there is one."""
+    """Return INS_REF once there is a local origin."""
     if not vehicle.estimate.position_ok or vehicle.home is None:
         return None
     latitude, longitude, amsl = vehicle.estimate.origin
     fields: Fields = {
-        "lat0": counts(latitude, 1e7),
-        "lon0": counts(longitude, 1e7),
-        "alt0": counts(amsl, 1000.0),
-        "hmsl0": counts(amsl, 1000.0),
+        "lat0": to_counts(latitude, 1e7),
+        "lon0": to_counts(longitude, 1e7),
+        "alt0": to_counts(amsl, 1000.0),
+        "hmsl0": to_counts(amsl, 1000.0),
         "baro_qfe": vehicle.estimate.pressure * 100.0,
     }
     _centimetres("ecef_{}0", geodetic_to_ecef(latitude, longitude, amsl), fields)
@@ -146,7 +146,7 @@ def ins_ref(vehicle: Vehicle) -> Fields | None:
 
 
 def rotorcraft_status(vehicle: Vehicle) -> Fields:
-    """Mode, motors, arming."""
+    """Return ROTORCRAFT_STATUS."""
     plane, height = GUIDANCE[vehicle.mode.number]
     return {
         "rc_status": state_of(vehicle).radio.status(vehicle),
@@ -158,18 +158,18 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
         "arming_status": modes.arming_status(vehicle),
         "ap_h_mode": plane,
         "ap_v_mode": height,
-        "cpu_time": whole(to_seconds(vehicle.uptime())),
+        "cpu_time": to_unsigned(to_seconds(vehicle.uptime())),
         "vsupply": vehicle.estimate.battery_volts,
         "vboard": vehicle.estimate.battery_volts,
     }
 
 
 def nav_status(vehicle: Vehicle) -> Fields:
-    """Where it is in its flight plan."""
+    """Return ROTORCRAFT_NAV_STATUS: progress of the flight plan."""
     navigation = state_of(vehicle).navigation
     return {
-        "block_time": whole(navigation.block_time),
-        "stage_time": whole(navigation.stage_time),
+        "block_time": to_unsigned(navigation.block_time),
+        "stage_time": to_unsigned(navigation.stage_time),
         "dist_home": navigation.from_home(),
         "dist_wp": navigation.from_goal(),
         "cur_block": navigation.block,
@@ -179,17 +179,17 @@ def nav_status(vehicle: Vehicle) -> Fields:
 
 
 def alive(_vehicle: Vehicle) -> Fields:
-    """ALIVE."""
+    """Return ALIVE."""
     return {"md5sum": MD5SUM}
 
 
 def energy(vehicle: Vehicle) -> Fields:
-    """The battery."""
+    """Return ENERGY."""
     estimate = vehicle.estimate
     power = estimate.battery_volts * estimate.battery_amps
     joules, seconds = estimate.battery_energy_j, max(1.0, to_seconds(vehicle.uptime()))
     return {
-        "throttle": whole(estimate.throttle * 100.0, 8) if vehicle.armed else 0,
+        "throttle": to_unsigned(estimate.throttle * 100.0, 8) if vehicle.armed else 0,
         "voltage": estimate.battery_volts,
         "current": estimate.battery_amps,
         "power": power,
@@ -200,51 +200,51 @@ def energy(vehicle: Vehicle) -> Fields:
 
 
 def datalink_report(vehicle: Vehicle) -> Fields:
-    """How the ground is heard."""
-    kept = state_of(vehicle)
-    heard = kept.uplink_at != NEVER
-    silence = vehicle.kernel.now() - kept.uplink_at if heard else vehicle.uptime()
+    """Return DATALINK_REPORT."""
+    state = state_of(vehicle)
+    heard = state.last_uplink_ns != NEVER
+    silence = vehicle.kernel.now() - state.last_uplink_ns if heard else vehicle.uptime()
     return {
-        "uplink_lost_time": whole(to_seconds(silence)),
-        "uplink_nb_msgs": kept.uplink_messages & 0xFFFF,
-        "downlink_nb_msgs": kept.downlink_messages & 0xFFFF,
+        "uplink_lost_time": to_unsigned(to_seconds(silence)),
+        "uplink_nb_msgs": state.uplink_messages & 0xFFFF,
+        "downlink_nb_msgs": state.downlink_messages & 0xFFFF,
     }
 
 
 def radio_control(vehicle: Vehicle) -> Fields:
-    """The sticks."""
+    """Return ROTORCRAFT_RADIO_CONTROL."""
     radio = state_of(vehicle).radio
     return {**radio.frame._asdict(), "kill": FULL, "status": radio.status(vehicle)}
 
 
 def waypoint(vehicle: Vehicle, number: int) -> Fields:
-    """WP_MOVED_ENU of that number."""
+    """Return WP_MOVED_ENU of that waypoint."""
     east, north, up = state_of(vehicle).navigation.waypoints[number]
     return {
         "wp_id": number,
-        "east": counts(east, POSITION),
-        "north": counts(north, POSITION),
-        "up": counts(up, POSITION),
+        "east": to_counts(east, POSITION),
+        "north": to_counts(north, POSITION),
+        "up": to_counts(up, POSITION),
     }
 
 
 def next_waypoint(vehicle: Vehicle) -> Fields:
-    """WP_MOVED_ENU of one after the other."""
-    kept = state_of(vehicle)
-    kept.shown_waypoint = (kept.shown_waypoint + 1) % len(kept.navigation.waypoints)
-    return waypoint(vehicle, kept.shown_waypoint)
+    """Return WP_MOVED_ENU of the waypoints in turn."""
+    state = state_of(vehicle)
+    state.last_sent_waypoint = (state.last_sent_waypoint + 1) % len(state.navigation.waypoints)
+    return waypoint(vehicle, state.last_sent_waypoint)
 
 
 def next_setting(vehicle: Vehicle) -> Fields | None:
-    """DL_VALUE of one after the other."""
-    kept = state_of(vehicle)
-    kept.shown_setting = (kept.shown_setting + 1) % len(NUMBERED)
-    value = read_setting(vehicle, kept.shown_setting)
-    return None if value is None else {"index": kept.shown_setting, "value": value}
+    """Return DL_VALUE of the settings in turn."""
+    state = state_of(vehicle)
+    state.last_sent_setting = (state.last_sent_setting + 1) % len(NUMBERED)
+    value = read_setting(vehicle, state.last_sent_setting)
+    return None if value is None else {"index": state.last_sent_setting, "value": value}
 
 
-class Regular(NamedTuple):
-    """A message that goes out each *period*; ``build`` returns ``None`` while there is nothing to say."""
+class PeriodicMessage(NamedTuple):
+    """A message with its period; ``build`` returns None while there is nothing to send."""
 
     name: str
     period: Ns
@@ -255,18 +255,18 @@ def _period(seconds: float) -> Ns:
     return round(seconds * S)
 
 
-REGULAR = (
-    Regular("ROTORCRAFT_FP", _period(0.25), rotorcraft_fp),
-    Regular("GPS_INT", _period(0.25), gps_int),
-    Regular("ATTITUDE", _period(0.5), attitude),
-    Regular("ROTORCRAFT_RADIO_CONTROL", _period(0.5), radio_control),
-    Regular("DL_VALUE", _period(1.1), next_setting),
-    Regular("ROTORCRAFT_STATUS", _period(1.2), rotorcraft_status),
-    Regular("WP_MOVED_ENU", _period(1.3), next_waypoint),
-    Regular("ROTORCRAFT_NAV_STATUS", _period(1.6), nav_status),
-    Regular("ALIVE", _period(2.1), alive),
-    Regular("ENERGY", _period(2.5), energy),
-    Regular("INS_REF", _period(5.1), ins_ref),
-    Regular("DATALINK_REPORT", _period(5.1), datalink_report),
+PERIODIC_MESSAGES = (
+    PeriodicMessage("ROTORCRAFT_FP", _period(0.25), rotorcraft_fp),
+    PeriodicMessage("GPS_INT", _period(0.25), gps_int),
+    PeriodicMessage("ATTITUDE", _period(0.5), attitude),
+    PeriodicMessage("ROTORCRAFT_RADIO_CONTROL", _period(0.5), radio_control),
+    PeriodicMessage("DL_VALUE", _period(1.1), next_setting),
+    PeriodicMessage("ROTORCRAFT_STATUS", _period(1.2), rotorcraft_status),
+    PeriodicMessage("WP_MOVED_ENU", _period(1.3), next_waypoint),
+    PeriodicMessage("ROTORCRAFT_NAV_STATUS", _period(1.6), nav_status),
+    PeriodicMessage("ALIVE", _period(2.1), alive),
+    PeriodicMessage("ENERGY", _period(2.5), energy),
+    PeriodicMessage("INS_REF", _period(5.1), ins_ref),
+    PeriodicMessage("DATALINK_REPORT", _period(5.1), datalink_report),
 )
-"""In the order of their periods, which is that of messages that fall due together."""
+"""Sorted by period, which is the order of messages that are due together."""

@@ -71,4 +71,4 @@ def rover():
 @pytest.fixture(scope="session")
 def recorded():
     """Figures read from recordings of ArduPilot 4.5.6."""
-    return json.loads((Path(__file__).parents[2] / "golden" / "ardupilot-flight.json").read_text())
+    return json.loads((Path(__file__).parents[4] / "golden" / "ardupilot-flight.json").read_text())
