@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +19,8 @@ from typer.main import get_command
 from volery.cli.main import app
 from volery.cost import load_catalogue
 from volery.model.document import schema
+from volery.model.faults import FAULTS, TRIAL_FAULTS, Fault
+from volery.model.fields import entries, summary
 from volery.requirements.observables import OBSERVABLES
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
 from volery.simulation.autopilots.firmware import FirmwareFamily
@@ -25,7 +28,7 @@ from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import PHASES
-from volery.testing.faults import FAULTS
+from volery.testing.faults import FAULTS as TRIALS
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"
@@ -129,8 +132,8 @@ FIRMWARES = {
 }
 
 
-def honoured(firmware: Firmware) -> str:
-    """Which parameters of a simulated autopilot change what it does."""
+def supported_parameters(firmware: Firmware) -> str:
+    """Return the page of parameters that change the behaviour of a simulated autopilot."""
     lines = [
         f"# Parameters of the simulated {firmware.name}\n",
         firmware.parameters,
@@ -143,7 +146,7 @@ def honoured(firmware: Firmware) -> str:
         lines += [f"\n## {one.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
         lines += [f"| `{name}` | {what} |" for name, what in sorted(table.supported.items())]
         lines += [
-            f"\nKept and not honoured, {len(kept)} of {len(every)}:\n",
+            f"\nStored without effect, {len(kept)} of {len(every)}:\n",
             ", ".join(f"`{one}`" for one in kept),
         ]
     return "\n".join(lines) + "\n"
@@ -198,31 +201,159 @@ def conformance() -> str:
     return "\n".join(lines) + "\n"
 
 
-def faults() -> str:
-    """What came of each fault in each phase of a flight."""
+def model() -> str:
+    """Return the reference of the model language: every key of every mapping."""
+    made = schema()
     lines = [
-        "# Faults, and what comes of them\n",
+        "# The model language\n",
+        "Every mapping of a model file, key by key. A star marks keys that must be given. Quantities are",
+        "written with their unit; a bare zero needs none. `volery model schema` prints the same as a JSON",
+        "Schema ([model.schema.json](model.schema.json)), with which editors complete and check a model.\n",
+        "Faults have [a page of their own](faults.md); so do [observables](observables.md) and",
+        "[processors](processors.md).\n",
+        "## The file\n",
+        *_keys(made),
+    ]
+    faulty = {cls.__name__ for cls in FAULTS.values()}
+    for name, definition in made["$defs"].items():
+        if name not in faulty:
+            lines += [f"\n## {_title(name)}\n", f"{definition['description']}\n", *_keys(definition)]
+    return "\n".join(lines) + "\n"
+
+
+def _keys(definition: dict[str, Any]) -> list[str]:
+    """Return the table of a mapping's keys."""
+    required = definition.get("required", [])
+    lines = ["| key | value | default | meaning |", "|---|---|---|---|"]
+    for key, one in definition["properties"].items():
+        star = "\\*" if key in required else ""
+        default = f"`{one['default']}`" if "default" in one else ""
+        lines.append(f"| `{key}`{star} | {_value(one)} | {default} | {one['description']} |")
+    others = definition.get("additionalProperties")
+    if isinstance(others, dict):
+        lines.append(f"| any other | {_value(others)} | | {others.get('description', '')} |")
+    return lines
+
+
+def _value(one: dict[str, Any]) -> str:
+    """Return how a value is written, in a few words."""
+    if "$ref" in one:
+        title = _title(one["$ref"].rpartition("/")[2])
+        return f"[{title}](#{title.lower().replace(' ', '-')})"
+    if "enum" in one or "const" in one:
+        return ", ".join(f"`{value}`" for value in one.get("enum", [one.get("const")]))
+    if "x-unit" in one:
+        return _quantity(one)
+    if "anyOf" in one:
+        if all(option.get("$ref", "").rpartition("/")[2] in _FAULT_CLASSES for option in one["anyOf"]):
+            return "[fault](faults.md)"
+        return " or ".join(dict.fromkeys(_value(option) for option in one["anyOf"]))
+    return _collection(one) or _scalar(one.get("type", "anything"))
+
+
+def _collection(one: dict[str, Any]) -> str:
+    """Return how a list or a mapping is written; an empty text for anything else."""
+    if "items" in one:
+        return f"list of {_value(one['items'])}"
+    if "patternProperties" in one:
+        return f"by name: {_value(next(iter(one['patternProperties'].values())))}"
+    if isinstance(one.get("additionalProperties"), dict):
+        return f"mapping to {_value(one['additionalProperties'])}"
+    return ""
+
+
+def _scalar(types: str | list[str]) -> str:
+    """Return how a value of JSON types is written."""
+    if isinstance(types, list):
+        return "text or number"
+    words = {"string": "text", "integer": "whole number", "object": "mapping", "null": "nothing"}
+    return words.get(types, types)
+
+
+def _quantity(one: dict[str, Any]) -> str:
+    """Return the unit of a quantity with its range."""
+    unit = "ratio" if one["x-unit"] == "1" else one["x-unit"]
+    bounds = [
+        f"{words} {one[key]:g}"
+        for key, words in (("x-minimum", "at least"), ("x-above", "more than"), ("x-maximum", "at most"))
+        if key in one
+    ]
+    return ", ".join([unit, *bounds])
+
+
+_FAULT_CLASSES = {cls.__name__ for cls in FAULTS.values()}
+
+
+def _title(name: str) -> str:
+    """Return the heading of a class of the model: ``AllocationText`` gives ``Allocation``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Text")).capitalize()
+
+
+def faults() -> str:
+    """Return the catalogue of faults, and the results of the fault trials."""
+    definitions = schema()["$defs"]
+    lines = [
+        "# Faults\n",
+        "## What a model can state\n",
+        "Under `environment.faults`, by a name of your own: `kind`, when (`at`), for how long (`duration`;",
+        "for good if it is not given), what it happens to, and the arguments of the kind.\n",
+        "```yaml",
+        "environment:",
+        "  faults:",
+        "    weak_motor: {kind: motor-dead, vehicle: drone_1, motor: 2, thrust: 60 %, at: 30 s}",
+        "    gust_front: {kind: wind, speed: 9 m/s, direction: 200 deg, at: 40 s, duration: 20 s}",
+        "```",
+    ]
+    common = {"kind", "at", "duration"}
+    for kind, cls in FAULTS.items():
+        definition = definitions[cls.__name__]
+        own = {key: one for key, one in definition["properties"].items() if key not in common}
+        described = {**definition, "properties": own}
+        lines += [f"\n### {kind}\n", f"{definition['description']}\n", *(_keys(described) if own else [])]
+    lines += ["\n## Only in fault trials\n", "| kind | what happens |", "|---|---|"]
+    lines += [f"| `{kind}` | {summary(cls)} |" for kind, cls in TRIAL_FAULTS.items()]
+    return "\n".join([*lines, *_fault_trials()]) + "\n"
+
+
+def _fault_trials() -> list[str]:
+    """Return the results of each fault in each phase of a flight."""
+    lines = [
+        "\n## Fault trials\n",
         "One fault in one phase of a flight of each simulated autopilot, through bytes, in virtual time. The",
-        "first line of a cell is what the caller saw: `done`, or the error that the call raised; the second",
-        "what the aircraft did from the fault on, by its modes, until the program's end had brought it down.",
+        "first line of a cell is the outcome for the caller: `done`, or the error that the call raised; the",
+        "second is the sequence of the aircraft's modes from the fault until it stands on the ground.",
         "`scripts/gather_trials.py` flies them anew.\n",
-        "Of every cell holds: no call hung; what ended done was done, by the vehicle's own truth; any other",
-        "end is an error that names the vehicle; nothing was done twice; nobody else's mode was fought; at",
-        "last it stood on the ground, disarmed.\n",
-        "| fault | what happens |",
+        "In every cell: no call hung; what ended done was done, by the vehicle's true state; any other end",
+        "is an error that names the vehicle; nothing was done twice; a mode that another station selected",
+        "was not overridden; at the end the vehicle stood on the ground, disarmed.\n",
+        "| trial | fault |",
         "|---|---|",
-        *(f"| {name} | {fault.words} |" for name, fault in FAULTS.items()),
+        *(f"| {name} | {_arguments(fault)} |" for name, fault in TRIALS.items()),
         "\n| phase | when |",
         "|---|---|",
         *(f"| {name} | {program.__doc__} |" for name, program in PHASES.items()),
     ]
     for name, of in _trials().items():
         cells = {(one["fault"], one["phase"]): one for one in of["faults"]}
-        lines += [f"\n## {name}\n", f"| fault | {' | '.join(PHASES)} |", "|---" * (len(PHASES) + 1) + "|"]
-        for fault in FAULTS:
+        lines += [f"\n### {name}\n", f"| trial | {' | '.join(PHASES)} |", "|---" * (len(PHASES) + 1) + "|"]
+        for fault in TRIALS:
             row = [_cell(cells[fault, phase]) for phase in PHASES]
             lines.append(f"| {fault} | {' | '.join(row)} |")
-    return "\n".join(lines) + "\n"
+    return lines
+
+
+def _arguments(fault: Fault | None) -> str:
+    """Return the kind of a fault with the arguments that differ from the defaults."""
+    if fault is None:
+        return "none"
+    stated = [
+        f"{one.key}: {one.syntax.written(value)}"
+        for one in entries(type(fault))
+        if one.key not in {"at", "vehicle"}
+        and (value := getattr(fault, one.attribute)) is not None
+        and (value != one.default or one.key == "charge")
+    ]
+    return f"`{fault.kind}` {', '.join(stated)}".strip()
 
 
 def _cell(one: dict[str, Any]) -> str:
@@ -236,10 +367,11 @@ def pages() -> dict[str, str]:
         "observables.md": MADE + observables(),
         "processors.md": MADE + processors(),
         "command-line.md": MADE + command_line(),
-        **{f"{name}-parameters.md": MADE + honoured(one) for name, one in FIRMWARES.items()},
+        **{f"{name}-parameters.md": MADE + supported_parameters(one) for name, one in FIRMWARES.items()},
         **{f"{name}-checks.md": MADE + checks(one, name) for name, one in FIRMWARES.items()},
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
+        "model.md": MADE + model(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
 

@@ -211,7 +211,7 @@ def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
     return replace(node, value={**node.items, "at": default})
 
 
-FIGURES = ListOf(Record(Figure, prepare=_with_reference), bare=True)
+FIGURES = ListOf(Record(Figure, prepare=_with_reference, supplied=("at",)), bare=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -348,6 +348,11 @@ class Vehicle:
         OneOf(SENSOR_SETS),
         "Grade of its sensors: `consumer`, or `rtk` with a satellite receiver to 2 cm.",
     ] = "consumer"
+    added_sensors: Annotated[
+        tuple[str, ...],
+        ListOf(TEXT, bare=True),
+        "Sensors of installed packages that it carries as well, by their names.",
+    ] = ()
     started: Annotated[
         str, OneOf(STARTS), "`warm`: estimator settled, satellites fixed. `cold`: just switched on."
     ] = "warm"

@@ -276,7 +276,7 @@ class OtherStation(VehicleFault):
 @fault("program-killed", trials_only=True)
 @dataclass(frozen=True, kw_only=True)
 class ProgramKilled(VehicleFault):
-    """The program that commands the vehicle is killed: it stops without a farewell."""
+    """The program that commands the vehicle is killed: it stops without closing its link."""
 
 
 class _AnyFault(Syntax):

@@ -69,7 +69,7 @@ class Syntax(ABC):
 
     def written(self, value: Any) -> Any:
         """Return *value*, a default, as it would be written; None if it is not worth stating."""
-        return value if isinstance(value, bool | int | float | str) else None
+        return value if isinstance(value, bool | int | float) or (value and isinstance(value, str)) else None
 
 
 def read_child(syntax: Syntax, node: Node, path: Path, reading: Reading) -> tuple[bool, Any]:
@@ -97,10 +97,6 @@ class Text(Syntax):
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         return {"type": "string"}
-
-    def written(self, value: Any) -> Any:
-        """See ``Syntax``. An empty text is no default worth stating."""
-        return value or None
 
 
 @dataclass(frozen=True)
@@ -287,7 +283,7 @@ class Reference(Syntax):
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         other = f", or `{self.none}`" if self.none else ""
-        return {"type": "string", "x-quantity": f"the name of: {self.noun}{other}"}
+        return {"type": "string", "x-quantity": f"the name of {'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}{other}"}
 
 
 # -- collections
@@ -460,13 +456,14 @@ def entries(cls: Any) -> tuple[Entry, ...]:
 class Record(Syntax):
     """A mapping with the declared keys of a dataclass.
 
-    ``prepare`` may add entries to the mapping before it is read: defaults that stand elsewhere. ``kind`` is
-    the value of the key ``kind``, where the mapping is one of several.
+    ``prepare`` may add entries to the mapping before it is read: defaults that stand elsewhere, which are
+    then ``supplied``. ``kind`` is the value of the key ``kind``, where the mapping is one of several.
     """
 
     cls: type[Any]
     prepare: Callable[[Node, Path, Reading], Node] | None = None
     kind: str = ""
+    supplied: tuple[str, ...] = ()
 
     def read(self, node: Node, path: Path, reading: Reading) -> Any:
         """See ``Syntax``. ``name`` is the last step of *path*, ``where`` the line of the mapping."""
@@ -530,11 +527,12 @@ class Record(Syntax):
         for entry in entries(self.cls):
             described = property_schema(entry, definitions)
             if entry.others:
-                below = described["additionalProperties"]
+                below = {**described["additionalProperties"], "description": entry.description}
             else:
                 properties[entry.key] = described
         required = ["kind"] if self.kind else []
-        required += [entry.key for entry in entries(self.cls) if entry.required]
+        declared = entries(self.cls)
+        required += [one.key for one in declared if one.required and one.key not in self.supplied]
         return {
             "type": "object",
             "description": summary(self.cls),
