@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from volery.base.frames import world_to_body
 from volery.simulation.world.sensors import ErrorModel, Sensor, SensorInput
 
-
 ERROR = ErrorModel(white_sigma=0.3, bias_sigma=0.2, correlation_time=300.0)
 """Default error [m/s]."""
 

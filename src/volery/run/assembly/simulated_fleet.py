@@ -189,6 +189,7 @@ def body_of(vehicle: VehicleModel) -> BodySpec:
         at=(vehicle.at.east_m, vehicle.at.north_m, 0.0),
         heading_deg=vehicle.heading_deg,
         sensors=vehicle.sensors,
+        added_sensors=vehicle.added_sensors,
         battery=_battery(vehicle.battery, usual) if vehicle.battery else usual,
     )
 

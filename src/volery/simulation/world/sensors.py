@@ -378,6 +378,10 @@ def added_sensor(name: str) -> Sensor:
     Raises:
         UsageError: There is none of that name, or it is a suite.
     """
+    names = sensors.names()
+    if name not in names:
+        others = f"there is {choices(names)}" if names else "no installed package provides one"
+        raise UsageError(f"no sensor named {name!r}{did_you_mean(name, names)}; {others}")
     found = sensors.load(name)
     if not isinstance(found, Sensor):
         raise UsageError(f"{name!r} is a suite of sensors: give it as the vehicle's sensors")
