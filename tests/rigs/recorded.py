@@ -33,7 +33,7 @@ class Recorded:
         self._folder, self._hearing = folder, hearing
 
     def hear(self, hearing: Any, frame: Frame) -> None:
-        assert hearing.hear(frame.name, frame.fields)
+        assert hearing.handle_message(frame.name, frame.fields)
 
     def replayed(self, name: str) -> Iterator[tuple[float, Telemetry]]:
         """The telemetry after each message of an extract, with its time in seconds."""

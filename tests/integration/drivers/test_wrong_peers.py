@@ -72,7 +72,7 @@ def test_a_listener_that_says_nothing() -> None:
     with peer(lambda to: None) as url:
         error = said_to_the_user(url, within=1.0)
     assert isinstance(error, LinkSilent)
-    assert "no ArduPilot was heard" in str(error)
+    assert "no message of an ArduPilot was received" in str(error)
 
 
 def test_text() -> None:
@@ -103,7 +103,7 @@ def test_another_autopilot() -> None:
     beat = bytes(mavlink_2.MAVLink_heartbeat_message(2, 12, 81, 65536, 3, 3).pack(sender))
     with peer(lambda to: to.sendall(beat)) as url:
         error = said_to_the_user(url)
-    assert "a PX4 speaks here, not an ArduPilot" in str(error)
+    assert "a PX4 answers here, not an ArduPilot" in str(error)
 
 
 def test_a_baud_rate_that_is_none() -> None:

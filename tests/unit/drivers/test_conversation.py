@@ -15,7 +15,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.vehicles import Rover
 from volery.vehicles.drivers.ardupilot import open_driver
 from volery.vehicles.drivers.ardupilot.link_loss import on_link_loss
-from volery.vehicles.drivers.mavlink.client import value_of
+from volery.vehicles.drivers.mavlink.client import parameter_value
 
 Make = Callable[..., Any]
 ARM = 400
@@ -66,7 +66,7 @@ def test_parameters_that_another_station_reads_are_nothing_to_us(bench: Make) ->
     for number in range(50):
         at.autopilot.say("PARAM_VALUE", param_id=f"OTHER_{number}", param_value=1.0, param_type=9)
     at.kernel.run(3 * S)
-    assert not at.vehicle._driver._commands._read
+    assert not at.vehicle._driver._backend._parameters
 
 
 def test_failsafes_in_words() -> None:
@@ -85,9 +85,9 @@ def test_failsafes_in_words() -> None:
 
 def test_whole_numbers_of_px4_lie_in_the_bytes_of_a_float() -> None:
     two = {"param_value": 2.802596928649634e-45, "param_type": 6}
-    assert value_of(two, bytewise=True) == 2.0
-    assert value_of({"param_value": 2.0, "param_type": 6}, bytewise=False) == 2.0
-    assert value_of({"param_value": 0.5, "param_type": 9}, bytewise=True) == 0.5
+    assert parameter_value(two, bytewise=True) == 2.0
+    assert parameter_value({"param_value": 2.0, "param_type": 6}, bytewise=False) == 2.0
+    assert parameter_value({"param_value": 0.5, "param_type": 9}, bytewise=True) == 0.5
 
 
 def test_a_px4_is_named(bench: Make) -> None:
@@ -101,7 +101,7 @@ def test_a_px4_is_named(bench: Make) -> None:
         at.autopilot.mute = True
 
     at.kernel.every(S, beat)
-    with pytest.raises(LinkGarbled, match="a PX4 speaks here, not an ArduPilot"):
+    with pytest.raises(LinkGarbled, match="a PX4 answers here, not an ArduPilot"):
         at.fly(lambda drone: drone.wait_connected(within=5))
 
 

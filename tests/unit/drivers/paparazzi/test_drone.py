@@ -394,14 +394,14 @@ def test_an_aircraft_with_its_own_numbers(bench: Make, tmp_path: Path) -> None:
 
 def test_another_aircraft_than_the_one_meant(bench: Make) -> None:
     at = bench(options={"system": "12"})
-    with pytest.raises(Exception, match="aircraft 7 speaks here, not 12"):
+    with pytest.raises(Exception, match="aircraft 7 answers here, not 12"):
         at.fly(lambda drone: drone.wait_connected())
 
 
 def test_nobody_there(bench: Make) -> None:
     at = bench()
     at.autopilot.mute = True
-    with pytest.raises(LinkSilent, match="no Paparazzi aircraft was heard"):
+    with pytest.raises(LinkSilent, match="no message of a Paparazzi aircraft was received"):
         at.fly(lambda drone: drone.wait_connected())
 
 

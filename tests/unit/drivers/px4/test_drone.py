@@ -482,7 +482,7 @@ def test_a_mission_ends_when_its_last_place_is_reached(bench: Make) -> None:
 def test_an_ardupilot_is_named(bench: Make) -> None:
     at = bench()
     at.autopilot.firmware = 3
-    with pytest.raises(LinkGarbled, match="an ArduPilot speaks here, not a PX4"):
+    with pytest.raises(LinkGarbled, match="an ArduPilot answers here, not a PX4"):
         at.fly(lambda drone: drone.wait_connected(within=5))
 
 

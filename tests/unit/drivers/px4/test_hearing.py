@@ -20,7 +20,7 @@ class RecordedPx4(Recorded):
         if frame.name != "COMMAND_ACK":
             super().hear(hearing, frame)
         elif frame.fields["command"] == ARM and frame.fields["result"] == REJECTED:
-            hearing.say_failing_checks()
+            hearing.add_failing_checks()
 
 
 RECORDED = RecordedPx4(FOLDER, PX4Decoder)

@@ -40,8 +40,8 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
     names = options.get("names", last if last in NAMES else OLD_NAMES)
     if names not in NAMES:
         raise UsageError(f"names={names!r}; there is {choices(NAMES)}")
-    carrier = DjiBackend(kernel, node, name, NAMES[names](node, namespace), record=records_texts(options))
-    return Dji(kernel, name, carrier)
+    backend = DjiBackend(kernel, node, name, NAMES[names](node, namespace), record=records_texts(options))
+    return Dji(kernel, name, backend)
 
 
 DRIVER = DriverFactory(on_graph=open_driver, namespace=f"/{{name}}/{OLD_NAMES}", graph_names=OLD_NAMES)

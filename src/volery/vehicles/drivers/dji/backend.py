@@ -34,11 +34,19 @@ SILENT_AFTER: Ns = 3 * S
 KEPT = 1000
 """Messages that wait to be taken in; older ones are dropped."""
 
-ACTIVATION, AUTHORITY, REFERENCE, MOTORS = "activation", "authority", "local reference", "motors"
-TASK, MISSION, START = "task", "mission", "mission start"
-"""Keys of ``Telemetry.answers``."""
-
 NOT_M100 = "aircraft of OSDK 4"
+
+
+class Ack:
+    """Keys of acknowledgements in ``Telemetry.answers``."""
+
+    ACTIVATION = "activation"
+    AUTHORITY = "authority"
+    REFERENCE = "local reference"
+    MOTORS = "motors"
+    TASK = "task"
+    MISSION = "mission"
+    START = "mission start"
 
 
 def _nothing() -> None:
@@ -48,17 +56,19 @@ def _nothing() -> None:
 class DjiBackend:
     """Talks to one node. Making it subscribes and starts its tasks."""
 
-    def __init__(self, kernel: Kernel, node: Node, name: str, names: NodeInterface, *, record: bool) -> None:
+    def __init__(
+        self, kernel: Kernel, node: Node, name: str, interface: NodeInterface, *, record: bool
+    ) -> None:
         self.telemetry = Telemetry(kernel, name)
-        self.hearing = DjiDecoder(kernel, self.telemetry, record=record)
-        self.stream = SetpointStream(kernel, self.telemetry, self.hearing)
-        self.names = names
+        self.decoder = DjiDecoder(kernel, self.telemetry, record=record)
+        self.stream = SetpointStream(kernel, self.telemetry, self.decoder)
+        self.interface = interface
         self._kernel = kernel
         self._node = node
         self._wrong = ""
-        self._under_way: set[str] = set()
+        self._pending: set[str] = set()
         self._arrived: deque[Work] = deque(maxlen=KEPT)
-        self._due = Signal(kernel, f"messages of {names.namespace}")
+        self._due = Signal(kernel, f"messages of {interface.namespace}")
         self._next: Ns = 0
         self._sent_at: Ns = -QUIET
         self._silent = False
@@ -67,10 +77,10 @@ class DjiBackend:
         self._scope = kernel.root.child(f"{name} (DJI)")
         self._spinner = node.group()
         inbox = node.group(self._take)
-        for topic, (kind, handler) in self.hearing.topics(names.package).items():
-            node.subscribe(f"{names.namespace}/{topic}", kind, handler, group=inbox)
+        for topic, (kind, handler) in self.decoder.topics(interface.package).items():
+            node.subscribe(f"{interface.namespace}/{topic}", kind, handler, group=inbox)
         self._spawn(self._run, "DJI node")
-        self._spawn(self._greet, "greeting")
+        self._spawn(self._identify, "greeting")
         self._watch = kernel.every(LOOK_PERIOD, self._notice_silence)
 
     def _spawn(self, body: Any, what: str) -> None:
@@ -87,31 +97,31 @@ class DjiBackend:
     def _run(self) -> None:
         """The node's own loop: take in what has come, send what is due."""
         while not self._closed and not self._node.closed:
-            self._due.wait_for(self._wakes, self._patience())
+            self._due.wait_for(self._wakes, self._time_left())
             if self._arrived:
-                self._take_in()
+                self._process()
             self._send_setpoint()
 
     def _wakes(self) -> bool:
         return bool(self._arrived) or self._closed or self._node.closed or self.stream.fresh
 
-    def _patience(self) -> Ns | None:
+    def _time_left(self) -> Ns | None:
         return max(0, self._next - self._kernel.now()) if self.stream.wanted else None
 
-    def _take_in(self) -> None:
+    def _process(self) -> None:
         """It is paid as one ``spinOnce``, whatever the number of messages."""
         self._spinner.spin_once(0)
         with self._kernel.guard:
             while self._arrived:
                 self._arrived.popleft().run()
-            self._judge()
+            self._update()
 
-    def _judge(self) -> None:
+    def _update(self) -> None:
         if self._silent and self.telemetry.silence(self._kernel.now()) < 1.0:
             self._silent = False
             self._record_link("back", "the aircraft is heard again")
-        self.hearing.judge()
-        self.stream.judge()
+        self.decoder.update()
+        self.stream.update()
         self.telemetry.changed.notify()
 
     def _send_setpoint(self) -> None:
@@ -125,7 +135,7 @@ class DjiBackend:
         if setpoint is None:
             return
         try:
-            self.names.setpoint(*setpoint)
+            self.interface.setpoint(*setpoint)
         except ServiceError as error:
             self._wrong = str(error)
         self._sent_at = self._kernel.now()
@@ -135,7 +145,7 @@ class DjiBackend:
         """No set-point is sent or on its way."""
         return not self.stream.wanted and self._kernel.now() - self._sent_at >= QUIET
 
-    def stir(self) -> None:
+    def wake(self) -> None:
         """There is something else to send. House code."""
         self._due.notify()
 
@@ -150,9 +160,9 @@ class DjiBackend:
 
     # -- who it is
 
-    def _greet(self) -> None:
+    def _identify(self) -> None:
         """Until it is known which aircraft it is, its numbers mean nothing."""
-        ask = self.names.version()
+        ask = self.interface.version()
         while ask is not None and not self._closed:
             if ask.client.wait(S):
                 try:
@@ -161,36 +171,36 @@ class DjiBackend:
                     self._wrong = str(error)
                 else:
                     self._wrong = ""
-                    self.hearing.aircraft = response.hardware or "aircraft"
+                    self.decoder.aircraft = response.hardware or "aircraft"
                     break
                 sleep(self._kernel, S)
         if ask is None:
-            self.hearing.aircraft = NOT_M100
-            self.hearing.activate()
+            self.decoder.aircraft = NOT_M100
+            self.decoder.activate()
         with self._kernel.guard:
-            self._judge()
+            self._update()
 
     # -- requests
 
-    def ask(self, key: str, ask: ServiceRequest | None, accepted: Action = _nothing) -> None:
+    def request(self, key: str, ask: ServiceRequest | None, accepted: Action = _nothing) -> None:
         """Send a request; its answer will be in the telemetry under *key*, *accepted* is called before if it
         is. Never blocks.
         """
-        if ask is None or key in self._under_way:
+        if ask is None or key in self._pending:
             return
-        self._under_way.add(key)
-        self._spawn(partial(self._call, key, ask, accepted), key)
+        self._pending.add(key)
+        self._spawn(partial(self._request, key, ask, accepted), key)
 
-    def _call(self, key: str, ask: ServiceRequest, accepted: Action) -> None:
+    def _request(self, key: str, ask: ServiceRequest, accepted: Action) -> None:
         try:
             response = ask.client.call(ask.request, within=ANSWERED_WITHIN)
         except ServiceError as error:
             with self._kernel.guard:
-                self._under_way.discard(key)
+                self._pending.discard(key)
                 self._wrong = str(error)
             return
         with self._kernel.guard:
-            self._under_way.discard(key)
+            self._pending.discard(key)
             self._wrong = ""
             if response.result:
                 accepted()
@@ -199,26 +209,26 @@ class DjiBackend:
     def _answered(self, key: str, accepted: bool, code: int | None) -> None:
         result = "accepted" if accepted else "refused" if code is None else f"refused with {code}"
         self.telemetry.answers[key] = Answer(self._kernel.now(), accepted, result)
-        self._judge()
+        self._update()
 
     def activate(self) -> None:
         """Have the node activate, where it does not by itself."""
-        self.ask(ACTIVATION, self.names.activation(), self.hearing.activate)
+        self.request(Ack.ACTIVATION, self.interface.activation(), self.decoder.activate)
 
     def authority(self) -> None:
         """Obtain the authority."""
-        self.ask(AUTHORITY, self.names.authority(True), self.hearing.granted)
+        self.request(Ack.AUTHORITY, self.interface.authority(True), self.decoder.granted)
 
     def motors(self, on: bool, *, force: bool = False) -> None:
         """Start or stop them; by force in the air, too."""
-        ask = self.names.kill() if force else self.names.motors(on)
-        self.ask(MOTORS, ask, partial(self.hearing.motors, on))
+        ask = self.interface.kill() if force else self.interface.motors(on)
+        self.request(Ack.MOTORS, ask, partial(self.decoder.motors, on))
 
     def task(self, task: int, mode: DisplayMode) -> None:
         """A task, after which it is in that mode. Set-points would end it: none is sent any more."""
         self.stream.stop()
-        self.hearing.asked = mode.name
-        self.ask(TASK, self.names.task(task))
+        self.decoder.commanded = mode.name
+        self.request(Ack.TASK, self.interface.task(task))
 
     # -- the end
 
@@ -228,15 +238,15 @@ class DjiBackend:
             return LinkSilent(self._wrong)
         if self.telemetry.last_message_ns >= 0:
             return None
-        below = self.names.namespace
-        if self.hearing.node_seen:
+        below = self.interface.namespace
+        if self.decoder.node_seen:
             return LinkSilent(f"the node at {below} does not say which aircraft it serves")
         return LinkSilent(f"no DJI node publishes {below}/flight_status")
 
     @property
     def is_m100(self) -> bool:
         """Its numbers and its topics are fewer."""
-        return self.hearing.aircraft == M100
+        return self.decoder.aircraft == M100
 
     def close(self) -> None:
         """Commands no more; the node is its owner's."""

@@ -1,4 +1,4 @@
-"""What a DJI node's topics say, as ``Telemetry``. One method for each topic that is listened to.
+"""What a DJI node's topics add_text, as ``Telemetry``. One method for each topic that is listened to.
 
 Who has the authority is on no topic: it follows from the answers to our requests and from the pilot's mode
 switch, which takes it whenever it is moved.
@@ -54,7 +54,7 @@ TAKES_OFF = frozenset({DisplayMode.ENGINE_START, DisplayMode.ASSISTED_TAKEOFF, D
 class DjiDecoder:
     """Turns messages into telemetry, once ``aircraft`` is known: the M100's numbers are its own.
 
-    ``asked`` is the mode that was asked of it last. Stages of what was asked go by its name: a landing at
+    ``commanded`` is the mode that was commanded of it last. Stages of what was commanded go by its name: a landing at
     the end of going home is still going home, the start of the motors for a take-off is the take-off.
     """
 
@@ -62,12 +62,12 @@ class DjiDecoder:
         self.aircraft = ""
         self.activated = False
         self.authority = False
-        self.asked = ""
+        self.commanded = ""
         self.node_seen = False
         self.located_at: Ns = -1
         """When it last said where it is."""
         self._kernel = kernel
-        self._seen = telemetry
+        self._telemetry = telemetry
         self._records = record
         self._display = UNKNOWN
         self._shown = UNKNOWN
@@ -102,22 +102,24 @@ class DjiDecoder:
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True
         if message.data == M100Status.FINISHED_LANDING != self._status and self.aircraft == M100:
-            self._motors = False  # when it begins to say so; it goes on for a while, whatever is started then
+            self._motors = (
+                False  # when it begins to add_text so; it goes on for a while, whatever is started then
+            )
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
-            self._seen.last_message_ns = self._kernel.now()
+            self._telemetry.last_message_ns = self._kernel.now()
 
     def _display_mode(self, message: Any) -> None:
         now, shown = self._kernel.now(), message.data
         if shown != self._shown:
             self._shown, self._shown_since = shown, now
         comes_down = self._display in DESCENDING_MODES and shown not in DESCENDING_MODES
-        if not comes_down or not self._seen.armed or now - self._shown_since >= SETTLED:
+        if not comes_down or not self._telemetry.armed or now - self._shown_since >= SETTLED:
             self._display = shown
 
     def _health(self, message: Any) -> None:
         self._gps_health = message.data
-        self._seen.fix = f"gps health {message.data}"
+        self._telemetry.fix = f"gps health {message.data}"
 
     def _position(self, message: Any) -> None:
         """Its altitude is above the sea: assumed."""
@@ -126,7 +128,7 @@ class DjiDecoder:
             return
         if abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0:
             self.located_at = self._kernel.now()
-            self._seen.position = Position(place[0], place[1], AMSL(place[2]))
+            self._telemetry.position = Position(place[0], place[1], AMSL(place[2]))
 
     def _height_above(self, message: Any) -> None:
         self._height = message.data
@@ -134,18 +136,18 @@ class DjiDecoder:
     def _velocity(self, message: Any) -> None:
         vector = message.vector
         north, east, down = enu_to_ned((vector.x, vector.y, vector.z))
-        self._seen.velocity = Velocity(north, east, -down)
+        self._telemetry.velocity = Velocity(north, east, -down)
 
     def _attitude(self, message: Any) -> None:
         q = message.quaternion
         roll, pitch, yaw = quaternion_to_euler(attitude_enu_to_ned((q.w, q.x, q.y, q.z)))
-        self._seen.attitude = Attitude(degrees(roll), degrees(pitch), degrees(yaw) % 360.0)
+        self._telemetry.attitude = Attitude(degrees(roll), degrees(pitch), degrees(yaw) % 360.0)
 
     def _battery(self, message: Any) -> None:
         volts, amperes = message.voltage, -message.current
         if volts > MOST_VOLTS:
             volts, amperes = volts / MILLI, amperes / MILLI
-        self._seen.battery = Battery(message.percentage / 100.0, volts, amperes)
+        self._telemetry.battery = Battery(message.percentage / 100.0, volts, amperes)
 
     def _rc(self, message: Any) -> None:
         """Any move of the mode switch takes the authority."""
@@ -168,7 +170,7 @@ class DjiDecoder:
         for name in dir(type(message)):
             value = getattr(type(message), name)
             if name.isupper() and isinstance(value, int) and value & new:
-                self.say(WARNING, name.replace("_", " ").lower())
+                self.add_text(WARNING, name.replace("_", " ").lower())
 
     # -- authority
 
@@ -189,7 +191,7 @@ class DjiDecoder:
     def _lose(self, to: str, text: str) -> None:
         self.authority = False
         self._taken, self._taken_at = to, self._kernel.now()
-        self.say(WARNING, text)
+        self.add_text(WARNING, text)
 
     def motors(self, on: bool) -> None:
         """An M100 has accepted that its motors start or stop."""
@@ -197,72 +199,72 @@ class DjiDecoder:
 
     # -- what follows from all of them
 
-    def judge(self) -> None:
+    def update(self) -> None:
         """After the messages that came at one time."""
-        seen = self._seen
-        if seen.last_message_ns < 0:
+        telemetry = self._telemetry
+        if telemetry.last_message_ns < 0:
             return
         if self._taken and self._taken != "RC" and self._kernel.now() - self._taken_at > TAKEN_OVER_FOR:
             self._taken = ""
-        seen.kind, seen.autopilot = DRONE_KIND, f"DJI {self.aircraft}"
-        was_armed = seen.armed
-        mode = self._judge_m100() if self.aircraft == M100 else self._judge_others()
-        self._judge_home(was_armed)
-        seen.armable = self.activated
+        telemetry.kind, telemetry.autopilot = DRONE_KIND, f"DJI {self.aircraft}"
+        was_armed = telemetry.armed
+        mode = self._update_m100() if self.aircraft == M100 else self._update_others()
+        self._update_home(was_armed)
+        telemetry.armable = self.activated
         healthy = self._gps_health >= HEALTHY_GPS
-        seen.ready = self.activated and healthy and seen.position is not None
+        telemetry.ready = self.activated and healthy and telemetry.position is not None
         name = self._named(mode)
-        by_itself = mode in DESCENDING_MODES and name != self.asked
-        lost_place = seen.flying and mode == DisplayMode.ATTITUDE and not healthy
-        seen.failsafe = bool(seen.armed and (by_itself or lost_place))
-        seen.status = "critical" if seen.failsafe else "active" if seen.flying else "standby"
-        seen.mode = f"{name} by {self._taken}" if self._taken and mode not in DESCENDING_MODES else name
-        if not seen.armed:
-            self.asked = ""
+        by_itself = mode in DESCENDING_MODES and name != self.commanded
+        lost_place = telemetry.flying and mode == DisplayMode.ATTITUDE and not healthy
+        telemetry.failsafe = bool(telemetry.armed and (by_itself or lost_place))
+        telemetry.status = "critical" if telemetry.failsafe else "active" if telemetry.flying else "standby"
+        telemetry.mode = f"{name} by {self._taken}" if self._taken and mode not in DESCENDING_MODES else name
+        if not telemetry.armed:
+            self.commanded = ""
 
-    def _judge_others(self) -> int:
-        self._seen.armed = self._status >= FlightStatus.ON_GROUND
-        self._seen.flying = self._status >= FlightStatus.IN_AIR
+    def _update_others(self) -> int:
+        self._telemetry.armed = self._status >= FlightStatus.ON_GROUND
+        self._telemetry.flying = self._status >= FlightStatus.IN_AIR
         return self._display
 
-    def _judge_m100(self) -> int:
-        """It has no display mode: what it does follows from its status and from what was asked of it."""
-        seen, status = self._seen, self._status
+    def _update_m100(self) -> int:
+        """It has no display mode: what it does follows from its status and from what was commanded of it."""
+        telemetry, status = self._telemetry, self._status
         moving = (M100Status.TAKING_OFF, M100Status.IN_AIR, M100Status.LANDING)
-        seen.armed = self._motors or status in moving
-        seen.flying = status in (M100Status.IN_AIR, M100Status.LANDING)
+        telemetry.armed = self._motors or status in moving
+        telemetry.flying = status in (M100Status.IN_AIR, M100Status.LANDING)
         if status == M100Status.TAKING_OFF:
             return DisplayMode.AUTO_TAKEOFF
         if status == M100Status.LANDING:
             return DisplayMode.AUTO_LANDING
-        asked = self.asked if seen.flying and self.asked in DisplayMode.__members__ else ""
-        if asked and asked != DisplayMode.AUTO_TAKEOFF.name:
-            return DisplayMode[asked]
+        commanded = self.commanded if telemetry.flying and self.commanded in DisplayMode.__members__ else ""
+        if commanded and commanded != DisplayMode.AUTO_TAKEOFF.name:
+            return DisplayMode[commanded]
         return DisplayMode.P_GPS
 
     def _named(self, mode: int) -> str:
-        asked = self.asked
-        if asked == DisplayMode.NAVI_GO_HOME.name and mode == DisplayMode.AUTO_LANDING:
-            return asked
-        if asked == DisplayMode.AUTO_TAKEOFF.name and mode in TAKES_OFF:
-            return asked
+        commanded = self.commanded
+        if commanded == DisplayMode.NAVI_GO_HOME.name and mode == DisplayMode.AUTO_LANDING:
+            return commanded
+        if commanded == DisplayMode.AUTO_TAKEOFF.name and mode in TAKES_OFF:
+            return commanded
         return display_name(mode) if mode != UNKNOWN else ""
 
-    def _judge_home(self, was_armed: bool) -> None:
+    def _update_home(self, was_armed: bool) -> None:
         """Home is where the motors are started; before, it is where it stands."""
-        seen, here = self._seen, self._seen.position
-        if not seen.armed:
-            seen.above_home = 0.0 if here is not None else nan
-            seen.home = here
+        telemetry, here = self._telemetry, self._telemetry.position
+        if not telemetry.armed:
+            telemetry.above_home = 0.0 if here is not None else nan
+            telemetry.home = here
             return
-        seen.above_home = self._height
-        if not was_armed and not seen.flying and here is not None and isfinite(self._height):
+        telemetry.above_home = self._height
+        if not was_armed and not telemetry.flying and here is not None and isfinite(self._height):
             amsl = here.altitude.metres - self._height
-            seen.home = Position(here.latitude, here.longitude, AMSL(amsl))
+            telemetry.home = Position(here.latitude, here.longitude, AMSL(amsl))
 
-    def say(self, severity: int, text: str) -> None:
+    def add_text(self, severity: int, text: str) -> None:
         """A text of ours about the aircraft: it has none of its own."""
         now = self._kernel.now()
-        self._seen.texts.append(StatusText(now, severity, text))
+        self._telemetry.texts.append(StatusText(now, severity, text))
         if self._records:
-            self._kernel.record(Text(now, self._seen.name, severity, text))
+            self._kernel.record(Text(now, self._telemetry.name, severity, text))

@@ -49,7 +49,7 @@ from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
 LOW_THROTTLE = 0.3
-"""Below it, in the air, thrust by the sticks would let it fall."""
+"""Below it, in the air, thrust by the control would let it fall."""
 
 CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN}
 _NONE: frozenset[Capability] = frozenset()
@@ -61,15 +61,15 @@ class Dji:
     landing_modes = LANDING_MODES
     cycle: Action | None = None
 
-    def __init__(self, kernel: Kernel, name: str, carrier: DjiBackend) -> None:
+    def __init__(self, kernel: Kernel, name: str, backend: DjiBackend) -> None:
         self.name = name
-        self.telemetry = carrier.telemetry
+        self.telemetry = backend.telemetry
         self._kernel = kernel
-        self._carrier = carrier
-        self._stream = carrier.stream
-        self._pieces = DjiSteps(name, carrier)
-        self._tasks = DjiTasks(self._pieces)
-        self._mission = MissionRunner(self._pieces, self._tasks)
+        self._backend = backend
+        self._stream = backend.stream
+        self._steps = DjiSteps(name, backend)
+        self._tasks = DjiTasks(self._steps)
+        self._mission = MissionRunner(self._steps, self._tasks)
 
     @property
     def offboard_mode(self) -> str:
@@ -91,7 +91,7 @@ class Dji:
 
     def problem(self) -> LinkError | CapabilityError | None:
         """What is wrong with the way to the aircraft."""
-        return self._carrier.problem()
+        return self._backend.problem()
 
     def on_link_loss(self) -> str:
         """Assumed: the public definitions do not say, and no parameter of the aircraft can be read."""
@@ -102,13 +102,13 @@ class Dji:
 
     def close(self) -> None:
         """Stop talking."""
-        self._carrier.close()
+        self._backend.close()
 
     # -- on the ground, off it and back
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Activated, a position that may be trusted, and a local reference."""
-        return self._pieces.ready(within)
+        return self._steps.ready(within)
 
     def arm(self) -> Sequence[Step]:
         """Start the motors."""
@@ -138,12 +138,12 @@ class Dji:
         if home is None:
             raise Refused(self.name, f"go to {goal}", "it is not known where it took off")
         height = above_home(goal, home)
-        self._pieces.check_height(height, f"go to {goal}")
+        self._steps.check_height(height, f"go to {goal}")
 
         def there() -> Point:
             return Point(goal.latitude, goal.longitude, height, yaw_of(self.telemetry), speed)
 
-        return self._pieces.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
+        return self._steps.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
 
     def hold(self) -> Sequence[Step]:
         """Zero velocity until it stands; then it hovers by itself. Without a position it cannot."""
@@ -151,50 +151,52 @@ class Dji:
             raise Refused(self.name, "hold", f"it has no position ({self.telemetry.fix}) and drifts; land()")
         brake = Step(
             ask="stop",
-            send=lambda: self._follow(STILL, 0.0, STOPPED_WITHIN),
+            send=lambda: self._stream_velocity(STILL, 0.0, STOPPED_WITHIN),
             done=lambda seen: at_rest(seen) and not self._stream.fresh,
             within=STOPPED_WITHIN,
             enters=SDK,
             leads_to=(WAITS,),
             armed=True,
         )
-        return (*self._pieces.free(), self._pieces.authority(), brake, self._pieces.hover())
+        return (*self._steps.leave_descent(), self._steps.authority(), brake, self._steps.hover())
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Streamed for as long as it lasts; then it stops."""
-        follow = immediate_step("fly on", lambda: self._follow(velocity, yaw_rate, lasting), enters=SDK)
-        return (*self._pieces.free(), self._pieces.authority(), follow)
+        follow = immediate_step(
+            "fly on", lambda: self._stream_velocity(velocity, yaw_rate, lasting), enters=SDK
+        )
+        return (*self._steps.leave_descent(), self._steps.authority(), follow)
 
-    def _follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        self._pieces.aim(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
+    def _stream_velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
+        self._steps.follow(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """In place."""
 
         def turn() -> Point | None:
-            here = self._pieces.over_here(self.telemetry.above_home)
+            here = self._steps.over_here(self.telemetry.above_home)
             return here._replace(yaw=heading_to_yaw(radians(degrees))) if here is not None else None
 
-        return self._pieces.to_point(
+        return self._steps.to_point(
             f"turn to {degrees:g} degrees", turn, heading_reached(degrees), TURNED_WITHIN
         )
 
-    # -- by sticks
+    # -- by control
 
     def stabilize(self) -> Sequence[Step]:
         """Lean angles, turn rate and thrust."""
         check_throttle(self.telemetry, self._stream.held or ManualControl(), LOW_THROTTLE)
-        return self._by_hand("fly stabilized", Manual(keeps_height=False))
+        return self._enter_manual("fly stabilized", Manual(keeps_height=False))
 
     def altitude_hold(self) -> Sequence[Step]:
         """Lean angles, turn rate and climb rate."""
-        return self._by_hand("hold the altitude", Manual(keeps_height=True))
+        return self._enter_manual("hold the altitude", Manual(keeps_height=True))
 
-    def _by_hand(self, ask: str, aim: Manual) -> Sequence[Step]:
+    def _enter_manual(self, ask: str, target: Manual) -> Sequence[Step]:
         def send() -> None:
             if self._stream.held is None:
                 self._stream.held = ManualControl() if self.telemetry.flying else ManualControl(throttle=0.0)
-            self._pieces.aim(aim)
+            self._steps.follow(target)
 
         step = Step(
             ask=ask,
@@ -204,23 +206,23 @@ class Dji:
             enters=SDK,
             leads_to=STARTS,
         )
-        return (self._pieces.activated(), *self._pieces.free(), self._pieces.authority(), step)
+        return (self._steps.activated(), *self._steps.leave_descent(), self._steps.authority(), step)
 
     def manual(self) -> Sequence[Step]:
         """There are no DJI rovers."""
         raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
 
-    def manual_control(self, sticks: ManualControl | None) -> None:
+    def manual_control(self, control: ManualControl | None) -> None:
         """They are sent while it is flown by them."""
-        if sticks is None:
-            if self._stream.by_hand:
+        if control is None:
+            if self._stream.is_manual:
                 self._stream.stop()
             self._stream.held = None
             return
-        self._stream.held = sticks
-        if self._stream.by_hand:
+        self._stream.held = control
+        if self._stream.is_manual:
             self._stream.fresh = True
-            self._carrier.stir()
+            self._backend.wake()
 
     def stop(self) -> None:
         """Nothing is sent any more: it brakes and hovers."""

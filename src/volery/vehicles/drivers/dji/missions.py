@@ -15,7 +15,7 @@ from volery.base.time import Ns, S
 from volery.ros.messages import message_class
 from volery.ros.messages.dji_constants import MISSION_SPEEDS, DisplayMode
 from volery.vehicles.driver import Step
-from volery.vehicles.drivers.dji import backend as key
+from volery.vehicles.drivers.dji.backend import Ack
 from volery.vehicles.drivers.dji.node_interfaces import START_MISSION
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, RESEND_PERIOD, SDK, WAITS, DjiSteps, DjiTasks
 from volery.vehicles.drivers.steps import ANSWERED_WITHIN, arrived_at, send_nothing
@@ -135,62 +135,62 @@ FLYING = DisplayMode.NAVI_MISSION.name
 class MissionRunner:
     """The mission that this program gave it last."""
 
-    def __init__(self, pieces: DjiSteps, tasks: DjiTasks) -> None:
-        self._pieces = pieces
+    def __init__(self, steps: DjiSteps, tasks: DjiTasks) -> None:
+        self._steps = steps
         self._tasks = tasks
-        self._carrier = pieces.carrier
-        self._seen = pieces.telemetry
+        self._backend = steps.backend
+        self._telemetry = steps.telemetry
         self._plan: Plan | None = None
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
         """As waypoints above the point of take-off."""
-        home, here = self._seen.home, self._seen.position
+        home, here = self._telemetry.home, self._telemetry.position
         if home is None or here is None:
             said = "it does not know where it is yet; wait_ready() first"
-            raise Refused(self._pieces.name, "upload a mission", said)
-        plan = plan_of(self._pieces.name, self._carrier.names.package, mission, home, here)
+            raise Refused(self._steps.name, "upload a mission", said)
+        plan = plan_of(self._steps.name, self._backend.interface.package, mission, home, here)
 
         def keep() -> None:
             self._plan = plan
 
         step = Step(
             ask=f"take a mission of {len(plan.task.mission_waypoint)} waypoints",
-            send=lambda: self._carrier.ask(key.MISSION, self._carrier.names.mission(plan.task), keep),
-            done=lambda seen: self._pieces.accepted(key.MISSION),
+            send=lambda: self._backend.request(Ack.MISSION, self._backend.interface.mission(plan.task), keep),
+            done=lambda seen: self._steps.accepted(Ack.MISSION),
             within=30 * S + len(plan.task.mission_waypoint) * 2 * S,
-            answer=key.MISSION,
+            answer=Ack.MISSION,
             again=5 * S,
         )
-        return (self._pieces.activated(), step)
+        return (self._steps.activated(), step)
 
     def start(self, within: Ns) -> Sequence[Step]:
         """Take off, start it; to its end: down, or standing at the last point."""
         plan = self._plan
         if plan is None:
-            raise Refused(self._pieces.name, "start the mission", "none was uploaded by this program")
+            raise Refused(self._steps.name, "start the mission", "none was uploaded by this program")
         lift: Sequence[Step] = ()
-        if not self._seen.flying:
+        if not self._telemetry.flying:
             if plan.takeoff is None:
                 said = "it is on the ground, and no TakeOff comes first"
-                raise Refused(self._pieces.name, "start the mission", said)
+                raise Refused(self._steps.name, "start the mission", said)
             lift = self._tasks.takeoff(plan.takeoff, within)
         begin = Step(
             ask="start the mission",
             send=self._begin,
-            done=lambda seen: self._pieces.accepted(key.START),
+            done=lambda seen: self._steps.accepted(Ack.START),
             within=ANSWERED_WITHIN,
-            answer=key.START,
+            answer=Ack.START,
             again=RESEND_PERIOD,
             enters=FLYING,
             leads_to=(WAITS, SDK),
             armed=True,
         )
-        return (*lift, self._pieces.authority(), self._pieces.quiet(), begin, self._over(plan, within))
+        return (*lift, self._steps.authority(), self._steps.quiet(), begin, self._over(plan, within))
 
     def _begin(self) -> None:
-        self._pieces.stream.stop()
-        self._pieces.hearing.asked = FLYING
-        self._carrier.ask(key.START, self._carrier.names.mission_action(START_MISSION))
+        self._steps.stream.stop()
+        self._steps.decoder.commanded = FLYING
+        self._backend.request(Ack.START, self._backend.interface.mission_action(START_MISSION))
 
     def _over(self, plan: Plan, within: Ns) -> Step:
         """Without an end in the air it is over when it is down."""
@@ -202,7 +202,7 @@ class MissionRunner:
             return (
                 end is not None
                 and arrived_at(end, False)(seen)
-                and (seen.mode != FLYING or self._carrier.is_m100)
+                and (seen.mode != FLYING or self._backend.is_m100)
             )
 
         return Step(

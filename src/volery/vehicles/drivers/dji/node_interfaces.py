@@ -98,16 +98,16 @@ class _CommonInterface:
     def _client(self, name: str, kind: str) -> Client:
         return self._node.client(name, f"{self.package}/srv/{kind}")
 
-    def _ask(self, client: Client, **fields: Any) -> ServiceRequest:
+    def _make_request(self, client: Client, **fields: Any) -> ServiceRequest:
         return ServiceRequest(client, request(client.type, **fields))
 
     def mission(self, task: Any) -> ServiceRequest:
         """``mission_waypoint_upload``."""
-        return self._ask(self._upload, waypoint_task=task)
+        return self._make_request(self._upload, waypoint_task=task)
 
     def mission_action(self, action: int) -> ServiceRequest:
         """``mission_waypoint_action``."""
-        return self._ask(self._action, action=action)
+        return self._make_request(self._action, action=action)
 
 
 class DjiSdkInterface(_CommonInterface):
@@ -132,19 +132,19 @@ class DjiSdkInterface(_CommonInterface):
 
     def version(self) -> ServiceRequest:
         """``query_drone_version``."""
-        return self._ask(self._version)
+        return self._make_request(self._version)
 
     def activation(self) -> ServiceRequest:
         """``activation``, with the key among the node's own parameters."""
-        return self._ask(self._activation)
+        return self._make_request(self._activation)
 
     def authority(self, wanted: bool) -> ServiceRequest:
         """``sdk_control_authority``."""
-        return self._ask(self._authority, control_enable=int(wanted))
+        return self._make_request(self._authority, control_enable=int(wanted))
 
     def motors(self, on: bool) -> ServiceRequest:
         """``drone_arm_control``."""
-        return self._ask(self._arm, arm=int(on))
+        return self._make_request(self._arm, arm=int(on))
 
     def kill(self) -> ServiceRequest:
         """``drone_arm_control``: there is no kill switch."""
@@ -152,14 +152,14 @@ class DjiSdkInterface(_CommonInterface):
 
     def task(self, task: int) -> ServiceRequest:
         """``drone_task_control``."""
-        return self._ask(self._task, task=task)
+        return self._make_request(self._task, task=task)
 
     def interrupt(self, task: int) -> None:
         """There is no such task: set-points are to end it. Assumed."""
 
     def reference(self) -> ServiceRequest:
         """``set_local_pos_ref``."""
-        return self._ask(self._reference)
+        return self._make_request(self._reference)
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
         """On the topic of that flag, or on the generic one."""
@@ -195,7 +195,7 @@ class OsdkRosInterface(_CommonInterface):
 
     def authority(self, wanted: bool) -> ServiceRequest:
         """``obtain_release_control_authority``."""
-        return self._ask(self._authority, enable_obtain=wanted)
+        return self._make_request(self._authority, enable_obtain=wanted)
 
     def motors(self, on: bool) -> ServiceRequest:
         """``flight_task_control``."""
@@ -203,11 +203,11 @@ class OsdkRosInterface(_CommonInterface):
 
     def kill(self) -> ServiceRequest:
         """``kill_switch``."""
-        return self._ask(self._kill, enable=True)
+        return self._make_request(self._kill, enable=True)
 
     def task(self, task: int) -> ServiceRequest:
         """``flight_task_control``."""
-        return self._ask(self._task, task=task)
+        return self._make_request(self._task, task=task)
 
     def interrupt(self, task: int) -> ServiceRequest:
         """``flight_task_control``."""
@@ -215,7 +215,7 @@ class OsdkRosInterface(_CommonInterface):
 
     def reference(self) -> ServiceRequest:
         """``set_local_pos_reference``."""
-        return self._ask(self._reference)
+        return self._make_request(self._reference)
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
         """``joystick_action``, after ``set_joystick_mode`` where the flag is another. Raises
@@ -232,11 +232,11 @@ class OsdkRosInterface(_CommonInterface):
         turn = -degrees(yaw) if flag & Flag.YAW_RATE else degrees(yaw_to_heading(yaw))
         command = {"x": x, "y": y, "z": z, "yaw": turn}
         self._joystick.call(
-            self._ask(self._joystick, joystickCommand=command).request, within=SETPOINT_WITHIN
+            self._make_request(self._joystick, joystickCommand=command).request, within=SETPOINT_WITHIN
         )
 
     def _mode_of(self, flag: int) -> ServiceRequest:
-        return self._ask(
+        return self._make_request(
             self._mode,
             horizontal_mode=(flag & HORIZONTAL) >> 6,
             vertical_mode=(flag >> 4) & 3,

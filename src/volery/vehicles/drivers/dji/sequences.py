@@ -12,8 +12,7 @@ from volery.base.errors import OutOfBounds, Refused
 from volery.base.time import Ns, S
 from volery.ros.messages.dji_constants import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Step
-from volery.vehicles.drivers.dji import backend as key
-from volery.vehicles.drivers.dji.backend import DjiBackend
+from volery.vehicles.drivers.dji.backend import Ack, DjiBackend
 from volery.vehicles.drivers.dji.decoder import DESCENDING_MODES, TAKES_OFF
 from volery.vehicles.drivers.dji.node_interfaces import GO_HOME, LAND, TAKE_OFF
 from volery.vehicles.drivers.dji.setpoints import Manual, Moving, Point, yaw_of
@@ -39,12 +38,12 @@ LANDING_MODES = frozenset(mode.name for mode in DESCENDING_MODES)
 class DjiSteps:
     """What it takes to have one aircraft do something."""
 
-    def __init__(self, name: str, carrier: DjiBackend) -> None:
+    def __init__(self, name: str, backend: DjiBackend) -> None:
         self.name = name
-        self.carrier = carrier
-        self.telemetry = carrier.telemetry
-        self.hearing = carrier.hearing
-        self.stream = carrier.stream
+        self.backend = backend
+        self.telemetry = backend.telemetry
+        self.decoder = backend.decoder
+        self.stream = backend.stream
 
     def accepted(self, which: str) -> bool:
         """Whether the last answer to that question was yes."""
@@ -57,11 +56,11 @@ class DjiSteps:
         """By the node's own parameters."""
         return Step(
             ask="activate",
-            send=self.carrier.activate,
-            done=lambda seen: self.hearing.activated,
+            send=self.backend.activate,
+            done=lambda seen: self.decoder.activated,
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=key.ACTIVATION,
+            answer=Ack.ACTIVATION,
             again=RESEND_PERIOD,
             advice="the node activates with app_id and enc_key among its parameters",
         )
@@ -78,11 +77,11 @@ class DjiSteps:
         )
         refer = Step(
             ask="set its local reference",
-            send=lambda: self.carrier.ask(key.REFERENCE, self.carrier.names.reference()),
-            done=lambda seen: seen.armed or self.accepted(key.REFERENCE),
+            send=lambda: self.backend.request(Ack.REFERENCE, self.backend.interface.reference()),
+            done=lambda seen: seen.armed or self.accepted(Ack.REFERENCE),
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=key.REFERENCE,
+            answer=Ack.REFERENCE,
             again=RESEND_PERIOD,
         )
         activate = self.activated()
@@ -92,29 +91,29 @@ class DjiSteps:
         """The program's, which everything takes but tasks."""
         return Step(
             ask="give the program the authority",
-            send=self.carrier.authority,
-            done=lambda seen: self.hearing.authority,
+            send=self.backend.authority,
+            done=lambda seen: self.decoder.authority,
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=key.AUTHORITY,
+            answer=Ack.AUTHORITY,
             again=RESEND_PERIOD,
             advice="the pilot's mode switch must be at F (P on aircraft that have no F)",
         )
 
-    def free(self) -> Sequence[Step]:
+    def leave_descent(self) -> Sequence[Step]:
         """Out of a landing or a way home that was asked for before, where that takes a task."""
-        doing = self.hearing.asked
+        doing = self.decoder.commanded
         task = GO_HOME if doing == DisplayMode.NAVI_GO_HOME.name else LAND
-        ask = self.carrier.names.interrupt(task) if doing in LANDING_MODES else None
+        ask = self.backend.interface.interrupt(task) if doing in LANDING_MODES else None
         if ask is None or not self.telemetry.flying or self.telemetry.mode != doing:
             return ()
         return (
             Step(
                 ask=f"leave {doing}",
-                send=lambda: self.carrier.ask(key.TASK, ask),
+                send=lambda: self.backend.request(Ack.TASK, ask),
                 done=lambda seen: seen.mode in {WAITS, SDK},
                 within=ANSWERED_WITHIN,
-                answer=key.TASK,
+                answer=Ack.TASK,
                 again=RESEND_PERIOD,
                 enters=WAITS,
                 leads_to=(doing,),
@@ -123,11 +122,11 @@ class DjiSteps:
 
     # -- set-points
 
-    def aim(self, aim: Point | Moving | Manual) -> None:
+    def follow(self, target: Point | Moving | Manual) -> None:
         """Stream it from now on."""
-        self.hearing.asked = SDK
-        self.stream.aim(aim)
-        self.carrier.stir()
+        self.decoder.commanded = SDK
+        self.stream.follow(target)
+        self.backend.wake()
 
     def to_point(
         self,
@@ -139,12 +138,12 @@ class DjiSteps:
         """Streamed until *done*; then it hovers by itself."""
 
         def send() -> None:
-            aim = point()
-            if aim is not None:
-                self.aim(aim)
+            target = point()
+            if target is not None:
+                self.follow(target)
 
         step = Step(ask=ask, send=send, done=done, within=within, enters=SDK, leads_to=(WAITS,), armed=True)
-        return (*self.free(), self.authority(), step, self.hover())
+        return (*self.leave_descent(), self.authority(), step, self.hover())
 
     def over_here(self, height: float) -> Point | None:
         """Where it is, that high above home; ``None`` while it does not know."""
@@ -167,7 +166,7 @@ class DjiSteps:
         return Step(
             ask="send no more set-points",
             send=self.stream.stop,
-            done=lambda seen: self.carrier.quiet,
+            done=lambda seen: self.backend.quiet,
             within=ANSWERED_WITHIN,
             skippable=True,
             mode=self.telemetry.mode,
@@ -186,64 +185,64 @@ to about 1.2 m that leaves little for the drift of a height.
 class DjiTasks:
     """Take-off, landing and going home need no authority; the motors do."""
 
-    def __init__(self, pieces: DjiSteps) -> None:
-        self._pieces = pieces
-        self._carrier = pieces.carrier
-        self._seen = pieces.telemetry
+    def __init__(self, steps: DjiSteps) -> None:
+        self._steps = steps
+        self._backend = steps.backend
+        self._telemetry = steps.telemetry
 
     def arm(self) -> Sequence[Step]:
         """Start the motors."""
         step = Step(
             ask="start the motors",
-            send=lambda: self._carrier.motors(True),
+            send=lambda: self._backend.motors(True),
             done=lambda seen: seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=key.MOTORS,
+            answer=Ack.MOTORS,
             again=RESEND_PERIOD,
             leads_to=STARTS,
         )
-        return (self._pieces.activated(), self._pieces.authority(), step)
+        return (self._steps.activated(), self._steps.authority(), step)
 
     def disarm(self, force: bool) -> Sequence[Step]:
         """Stop the motors. In the air the aircraft would fall: that takes *force*."""
-        if self._seen.flying and not force:
+        if self._telemetry.flying and not force:
             said = "it flies, and would fall; land() first, or force it"
-            raise Refused(self._pieces.name, "disarm", said)
+            raise Refused(self._steps.name, "disarm", said)
         step = Step(
             ask="stop the motors",
-            send=lambda: self._carrier.motors(False, force=force),
+            send=lambda: self._backend.motors(False, force=force),
             done=lambda seen: not seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=key.MOTORS,
+            answer=Ack.MOTORS,
             again=RESEND_PERIOD,
         )
-        alone = force and self._carrier.names.kills_without_authority
-        return (self._pieces.authority(), step) if self._seen.armed and not alone else (step,)
+        alone = force and self._backend.interface.kills_without_authority
+        return (self._steps.authority(), step) if self._telemetry.armed and not alone else (step,)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Task 4, which starts the motors and goes to its own height; then to *height* by set-points."""
-        pieces = self._pieces
-        pieces.check_height(height, f"take off to {height:g} m")
+        steps = self._steps
+        steps.check_height(height, f"take off to {height:g} m")
         lift = Step(
             ask="take off",
-            send=lambda: self._carrier.task(TAKE_OFF, DisplayMode.AUTO_TAKEOFF),
+            send=lambda: self._backend.task(TAKE_OFF, DisplayMode.AUTO_TAKEOFF),
             done=self._off_the_ground,
             within=UP_WITHIN,
-            answer=key.TASK,
+            answer=Ack.TASK,
             again=RESEND_PERIOD,
             enters=DisplayMode.AUTO_TAKEOFF.name,
             leads_to=STARTS,
             armed=True,
         )
-        climb = pieces.to_point(
-            f"climb to {height:g} m", lambda: pieces.over_here(height), climbed_to(height), within
+        climb = steps.to_point(
+            f"climb to {height:g} m", lambda: steps.over_here(height), climbed_to(height), within
         )
-        return (*pieces.ready(), pieces.authority(), lift, *climb)
+        return (*steps.ready(), steps.authority(), lift, *climb)
 
     def _off_the_ground(self, seen: Telemetry) -> bool:
-        if self._carrier.is_m100 and not seen.above_home >= M100_GAINS_M:
+        if self._backend.is_m100 and not seen.above_home >= M100_GAINS_M:
             return False
         return seen.flying and seen.mode not in {mode.name for mode in TAKES_OFF}
 
@@ -256,18 +255,18 @@ class DjiTasks:
         return self._until_down(LAND, DisplayMode.AUTO_LANDING, "land", within)
 
     def _until_down(self, task: int, mode: DisplayMode, ask: str, within: Ns) -> Sequence[Step]:
-        if not self._seen.armed:
+        if not self._telemetry.armed:
             return ()
-        if not self._seen.flying:
+        if not self._telemetry.flying:
             return self.disarm(force=False)
         begin = Step(
             ask=ask,
-            send=lambda: self._carrier.task(task, mode),
+            send=lambda: self._backend.task(task, mode),
             done=lambda seen: seen.mode == mode.name or not seen.armed,
             within=ANSWERED_WITHIN,
-            answer=key.TASK,
+            answer=Ack.TASK,
             again=RESEND_PERIOD,
             enters=mode.name,
             leads_to=(WAITS, SDK),
         )
-        return (self._pieces.quiet(), begin, disarmed_step(ask, mode.name, within))
+        return (self._steps.quiet(), begin, disarmed_step(ask, mode.name, within))

@@ -1,4 +1,4 @@
-"""What is sent 50 times a second: the remaining offset to a point, a velocity, or sticks.
+"""What is sent 50 times a second: the remaining offset to a point, a velocity, or control.
 
 An aircraft whose set-points are not fed brakes and hovers. So nothing is sent that would be wrong: no offset
 from a place that is not known any more.
@@ -68,64 +68,64 @@ class Moving(NamedTuple):
 
 
 class Manual(NamedTuple):
-    """The sticks command: with ``keeps_height`` the throttle a climb rate, else the thrust."""
+    """The control command: with ``keeps_height`` the throttle a climb rate, else the thrust."""
 
     keeps_height: bool
 
 
-Aim = Point | Moving | Manual
+Target = Point | Moving | Manual
 
 
 class SetpointStream:
-    """Holds the present aim. ``fresh``: it is another one, to be sent at once."""
+    """Holds the present target. ``fresh``: it is another one, to be sent at once."""
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, hearing: DjiDecoder) -> None:
+    def __init__(self, kernel: Kernel, telemetry: Telemetry, decoder: DjiDecoder) -> None:
         self.held: ManualControl | None = None
         self.fresh = False
         self._kernel = kernel
-        self._seen = telemetry
-        self._hearing = hearing
-        self._aim: Aim | None = None
+        self._telemetry = telemetry
+        self._decoder = decoder
+        self._target: Target | None = None
         self._was_armed = False
         self._unheeded: Ns | None = None  # since when set-points have been sent without effect
 
     @property
     def wanted(self) -> bool:
         """There is something to send."""
-        return self._aim is not None
+        return self._target is not None
 
     @property
-    def by_hand(self) -> bool:
-        """The sticks command it."""
-        return isinstance(self._aim, Manual)
+    def is_manual(self) -> bool:
+        """The control command it."""
+        return isinstance(self._target, Manual)
 
-    def aim(self, aim: Aim) -> None:
+    def follow(self, target: Target) -> None:
         """From now on."""
-        self._aim, self.fresh = aim, True
-        self._was_armed = self._seen.armed
+        self._target, self.fresh = target, True
+        self._was_armed = self._telemetry.armed
         self._unheeded = None
 
     def stop(self) -> None:
         """Nothing is sent any more."""
-        self._aim, self.fresh = None, False
+        self._target, self.fresh = None, False
         self.held = None
 
-    def judge(self) -> None:
+    def update(self) -> None:
         """After each round of telemetry: whether it makes sense to go on."""
-        if self._aim is None:
+        if self._target is None:
             return
-        self._was_armed = self._was_armed or self._seen.armed
-        if (self._was_armed and not self._seen.armed) or not self._hearing.authority:
+        self._was_armed = self._was_armed or self._telemetry.armed
+        if (self._was_armed and not self._telemetry.armed) or not self._decoder.authority:
             self.stop()
         elif self._not_obeyed():
-            self._hearing.not_obeyed()
-            self._hearing.judge()
+            self._decoder.not_obeyed()
+            self._decoder.update()
             self.stop()
 
     def _not_obeyed(self) -> bool:
         waits = {mode.name for mode in WAITS}
         now = self._kernel.now()
-        if not self._seen.flying or self._seen.mode not in waits or self._seen.failsafe:
+        if not self._telemetry.flying or self._telemetry.mode not in waits or self._telemetry.failsafe:
             self._unheeded = None
         return self._unheeded is not None and now - self._unheeded > OBEYED_WITHIN
 
@@ -135,57 +135,57 @@ class SetpointStream:
         made = self._made()
         if made is None:
             self._unheeded = None
-        elif self._unheeded is None and self._seen.mode != DisplayMode.NAVI_SDK_CTRL.name:
+        elif self._unheeded is None and self._telemetry.mode != DisplayMode.NAVI_SDK_CTRL.name:
             self._unheeded = self._kernel.now()
         return made
 
     def _made(self) -> Setpoint | None:
-        aim = self._aim
-        if isinstance(aim, Point):
-            return self._towards(aim)
-        if isinstance(aim, Moving):
-            return self._along(aim)
-        return None if aim is None else self._sticks(aim)
+        target = self._target
+        if isinstance(target, Point):
+            return self._towards(target)
+        if isinstance(target, Moving):
+            return self._along(target)
+        return None if target is None else self._manual(target)
 
-    def _towards(self, aim: Point) -> Setpoint | None:
-        here = self._seen.position
-        if here is None or self._kernel.now() - self._hearing.located_at > STALE:
+    def _towards(self, target: Point) -> Setpoint | None:
+        here = self._telemetry.position
+        if here is None or self._kernel.now() - self._decoder.located_at > STALE:
             return None
         east, north, _ = LocalFrame(here.latitude, here.longitude, 0.0).to_enu(
-            aim.latitude, aim.longitude, 0.0
+            target.latitude, target.longitude, 0.0
         )
-        if aim.speed is None:
-            return POSITION_YAW, (east, north, aim.height, aim.yaw)
-        away, carrot = hypot(east, north), aim.speed * CARROT_S
-        if away > aim.speed**2 / (2.0 * BRAKES_M_S2) + carrot:
-            return self._at_speed(aim, (east, north), aim.speed)
+        if target.speed is None:
+            return POSITION_YAW, (east, north, target.height, target.yaw)
+        away, carrot = hypot(east, north), target.speed * CARROT_S
+        if away > target.speed**2 / (2.0 * BRAKES_M_S2) + carrot:
+            return self._at_speed(target, (east, north), target.speed)
         share = min(1.0, carrot / away) if away > 0.0 else 1.0
-        return POSITION_YAW, (east * share, north * share, aim.height, aim.yaw)
+        return POSITION_YAW, (east * share, north * share, target.height, target.yaw)
 
-    def _at_speed(self, aim: Point, offset: tuple[float, float], speed: float) -> Setpoint:
+    def _at_speed(self, target: Point, offset: tuple[float, float], speed: float) -> Setpoint:
         """Straight there: the climb is spread over the way."""
         away = hypot(*offset)
-        climb = aim.height - self._seen.above_home
+        climb = target.height - self._telemetry.above_home
         up = min(UP_M_S, max(-DOWN_M_S, climb / max(1.0, away / speed)))
         return VELOCITY_YAW_RATE, (offset[0] / away * speed, offset[1] / away * speed, up, 0.0)
 
-    def _along(self, aim: Moving) -> Setpoint | None:
+    def _along(self, target: Moving) -> Setpoint | None:
         now = self._kernel.now()
-        if now >= aim.until + STOP_FOR:
-            self._aim = None
+        if now >= target.until + STOP_FOR:
+            self._target = None
             return None
-        velocity, turn = (aim.velocity, aim.turn) if now < aim.until else (STILL, 0.0)
+        velocity, turn = (target.velocity, target.turn) if now < target.until else (STILL, 0.0)
         return VELOCITY_YAW_RATE, (velocity.east, velocity.north, velocity.up, turn)
 
-    def _sticks(self, aim: Manual) -> Setpoint | None:
-        sticks = self.held
-        if sticks is None:
+    def _manual(self, target: Manual) -> Setpoint | None:
+        control = self.held
+        if control is None:
             return None
-        lean = (sticks.roll * STICK_TILT, sticks.pitch * STICK_TILT)
-        turn = -sticks.yaw * STICK_YAW_RATE
-        if not aim.keeps_height:
-            return ANGLE_YAW_RATE_THRUST, (*lean, 100.0 * sticks.throttle, turn)
-        return ANGLE_YAW_RATE_CLIMB, (*lean, _climb(sticks.throttle), turn)
+        lean = (control.roll * STICK_TILT, control.pitch * STICK_TILT)
+        turn = -control.yaw * STICK_YAW_RATE
+        if not target.keeps_height:
+            return ANGLE_YAW_RATE_THRUST, (*lean, 100.0 * control.throttle, turn)
+        return ANGLE_YAW_RATE_CLIMB, (*lean, _climb(control.throttle), turn)
 
 
 def _climb(throttle: float) -> float:

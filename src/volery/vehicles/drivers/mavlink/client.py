@@ -340,9 +340,7 @@ class MavlinkClient:
     def _handle_parameter(self, fields: Mapping[str, Any]) -> bool:
         """Another station may list all parameters at the same time."""
         name: str = fields["param_id"]
-        value: float = fields["param_value"]
-        if self.firmware.bytewise:
-            value = from_bytewise(fields["param_type"], value)
+        value = parameter_value(fields, self.firmware.bytewise)
         if name not in self._requested_parameters() or not isfinite(value):
             return False
         self._parameters[name] = value
@@ -454,6 +452,12 @@ class MavlinkClient:
         """Request MISSION_CURRENT, which reports the end of missions that do not land."""
         self._streams.add("MISSION_CURRENT", S)
         self._streams.check(self._kernel.now())
+
+
+def parameter_value(fields: Mapping[str, Any], bytewise: bool) -> float:
+    """Return the value in a PARAM_VALUE; *bytewise*: whole numbers lie in the bytes of the float, as in PX4."""
+    value: float = fields["param_value"]
+    return from_bytewise(fields["param_type"], value) if bytewise else value
 
 
 def link_error(link: Link, wrong: str) -> LinkError:

@@ -1,6 +1,6 @@
-"""Paparazzi rotorcraft: its sequences, written once, and two ways to reach it: pprzlink and pprzros topics.
+"""Paparazzi rotorcraft: one driver, over pprzlink or over pprzros topics.
 
-From public definitions of the protocol; not flown. ``modes.ASSUMED`` lists what is taken for granted.
+It follows the public definitions of the protocol and has not been flown; ``modes.ASSUMED`` lists the assumptions.
 """
 
 from __future__ import annotations
@@ -24,27 +24,36 @@ from volery.vehicles.drivers.paparazzi.sequences import Blocks
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 
 OPTIONS = ("aircraft", "land", "start", "system", "takeoff", "texts")
-CARRIERS = ("baud", "from", "uplink")
-"""Options that are not the driver's, but of what carries it."""
+LINK_OPTIONS = ("baud", "from", "uplink")
+"""Options of an address that belong to the link."""
 
 
 def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> Paparazzi:
-    """A Paparazzi rotorcraft behind a pprzlink. It begins to listen and to send pings at once.
+    """Open a Paparazzi rotorcraft on a pprzlink; pings are sent from now on.
 
-    Options: ``aircraft``, the folder with its XML, else it is taken for the stock rotorcraft; ``system``, its
-    id, else the XML's, else the first that speaks; ``start``, ``takeoff`` and ``land``, other names of these
-    blocks of its flight plan; ``texts=unrecorded`` where it records its texts itself, as a simulated one.
+    Args:
+        kernel: clock and tasks.
+        link: link to the aircraft.
+        name: name of the vehicle.
+        options: ``aircraft``, the folder with its XML (default: the stock rotorcraft); ``system``, its id
+            (default: the id in the XML, or the first that is received); ``start``, ``takeoff`` and ``land``,
+            the names of these blocks of its flight plan; ``texts=unrecorded`` if the aircraft records its
+            texts itself, as a simulated one does.
     """
-    check_options("paparazzi", options, *OPTIONS, *CARRIERS)
-    uplink = PaparazziBackend(kernel, link, name, _aircraft(options), options)
-    return Paparazzi(kernel, uplink, _blocks(options))
+    check_options("paparazzi", options, *OPTIONS, *LINK_OPTIONS)
+    backend = PaparazziBackend(kernel, link, name, _aircraft(options), options)
+    return Paparazzi(kernel, backend, _blocks(options))
 
 
 def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Paparazzi:
-    """A Paparazzi rotorcraft behind the pprzros bridge, commanded by *node*. It begins to listen at once.
+    """Open a Paparazzi rotorcraft behind the pprzros bridge.
 
-    Options: ``namespace`` of the bridge, else the root, where ``/pprzros/to_ros`` and ``/pprzros/from_ros``
-    are; and those of ``open_driver``.
+    Args:
+        kernel: clock and tasks.
+        node: the node that commands the vehicle.
+        name: name of the vehicle.
+        options: ``namespace`` of ``pprzros/to_ros`` and ``pprzros/from_ros`` (default: the root), and the
+            options of ``open_driver``.
     """
     check_options("paparazzi", options, *OPTIONS, "namespace")
     aircraft, blocks = _aircraft(options), _blocks(options)
@@ -66,4 +75,3 @@ def _blocks(options: Mapping[str, str]) -> Blocks:
 
 
 DRIVER = DriverFactory(on_link=open_driver, codec=PPRZLINK, on_graph=open_pprzros, graph_names="pprzros")
-"""Paparazzi on a pprzlink; on a graph it goes by pprzros's names."""

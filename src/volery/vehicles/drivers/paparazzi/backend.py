@@ -1,10 +1,7 @@
-"""The other end of a pprzlink: which aircraft it is, what it is told, whether its settings are those meant.
+"""What can be sent to a Paparazzi rotorcraft on a pprzlink, and the check of its setting numbers.
 
-pprzlink has no acknowledgements. A setting is answered by its value, everything else shows on the telemetry
-or does not.
-
-What has to be repeated to a Paparazzi: sticks, since it misses its transmitter; velocities, since one may
-be lost on the way, and the last would stand for ever.
+pprzlink has no acknowledgements. A setting is answered by its value; the effect of everything else shows in the
+telemetry or not at all.
 """
 
 from __future__ import annotations
@@ -23,31 +20,36 @@ from volery.links.pprzlink_messages import TELEMETRY, entry_value, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import records_texts, system_option
 from volery.vehicles.driver import ManualControl
-from volery.vehicles.drivers import setpoint_repeater
 from volery.vehicles.drivers.paparazzi.decoder import PaparazziDecoder
 from volery.vehicles.drivers.paparazzi.modes import AUTO2, GUIDED, KILL_THROTTLE, MODE, NUMBERS, STATUS
+from volery.vehicles.drivers.setpoint_repeater import SetpointRepeater
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 PING_PERIOD: Ns = S
-"""A plan may have its aircraft come home when the ground falls silent."""
+"""A flight plan may make the aircraft return when the ground station falls silent."""
 SILENT_AFTER: Ns = 3 * S
 WRONG_ANSWERS = 5
-"""So often a setting may have another value than the telemetry shows: that is 0.25 to 2 s late."""
+"""Number of times that a setting may differ from the telemetry, which is 0.25 to 2 s late."""
+CONTROL_PERIOD: Ns = 100 * MS
+VELOCITY_PERIOD: Ns = 250 * MS
 
 RELATIVE, BODY, RELATIVE_Z, RELATIVE_YAW = 0x01, 0x02, 0x04, 0x08
 VELOCITY, VELOCITY_Z, YAW_RATE = 0x20, 0x40, 0x80
-"""Flags of GUIDED_SETPOINT_NED; none: a place and a heading."""
+"""Flags of GUIDED_SETPOINT_NED; without flags a position and a heading."""
 BY_VELOCITY = VELOCITY | VELOCITY_Z | YAW_RATE
 
 STICK, THROTTLE = 127, 127
+"""Full deflection in RC_4CH."""
 AUTO2_SWITCH = entry_value("RC_4CH", "mode", "AUTO2")
 STOP = entry_value("EMERGENCY_CMD", "cmd", "KILL")
 COME_DOWN = entry_value("EMERGENCY_CMD", "cmd", "LAND")
 
 
 class Setpoint(NamedTuple):
-    """North, east, down in metres about the local origin and a heading in radians; with the flags
-    ``BY_VELOCITY`` metres per second and radians per second, clockwise.
+    """A set-point in GUIDED.
+
+    North, east and down in metres about the local origin and a heading in radians; with the flags ``BY_VELOCITY``
+    metres per second and radians per second, clockwise.
     """
 
     north: float
@@ -57,22 +59,38 @@ class Setpoint(NamedTuple):
     flags: int = 0
 
 
+STILL = Setpoint(0.0, 0.0, 0.0, 0.0, BY_VELOCITY)
+
+
 class PaparazziBackend:
-    """Talks to one rotorcraft: the first that speaks, or the one that option ``system_option`` or its XML names."""
+    """Client of one rotorcraft: the first that is received, or the one in option ``system`` or in its XML.
+
+    Args:
+        kernel: clock and record.
+        link: link to the aircraft.
+        name: name of the vehicle.
+        aircraft: definition of the aircraft from its XML.
+        options: options of the address.
+    """
 
     def __init__(
-        self, kernel: Kernel, link: Link, name: str, aircraft: PaparazziAircraft, options: Mapping[str, str]
+        self,
+        kernel: Kernel,
+        link: Link,
+        name: str,
+        aircraft: PaparazziAircraft,
+        options: Mapping[str, str],
     ) -> None:
         self.telemetry = Telemetry(kernel, name)
-        self.hearing = PaparazziDecoder(kernel, self.telemetry, aircraft, record=records_texts(options))
+        self.decoder = PaparazziDecoder(kernel, self.telemetry, aircraft, record=records_texts(options))
         self.aircraft = aircraft
         self._kernel = kernel
         self._link = link
-        self._wanted = system_option(options) or aircraft.system
+        self._expected_system = system_option(options) or aircraft.system
         self._system = 0
-        self._stranger = 0  # another aircraft that is heard
+        self._other_system = 0  # another aircraft that is received
         self._silent = False
-        self._mistaken = ""
+        self._wrong_setting = ""
         self._wrong_answers = 0
         self._checked = {one.name: one for one in (self._find(MODE), self._find(KILL_THROTTLE)) if one}
         self._unchecked = set(self._checked)
@@ -82,104 +100,100 @@ class PaparazziBackend:
     def _find(self, name: str) -> Setting | None:
         return next((one for one in self.aircraft.settings if one.name == name), None)
 
-    # -- hearing
+    # -- receiving
 
     def _receive(self, frame: Frame) -> None:
-        if message_type(frame.name).kind != TELEMETRY or not self._is_ours(frame):
+        if message_type(frame.name).kind != TELEMETRY or not self._is_from_aircraft(frame):
             return
         now = self._kernel.now()
         if self._silent:
             self._silent = False
-            self._kernel.record(LinkState(now, self.telemetry.name, "back", "the aircraft is heard again"))
-        known = self.hearing.hear(frame.name, frame.fields)
+            self._kernel.record(LinkState(now, self.telemetry.name, "back", "the aircraft is received again"))
+        used = self.decoder.handle_message(frame.name, frame.fields)
         if frame.name in ("DL_VALUE", STATUS):
             self._check_settings()
-        if known:
+        if used:
             self.telemetry.changed.notify()
 
-    def _is_ours(self, frame: Frame) -> bool:
+    def _is_from_aircraft(self, frame: Frame) -> bool:
         if self._system:
             return frame.system == self._system
-        if self._wanted is not None and frame.system != self._wanted:
-            self._stranger = frame.system
+        if self._expected_system is not None and frame.system != self._expected_system:
+            self._other_system = frame.system
             return False
         self._system = frame.system
         return True
 
     def _tick(self) -> None:
-        """Each second: say that we are there, ask for settings not checked yet, notice silence."""
+        """Send a ping, request unchecked settings, and detect silence."""
         self._send("PING")
-        heard, now = self.telemetry.last_message_ns, self._kernel.now()
-        if heard < 0:
+        last, now = self.telemetry.last_message_ns, self._kernel.now()
+        if last < 0:
             return
         for name in sorted(self._unchecked):
             self._send("GET_SETTING", index=self._checked[name].number, ac_id=self._system)
-        if now - heard > SILENT_AFTER and not self._silent:
+        if now - last > SILENT_AFTER and not self._silent:
             self._silent = True
-            detail = self._link.problem() or "the aircraft is not heard"
+            detail = self._link.problem() or "the aircraft is not received"
             self._kernel.record(LinkState(now, self.telemetry.name, "silent", detail))
 
-    # -- whether the settings are the ones that are meant
+    # -- check of the setting numbers
 
     def _check_settings(self) -> None:
-        """Writing a setting under a wrong number could change anything; so what is read must fit first."""
-        seen = self.telemetry
-        shown = {MODE: NUMBERS.get(seen.mode), KILL_THROTTLE: int(not seen.armed)}
+        """Compare settings with the telemetry: writing under a wrong number could change anything."""
+        telemetry = self.telemetry
+        shown = {MODE: NUMBERS.get(telemetry.mode), KILL_THROTTLE: int(not telemetry.armed)}
         for name in sorted(self._unchecked):
             number = self._checked[name].number
-            answer = self.hearing.values.pop(number, None)
-            if answer is None or not seen.mode:
+            answer = self.decoder.values.pop(number, None)
+            if answer is None or not telemetry.mode:
                 continue
             if answer[1] == shown[name]:
                 self._unchecked.discard(name)
-            else:
-                self._wrong_answers += 1
-                self._suspect(name, number, answer[1])
-        if not self._unchecked and not self.hearing.settled:
-            self.hearing.settled, self._mistaken = True, ""
-            self.hearing.judge_readiness()
+                continue
+            self._wrong_answers += 1
+            if self._wrong_answers >= WRONG_ANSWERS:
+                state = f"in {telemetry.mode}, {'armed' if telemetry.armed else 'disarmed'}"
+                self._wrong_setting = (
+                    f"setting {number} of this aircraft is not {name!r} as in {self.aircraft.source}: it is "
+                    f"{answer[1]:g} while it is {state}; give its own XML: aircraft=var/aircrafts/NAME"
+                )
+        if not self._unchecked and not self.decoder.settings_checked:
+            self.decoder.settings_checked, self._wrong_setting = True, ""
+            self.decoder.update_ready()
 
-    def _suspect(self, name: str, number: int, value: float) -> None:
-        if self._wrong_answers >= WRONG_ANSWERS:
-            seen = self.telemetry
-            shows = f"in {seen.mode}, {'armed' if seen.armed else 'disarmed'}"
-            self._mistaken = (
-                f"setting {number} of this aircraft is not {name!r} as in {self.aircraft.source}: it is "
-                f"{value:g} while it is {shows}; give its own XML: aircraft=var/aircrafts/NAME"
-            )
-
-    # -- speaking
+    # -- sending
 
     def _send(self, name: str, **fields: Any) -> None:
         self._link.send(Frame(name, fields, TO_GROUND, 0))
 
-    def setting(self, name: str, value: float) -> None:
-        """Write it, unless nobody knows yet whether its number is right, or the aircraft has none."""
+    def set_setting(self, name: str, value: float) -> None:
+        """Write a setting, if the aircraft has it and its number has been checked."""
         found = self._find(name)
-        if found is not None and self.hearing.settled:
+        if found is not None and self.decoder.settings_checked:
             self._send("SETTING", index=found.number, ac_id=self._system, value=value)
 
-    def mode(self, mode: str) -> None:
-        """Change the mode: directly, and by what the third position of a mode switch means."""
-        self.hearing.ask_mode(mode)
-        self.setting(AUTO2, NUMBERS[mode])
-        self.setting(MODE, NUMBERS[mode])
+    def set_mode(self, mode: str) -> None:
+        """Change the mode: directly, and as the meaning of the third position of a mode switch."""
+        self.decoder.note_commanded(mode)
+        self.set_setting(AUTO2, NUMBERS[mode])
+        self.set_setting(MODE, NUMBERS[mode])
 
-    def motors(self, on: bool) -> None:
-        """Start or stop them."""
-        self.hearing.starting = self._kernel.now() if on and self.hearing.settled else None
-        self.setting(KILL_THROTTLE, 0.0 if on else 1.0)
+    def set_motors(self, on: bool) -> None:
+        """Start or stop the motors."""
+        self.decoder.starting = self._kernel.now() if on and self.decoder.settings_checked else None
+        self.set_setting(KILL_THROTTLE, 0.0 if on else 1.0)
 
-    def emergency(self, command: int) -> None:
-        """``STOP`` or ``COME_DOWN``."""
+    def send_emergency(self, command: int) -> None:
+        """Send an emergency command: ``STOP`` or ``COME_DOWN``."""
         self._send("EMERGENCY_CMD", ac_id=self._system, cmd=command)
 
-    def block(self, name: str) -> None:
-        """Go on in another block of the flight plan."""
+    def enter_block(self, name: str) -> None:
+        """Continue in another block of the flight plan."""
         self._send("BLOCK", block_id=self.aircraft.block(name).number, ac_id=self._system)
 
-    def setpoint(self, setpoint: Setpoint) -> None:
-        """Obeyed in GUIDED only."""
+    def send_setpoint(self, setpoint: Setpoint) -> None:
+        """Send a set-point, which is obeyed in GUIDED only."""
         self._send(
             "GUIDED_SETPOINT_NED",
             ac_id=self._system,
@@ -190,69 +204,67 @@ class PaparazziBackend:
             yaw=setpoint.yaw,
         )
 
-    def manual_control(self, sticks: ManualControl) -> None:
-        """As a transmitter whose mode switch is in the third position; pitch is nose up."""
+    def send_manual_control(self, control: ManualControl) -> None:
+        """Send RC_4CH, like a transmitter with its mode switch in the third position; pitch is nose up."""
         self._send(
             "RC_4CH",
             ac_id=self._system,
             mode=AUTO2_SWITCH,
-            throttle=round(THROTTLE * sticks.throttle),
-            roll=round(STICK * sticks.roll),
-            pitch=round(-STICK * sticks.pitch),
-            yaw=round(STICK * sticks.yaw),
+            throttle=round(THROTTLE * control.throttle),
+            roll=round(STICK * control.roll),
+            pitch=round(-STICK * control.pitch),
+            yaw=round(STICK * control.yaw),
         )
 
-    # -- the way there
+    # -- link
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """Nothing while it is heard and is what it should be; else what is there instead."""
-        if self._mistaken:
-            return CapabilityError(self._mistaken)
+        """Return what is wrong with the link, or why the aircraft is not supported, as an error to raise."""
+        if self._wrong_setting:
+            return CapabilityError(self._wrong_setting)
         wrong = self._link.problem()
         if wrong:
-            heard = getattr(self._link, "statistics", None)
-            garbled = isinstance(heard, ReceiveStatistics) and heard.octets > 0 and not heard.frames
-            return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
+            statistics = getattr(self._link, "statistics", None)
+            received = isinstance(statistics, ReceiveStatistics) and statistics.octets > 0
+            return LinkGarbled(wrong) if received and not statistics.frames else LinkSilent(wrong)
         if self.telemetry.last_message_ns >= 0:
             return None
-        if self._stranger:
-            return LinkSilent(f"aircraft {self._stranger} speaks here, not {self._wanted}")
-        return LinkSilent("no Paparazzi aircraft was heard")
+        if self._other_system:
+            return LinkSilent(f"aircraft {self._other_system} answers here, not {self._expected_system}")
+        return LinkSilent("no message of a Paparazzi aircraft was received")
 
     def close(self) -> None:
-        """No more pings; the link is closed."""
+        """Stop the pings and close the link."""
         self._ping.cancel()
         self._link.close()
 
 
-STICKS_PERIOD: Ns = 100 * MS
-VELOCITY_PERIOD: Ns = 250 * MS
+class PaparazziSetpoints(SetpointRepeater):
+    """Repeats velocities in GUIDED, and manual control in the modes that this program commanded."""
 
-STILL = Setpoint(0.0, 0.0, 0.0, 0.0, BY_VELOCITY)
-
-
-class PaparazziSetpoints(setpoint_repeater.SetpointRepeater):
-    """In GUIDED, and in the modes that were asked for."""
-
-    def __init__(self, kernel: Kernel, uplink: PaparazziBackend) -> None:
+    def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
         super().__init__(
-            kernel, uplink.telemetry, GUIDED, velocity_period=VELOCITY_PERIOD, sticks_period=STICKS_PERIOD
+            kernel,
+            backend.telemetry,
+            GUIDED,
+            velocity_period=VELOCITY_PERIOD,
+            control_period=CONTROL_PERIOD,
         )
-        self._uplink = uplink
+        self._backend = backend
 
-    def stand_still(self) -> None:
-        """A velocity of zero, once."""
-        self._uplink.setpoint(STILL)
+    def send_stop(self) -> None:
+        """Send a velocity of zero once."""
+        self._backend.send_setpoint(STILL)
 
-    def move(self, velocity: Velocity, yaw_rate: float) -> None:
-        """A velocity and a turn rate, once."""
+    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Send a velocity and a turn rate once."""
         north, east, up = velocity
-        self._uplink.setpoint(Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
+        self._backend.send_setpoint(Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
 
-    def asked_for(self, mode: str) -> bool:
-        """One of ours."""
-        return mode in self._uplink.hearing.ours
+    def is_commanded(self, mode: str) -> bool:
+        """Return whether *mode* is one of ours."""
+        return mode in self._backend.decoder.ours
 
-    def send(self, sticks: ManualControl) -> None:
-        """As a transmitter's."""
-        self._uplink.manual_control(sticks)
+    def send_control(self, control: ManualControl) -> None:
+        """Send manual control like a transmitter."""
+        self._backend.send_manual_control(control)

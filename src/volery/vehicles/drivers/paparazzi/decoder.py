@@ -1,4 +1,4 @@
-"""What a Paparazzi rotorcraft's messages say, as ``Telemetry``. One method for each that is listened to."""
+"""Decoder of a Paparazzi rotorcraft's messages. One method for each message."""
 
 from __future__ import annotations
 
@@ -34,39 +34,50 @@ POSITION, SPEED, ANGLE = 1 / 2**8, 1 / 2**19, 1 / 2**12
 """Metres, metres per second and radians of one count in ROTORCRAFT_FP."""
 
 KINDS = {STATUS: DRONE_KIND, "PPRZ_MODE": "plane", "ROVER_STATUS": "Paparazzi rover"}
-"""What sends this message is of this kind."""
+"""Kind of the vehicle that sends a message."""
 
 EFFECT: Ns = 300 * MS
-"""So long after motors were told to start, a status that says why they do not is the answer to that."""
+"""Time after the command to start the motors from which a status that prevents arming is its answer."""
 
 NOTICE, WARNING = 5, 4
 
 
 class Origin:
-    """The local frame: east, north, up about a point that INS_REF tells. Altitudes are AMSL outside."""
+    """The local frame: east, north, up about the point in INS_REF. Altitudes outside are AMSL."""
 
     def __init__(self, fields: Fields) -> None:
         self.latitude: float = fields["lat0"] / 1e7
         self.longitude: float = fields["lon0"] / 1e7
         self.amsl: float = fields["hmsl0"] / 1000.0
-        self._above_amsl: float = fields["alt0"] / 1000.0 - self.amsl  # of the ellipsoid's heights
+        self._ellipsoid_above_amsl: float = fields["alt0"] / 1000.0 - self.amsl
         self._frame = LocalFrame(self.latitude, self.longitude, fields["alt0"] / 1000.0)
 
     def position(self, enu: Vector) -> Position:
-        """Where on the globe."""
+        """Return the position of a point in the local frame."""
         latitude, longitude, height = self._frame.from_enu(enu)
-        return Position(latitude, longitude, AMSL(height - self._above_amsl))
+        return Position(latitude, longitude, AMSL(height - self._ellipsoid_above_amsl))
 
     def enu(self, latitude: float, longitude: float, amsl: float) -> Vector:
-        """Where in the local frame."""
-        return self._frame.to_enu(latitude, longitude, amsl + self._above_amsl)
+        """Return a position in the local frame."""
+        return self._frame.to_enu(latitude, longitude, amsl + self._ellipsoid_above_amsl)
 
 
 class PaparazziDecoder:
-    """Turns messages into telemetry. ``hear`` one; it says whether it was of interest.
+    """Decodes messages into telemetry. HOME and FAILSAFE are failsafes unless this program commanded them.
 
-    *record*: what it says in words goes into the trace, too. ``ours`` are the mode that we asked for last
-    and, until it is seen, the one before. HOME and FAILSAFE are failsafes only where nobody asked for them.
+    Attributes:
+        ours: the mode commanded last and, until that is seen, the one before.
+        settings_checked: the numbers of the settings were checked.
+        starting: when the motors were commanded to start; ``None`` if they were not.
+        values: time and value of received settings, by number.
+        block: time and number of the last reported block of the flight plan.
+        good_fix: the GPS receiver has a 3D fix.
+
+    Args:
+        kernel: clock and record.
+        telemetry: written by the decoder.
+        aircraft: definition of the aircraft from its XML.
+        record: whether the aircraft's texts are recorded.
     """
 
     def __init__(
@@ -74,17 +85,17 @@ class PaparazziDecoder:
     ) -> None:
         self.origin: Origin | None = None
         self.ours: frozenset[str] = frozenset()
-        self._asked_mode = ""
-        self.settled = False  # the numbers of settings were checked
-        self.starting: Ns | None = None  # since when motors are to start
+        self.settings_checked = False
+        self.starting: Ns | None = None
         self.values: dict[int, tuple[Ns, float]] = {}
         self.block: tuple[Ns, int] = (-1, -1)
         self.good_fix = False
         self._kernel = kernel
-        self._seen = telemetry
+        self._telemetry = telemetry
         self._records = record
         self._home_number, self._home = _home_of(aircraft)
         self._preparing = {block.number for block in aircraft.blocks if block.name in PREPARING_BLOCKS}
+        self._commanded_mode = ""
         self._origin_is_set = False
         self._arming = ""
         self._handlers: Mapping[str, Callable[[Fields], None]] = {
@@ -96,119 +107,120 @@ class PaparazziDecoder:
             "ROTORCRAFT_NAV_STATUS": self._navigation,
             "DL_VALUE": self._value,
             "WP_MOVED_ENU": self._moved,
-            "INFO_MSG": lambda fields: self.say(NOTICE, fields["msg"]),
+            "INFO_MSG": lambda fields: self.add_text(NOTICE, fields["msg"]),
         }
 
-    def hear(self, name: str, fields: Fields) -> bool:
-        """Take note of a message of our aircraft. It is heard of once it has told what kind it is."""
-        seen = self._seen
-        if name in KINDS and not seen.kind:
-            seen.kind, seen.autopilot = KINDS[name], "Paparazzi"
-        if seen.kind:
-            seen.last_message_ns = self._kernel.now()
+    def handle_message(self, name: str, fields: Fields) -> bool:
+        """Decode a message; return whether it was used. Nothing counts before the kind of vehicle is known."""
+        telemetry = self._telemetry
+        if name in KINDS and not telemetry.kind:
+            telemetry.kind, telemetry.autopilot = KINDS[name], "Paparazzi"
+        if telemetry.kind:
+            telemetry.last_message_ns = self._kernel.now()
         handler = self._handlers.get(name)
         if handler is None:
             return False
         handler(fields)
         return True
 
-    def ask_mode(self, mode: str) -> None:
-        """*mode* is about to be asked for."""
-        if mode != self._asked_mode:
-            self._asked_mode = mode
-            self.ours = frozenset({mode, self._seen.mode})
+    def note_commanded(self, mode: str) -> None:
+        """Note that *mode* is being commanded."""
+        if mode != self._commanded_mode:
+            self._commanded_mode = mode
+            self.ours = frozenset({mode, self._telemetry.mode})
 
-    def say(self, severity: int, text: str) -> None:
-        """Words of the aircraft's."""
+    def add_text(self, severity: int, text: str) -> None:
+        """Add a text of the aircraft."""
         now = self._kernel.now()
-        self._seen.texts.append(StatusText(now, severity, text))
+        self._telemetry.texts.append(StatusText(now, severity, text))
         if self._records:
-            self._kernel.record(Text(now, self._seen.name, severity, text))
+            self._kernel.record(Text(now, self._telemetry.name, severity, text))
 
-    def judge_readiness(self) -> None:
-        """It knows where it is, its attitude is aligned, and its settings are the ones that we write."""
-        seen = self._seen
-        seen.armable = bool(self._arming) and self._arming not in PREVENTS_ARMING
-        placed = self._origin_is_set and seen.position is not None
-        seen.ready = seen.armable and self.settled and self.good_fix and placed
+    def update_ready(self) -> None:
+        """Ready means: position, aligned attitude, and checked settings."""
+        telemetry = self._telemetry
+        telemetry.armable = bool(self._arming) and self._arming not in PREVENTS_ARMING
+        located = self._origin_is_set and telemetry.position is not None
+        telemetry.ready = telemetry.armable and self.settings_checked and self.good_fix and located
 
     def _status(self, fields: Fields) -> None:
-        seen = self._seen
-        seen.mode = entry_name(STATUS, "ap_mode", fields["ap_mode"])
-        seen.armed = bool(fields["ap_motors_on"])
-        seen.flying = bool(fields["ap_in_flight"]) and seen.armed
-        seen.failsafe = seen.mode in {FAILSAFE, HOME} and seen.mode != self._asked_mode
-        if seen.mode == self._asked_mode:
-            self.ours = frozenset({seen.mode})
-        seen.fix = entry_name(STATUS, "gps_status", fields["gps_status"]).lower()
+        telemetry = self._telemetry
+        telemetry.mode = entry_name(STATUS, "ap_mode", fields["ap_mode"])
+        telemetry.armed = bool(fields["ap_motors_on"])
+        telemetry.flying = bool(fields["ap_in_flight"]) and telemetry.armed
+        commanded = telemetry.mode == self._commanded_mode
+        telemetry.failsafe = telemetry.mode in {FAILSAFE, HOME} and not commanded
+        if commanded:
+            self.ours = frozenset({telemetry.mode})
+        telemetry.fix = entry_name(STATUS, "gps_status", fields["gps_status"]).lower()
         self.good_fix = fields["gps_status"] >= GOOD_FIX
-        self._hear_arming(entry_name(STATUS, "arming_status", fields["arming_status"]))
-        self._hear_volts(fields["vsupply"])
-        self.judge_readiness()
+        self._update_arming(entry_name(STATUS, "arming_status", fields["arming_status"]))
+        if isnan(telemetry.battery.amperes):
+            telemetry.battery = Battery(nan, fields["vsupply"], nan)
+        self.update_ready()
 
-    def _hear_arming(self, word: str) -> None:
-        self._seen.status = word.lower().replace("_", " ")
-        now = self._kernel.now()
-        began = self.starting
+    def _update_arming(self, status: str) -> None:
+        telemetry, began, now = self._telemetry, self.starting, self._kernel.now()
+        telemetry.status = status.lower().replace("_", " ")
         refused = (
-            began is not None and now - began >= EFFECT and word in PREVENTS_ARMING and not self._seen.armed
+            began is not None and now - began >= EFFECT and status in PREVENTS_ARMING and not telemetry.armed
         )
         if refused:
             self.starting = None
-            self._seen.answers[START] = Answer(now, False, word)
-        if refused or (word != self._arming and word in NEEDS_CARE):
-            self.say(WARNING, f"arming status: {self._seen.status}")
-        self._arming = word
+            telemetry.answers[START] = Answer(now, False, status)
+        if refused or (status != self._arming and status in NEEDS_CARE):
+            self.add_text(WARNING, f"arming status: {telemetry.status}")
+        self._arming = status
 
     def _reference(self, fields: Fields) -> None:
-        """All zero: no origin has been set. Off the globe: garbled on the way."""
+        """All zeros mean that no origin has been set; a point off the globe was garbled on the way."""
         latitude, longitude = fields["lat0"], fields["lon0"]
         if not (latitude or longitude) or abs(latitude) > 90 * 10**7 or abs(longitude) > 180 * 10**7:
             return
         self.origin = Origin(fields)
         self._origin_is_set = self.block[1] >= 0 and self.block[1] not in self._preparing
-        self._place_home()
-        self.judge_readiness()
+        self._update_home()
+        self.update_ready()
 
-    def _place_home(self) -> None:
+    def _update_home(self) -> None:
         if self.origin is None:
             return
         east, north = self._home
         there = self.origin.position((east, north, 0.0))
-        self._seen.home = Position(there.latitude, there.longitude, AMSL(self.origin.amsl))
+        self._telemetry.home = Position(there.latitude, there.longitude, AMSL(self.origin.amsl))
 
     def _moved(self, fields: Fields) -> None:
-        """The plan's HOME has another place than its XML says."""
+        """Take the new place of the plan's waypoint HOME."""
         if fields["wp_id"] == self._home_number:
             self._home = fields["east"] * POSITION, fields["north"] * POSITION
-            self._place_home()
+            self._update_home()
 
     def _flight(self, fields: Fields) -> None:
-        seen = self._seen
+        telemetry = self._telemetry
         heading = degrees(fields["psi"] * ANGLE) % 360.0
-        seen.attitude = Attitude(degrees(fields["phi"] * ANGLE), degrees(fields["theta"] * ANGLE), heading)
+        telemetry.attitude = Attitude(
+            degrees(fields["phi"] * ANGLE), degrees(fields["theta"] * ANGLE), heading
+        )
         if self.origin is None:
             return
-        seen.position = self.origin.position(_enu(fields, ""))
-        seen.above_home = seen.position.altitude.metres - self.origin.amsl
-        if seen.mode == GUIDED:
-            seen.target = self.origin.position(_enu(fields, "carrot_"))
-        seen.velocity = Velocity(fields["vnorth"] * SPEED, fields["veast"] * SPEED, fields["vup"] * SPEED)
-        self.judge_readiness()
+        telemetry.position = self.origin.position(_enu(fields, ""))
+        telemetry.above_home = telemetry.position.altitude.metres - self.origin.amsl
+        if telemetry.mode == GUIDED:
+            telemetry.target = self.origin.position(_enu(fields, "carrot_"))
+        telemetry.velocity = Velocity(
+            fields["vnorth"] * SPEED, fields["veast"] * SPEED, fields["vup"] * SPEED
+        )
+        self.update_ready()
 
     def _satellites(self, fields: Fields) -> None:
-        self._seen.satellites = fields["numsv"]
+        self._telemetry.satellites = fields["numsv"]
 
     def _energy(self, fields: Fields) -> None:
-        """Paparazzi does not tell what remains, only what was drawn."""
-        self._seen.battery = Battery(nan, fields["voltage"], fields["current"])
-
-    def _hear_volts(self, volts: float) -> None:
-        if isnan(self._seen.battery.amperes):
-            self._seen.battery = Battery(nan, volts, nan)
+        """Paparazzi reports what was drawn, not what remains."""
+        self._telemetry.battery = Battery(nan, fields["voltage"], fields["current"])
 
     def _navigation(self, fields: Fields) -> None:
-        """What INS_REF told before the origin was set is not to be relied on."""
+        """An INS_REF received before the origin was set is not valid."""
         self.block = self._kernel.now(), fields["cur_block"]
         if self.block[1] in self._preparing:
             self._origin_is_set = False
@@ -218,13 +230,13 @@ class PaparazziDecoder:
 
 
 def _enu(fields: Fields, prefix: str) -> Vector:
-    """Metres in the local frame."""
+    """Return a point in the local frame, m."""
     east, north, up = (fields[f"{prefix}{axis}"] * POSITION for axis in ("east", "north", "up"))
     return east, north, up
 
 
 def _home_of(aircraft: PaparazziAircraft) -> tuple[int, tuple[float, float]]:
-    """Number of the waypoint HOME, and where it is: east, north; at the origin if the plan says nothing."""
+    """Return number and (east, north) of waypoint HOME; the origin if the plan does not state its place."""
     for waypoint in aircraft.waypoints:
         if waypoint.name == HOME_WAYPOINT:
             known = not (isnan(waypoint.east) or isnan(waypoint.north))

@@ -1,4 +1,4 @@
-"""Names of the rotorcraft firmware, and what the driver takes for granted about an aircraft."""
+"""Names of the rotorcraft firmware, and what the driver assumes about an aircraft."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ ATTITUDE_MODE, HEIGHT_MODE = "ATTITUDE_DIRECT", "ATTITUDE_RC_CLIMB"
 NUMBERS: Mapping[str, int] = {
     word: number for number, word in enumerate(message_type(STATUS).words("ap_mode"))
 }
-"""Of the modes."""
+"""Numbers of the modes."""
 
 GOOD_FIX = entry_value(STATUS, "gps_status", "3D")
-"""This or better."""
+"""Least ``gps_status`` for a position."""
 
 NEEDS_CARE = message_type(STATUS).words("arming_status")[8:]
-"""Words of ``arming_status`` that say why it does not arm."""
+"""Values of ``arming_status`` that state why it does not arm."""
 
 PREVENTS_ARMING = frozenset({"AHRS_NOT_ALLIGNED", "OUT_OF_GEOFENCE", "LOW_BATTERY"})
-"""Those that last until something is put right. The others are about a pilot's sticks."""
+"""Values that last until the cause is removed. The others concern a pilot's sticks."""
 
 START = "start of the motors"
-"""Key of the only refusal that there is: the arming status after they were told to start."""
+"""Key of the only refusal that exists: the arming status after the command to start the motors."""
 
-# What the driver writes, by the names that an aircraft's XML gives a number.
+# Settings that the driver writes; an aircraft's XML defines their numbers.
 AUTO2 = "auto2"
 KILL_THROTTLE = "kill_throttle"
 MODE = "mode"
@@ -38,7 +38,7 @@ START_BLOCK, TAKEOFF_BLOCK, LAND_BLOCK = "Start Engine", "Takeoff", "land here"
 """Blocks of the stock rotorcraft plan; the options ``start``, ``takeoff`` and ``land`` name others."""
 
 PREPARING_BLOCKS = ("Wait GPS", "Geo init")
-"""While it is in these, the origin of its local frame is still to be set. A plan need not have them."""
+"""Blocks in which the origin of the local frame is not set yet. A plan need not have them."""
 
 HOME_WAYPOINT = "HOME"
 
@@ -58,4 +58,4 @@ ASSUMED: Mapping[str, str] = {
     "ATTITUDE_RC_CLIMB": "keeps the height with the throttle in the middle, climbs and sinks by it else; "
     "ATTITUDE_Z_HOLD keeps the height at which it began whatever the throttle says",
 }
-"""What is taken for granted, from public definitions and sources: no recording of a flight proves it."""
+"""What the driver assumes, from public definitions and sources; no recording of a flight confirms it."""

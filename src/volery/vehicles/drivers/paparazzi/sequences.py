@@ -1,9 +1,8 @@
-"""Pieces that sequences of steps are made of: modes, motors, and places in the aircraft's local frame.
+"""Steps of the Paparazzi driver: modes, motors, positions in the local frame, take-off and landing.
 
-Off the ground and down again: by blocks of the flight plan in NAV, or in GUIDED where NAV would turn back.
-
-In NAV an aircraft goes home by itself if it is further from there than its plan allows. So blocks are flown
-only well inside that distance.
+Take-off and landing use blocks of the flight plan in NAV, or GUIDED where NAV would turn back: in NAV an aircraft
+returns by itself if it is further from home than its plan allows. Blocks are therefore flown only well inside
+that distance.
 """
 
 from __future__ import annotations
@@ -45,9 +44,16 @@ from volery.vehicles.drivers.steps import (
 from volery.vehicles.telemetry import Telemetry
 
 CHANGED_WITHIN: Ns = 8 * S
-"""Of a mode; and of the motors. ROTORCRAFT_STATUS comes each 1.2 s where nothing changes."""
+"""Time-out of mode changes and motors. ROTORCRAFT_STATUS arrives each 1.2 s where nothing changes."""
+SETTINGS_WITHIN: Ns = 10 * S
+BLOCK_WITHIN: Ns = 15 * S
 
-SETTLED_WITHIN: Ns = 10 * S
+LIFTED_M = 1.0
+"""Height above the ground at which the take-off block is done."""
+SINKING_M_S = 0.8
+"""Rate of descent in GUIDED; the blocks of the stock plan use the same."""
+WELL_INSIDE = 0.9
+"""Share of the distance at which NAV turns back, inside which blocks are flown."""
 
 TRANSMITTER = (
     "if a transmitter is on, put its mode switch into the third position (AUTO2) or switch it off: "
@@ -57,24 +63,24 @@ ARMING = "look at its arming status; it does not start its motors in KILL or wit
 
 
 class PaparazziSteps:
-    """What it takes to say something to one aircraft. ``yaw`` is the heading last asked for, radians."""
+    """Common steps for one aircraft. ``yaw`` is the heading commanded last, radians."""
 
-    def __init__(self, kernel: Kernel, uplink: PaparazziBackend) -> None:
+    def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
         self.kernel = kernel
-        self.uplink = uplink
-        self.telemetry = uplink.telemetry
-        self.hearing = uplink.hearing
-        self.setpoints = PaparazziSetpoints(kernel, uplink)
+        self.backend = backend
+        self.telemetry = backend.telemetry
+        self.decoder = backend.decoder
+        self.setpoints = PaparazziSetpoints(kernel, backend)
         self.yaw: float | None = None
 
-    # -- steps
+    # -- modes and motors
 
-    def change(self, mode: str, send: Action | None = None) -> Step:
-        """Enter *mode*; by *send* where there is another way than settings."""
-        self.setpoints.unfollow()
+    def change_mode(self, mode: str, send: Action | None = None) -> Step:
+        """Return a step that enters *mode*, by *send* if there is another way than settings."""
+        self.setpoints.end_velocity()
         return Step(
             ask=f"change to {mode}",
-            send=send or (lambda: self.uplink.mode(mode)),
+            send=send or (lambda: self.backend.set_mode(mode)),
             done=lambda seen: seen.mode == mode,
             within=CHANGED_WITHIN,
             skippable=True,
@@ -84,31 +90,31 @@ class PaparazziSteps:
         )
 
     def guided(self) -> tuple[Step, Step]:
-        """GUIDED first; only then are the sticks let go."""
-        return self.change(GUIDED), self.let_go()
+        """Return steps that enter GUIDED and only then release manual control."""
+        return self.change_mode(GUIDED), self.release()
 
-    def let_go(self) -> Step:
-        """No sticks any more."""
+    def release(self) -> Step:
+        """Return a step that releases manual control."""
         return immediate_step("let go of the sticks", self.setpoints.release)
 
-    def know_settings(self) -> Step:
-        """Nothing is written before."""
+    def check_settings(self) -> Step:
+        """Return a step that waits for the check of the setting numbers; nothing is written before."""
         return Step(
             ask="tell its settings",
             send=send_nothing,
-            done=lambda seen: self.hearing.settled,
-            within=SETTLED_WITHIN,
+            done=lambda seen: self.decoder.settings_checked,
+            within=SETTINGS_WITHIN,
             skippable=True,
             advice="it must answer GET_SETTING, and number its settings as in its XML: aircraft=PATH",
         )
 
     def start_motors(self) -> Step:
-        """In the mode it is in; from KILL, where motors do not start, by way of GUIDED."""
+        """Return a step that arms in the present mode; from KILL, where motors do not start, in GUIDED."""
 
         def send() -> None:
             if self.telemetry.mode == KILL:
-                self.uplink.mode(GUIDED)
-            self.uplink.motors(True)
+                self.backend.set_mode(GUIDED)
+            self.backend.set_motors(True)
 
         return Step(
             ask="arm",
@@ -122,12 +128,12 @@ class PaparazziSteps:
         )
 
     def stop_motors(self, *, force: bool = False) -> Step:
-        """*force*: in every way there is."""
+        """Return a step that stops the motors; *force* also sends the emergency command."""
 
         def send() -> None:
             if force:
-                self.uplink.emergency(STOP)
-            self.uplink.motors(False)
+                self.backend.send_emergency(STOP)
+            self.backend.set_motors(False)
 
         return Step(
             ask="disarm",
@@ -138,31 +144,33 @@ class PaparazziSteps:
             again=S,
         )
 
-    # -- places
+    # -- positions
 
     def heading(self) -> float:
-        """The one last asked for, else the one it has; radians."""
+        """Return the heading commanded last, else the present one; radians."""
         return self.yaw if self.yaw is not None else radians(self.telemetry.attitude.heading)
 
     def spot(self) -> tuple[float, float]:
-        """North, east of where it is; the origin as long as it has told no place."""
+        """Return north, east of the present position; the origin before the first position."""
         here = self.telemetry.position
         return self._ned(here)[:2] if here is not None else (0.0, 0.0)
 
     def at(self, goal: Position) -> Setpoint:
-        """*goal*, with the heading as it is to be."""
+        """Return the set-point of *goal* with the commanded heading."""
         return Setpoint(*self._ned(goal), self.heading())
 
     def stay(self) -> None:
-        """Be told to be where it is."""
+        """Send the present position as set-point."""
         if self.telemetry.position is not None:
-            self.uplink.setpoint(self.at(self.telemetry.position))
+            self.backend.send_setpoint(self.at(self.telemetry.position))
 
     def _ned(self, place: Position) -> tuple[float, float, float]:
-        """North, east, down in the local frame."""
-        name, origin = self.telemetry.name, self.hearing.origin
+        """Return north, east, down in the local frame."""
+        name, origin = self.telemetry.name, self.decoder.origin
         if origin is None:
-            raise Refused(name, f"go to {place}", "it has not told the origin of its local frame (INS_REF)")
+            raise Refused(
+                name, f"go to {place}", "it has not reported the origin of its local frame (INS_REF)"
+            )
         if isinstance(place.altitude, AboveHome):
             amsl = origin.amsl + place.altitude.metres
         elif isinstance(place.altitude, AMSL):
@@ -171,16 +179,6 @@ class PaparazziSteps:
             raise CapabilityError(f"{name}: {place.altitude}: it flies to AMSL or above home only")
         east, north, up = origin.enu(place.latitude, place.longitude, amsl)
         return north, east, -up
-
-
-BLOCK_WITHIN: Ns = 15 * S
-
-LIFTED_M = 1.0
-"""So far above where it stood the take-off block has done its part."""
-SINKING_M_S = 0.8
-"""Landing in GUIDED; the stock plan's blocks do the same."""
-WELL_INSIDE = 0.9
-"""Of the distance at which it turns back, blocks are flown."""
 
 
 @dataclass(frozen=True)
@@ -193,35 +191,35 @@ class Blocks:
 
 
 class TakeoffAndLanding:
-    """The sequences. Raises ``UsageError`` if the aircraft's flight plan has not those *blocks*."""
+    """Steps of take-off and landing. Raises ``UsageError`` if the flight plan does not have the blocks."""
 
-    def __init__(self, pieces: PaparazziSteps, blocks: Blocks) -> None:
-        self._pieces = pieces
-        self._uplink = pieces.uplink
-        self._telemetry = pieces.telemetry
+    def __init__(self, steps: PaparazziSteps, blocks: Blocks) -> None:
+        self._steps = steps
+        self._backend = steps.backend
+        self._telemetry = steps.telemetry
         self._blocks = blocks
         for block in (blocks.start, blocks.takeoff, blocks.land):
-            self._uplink.aircraft.block(block)
+            self._backend.aircraft.block(block)
 
     def _by_plan(self) -> bool:
-        """So near home that it goes on with its plan in NAV. It is taken to be there until it tells."""
-        seen, farthest = self._telemetry, self._uplink.aircraft.farthest
-        if farthest is None or seen.home is None or seen.position is None:
+        """Return whether it is so near home that NAV does not turn back; assumed without a position."""
+        telemetry, farthest = self._telemetry, self._backend.aircraft.farthest
+        if farthest is None or telemetry.home is None or telemetry.position is None:
             return True
-        return horizontal_distance(seen.position, seen.home) <= WELL_INSIDE * farthest
+        return horizontal_distance(telemetry.position, telemetry.home) <= WELL_INSIDE * farthest
 
-    # -- up
+    # -- take-off
 
     def climb(self, height: float, within: Ns) -> Sequence[Step]:
-        """From the ground to *height* metres above home, in GUIDED at the end."""
-        pieces = self._pieces
-        pieces.yaw = None
+        """Return steps from the ground to *height* metres above home, in GUIDED at the end."""
+        steps = self._steps
+        steps.yaw = None
         spot: list[tuple[float, float]] = []
 
         def send() -> None:
             if not spot:
-                spot.append(pieces.spot())
-            self._uplink.setpoint(Setpoint(*spot[0], -height, pieces.heading()))
+                spot.append(steps.spot())
+            self._backend.send_setpoint(Setpoint(*spot[0], -height, steps.heading()))
 
         straight_up = Step(
             ask=f"climb to {height:g} m",
@@ -233,14 +231,14 @@ class TakeoffAndLanding:
             armed=True,
         )
         if self._by_plan():
-            lifted = (pieces.change(NAV), self._start(), self._lift(within), *pieces.guided())
-            return (*lifted, straight_up)
-        return (*pieces.guided(), replace(pieces.start_motors(), mode=GUIDED), straight_up)
+            enter = steps.change_mode(NAV)
+            return (enter, self._start_block(), self._takeoff_block(within), *steps.guided(), straight_up)
+        return (*steps.guided(), replace(steps.start_motors(), mode=GUIDED), straight_up)
 
-    def _start(self) -> Step:
+    def _start_block(self) -> Step:
         return Step(
             ask="start the motors",
-            send=lambda: self._uplink.block(self._blocks.start),
+            send=lambda: self._backend.enter_block(self._blocks.start),
             done=lambda seen: seen.armed,
             within=BLOCK_WITHIN,
             skippable=True,
@@ -249,12 +247,12 @@ class TakeoffAndLanding:
             advice=ARMING,
         )
 
-    def _lift(self, within: Ns) -> Step:
+    def _takeoff_block(self, within: Ns) -> Step:
         ground: list[float] = []
 
         def send() -> None:
             ground.append(self._telemetry.above_home)
-            self._uplink.block(self._blocks.takeoff)
+            self._backend.enter_block(self._blocks.takeoff)
 
         return Step(
             ask="lift off",
@@ -267,35 +265,46 @@ class TakeoffAndLanding:
             advice=f"look at what block {self._blocks.takeoff!r} of its flight plan does",
         )
 
-    # -- down
+    # -- landing
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Here, until the motors are off; without a fix in FAILSAFE, which needs none."""
-        pieces = self._pieces
-        pieces.yaw = None
-        if not pieces.hearing.good_fix:
-            failing = pieces.change(FAILSAFE, self._fail_safely)
-            return (failing, pieces.let_go(), self._down(FAILSAFE, within))
-        return self.land_by_plan(within) if self._by_plan() else self._sink(within)
+        """Return steps that land in place; without a fix in FAILSAFE, which needs no position."""
+        steps = self._steps
+        steps.yaw = None
+        if steps.decoder.good_fix:
+            return self.land_by_plan(within) if self._by_plan() else self._descend(within)
+
+        def fail_safely() -> None:
+            self._backend.set_mode(FAILSAFE)
+            self._backend.send_emergency(COME_DOWN)
+
+        enter = steps.change_mode(FAILSAFE, fail_safely)
+        return (enter, steps.release(), disarmed_step("land", FAILSAFE, within, (KILL,)))
 
     def land_by_plan(self, within: Ns) -> Sequence[Step]:
-        """By the landing block."""
-        pieces = self._pieces
-        return (self._enter_landing(), pieces.change(NAV), pieces.let_go(), self._down(NAV, within))
+        """Return steps that land by the landing block."""
+        steps = self._steps
+        enter = self._landing_block()
+        return (
+            enter,
+            steps.change_mode(NAV),
+            steps.release(),
+            disarmed_step("land", NAV, within, (KILL,)),
+        )
 
-    def _enter_landing(self) -> Step:
-        """Into the block before NAV: the block that it was left in would be flown meanwhile."""
-        pieces = self._pieces
-        number = self._uplink.aircraft.block(self._blocks.land).number
-        asked_at: list[Ns] = []
+    def _landing_block(self) -> Step:
+        """Return a step that enters the block before NAV, in which the previous block would be flown."""
+        steps = self._steps
+        number = self._backend.aircraft.block(self._blocks.land).number
+        sent_at: list[Ns] = []
 
         def send() -> None:
-            asked_at.append(pieces.kernel.now())
-            self._uplink.block(self._blocks.land)
+            sent_at.append(steps.kernel.now())
+            self._backend.enter_block(self._blocks.land)
 
         def landing(seen: Telemetry) -> bool:
-            heard_at, block = pieces.hearing.block
-            return not seen.armed or (heard_at > asked_at[0] and block >= number)
+            reported_at, block = steps.decoder.block
+            return not seen.armed or (reported_at > sent_at[0] and block >= number)
 
         return Step(
             ask=f"go to block {self._blocks.land!r}",
@@ -306,15 +315,15 @@ class TakeoffAndLanding:
             mode=self._telemetry.mode,
         )
 
-    def _sink(self, within: Ns) -> Sequence[Step]:
-        """Straight down in GUIDED until it judges itself to be on the ground; then the motors are stopped."""
-        pieces = self._pieces
+    def _descend(self, within: Ns) -> Sequence[Step]:
+        """Return steps that descend vertically in GUIDED until landed, then stop the motors."""
+        steps = self._steps
         spot: list[tuple[float, float]] = []
 
         def send() -> None:
             if not spot:
-                spot.append(pieces.spot())
-            self._uplink.setpoint(Setpoint(*spot[0], SINKING_M_S, pieces.heading(), VELOCITY_Z))
+                spot.append(steps.spot())
+            self._backend.send_setpoint(Setpoint(*spot[0], SINKING_M_S, steps.heading(), VELOCITY_Z))
 
         descend = Step(
             ask="descend",
@@ -325,11 +334,4 @@ class TakeoffAndLanding:
             mode=GUIDED,
             leads_to=(KILL,),
         )
-        return (*pieces.guided(), descend, pieces.stop_motors())
-
-    def _fail_safely(self) -> None:
-        self._uplink.mode(FAILSAFE)
-        self._uplink.emergency(COME_DOWN)
-
-    def _down(self, mode: str, within: Ns) -> Step:
-        return disarmed_step("land", mode, within, (KILL,))
+        return (*steps.guided(), descend, steps.stop_motors())
