@@ -42,10 +42,8 @@ def show_outcome(output: Output, run: Run) -> int:
             output.complain(f"volery: {unmet(name, found)}")
     for note in run.notes:
         output.note(f"volery: {note}")
-    for problem in run.problems:
+    for problem in (*run.problems, *(f"{name} did not end when it was cancelled" for name in run.left)):
         output.complain(f"volery: {problem}")
-    for name in run.left:
-        output.complain(f"volery: {name} did not end when it was cancelled")
     if isinstance(run.error, BAD_INPUT_ERRORS):
         return BAD_INPUT
     return OK if run.ok else FAILED

@@ -45,13 +45,11 @@ from volery.report.grids import (
     widest_band,
 )
 from volery.report.terminal import comparison_table
-from volery.requirements.accounts import Accounts
-from volery.requirements.observables import DELIVERED
+from volery.requirements.accounts import DELIVERED, Accounts
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record, write_record
-from volery.requirements.verdicts import Observers, bounds_of
 from volery.trace.attachments import WORLD_ATTACHMENT, scenery_from_json
 from volery.trace.events import Record, Verdict
-from volery.trace.mcap_writer import OUTCOME
+from volery.trace.mcap_writer import OUTCOME, TRACE_FILE
 from volery.trace.reader import Reading
 from volery.trace.timeline import TimelineWriter
 
@@ -62,7 +60,6 @@ except ModuleNotFoundError:
     require_extra("report", "HTML reports")
     raise
 
-TRACE_FILE = "trace.mcap"
 REPORT_FILE = "report.html"
 
 
@@ -106,6 +103,8 @@ def gather(folder: Path, *taps: Record) -> ReportContent:
 
 
 def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
+    from volery.requirements.verdicts import Observers, bounds_of
+
     accounts = Accounts(reading.setup)
     observers = Observers(bounds_of(reading.setup), reading.setup)
     everybody: tuple[Record, ...] = (accounts, observers, *taps)

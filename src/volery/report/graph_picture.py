@@ -12,10 +12,10 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.base.time import to_seconds
-from volery.report.document import TRACE_FILE
 from volery.ros.graph.interface import ServiceState
 from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.trace.events import Call, Message, Published
+from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
 GRAPH_NAME_PREFIX = "/"

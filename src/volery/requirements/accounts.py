@@ -55,6 +55,9 @@ from volery.trace.events import (
 )
 
 PARCEL = "parcel"
+"""Kind of the milestones of a parcel."""
+ORDERED, DELIVERED, FAILED = "ordered", "delivered", "failed"
+"""States of a parcel that observables are defined by. An application may have others in between."""
 """The kind of milestone that tells of parcels."""
 HOUSE = "volery"
 """The source of words that come from the house itself: its warnings become warnings of the record."""

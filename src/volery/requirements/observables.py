@@ -18,6 +18,7 @@ from typing import Any
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
 from volery.model.reading import Observable
+from volery.requirements.accounts import DELIVERED, FAILED, ORDERED, PARCEL
 from volery.requirements.ledgers import ChainLedger, ComponentLedger, Distribution, VehicleLedger
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
@@ -35,10 +36,6 @@ from volery.trace.events import (
 
 PERIOD_TOLERANCE = 0.1
 """A release is in time if it is at most this share of the period late."""
-
-PARCEL_KIND = "parcel"
-ORDERED, DELIVERED, FAILED = "ordered", "delivered", "failed"
-"""The states of a parcel that quantities are defined by. An application may have others in between."""
 
 LANDINGS = ("land", "return_home")
 """Operations that end on the ground."""
@@ -248,7 +245,7 @@ def _parcels(state: str) -> Make:
         seen: dict[str, None] = {}
 
         def take(event: Milestone) -> None:
-            if event.kind == PARCEL_KIND and event.state == state:
+            if event.kind == PARCEL and event.state == state:
                 seen[event.subject] = None
 
         return Observer((Milestone,), take, lambda at: float(len(seen)))
@@ -265,7 +262,7 @@ def _delivery_time(reading: Callable[[Distribution], float | None]) -> Make:
         spread = Distribution()
 
         def take(event: Milestone) -> None:
-            if event.kind != PARCEL_KIND:
+            if event.kind != PARCEL:
                 return
             since.setdefault(event.subject, event.at)
             if event.state == DELIVERED and event.subject not in delivered:

@@ -21,7 +21,7 @@ from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
 from volery.trace.attachments import RunSetup
 from volery.trace.events import Stream, Verdict
-from volery.trace.mcap_writer import Attachment, McapWriter
+from volery.trace.mcap_writer import TRACE_FILE, Attachment, McapWriter
 from volery.trace.timeline import TimelineWriter
 
 _LIBRARIES = ("greenlet", "llvmlite", "numba", "numpy", "pymavlink", "rosbags", "mcap")
@@ -42,7 +42,6 @@ def _circumstances(wall_s: float) -> Circumstances:
     return Circumstances(wall_s, versions)
 
 
-TRACE_FILE = "trace.mcap"
 TIMELINE_FILE = "timeline.json"
 REPORT_FILE = "report.html"
 

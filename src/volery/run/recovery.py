@@ -10,10 +10,11 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
 from volery.requirements.verdicts import Observers
 from volery.run.assembly.computers import Platform
-from volery.run.recording import TRACE_FILE, Recording
+from volery.run.recording import Recording
 from volery.run.result import Run
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.events import Event, Failure, Verdict
+from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
 CUT_FILE = "trace-cut.mcap"

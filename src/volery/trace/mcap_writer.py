@@ -1,7 +1,7 @@
-"""Writes the events of a run as an MCAP file with ROS 2 messages: ``trace.mcap``.
+"""Writer of the events of a run as an MCAP file with ROS 2 messages: ``trace.mcap``.
 
 The same run gives the same bytes: no wall time, no version, no compression. Chunks end with each simulated
-second and go to the operating system at once, so a killed process loses at most the last simulated second.
+second and are written at once, so a killed process loses at most the last simulated second.
 Records other than messages are built by the ``mcap`` library; messages, of which there are millions, by
 precompiled encoders.
 
@@ -31,21 +31,24 @@ from volery.trace.output import Output
 
 MAGIC = b"\x89MCAP0\r\n"
 TRACE_SCHEMA = "volery-trace/1"
+TRACE_FILE = "trace.mcap"
+"""Name of the trace in a run folder."""
+
 OUTCOME = "outcome"
-"""The metadata that says how the run ended, by ``status`` and ``reason``."""
+"""The metadata that states how the run ended: ``status`` and ``reason``."""
 MESSAGE_FRAME = "BQHIQQ"
-"""Opcode, length, channel, sequence, log time, publish time: what stands before a message's data."""
+"""The header of a message record: opcode, length, channel, sequence, log time, publish time."""
 MESSAGE_OVERHEAD = struct.calcsize(f"<{MESSAGE_FRAME}") - 9
-"""What a message record's length counts beside its data: the frame without opcode and length."""
+"""Bytes that a message record's length counts beside its data: the header without opcode and length."""
 _ROS2_PROFILE = "ros2"
 _MESSAGE = int(Opcode.MESSAGE)
 
 Definitions = Callable[[str], str]
-"""Gives the complete ``ros2msg`` text of a type such as ``std_msgs/msg/String``, dependencies included."""
+"""Returns the complete ``ros2msg`` text of a type such as ``std_msgs/msg/String``, dependencies included."""
 
 
 class Attachment(NamedTuple):
-    """A file that travels within a trace."""
+    """A file that is attached to a trace."""
 
     name: str
     media_type: str
@@ -57,14 +60,14 @@ def _no_definition(_: str) -> str:
 
 
 def _times(kind: type[Any]) -> Callable[[Any], tuple[Ns, Ns]]:
-    """When an event was told and when what it tells of began: MCAP's log time and publish time."""
+    """Return the function that gives an event's end and begin: MCAP's log time and publish time."""
     if kind is Message:
         return lambda event: (event.sent if event.received == NONE else event.received, event.sent)
     fields = kind._fields
     for log, publish in (("end", "start"), ("finished", "released"), ("at", "at")):
         if log in fields:
             return itemgetter(fields.index(log), fields.index(publish))
-    raise TypeError(f"{kind.__name__} says no time")
+    raise TypeError(f"{kind.__name__} has no field for its time")
 
 
 def _record(thing: records.McapRecord) -> bytes:
@@ -74,10 +77,16 @@ def _record(thing: records.McapRecord) -> bytes:
 
 
 class McapWriter:
-    """A tap of the stream that writes ``trace.mcap``. Call it with events, then ``close`` it.
+    """A listener of the event stream that writes ``trace.mcap``. Call it with events, then ``close`` it.
 
-    Gives every type of published message to *definitions* once. Raises ``UsageError`` if the file cannot be
-    made; what happens when the disk fills up is said at ``Output``.
+    Args:
+        path: The file to write. For a full disk, see ``Output``.
+        setup: The set-up of the run, which is attached.
+        attachments: Further files to attach.
+        definitions: Returns the definition of each type of published message; called once a type.
+
+    Raises:
+        UsageError: the file cannot be created.
     """
 
     def __init__(
@@ -106,7 +115,7 @@ class McapWriter:
 
     @property
     def problem(self) -> str:
-        """Why the trace is not whole; empty if it is."""
+        """Why the trace is incomplete; empty if it is complete."""
         return self._output.problem
 
     def __call__(self, event: Event) -> None:
@@ -114,11 +123,11 @@ class McapWriter:
         self._writers[type(event)](event)
 
     def listener(self, kind: type[Any]) -> Record:
-        """What writes events of *kind*."""
+        """Return what writes events of *kind*."""
         return self._writers[kind]
 
     def attach(self, attachment: Attachment) -> None:
-        """Add a file to the trace; it carries no time."""
+        """Attach a file to the trace, without a time."""
         self.flush()
         name, media_type, data = attachment
         record = _record(records.Attachment(0, 0, name, media_type, data))
@@ -127,7 +136,7 @@ class McapWriter:
             self._summary.attachments.append(index)
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
-        """Add words by name to the trace."""
+        """Add a metadata record to the trace."""
         self.flush()
         record = _record(records.Metadata(name=name, metadata=values))
         index = records.MetadataIndex(offset=self._output.size, length=len(record), name=name)
@@ -135,11 +144,11 @@ class McapWriter:
             self._summary.metadata.append(index)
 
     def outcome(self, status: str, reason: str) -> None:
-        """Say how the run ended; a trace that does not is that of a killed run."""
+        """Record how the run ended. A trace without that is of a killed run."""
         self.metadata(OUTCOME, {"status": status, "reason": reason})
 
     def flush(self) -> None:
-        """End the chunk and hand it to the operating system: it survives the death of this process."""
+        """End the chunk and write it: it survives the end of this process."""
         if not self._indexes:
             return
         body = bytes(self._body)
@@ -194,7 +203,7 @@ class McapWriter:
         return channel
 
     def _own(self, kind: type[Any]) -> Callable[[Any], None]:
-        """A function that writes events of one kind of ours: the hot path."""
+        """Return the function that writes events of one kind: the hot path."""
         codec = Codec(kind)
         pack = struct.Struct(f"<{MESSAGE_FRAME}{codec.codes}").pack
         overhead = MESSAGE_OVERHEAD + codec.fixed
@@ -213,8 +222,8 @@ class McapWriter:
                 topic = f"/volery/{subject}/state" if subject_of else f"/volery/{kind.__name__.lower()}"
                 schema = self._schema(type_name(kind), codec.definition)
                 channel = channels[subject] = self._channel(topic, schema, {})
-            said = words(event)
-            tail = tails.get(said) or new_tail(said)
+            strings = words(event)
+            tail = tails.get(strings) or new_tail(strings)
             body = self._body
             mark = self._indexes[channel].append
             mark(log)
@@ -245,7 +254,7 @@ class McapWriter:
 
 
 def _empty_indexes() -> defaultdict[int, array[int]]:
-    """Channel -> log time and place within the chunk of each of its messages, by turns."""
+    """Return a mapping of channel to log time and offset in the chunk of each message, alternating."""
     return defaultdict(lambda: array("Q"))
 
 
@@ -255,7 +264,7 @@ def _index_record(channel: int, index: array[int]) -> bytes:
 
 
 class _Summary:
-    """What stands at the end of the file, so that a reader need not read all of it."""
+    """The summary at the end of the file, with which readers find chunks without reading all of it."""
 
     def __init__(self) -> None:
         self.schemas: list[bytes] = []
@@ -268,7 +277,7 @@ class _Summary:
         self._counts: dict[int, int] = {}
 
     def chunk(self, entry: records.ChunkIndex, counts: dict[int, int]) -> None:
-        """A chunk was written, with so many messages per channel."""
+        """Add a chunk that was written, with the number of messages of each channel."""
         self._chunks.append(_record(entry))
         self._first = min(
             entry.message_start_time, entry.message_start_time if self._first is None else self._first
@@ -291,7 +300,7 @@ class _Summary:
         )
 
     def bytes(self, start: int) -> bytes:
-        """The summary section and the footer of a file whose data section ends at *start*."""
+        """Return the summary section and the footer of a file whose data section ends at *start*."""
         groups = [
             (Opcode.SCHEMA, b"".join(self.schemas)),
             (Opcode.CHANNEL, b"".join(self.channels)),

@@ -12,6 +12,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from volery.base.errors import EstimateError, UsageError
+from volery.base.extras import require_extra
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Allocation, Model, Overrides, Scenario, Seed
@@ -70,6 +71,7 @@ def cost(
     processor's core computes for it. The result is time, cycles, instructions, energy, the most expensive
     lines, and what is left out. Needs LLVM (Debian: clang-19 and llvm-19).
     """
+    require_extra("simulation", "estimates")
     from volery.cost.catalogue import load_catalogue
     from volery.cost.native.compilation import compile_program
     from volery.cost.native.instrumented_run import Invocation
@@ -183,6 +185,7 @@ def profile(
     computes the cost of each block from this trace. The costs are stored with the compiled code: later runs
     at fidelity `code` charge them, until the code changes. Needs LLVM (Debian: clang-19 and llvm-19).
     """
+    require_extra("simulation", "profiles")
     from volery.calibration.component_profile import profile_components
     from volery.cli.progress import run_progress
     from volery.model.reader import load

@@ -20,6 +20,7 @@ import typer
 
 import volery
 from volery.base.errors import UsageError
+from volery.base.extras import require_extra
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import Seed
@@ -55,6 +56,7 @@ def demo(
 
     Exit status: 0 if both runs completed, even if a requirement was not met.
     """
+    require_extra("simulation", "simulated runs")
     from volery.cli.outcome import unmet
     from volery.model.reader import load
     from volery.report.document import write_comparison

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from volery.base.errors import UsageError
+from volery.base.extras import require_extra
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import Seed
@@ -45,6 +46,7 @@ def serve(
     seed: Seed = 1,
 ) -> int:
     """Serve one simulated vehicle to ground stations, MAVSDK, MAVProxy or a script, until Ctrl-C."""
+    require_extra("simulation", "simulated vehicles")
     from volery.run.assembly.simulated_vehicles import parse_simulated
     from volery.run.serve import VehicleNodeServer, VehicleServer, has_links
     from volery.vehicles.address import parse, parse_listen

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from volery.base.extras import require_extra
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import (
@@ -46,6 +47,7 @@ def simulate(
 
     Exit status: 0 if the run completed and met every requirement, 2 for bad input, 1 otherwise.
     """
+    require_extra("simulation", "simulated runs")
     from volery.cli.outcome import next_folder, show_outcome
     from volery.cli.progress import run_progress
     from volery.model.reader import load

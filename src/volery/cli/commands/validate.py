@@ -13,6 +13,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from volery.base.errors import UsageError
+from volery.base.extras import require_extra
 from volery.base.time import from_seconds, to_seconds
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
@@ -44,6 +45,7 @@ def validate(
     measured. Exit status: 0 if every estimate is within 15 %, or within half the quartiles of the runs; 2 for
     bad input; 1 otherwise.
     """
+    require_extra("simulation", "estimates")
     from volery.calibration.validation.comparison import (
         compare,
         estimate_nodes,

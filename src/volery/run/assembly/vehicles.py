@@ -11,6 +11,7 @@ from math import nan, radians
 from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
+from volery.base.extras import require_extra
 from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, euler_to_quaternion
 from volery.base.position import Position
 from volery.base.time import Ns
@@ -100,6 +101,7 @@ def open_vehicles(
 def _open_simulated(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
+    require_extra("simulation", "simulated vehicles")
     from volery.run.assembly.simulated_fleet import fleet_of
     from volery.run.assembly.simulated_vehicles import HOME, parse_simulated
 
