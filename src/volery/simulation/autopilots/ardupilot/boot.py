@@ -28,7 +28,7 @@ def banner(name: str) -> bytes:
     return BANNER.format(name=name).encode()
 
 
-def words(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
+def texts_event(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
     """Return an event that sends these status texts."""
 
     def act(vehicle: Vehicle) -> None:
@@ -38,7 +38,7 @@ def words(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
     return BootEvent(round(seconds * S), act)
 
 
-def announced(seconds: float, *names: str) -> BootEvent:
+def announcement_event(seconds: float, *names: str) -> BootEvent:
     """Return an event that announces these parameters."""
 
     def act(vehicle: Vehicle) -> None:
@@ -49,7 +49,7 @@ def announced(seconds: float, *names: str) -> BootEvent:
     return BootEvent(round(seconds * S), act)
 
 
-def measured(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
+def measurement_event(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
     """Return an event that sets these parameters to measured values and announces them."""
 
     def act(vehicle: Vehicle) -> None:
@@ -64,43 +64,46 @@ def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
 
 
-def at(seconds: float, act: VehicleAction) -> BootEvent:
+def action_event(seconds: float, act: VehicleAction) -> BootEvent:
     """Return an event that executes an action."""
     return BootEvent(round(seconds * S), act)
 
 
-def origin_set(vehicle: Vehicle) -> None:
+def set_origin(vehicle: Vehicle) -> None:
     """Set the estimator's origin where the vehicle is."""
     vehicle.flight.set_origin()
 
 
-def home_set(vehicle: Vehicle) -> None:
+def set_home_position(vehicle: Vehicle) -> None:
     """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.estimate.position_ok and vehicle.home is None:
         vehicle.set_home_here()
 
 
-def field_elevation(vehicle: Vehicle) -> None:
+def report_field_elevation(vehicle: Vehicle) -> None:
     """Report the altitude of the home position."""
     if vehicle.home is not None:
         vehicle.send_text(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
 
 
-def using_gps(vehicle: Vehicle, units: Sequence[int]) -> None:
+def report_gps_use(vehicle: Vehicle, units: Sequence[int]) -> None:
     """Report that these estimator units use GPS."""
     for unit in units:
         vehicle.send_text(INFO, f"EKF3 IMU{unit} is using GPS")
 
 
-def both(text: str) -> tuple[str, str]:
+def for_both_units(text: str) -> tuple[str, str]:
     """Return a text for each of the two estimator units."""
     return text.format(unit=0), text.format(unit=1)
 
 
 ALIGNED = (
-    *(words(5.63, text) for text in both("EKF3 IMU{unit} tilt alignment complete")),
-    *(words(5.73, text) for text in both("EKF3 IMU{unit} MAG0 initial yaw alignment complete")),
-    words(9.64, "GPS 1: detected as u-blox at 230400 baud"),
+    *(texts_event(5.63, text) for text in for_both_units("EKF3 IMU{unit} tilt alignment complete")),
+    *(
+        texts_event(5.73, text)
+        for text in for_both_units("EKF3 IMU{unit} MAG0 initial yaw alignment complete")
+    ),
+    texts_event(9.64, "GPS 1: detected as u-blox at 230400 baud"),
 )
 
 _IDS = ("INS_GYR_ID", "INS_ACC_ID", "INS_GYR2_ID", "INS_ACC2_ID")
@@ -130,7 +133,7 @@ COPTER_PRESSURE = (("BARO1_GND_PRESS", 101079.71), ("BARO2_GND_PRESS", 101081.83
 ROVER_PRESSURE = (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))
 
 
-def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
+def store_parameters(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
     """Store measured values without an announcement."""
     for name, value in values:
         vehicle.parameters.set(name, value)
@@ -139,62 +142,65 @@ def keep(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
 def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a copter. ``ready`` is called at the end of the set-up."""
     return (
-        announced(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
-        announced(
+        announcement_event(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
+        announcement_event(
             0.01, "ESC_CALIBRATION", "RELAY1_FUNCTION", "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"
         ),
-        words(0.16, "Calibrating barometer"),
-        announced(0.16, "MNT1_TYPE", "CAM1_TYPE", "BARO_ALT_OFFSET"),
-        words(1.75, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
-        measured(1.75, (("BARO1_GND_PRESS", 94502.516), ("BARO2_GND_PRESS", 94502.242))),
-        announced(1.75, *_IDS),
-        at(2.28, ready),
-        words(2.28, "ArduPilot Ready", "AHRS: DCM active"),
-        measured(2.28, COPTER_GYROS),
-        words(2.58, "RC7: SaveWaypoint LOW"),
-        announced(3.28, "EK3_SRC1_POSXY"),
-        words(4.28, *both("EKF3 IMU{unit} initialised"), "AHRS: EKF3 active"),
+        texts_event(0.16, "Calibrating barometer"),
+        announcement_event(0.16, "MNT1_TYPE", "CAM1_TYPE", "BARO_ALT_OFFSET"),
+        texts_event(1.75, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
+        measurement_event(1.75, (("BARO1_GND_PRESS", 94502.516), ("BARO2_GND_PRESS", 94502.242))),
+        announcement_event(1.75, *_IDS),
+        action_event(2.28, ready),
+        texts_event(2.28, "ArduPilot Ready", "AHRS: DCM active"),
+        measurement_event(2.28, COPTER_GYROS),
+        texts_event(2.58, "RC7: SaveWaypoint LOW"),
+        announcement_event(3.28, "EK3_SRC1_POSXY"),
+        texts_event(4.28, *for_both_units("EKF3 IMU{unit} initialised"), "AHRS: EKF3 active"),
         *ALIGNED,
-        at(19.84, origin_set),
-        at(19.852, home_set),
-        words(19.852, "EKF3 IMU0 origin set"),
-        measured(19.885, COPTER_PRESSURE),
-        at(19.885, field_elevation),
-        words(20.05, "EKF3 IMU1 origin set"),
-        at(41.45, partial(using_gps, units=(0,))),
-        at(41.456, partial(using_gps, units=(1,))),
+        action_event(19.84, set_origin),
+        action_event(19.852, set_home_position),
+        texts_event(19.852, "EKF3 IMU0 origin set"),
+        measurement_event(19.885, COPTER_PRESSURE),
+        action_event(19.885, report_field_elevation),
+        texts_event(20.05, "EKF3 IMU1 origin set"),
+        action_event(41.45, partial(report_gps_use, units=(0,))),
+        action_event(41.456, partial(report_gps_use, units=(1,))),
     )
 
 
 def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a rover. ``ready`` is called at the end of the set-up."""
     return (
-        words(0.01, "Calibrating barometer"),
-        announced(0.01, "BARO_ALT_OFFSET"),
-        words(1.73, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
-        measured(1.73, (("SIM_PIN_MASK", 125), ("SIM_PIN_MASK", 121))),
-        words(1.73, "Beginning INS calibration. Do not move vehicle"),
-        measured(1.73, (("BARO1_GND_PRESS", 94503.914), ("BARO2_GND_PRESS", 94503.42))),
-        announced(1.73, "RELAY1_FUNCTION", "RELAY2_FUNCTION", "MNT1_TYPE", "CAM1_TYPE"),
-        announced(1.83, *_IDS),
-        words(2.35, "INS: alloc 6144 bytes for ISB (free=131072)", severity=DEBUG),
-        at(2.355, ready),
-        words(2.355, "ArduPilot Ready", "AHRS: DCM active"),
-        measured(2.355, ROVER_GYROS),
-        announced(3.37, "EK3_SRC1_POSXY"),
-        words(4.38, *both("EKF3 IMU{unit} initialised")),
-        *(words(5.98, text) for text in both("EKF3 IMU{unit} tilt alignment complete")),
-        *(words(6.06, text) for text in both("EKF3 IMU{unit} MAG0 initial yaw alignment complete")),
-        words(9.67, "GPS 1: detected as u-blox at 230400 baud"),
-        at(10.34, origin_set),
-        measured(10.345, (("BARO1_GND_PRESS", 94504.55), ("BARO2_GND_PRESS", 94503.32))),
-        at(10.36, home_set),
-        words(19.86, *both("EKF3 IMU{unit} origin set")),
-        at(19.94, field_elevation),
-        measured(21.34, (("BARO1_GND_PRESS", 101020.25), ("BARO2_GND_PRESS", 101018.77))),
-        measured(32.34, ROVER_PRESSURE),
-        at(42.08, partial(using_gps, units=(0, 1))),
-        words(42.085, "AHRS: EKF3 active"),
+        texts_event(0.01, "Calibrating barometer"),
+        announcement_event(0.01, "BARO_ALT_OFFSET"),
+        texts_event(1.73, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
+        measurement_event(1.73, (("SIM_PIN_MASK", 125), ("SIM_PIN_MASK", 121))),
+        texts_event(1.73, "Beginning INS calibration. Do not move vehicle"),
+        measurement_event(1.73, (("BARO1_GND_PRESS", 94503.914), ("BARO2_GND_PRESS", 94503.42))),
+        announcement_event(1.73, "RELAY1_FUNCTION", "RELAY2_FUNCTION", "MNT1_TYPE", "CAM1_TYPE"),
+        announcement_event(1.83, *_IDS),
+        texts_event(2.35, "INS: alloc 6144 bytes for ISB (free=131072)", severity=DEBUG),
+        action_event(2.355, ready),
+        texts_event(2.355, "ArduPilot Ready", "AHRS: DCM active"),
+        measurement_event(2.355, ROVER_GYROS),
+        announcement_event(3.37, "EK3_SRC1_POSXY"),
+        texts_event(4.38, *for_both_units("EKF3 IMU{unit} initialised")),
+        *(texts_event(5.98, text) for text in for_both_units("EKF3 IMU{unit} tilt alignment complete")),
+        *(
+            texts_event(6.06, text)
+            for text in for_both_units("EKF3 IMU{unit} MAG0 initial yaw alignment complete")
+        ),
+        texts_event(9.67, "GPS 1: detected as u-blox at 230400 baud"),
+        action_event(10.34, set_origin),
+        measurement_event(10.345, (("BARO1_GND_PRESS", 94504.55), ("BARO2_GND_PRESS", 94503.32))),
+        action_event(10.36, set_home_position),
+        texts_event(19.86, *for_both_units("EKF3 IMU{unit} origin set")),
+        action_event(19.94, report_field_elevation),
+        measurement_event(21.34, (("BARO1_GND_PRESS", 101020.25), ("BARO2_GND_PRESS", 101018.77))),
+        measurement_event(32.34, ROVER_PRESSURE),
+        action_event(42.08, partial(report_gps_use, units=(0, 1))),
+        texts_event(42.085, "AHRS: EKF3 active"),
     )
 
 
@@ -206,7 +212,7 @@ Problems = Callable[[Vehicle], list[str]]
 
 def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
     """Set the home position and evaluate the pre-arm checks of a vehicle that starts warm."""
-    home_set(vehicle)
+    set_home_position(vehicle)
     vehicle.arming.checks_passed = not before_arming(vehicle)
 
 

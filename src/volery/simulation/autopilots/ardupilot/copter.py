@@ -6,32 +6,32 @@ from functools import cache, partial
 
 from volery.base.time import MS, S, from_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import CopterFailsafes
+from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.firmware import (
     ardupilot_mavlink,
     builders,
-    introduce,
     own_parameters,
+    send_version,
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.ardupilot.modes import (
+    COPTER_DISARMED,
     CUSTOM,
     GUIDED,
     INFO,
     MANUAL,
     STABILIZED,
     Check,
-    between,
-    change_mode,
+    between_uptimes,
     disarm,
-    failing,
-    flies_by_position,
+    failing_checks,
+    in_other_modes,
+    in_position_modes,
     lost_position,
     low_battery,
-    needs_no_position,
+    mode_not_armable,
     no_mission,
-    not_armable,
 )
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -80,7 +80,7 @@ ORIGIN = round(19.852 * S)
 POSITION = round(41.45 * S)
 EACH_SECOND = round(0.285 * S)
 
-ARMED_WORDS = ("Arming motors", "Disarming motors")
+ARMING_TEXTS = ("Arming motors", COPTER_DISARMED)
 LANDED_TO_DISARM = 200 * MS
 """Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
 ALIGNS_ABOVE = 2.5
@@ -128,15 +128,15 @@ MODES = {
 }
 
 CHECKS = (
-    Check("Need Alt Estimate", flies_by_position(0.0, 5.7)),
-    Check("Gyros not healthy", between(0.0, 1.8)),
-    Check("Accels inconsistent", between(1.8, 11.5)),
-    Check("Gyros inconsistent", between(11.5, 22.35)),
-    Check("EKF attitude is bad", between(0.0, 5.6)),
-    Check("Compass not healthy", between(0.0, 2.4)),
-    Check("AHRS: EKF3 not started", needs_no_position(0.0, 4.28)),
-    Check("AHRS: waiting for home", flies_by_position(0.0, 19.852)),
-    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Need Alt Estimate", in_position_modes(0.0, 5.7)),
+    Check("Gyros not healthy", between_uptimes(0.0, 1.8)),
+    Check("Accels inconsistent", between_uptimes(1.8, 11.5)),
+    Check("Gyros inconsistent", between_uptimes(11.5, 22.35)),
+    Check("EKF attitude is bad", between_uptimes(0.0, 5.6)),
+    Check("Compass not healthy", between_uptimes(0.0, 2.4)),
+    Check("AHRS: EKF3 not started", in_other_modes(0.0, 4.28)),
+    Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
+    Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     Check("Battery 1 below minimum arming voltage", low_battery),
     Check("Need Position Estimate", lost_position),
     Check("Mode requires mission", no_mission),
@@ -145,17 +145,17 @@ CHECKS = (
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
 
 
-def before_arming(vehicle: Vehicle) -> list[str]:
+def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail."""
-    return failing(vehicle, CHECKS)
+    return failing_checks(vehicle, CHECKS)
 
 
-def problems(vehicle: Vehicle) -> list[str]:
+def arming_problems(vehicle: Vehicle) -> list[str]:
     """Return the texts of all checks that forbid arming now: pre-arm checks, then mode and throttle."""
-    found = before_arming(vehicle)
+    found = failing_prearm_checks(vehicle)
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
     if not may_arm_auto:
-        found += not_armable(vehicle)
+        found += mode_not_armable(vehicle)
     throttle = vehicle.tuning.sticks.throttle
     if vehicle.parameters["FS_THR_ENABLE"] and vehicle.rc[throttle] < vehicle.parameters["FS_THR_VALUE"]:
         found.append("Throttle below failsafe")
@@ -170,7 +170,7 @@ def _throttle_is_high(vehicle: Vehicle) -> bool:
     return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
 
 
-def ready(vehicle: Vehicle) -> None:
+def finish_setup(vehicle: Vehicle) -> None:
     """Finish the set-up: on the ground, in the mode that INITIAL_MODE names."""
     vehicle.ground.landed = True
     initial = MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
@@ -178,10 +178,10 @@ def ready(vehicle: Vehicle) -> None:
         vehicle.enter_mode(initial)
 
 
-def warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
-    boot.keep(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
-    ready(vehicle)
+    boot.store_parameters(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
+    finish_setup(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
@@ -201,7 +201,7 @@ def _notice_flight(vehicle: Vehicle) -> None:
     height = vehicle.height
     if height > ALIGNS_ABOVE and "aligned" not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add("aligned")
-        for text in boot.both("EKF3 IMU{unit} MAG0 in-flight yaw alignment complete"):
+        for text in boot.for_both_units("EKF3 IMU{unit} MAG0 in-flight yaw alignment complete"):
             vehicle.send_text(INFO, text)
     if height < 1.0:
         truth = vehicle.flight.truth()
@@ -214,13 +214,13 @@ def _disarm_by_itself(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
     if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:
-        disarm(vehicle, ARMED_WORDS[1], force=True)
+        disarm(vehicle, COPTER_DISARMED, force=True)
         return
     if ManualFlight(vehicle).pilot.throttle > 0.0:
         vehicle.ground.idle_since = now
     delay = vehicle.parameters["DISARM_DELAY"]
     if delay > 0.0 and now - vehicle.ground.idle_since >= from_seconds(delay):
-        disarm(vehicle, ARMED_WORDS[1], force=True)
+        disarm(vehicle, COPTER_DISARMED, force=True)
 
 
 def system_status(vehicle: Vehicle) -> int:
@@ -230,10 +230,10 @@ def system_status(vehicle: Vehicle) -> int:
     return STANDBY if vehicle.landed else ACTIVE
 
 
-def greet(vehicle: Vehicle) -> None:
+def send_banner(vehicle: Vehicle) -> None:
     """Send the status texts that follow a parameter list request."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
-    introduce(vehicle, "ArduCopter")
+    send_version(vehicle, "ArduCopter")
     vehicle.send_text(INFO, f"Frame: QUAD/{shape}")
 
 
@@ -259,14 +259,14 @@ _MAVLINK = ardupilot_mavlink(
     },
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
     commands=commands.copter_commands(
-        problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
+        arming_problems, ARMING_TEXTS, {mode.name: mode.number for mode in MODES.values()}
     ),
     handlers={
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,
     },
-    on_parameter_list=greet,
+    on_parameter_list=send_banner,
 )
 
 COPTER = Firmware(
@@ -283,13 +283,15 @@ COPTER = Firmware(
         rc=RcDefaults((1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0)),
     ),
     boot=BootSequence(
-        boot.copter_events(ready), warm, partial(boot.on_position, before_arming=before_arming)
+        boot.copter_events(finish_setup),
+        start_warm,
+        partial(boot.on_position, before_arming=failing_prearm_checks),
     ),
     periodic=PeriodicWork(
         on_step=on_step,
-        each_second=partial(boot.each_second, before_arming=before_arming),
+        each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
         each_second_from=EACH_SECOND,
     ),
-    failsafes=CopterFailsafes(change_mode, ARMED_WORDS[1]).watches(),
+    failsafes=COPTER_FAILSAFES,
     endpoint=partial(MavlinkEndpoint, _MAVLINK),
 )

@@ -5,17 +5,21 @@ Parameters set triggers and actions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from functools import partial
 
 from volery.base.time import S, from_seconds
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL, WARNING, disarm
+from volery.simulation.autopilots.ardupilot.modes import (
+    COPTER_DISARMED,
+    CRITICAL,
+    ROVER_DISARMED,
+    WARNING,
+    change_mode,
+    disarm,
+)
 from volery.simulation.autopilots.firmware import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
-
-Switch = Callable[[Vehicle, int], bool]
-"""Enters a mode if that is possible, and returns whether it was."""
 
 CONTINUE_MISSION_ON_RADIO, CONTINUE_MISSION_ON_STATION = 1 << 0, 1 << 1
 CONTINUE_GUIDED_ON_RADIO, CONTINUE_LANDING, CONTINUE_PILOT_ON_STATION = 1 << 2, 1 << 3, 1 << 4
@@ -72,171 +76,161 @@ def estimator_lost(vehicle: Vehicle) -> bool:
     return lost and (vehicle.mode.needs_position or "estimator" in vehicle.failsafes.active)
 
 
-class CopterFailsafes:
-    """Failsafe actions of a copter. ``switch`` changes its mode."""
-
-    RTL, LAND, BRAKE, AUTO, ALT_HOLD = 6, 9, 17, 3, 2
-    RESPONSES: Mapping[int, tuple[int, ...]] = {
-        1: (RTL, LAND),
-        3: (RTL, LAND),
-        4: (LAND,),
-        5: (LAND,),
-        6: (RTL, LAND),
-        7: (BRAKE, LAND),
-    }
-    """FS_GCS_ENABLE to the modes that are tried in order. SmartRTL is represented by its fallback."""
-    RADIO: Mapping[int, tuple[int, ...]] = {
-        1: (RTL, LAND),
-        2: (RTL, LAND),
-        3: (LAND,),
-        4: (RTL, LAND),
-        5: (LAND,),
-    }
-    BATTERY: Mapping[int, tuple[int, ...]] = {
-        1: (LAND,),
-        2: (RTL, LAND),
-        3: (RTL, LAND),
-        4: (LAND,),
-        7: (BRAKE, LAND),
-    }
-
-    def __init__(self, switch: Switch, disarmed: str) -> None:
-        self._switch = switch
-        self._disarmed = disarmed
-
-    def watches(self) -> tuple[Failsafe, ...]:
-        """Return the failsafes in the order in which they are checked."""
-        return (
-            Failsafe(
-                "station", station_lost, self.on_station_lost, lambda vehicle: self._clear(vehicle, "GCS")
-            ),
-            Failsafe("radio", radio_lost, self.on_radio_lost, lambda vehicle: self._clear(vehicle, "Radio")),
-            Failsafe("battery low", battery_low, lambda vehicle: self.on_battery(vehicle, "low")),
-            Failsafe(
-                "battery critical",
-                battery_critical,
-                lambda vehicle: self.on_battery(vehicle, "critical"),
-            ),
-            Failsafe("estimator", estimator_lost, self.on_estimator_lost, self.on_estimator_back),
-        )
-
-    def _clear(self, vehicle: Vehicle, what: str) -> None:
-        vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
-
-    def on_station_lost(self, vehicle: Vehicle) -> None:
-        """React to a lost ground station as FS_GCS_ENABLE and FS_OPTIONS demand."""
-        vehicle.rc.release()
-        options = round(vehicle.parameters["FS_OPTIONS"])
-        keeps = ""
-        if options & CONTINUE_MISSION_ON_STATION and vehicle.mode.name == "AUTO":
-            keeps = "Continuing Auto Mode"
-        elif options & CONTINUE_PILOT_ON_STATION and vehicle.mode.pilot:
-            keeps = "Continuing Pilot Control"
-        self._respond(
-            vehicle, "GCS", self.RESPONSES.get(round(vehicle.parameters["FS_GCS_ENABLE"]), ()), keeps
-        )
-
-    def on_radio_lost(self, vehicle: Vehicle) -> None:
-        """React to a lost transmitter as FS_THR_ENABLE and FS_OPTIONS demand."""
-        options = round(vehicle.parameters["FS_OPTIONS"])
-        keeps = ""
-        if options & CONTINUE_MISSION_ON_RADIO and vehicle.mode.name == "AUTO":
-            keeps = "Continuing Auto"
-        elif options & CONTINUE_GUIDED_ON_RADIO and vehicle.mode.name == "GUIDED":
-            keeps = "Continuing Guided Mode"
-        self._respond(vehicle, "Radio", self.RADIO.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), keeps)
-
-    def on_battery(self, vehicle: Vehicle, level: str) -> None:
-        """Report a low or critical battery and execute BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
-        estimate = vehicle.estimate
-        used = estimate.battery_used_mah
-        vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
-        action = round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
-        if action == 5:
-            disarm(vehicle, self._disarmed, force=True)
-        elif action:
-            self._respond(vehicle, "Battery", self.BATTERY.get(action, ()), "")
-
-    def _respond(self, vehicle: Vehicle, what: str, modes: tuple[int, ...], keeps: str) -> None:
-        if not vehicle.armed:
-            vehicle.send_text(WARNING, f"{what} Failsafe")
-        elif self._on_ground(vehicle):
-            vehicle.send_text(WARNING, f"{what} Failsafe - Disarming")
-            disarm(vehicle, self._disarmed, force=True)
-        elif vehicle.manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
-            vehicle.send_text(WARNING, f"{what} Failsafe - Continuing Landing")
-        elif keeps:
-            vehicle.send_text(WARNING, f"{what} Failsafe - {keeps}")
-        else:
-            for mode in modes:
-                if self._switch(vehicle, mode):
-                    break
-            vehicle.send_text(WARNING, f"{what} Failsafe")
-
-    def _on_ground(self, vehicle: Vehicle) -> bool:
-        """Return whether the vehicle may simply disarm: on the ground, and no started mission."""
-        manoeuvre = vehicle.manoeuvre
-        return vehicle.landed and not (isinstance(manoeuvre, FlyMission) and manoeuvre.started)
-
-    def on_estimator_lost(self, vehicle: Vehicle) -> None:
-        """React to a lost position: LAND or ALT_HOLD, as FS_EKF_ACTION demands."""
-        vehicle.send_text(CRITICAL, "EKF variance")
-        action = round(vehicle.parameters["FS_EKF_ACTION"])
-        mode = {1: self.LAND, 2: self.ALT_HOLD, 3: self.LAND}.get(action)
-        if mode is not None and self._switch(vehicle, mode):
-            vehicle.send_text(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
-
-    def on_estimator_back(self, vehicle: Vehicle) -> None:
-        """Report the position; the mode stays."""
-        vehicle.send_text(CRITICAL, "EKF Failsafe Cleared")
+def _report_battery(vehicle: Vehicle, level: str) -> int:
+    """Report a low or critical battery, and return the action of BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
+    estimate = vehicle.estimate
+    used = estimate.battery_used_mah
+    vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
+    return round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
 
 
-class RoverFailsafes:
-    """Failsafe actions of a rover: FS_ACTION for ground station and radio."""
+def _report_cleared(vehicle: Vehicle, what: str) -> None:
+    vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
 
-    HOLD, RTL = 4, 11
-    ACTIONS: Mapping[int, tuple[int, ...]] = {
-        1: (RTL, HOLD),
-        2: (HOLD,),
-        3: (RTL, HOLD),
-        4: (HOLD,),
-        6: (HOLD,),
-    }
 
-    def __init__(self, switch: Switch, disarmed: str) -> None:
-        self._switch = switch
-        self._disarmed = disarmed
+def _enter_first(vehicle: Vehicle, modes: tuple[int, ...]) -> None:
+    """Enter the first of these modes that is possible."""
+    any(change_mode(vehicle, mode) for mode in modes)
 
-    def watches(self) -> tuple[Failsafe, ...]:
-        """Return the failsafes in the order in which they are checked."""
-        return (
-            Failsafe("station", station_lost, lambda v: self._begin(v, "GCS"), lambda v: self._end(v, "GCS")),
-            Failsafe("radio", radio_lost, lambda v: self._begin(v, "Radio"), lambda v: self._end(v, "Radio")),
-            Failsafe("battery low", battery_low, lambda v: self._battery(v, "low")),
-            Failsafe("battery critical", battery_critical, lambda v: self._battery(v, "critical")),
-        )
 
-    def _begin(self, vehicle: Vehicle, what: str) -> None:
+# -- copter
+
+RTL, LAND, BRAKE, ALT_HOLD = 6, 9, 17, 2
+STATION_ACTIONS = {
+    1: (RTL, LAND),
+    3: (RTL, LAND),
+    4: (LAND,),
+    5: (LAND,),
+    6: (RTL, LAND),
+    7: (BRAKE, LAND),
+}
+"""FS_GCS_ENABLE to the modes that are tried in order. SmartRTL is represented by its fallback."""
+RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 3: (LAND,), 4: (RTL, LAND), 5: (LAND,)}
+"""The same for FS_THR_ENABLE."""
+BATTERY_ACTIONS = {1: (LAND,), 2: (RTL, LAND), 3: (RTL, LAND), 4: (LAND,), 7: (BRAKE, LAND)}
+"""The same for BATT_FS_LOW_ACT and BATT_FS_CRT_ACT."""
+DISARM_ACTION = 5
+"""Value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT, and of a rover's FS_ACTION, that disarms."""
+
+
+def _on_station_lost(vehicle: Vehicle) -> None:
+    vehicle.rc.release()
+    options = round(vehicle.parameters["FS_OPTIONS"])
+    keeps = ""
+    if options & CONTINUE_MISSION_ON_STATION and vehicle.mode.name == "AUTO":
+        keeps = "Continuing Auto Mode"
+    elif options & CONTINUE_PILOT_ON_STATION and vehicle.mode.pilot:
+        keeps = "Continuing Pilot Control"
+    _respond(vehicle, "GCS", STATION_ACTIONS.get(round(vehicle.parameters["FS_GCS_ENABLE"]), ()), keeps)
+
+
+def _on_radio_lost(vehicle: Vehicle) -> None:
+    options = round(vehicle.parameters["FS_OPTIONS"])
+    keeps = ""
+    if options & CONTINUE_MISSION_ON_RADIO and vehicle.mode.name == "AUTO":
+        keeps = "Continuing Auto"
+    elif options & CONTINUE_GUIDED_ON_RADIO and vehicle.mode.name == "GUIDED":
+        keeps = "Continuing Guided Mode"
+    _respond(vehicle, "Radio", RADIO_ACTIONS.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), keeps)
+
+
+def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
+    action = _report_battery(vehicle, level)
+    if action == DISARM_ACTION:
+        disarm(vehicle, COPTER_DISARMED, force=True)
+    elif action:
+        _respond(vehicle, "Battery", BATTERY_ACTIONS.get(action, ()), "")
+
+
+def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], keeps: str) -> None:
+    """Report a failsafe and act.
+
+    Args:
+        vehicle: The vehicle.
+        what: Name of the failsafe in the status text.
+        modes: Modes that are tried in order.
+        keeps: Status text of the option that changes nothing, or empty.
+    """
+    manoeuvre = vehicle.manoeuvre
+    mission_started = isinstance(manoeuvre, FlyMission) and manoeuvre.started
+    if not vehicle.armed:
         vehicle.send_text(WARNING, f"{what} Failsafe")
-        self._act(vehicle, round(vehicle.parameters["FS_ACTION"]))
+    elif vehicle.landed and not mission_started:
+        vehicle.send_text(WARNING, f"{what} Failsafe - Disarming")
+        disarm(vehicle, COPTER_DISARMED, force=True)
+    elif manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
+        vehicle.send_text(WARNING, f"{what} Failsafe - Continuing Landing")
+    elif keeps:
+        vehicle.send_text(WARNING, f"{what} Failsafe - {keeps}")
+    else:
+        _enter_first(vehicle, modes)
+        vehicle.send_text(WARNING, f"{what} Failsafe")
 
-    def _end(self, vehicle: Vehicle, what: str) -> None:
-        vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
 
-    def _battery(self, vehicle: Vehicle, level: str) -> None:
-        estimate = vehicle.estimate
-        used = estimate.battery_used_mah
-        vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
-        self._act(
-            vehicle, round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
-        )
+def _on_estimator_lost(vehicle: Vehicle) -> None:
+    """Enter LAND or ALT_HOLD, as FS_EKF_ACTION demands."""
+    vehicle.send_text(CRITICAL, "EKF variance")
+    mode = {1: LAND, 2: ALT_HOLD, 3: LAND}.get(round(vehicle.parameters["FS_EKF_ACTION"]))
+    if mode is not None and change_mode(vehicle, mode):
+        vehicle.send_text(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
 
-    def _act(self, vehicle: Vehicle, action: int) -> None:
-        if not vehicle.armed:
-            return
-        if action == 5:
-            disarm(vehicle, self._disarmed, force=True)
-            return
-        for mode in self.ACTIONS.get(action, ()):
-            if self._switch(vehicle, mode):
-                return
+
+COPTER_FAILSAFES = (
+    Failsafe("station", station_lost, _on_station_lost, partial(_report_cleared, what="GCS")),
+    Failsafe("radio", radio_lost, _on_radio_lost, partial(_report_cleared, what="Radio")),
+    Failsafe("battery low", battery_low, partial(_on_copter_battery, level="low")),
+    Failsafe("battery critical", battery_critical, partial(_on_copter_battery, level="critical")),
+    Failsafe(
+        "estimator",
+        estimator_lost,
+        _on_estimator_lost,
+        lambda vehicle: vehicle.send_text(CRITICAL, "EKF Failsafe Cleared"),
+    ),
+)
+
+
+# -- rover
+
+ROVER_HOLD, ROVER_RTL = 4, 11
+ROVER_ACTIONS = {
+    1: (ROVER_RTL, ROVER_HOLD),
+    2: (ROVER_HOLD,),
+    3: (ROVER_RTL, ROVER_HOLD),
+    4: (ROVER_HOLD,),
+    6: (ROVER_HOLD,),
+}
+"""FS_ACTION and the battery actions to the modes that are tried in order."""
+
+
+def _act_on_rover(vehicle: Vehicle, action: int) -> None:
+    if vehicle.armed and action == DISARM_ACTION:
+        disarm(vehicle, ROVER_DISARMED, force=True)
+    elif vehicle.armed:
+        _enter_first(vehicle, ROVER_ACTIONS.get(action, ()))
+
+
+def _on_rover_link_lost(vehicle: Vehicle, what: str) -> None:
+    vehicle.send_text(WARNING, f"{what} Failsafe")
+    _act_on_rover(vehicle, round(vehicle.parameters["FS_ACTION"]))
+
+
+def _on_rover_battery(vehicle: Vehicle, level: str) -> None:
+    _act_on_rover(vehicle, _report_battery(vehicle, level))
+
+
+ROVER_FAILSAFES = (
+    Failsafe(
+        "station",
+        station_lost,
+        partial(_on_rover_link_lost, what="GCS"),
+        partial(_report_cleared, what="GCS"),
+    ),
+    Failsafe(
+        "radio",
+        radio_lost,
+        partial(_on_rover_link_lost, what="Radio"),
+        partial(_report_cleared, what="Radio"),
+    ),
+    Failsafe("battery low", battery_low, partial(_on_rover_battery, level="low")),
+    Failsafe("battery critical", battery_critical, partial(_on_rover_battery, level="critical")),
+)

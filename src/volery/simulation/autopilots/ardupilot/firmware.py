@@ -29,7 +29,7 @@ EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
 """MAV_DATA_STREAM."""
 
 
-def nothing(_vehicle: Vehicle) -> None:
+def never_sent(_vehicle: Vehicle) -> None:
     """Return None: the firmware knows the message and has no reason to send it."""
     return
 
@@ -90,7 +90,7 @@ BUILDERS: Mapping[str, Builder] = {
             "SCALED_PRESSURE3",
             "WINCH_STATUS",
         ),
-        nothing,
+        never_sent,
     ),
 }
 
@@ -173,15 +173,15 @@ def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[
     return {**groups, ALL: tuple(name for names in groups.values() for name in names)}
 
 
-def board(vehicle: Vehicle) -> str:
+def board_id(vehicle: Vehicle) -> str:
     """Return the board's serial number, which follows from the system id."""
     return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
 
 
-def introduce(vehicle: Vehicle, name: str) -> None:
+def send_version(vehicle: Vehicle, name: str) -> None:
     """Report firmware version and board, as after a parameter list request."""
     vehicle.send_text(INFO, f"{name} V4.5.6 (7ce11b41)")
-    vehicle.send_text(INFO, f"{board(vehicle)}1f6d2a48adfda4")
+    vehicle.send_text(INFO, f"{board_id(vehicle)}1f6d2a48adfda4")
 
 
 def own_parameters(system: int, flight: Flight) -> dict[str, float]:
@@ -213,7 +213,7 @@ def builders(
     return {
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
-            vehicle, capabilities, board(vehicle).encode()
+            vehicle, capabilities, board_id(vehicle).encode()
         ),
         "HEARTBEAT": lambda vehicle: telemetry.heartbeat(vehicle, kind, system_status(vehicle)),
         "SYS_STATUS": partial(telemetry.sys_status, health=health),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
-from volery.simulation.autopilots.ardupilot.modes import INFO, disarm
+from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, disarm
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
 from volery.simulation.autopilots.mavlink.message_fields import finite
@@ -189,7 +189,7 @@ def runs(vehicle: Vehicle) -> bool:
 def copter_ended(vehicle: Vehicle) -> None:
     """Disarm on the ground; hold the position in the air."""
     if vehicle.landed and vehicle.armed:
-        disarm(vehicle, "Disarming motors", force=True)
+        disarm(vehicle, COPTER_DISARMED, force=True)
     elif vehicle.armed:
         stay = ToPoint(vehicle)
         stay.enter()

@@ -23,6 +23,9 @@ FORCE, SKIP_CHECKS = 21_196, 2_989
 
 DISPLAY_EVERY: Ns = 30 * S
 
+COPTER_DISARMED, ROVER_DISARMED = "Disarming motors", "Throttle disarmed"
+"""Status texts of disarming."""
+
 
 class Check(NamedTuple):
     """One arming check: its text, and whether it fails now."""
@@ -31,21 +34,21 @@ class Check(NamedTuple):
     fails: Callable[[Vehicle], bool]
 
 
-def between(start: float, end: float) -> Callable[[Vehicle], bool]:
+def between_uptimes(start: float, end: float) -> Callable[[Vehicle], bool]:
     """Return a check that fails between two uptimes [s]."""
     first, last = int(start * S), int(end * S)
     return lambda vehicle: first <= vehicle.uptime() < last
 
 
-def flies_by_position(start: float, end: float) -> Callable[[Vehicle], bool]:
+def in_position_modes(start: float, end: float) -> Callable[[Vehicle], bool]:
     """Return a check that fails between two uptimes [s] in modes that need a position."""
-    within = between(start, end)
+    within = between_uptimes(start, end)
     return lambda vehicle: vehicle.mode.needs_position and within(vehicle)
 
 
-def needs_no_position(start: float, end: float) -> Callable[[Vehicle], bool]:
+def in_other_modes(start: float, end: float) -> Callable[[Vehicle], bool]:
     """Return a check that fails between two uptimes [s] in modes that need no position."""
-    within = between(start, end)
+    within = between_uptimes(start, end)
     return lambda vehicle: not vehicle.mode.needs_position and within(vehicle)
 
 
@@ -67,14 +70,14 @@ def low_battery(vehicle: Vehicle) -> bool:
     return 0.0 < vehicle.estimate.battery_volts < volts or left < charge
 
 
-def failing(vehicle: Vehicle, checks: Sequence[Check]) -> list[str]:
+def failing_checks(vehicle: Vehicle, checks: Sequence[Check]) -> list[str]:
     """Return the texts of the checks that fail, in the firmware's order."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:
         return []
     return [check.text for check in checks if check.fails(vehicle)]
 
 
-def not_armable(vehicle: Vehicle) -> list[str]:
+def mode_not_armable(vehicle: Vehicle) -> list[str]:
     """Return the text that refuses the mode itself, if it does; a copter names the mode, a rover does not."""
     if vehicle.mode.armable:
         return []

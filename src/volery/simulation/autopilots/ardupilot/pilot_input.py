@@ -87,18 +87,18 @@ def _moved(vehicle: Vehicle) -> None:
 def on_step(vehicle: Vehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
     if vehicle.parameters["SIM_RC_FAIL"] or vehicle.rc.transmitter != list(vehicle.rules.rc.transmitter):
-        fail(vehicle)
-    expire(vehicle)
+        simulate_rc_failure(vehicle)
+    expire_overrides(vehicle)
 
 
-def expire(vehicle: Vehicle) -> None:
+def expire_overrides(vehicle: Vehicle) -> None:
     """Release overrides that are older than RC_OVERRIDE_TIME; a negative time keeps them."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]
     if seconds > 0.0 and vehicle.rc.expire(vehicle.kernel.now(), from_seconds(seconds)):
         _moved(vehicle)
 
 
-def fail(vehicle: Vehicle) -> None:
+def simulate_rc_failure(vehicle: Vehicle) -> None:
     """Simulate SIM_RC_FAIL, whose values 1 and 2 both read as a throttle of 950 us."""
     throttle = vehicle.tuning.sticks.throttle
     healthy = vehicle.rules.rc.transmitter[throttle - 1]

@@ -6,13 +6,13 @@ from functools import cache, partial
 
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import RoverFailsafes
+from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
     ardupilot_mavlink,
     builders,
-    introduce,
     own_parameters,
+    send_version,
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import rover_global, rover_local
@@ -20,15 +20,15 @@ from volery.simulation.autopilots.ardupilot.modes import (
     CUSTOM,
     GUIDED,
     MANUAL,
+    ROVER_DISARMED,
     WARNING,
     Check,
-    between,
-    change_mode,
-    failing,
+    between_uptimes,
+    failing_checks,
     lost_position,
     low_battery,
+    mode_not_armable,
     no_mission,
-    not_armable,
 )
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -78,7 +78,7 @@ READY = round(2.355 * S)
 HOME = round(10.36 * S)
 POSITION = round(42.08 * S)
 
-ARMED_WORDS = ("Throttle armed", "Throttle disarmed")
+ARMING_TEXTS = ("Throttle armed", ROVER_DISARMED)
 
 
 def guided_arrived(vehicle: Vehicle) -> None:
@@ -119,12 +119,12 @@ MODES = {
 INITIALISING = Mode(16, "INITIALISING", CUSTOM | MANUAL, Stand, armable=False)
 
 CHECKS = (
-    Check("Gyros not healthy", between(0.0, 1.85)),
-    Check("Accels inconsistent", between(1.85, 11.5)),
-    Check("Gyros inconsistent", between(11.5, 22.4)),
-    Check("Compass not healthy", between(0.0, 2.4)),
-    Check("AHRS: waiting for home", between(0.0, 10.36)),
-    Check("Battery 1 unhealthy", between(0.0, 2.4)),
+    Check("Gyros not healthy", between_uptimes(0.0, 1.85)),
+    Check("Accels inconsistent", between_uptimes(1.85, 11.5)),
+    Check("Gyros inconsistent", between_uptimes(11.5, 22.4)),
+    Check("Compass not healthy", between_uptimes(0.0, 2.4)),
+    Check("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
+    Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     Check("Battery 1 below minimum arming voltage", low_battery),
     Check("Need Position Estimate", lost_position),
     Check("Mode requires mission", no_mission),
@@ -146,25 +146,25 @@ STREAM_PARAMETERS = {
 """Suffix of the parameter that stores the rate of each MAV_DATA_STREAM."""
 
 
-def before_arming(vehicle: Vehicle) -> list[str]:
+def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail."""
-    return failing(vehicle, CHECKS)
+    return failing_checks(vehicle, CHECKS)
 
 
-def problems(vehicle: Vehicle) -> list[str]:
+def arming_problems(vehicle: Vehicle) -> list[str]:
     """Return the texts of all checks that forbid arming now."""
-    return before_arming(vehicle) + not_armable(vehicle)
+    return failing_prearm_checks(vehicle) + mode_not_armable(vehicle)
 
 
-def ready(vehicle: Vehicle) -> None:
+def finish_setup(vehicle: Vehicle) -> None:
     """Finish the set-up: enter the mode that INITIAL_MODE names."""
     vehicle.enter_mode(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
 
 
-def warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
-    boot.keep(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
-    ready(vehicle)
+    boot.store_parameters(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
+    finish_setup(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
@@ -183,9 +183,9 @@ def system_status(vehicle: Vehicle) -> int:
     return STANDBY if vehicle.mode.name == "HOLD" else ACTIVE
 
 
-def greet(vehicle: Vehicle) -> None:
+def send_banner(vehicle: Vehicle) -> None:
     """Send the status texts that follow a parameter list request."""
-    introduce(vehicle, "ArduRover")
+    send_version(vehicle, "ArduRover")
 
 
 def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
@@ -223,13 +223,13 @@ _MAVLINK = ardupilot_mavlink(
     on_stream_request=on_stream_request,
     least_period=25 * MS,
     commands=commands.rover_commands(
-        problems, ARMED_WORDS, {mode.name: mode.number for mode in MODES.values()}
+        arming_problems, ARMING_TEXTS, {mode.name: mode.number for mode in MODES.values()}
     ),
     handlers={
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
         "SET_POSITION_TARGET_LOCAL_NED": rover_local,
     },
-    on_parameter_list=greet,
+    on_parameter_list=send_banner,
 )
 
 ROVER = Firmware(
@@ -242,12 +242,16 @@ ROVER = Firmware(
         parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),
     ),
-    boot=BootSequence(boot.rover_events(ready), warm, partial(boot.on_position, before_arming=before_arming)),
+    boot=BootSequence(
+        boot.rover_events(finish_setup),
+        start_warm,
+        partial(boot.on_position, before_arming=failing_prearm_checks),
+    ),
     periodic=PeriodicWork(
         on_step=on_step,
-        each_second=partial(boot.each_second, before_arming=before_arming),
+        each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
         each_second_from=round(0.345 * S),
     ),
-    failsafes=RoverFailsafes(change_mode, ARMED_WORDS[1]).watches(),
+    failsafes=ROVER_FAILSAFES,
     endpoint=partial(MavlinkEndpoint, _MAVLINK),
 )

@@ -344,7 +344,7 @@ class Health(NamedTuple):
     estimator_healthy_after: int
 
 
-def logs(vehicle: Vehicle) -> bool:
+def is_logging(vehicle: Vehicle) -> bool:
     """Return whether the log is written: armed, and for 15 s after disarming or a refusal to arm."""
     now = vehicle.kernel.now()
     return (
@@ -366,7 +366,7 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         enabled &= ~AHRS
     if age < health.estimator_healthy_after or not vehicle.estimate.attitude_ok:
         healthy &= ~AHRS
-    if not logs(vehicle):
+    if not is_logging(vehicle):
         enabled &= ~LOGGING
     if not vehicle.arming.checks_passed:
         healthy &= ~PREARM

@@ -19,7 +19,7 @@ from volery.ros.graph import DEFAULT, LATCHED, Node, Publisher, QoS, RosGraph, W
 from volery.ros.messages import message_class
 from volery.ros.messages.dji_constants import M100, NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
 from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
-from volery.simulation.autopilots.dji.services import Services
+from volery.simulation.autopilots.dji.sdk_services import Services
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 

@@ -23,13 +23,13 @@ from volery.simulation.autopilots.dji.flight_controller import (
     controller_of,
 )
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters, tuning
+from volery.simulation.autopilots.dji.sdk_services import ACCEPTED, REFUSED
 from volery.simulation.autopilots.dji.sdk_setpoints import (
     LIFT_OFF_M,
     LIFT_OFF_M_S,
     LIFT_OFF_PERCENT,
     SdkControl,
 )
-from volery.simulation.autopilots.dji.services import ACCEPTED, REFUSED
 from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Failsafe, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter

@@ -22,7 +22,7 @@ from volery.simulation.autopilots.mavlink.command import (
 from volery.simulation.autopilots.mavlink.firmware import MessageHandler
 from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
-from volery.simulation.autopilots.px4 import events, modes, offboard
+from volery.simulation.autopilots.px4 import event_interface, modes, offboard
 from volery.simulation.autopilots.px4.failsafes import OFFBOARD_LOST
 from volery.simulation.autopilots.px4.flight_modes import Hold
 from volery.simulation.autopilots.px4.modes import CRITICAL, FORCE, INFO, Commander, commander_of
@@ -90,7 +90,7 @@ def on_land(vehicle: Vehicle, _command: Command) -> int:
     if commander.request_mode(modes.LAND) != ACCEPTED:
         return TEMPORARILY_REJECTED
     vehicle.send_text(INFO, "Landing at current position\t")
-    commander.log.send(events.LANDING_HERE)
+    commander.log.send(event_interface.LANDING_HERE)
     return ACCEPTED
 
 
@@ -101,7 +101,7 @@ def on_return(vehicle: Vehicle, _command: Command) -> int:
         vehicle.send_text(CRITICAL, "Return to launch denied\t")
         return TEMPORARILY_REJECTED
     vehicle.send_text(INFO, "Returning to launch\t")
-    commander.log.send(events.RETURNING)
+    commander.log.send(event_interface.RETURNING)
     return commander.request_mode(modes.RTL)
 
 
@@ -197,7 +197,7 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     if not isfinite(command.param1) or command.param1 <= 0.5:
         return TEMPORARILY_REJECTED
     if vehicle.armed:
-        commander_of(vehicle).finish_disarming("termination", events.BY_COMMAND)
+        commander_of(vehicle).finish_disarming("termination", event_interface.BY_COMMAND)
     return ACCEPTED
 
 
@@ -264,7 +264,7 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
     commander = commander_of(vehicle)
     lost_for = commander.joystick.receive(given, vehicle.kernel.now())
     if lost_for:
-        commander.log.send(events.STICKS_BACK, events.float_argument(lost_for))
+        commander.log.send(event_interface.STICKS_BACK, event_interface.float_argument(lost_for))
     set_rc_channels(vehicle, given)
     if vehicle.armed:
         _override(commander)

@@ -10,7 +10,7 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
-from volery.simulation.autopilots.px4 import commands, events, mission, modes
+from volery.simulation.autopilots.px4 import commands, event_interface, mission, modes
 from volery.simulation.autopilots.px4.failsafes import on_step
 from volery.simulation.autopilots.px4.firmware import own_parameters, px4_firmware, px4_mavlink
 from volery.simulation.autopilots.px4.flight_modes import (
@@ -41,22 +41,22 @@ def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float)
     heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
     if stage == "climb":
         vehicle.send_text(INFO, "RTL HOME activated\t")
-        log.send(events.RETURN_ACTIVATED)
+        log.send(event_interface.RETURN_ACTIVATED)
         if not vehicle.armed:
             return
         vehicle.send_text(INFO, "RTL: landing at home position.\t")
         vehicle.send_text(INFO, f"RTL: climb to {heights}")
-        log.send(events.RETURN_HOME)
-        log.send(events.RETURN_CLIMB, figures)
+        log.send(event_interface.RETURN_HOME)
+        log.send(event_interface.RETURN_CLIMB, figures)
     elif stage == "return":
         vehicle.send_text(INFO, f"RTL: return at {heights}")
-        log.send(events.RETURN_FLY, figures)
+        log.send(event_interface.RETURN_FLY, figures)
     elif stage == "descend":
         vehicle.send_text(INFO, f"RTL: descend to {heights}")
-        log.send(events.RETURN_DESCEND, figures)
+        log.send(event_interface.RETURN_DESCEND, figures)
     else:
         vehicle.send_text(INFO, "RTL: land at destination\t")
-        log.send(events.RETURN_LAND)
+        log.send(event_interface.RETURN_LAND)
 
 
 QUADROTOR = 2

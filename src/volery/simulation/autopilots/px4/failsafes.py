@@ -10,7 +10,7 @@ import struct
 
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.manual_control import NEVER
-from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, Commander, commander_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -76,7 +76,7 @@ def _detect_stick_loss(commander: Commander, now: Ns) -> None:
     if sticks.valid and now - sticks.last_received_ns > patience:
         sticks.valid = False
         vehicle.rc.release()
-        commander.log.send(events.STICKS_LOST)
+        commander.log.send(event_interface.STICKS_LOST)
 
 
 # --- ground ------------------------------------------------------------------------------------------------
@@ -90,7 +90,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
     if flying and not commander.flying:
         commander.took_off, commander.lifted_at = True, now
         vehicle.send_text(INFO, "Takeoff detected\t")
-        commander.log.send(events.TAKEOFF_DETECTED)
+        commander.log.send(event_interface.TAKEOFF_DETECTED)
     elif commander.flying and not vehicle.armed and vehicle.estimate.landed:
         flying = False  # it fell: nothing is said
         vehicle.ground.landed = True
@@ -98,7 +98,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
         flying = False
         commander.landed_at = now
         vehicle.send_text(INFO, "Landing detected\t")
-        commander.log.send(events.LANDING_DETECTED)
+        commander.log.send(event_interface.LANDING_DETECTED)
     else:
         flying = commander.flying
     commander.flying = flying
@@ -112,9 +112,9 @@ def _disarm_by_itself(commander: Commander, now: Ns) -> None:
     waiting = vehicle.parameters["COM_DISARM_PRFLT"]
     if commander.took_off:
         if after_landing > 0.0 and now - commander.landed_at >= from_seconds(after_landing):
-            commander.finish_disarming("landing", events.BY_LANDING)
+            commander.finish_disarming("landing", event_interface.BY_LANDING)
     elif waiting > 0.0 and now - vehicle.arming.armed_at >= from_seconds(waiting):
-        commander.finish_disarming("auto preflight disarming", events.BY_WAITING)
+        commander.finish_disarming("auto preflight disarming", event_interface.BY_WAITING)
 
 
 # --- failsafes ---------------------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ def _end_hold(commander: Commander) -> None:
         return
     commander.hold_until = NEVER
     commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
-    commander.log.send(events.FAILSAFE_AFTER_HOLD, struct.pack("<HHBB", 0, 3, 6, 1))
+    commander.log.send(event_interface.FAILSAFE_AFTER_HOLD, struct.pack("<HHBB", 0, 3, 6, 1))
     commander.begin_failsafe(commander.failsafe, commander.after_hold)
 
 
@@ -172,7 +172,7 @@ def _hold_first(commander: Commander, name: str, number: int) -> None:
         return
     seconds = max(1, round(left))
     vehicle.send_text(CRITICAL, f"Failsafe activated, entering Hold for {seconds} seconds\t")
-    commander.log.send(events.FAILSAFE_HOLD, struct.pack("<HHBBBB", 0, 3, 6, seconds, 0, 1))
+    commander.log.send(event_interface.FAILSAFE_HOLD, struct.pack("<HHBBBB", 0, 3, 6, seconds, 0, 1))
     commander.begin_failsafe(name, modes.LOITER)
     commander.hold_until = vehicle.kernel.now() + from_seconds(left)
     commander.after_hold = number
@@ -192,7 +192,7 @@ def _check_offboard(commander: Commander) -> None:
         if number == modes.RTL and not commander.can_fly(modes.RTL):
             number = modes.LAND
         vehicle.send_text(CRITICAL, "Failsafe activated\t")
-        commander.log.send(events.FAILSAFE, bytes((0, 0, 6, 0, action)))
+        commander.log.send(event_interface.FAILSAFE, bytes((0, 0, 6, 0, action)))
         commander.begin_failsafe(OFFBOARD_LOST, number)
 
 
@@ -230,7 +230,7 @@ def _check_link(commander: Commander) -> None:
 def _act(commander: Commander, name: str, action: int) -> None:
     if action in (TERMINATE, DISARM):
         commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
-        commander.finish_disarming("failsafe", events.BY_COMMAND)
+        commander.finish_disarming("failsafe", event_interface.BY_COMMAND)
         return
     number = ACTIONS.get(action, modes.RTL)
     if number == modes.LOITER:

@@ -30,7 +30,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.px4 import events, modes
+from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.commands import on_return
 from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
 from volery.simulation.autopilots.px4.modes import INFO, commander_of
@@ -98,7 +98,7 @@ def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
         vehicle.send_text(INFO, f"Takeoff to {above:.1f} meters above home\t")
-        commander_of(vehicle).log.send(events.MISSION_TAKEOFF, events.float_argument(above))
+        commander_of(vehicle).log.send(event_interface.MISSION_TAKEOFF, event_interface.float_argument(above))
 
 
 def ended(vehicle: Vehicle) -> None:

@@ -13,7 +13,7 @@ from volery.base.frames import Vector
 from volery.base.time import MS, Ns
 from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
-from volery.simulation.autopilots.px4 import events
+from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import SetpointStream
 from volery.simulation.autopilots.px4.pilot_input import Joystick
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -115,7 +115,7 @@ class Commander:
         """Reset to the state after a boot."""
         self.joystick = Joystick()
         self.stream = SetpointStream()
-        self.log = events.EventLog(self.vehicle)
+        self.log = event_interface.EventLog(self.vehicle)
         self.requested = LOITER
         """Mode that the user requested."""
         self.after_disarming = LOITER
@@ -143,7 +143,7 @@ class Commander:
         self.flying = False
         self.took_off = False
         self.landed_at: Ns = NEVER
-        self.reported: events.ArmingChecks | None = None
+        self.reported: event_interface.ArmingChecks | None = None
         self.reported_at: Ns = NEVER
         self.last_step: Ns = NEVER
 
@@ -165,11 +165,11 @@ class Commander:
         vehicle = self.vehicle
         return self.stream.alive(vehicle.kernel.now(), vehicle.seconds_parameter("COM_OF_LOSS_T"))
 
-    def checks(self) -> events.ArmingChecks:
+    def checks(self) -> event_interface.ArmingChecks:
         """Return the results of the arming checks."""
         vehicle = self.vehicle
         age = vehicle.uptime()
-        return events.ArmingChecks(
+        return event_interface.ArmingChecks(
             started=age >= STARTED_AFTER,
             attitude=age >= ATTITUDE_AFTER,
             position=self.ready,
@@ -204,7 +204,7 @@ class Commander:
         if vehicle.armed and not self.can_fly(number):
             vehicle.send_text(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
             group = OFFBOARD_IN_EVENTS if number == OFFBOARD else POSITION_IN_EVENTS
-            self.log.send(events.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
+            self.log.send(event_interface.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
             return TEMPORARILY_REJECTED
         self._accept_mode(number)
         return ACCEPTED
@@ -260,7 +260,7 @@ class Commander:
     def pilot_takes_over(self) -> None:
         """Enter POSCTL because the sticks moved in an automatic mode."""
         if self.failsafe:
-            self.log.send(events.PILOT_TOOK_OVER)
+            self.log.send(event_interface.PILOT_TOOK_OVER)
         else:
             self.vehicle.send_text(INFO, "Pilot took over using sticks\t")
         self._accept_mode(POSCTL)
@@ -278,7 +278,7 @@ class Commander:
         if not force:
             if self._throttle_is_high():
                 vehicle.send_text(CRITICAL, "Arming denied: throttle above center\t")
-                self.log.send(events.THROTTLE_HIGH)
+                self.log.send(event_interface.THROTTLE_HIGH)
                 return TEMPORARILY_REJECTED
             if not self.armable:
                 vehicle.arming.refused_at = vehicle.kernel.now()
@@ -292,7 +292,7 @@ class Commander:
         self.ground = vehicle.estimate.position[2]
         vehicle.arm()
         vehicle.send_text(INFO, "Armed by external command\t")
-        self.log.send(events.ARMED, events.BY_COMMAND)
+        self.log.send(event_interface.ARMED, event_interface.BY_COMMAND)
         self.report_minimum_height()
         return ACCEPTED
 
@@ -300,7 +300,9 @@ class Commander:
         """Report once that a take-off was raised to the minimum height."""
         if self.minimum_height and self.requested == TAKEOFF:
             self.vehicle.send_text(INFO, f"Using minimum takeoff altitude: {self.minimum_height:.2f} m\t")
-            self.log.send(events.MINIMUM_TAKEOFF, events.float_argument(self.minimum_height))
+            self.log.send(
+                event_interface.MINIMUM_TAKEOFF, event_interface.float_argument(self.minimum_height)
+            )
         self.minimum_height = 0.0
 
     @property
@@ -327,9 +329,9 @@ class Commander:
             return ACCEPTED
         if vehicle.flies and not vehicle.landed and not force:
             vehicle.send_text(CRITICAL, "Disarming denied! Not landed\t")
-            self.log.send(events.DISARM_REFUSED)
+            self.log.send(event_interface.DISARM_REFUSED)
             return TEMPORARILY_REJECTED
-        self.finish_disarming("external command", events.BY_COMMAND)
+        self.finish_disarming("external command", event_interface.BY_COMMAND)
         return ACCEPTED
 
     def finish_disarming(self, words: str, reason: bytes) -> None:
@@ -337,7 +339,7 @@ class Commander:
         vehicle = self.vehicle
         vehicle.disarm()
         vehicle.send_text(INFO, f"Disarmed by {words}\t")
-        self.log.send(events.DISARMED, reason)
+        self.log.send(event_interface.DISARMED, reason)
         self.end_failsafe()
         self.takeoff_amsl = None
         self.requested = self.after_disarming
@@ -354,7 +356,7 @@ class Commander:
         found = self.checks()
         if found != self.reported:
             self.reported, self.reported_at = found, now
-            for event, arguments in events.arming_report(found):
+            for event, arguments in event_interface.arming_report(found):
                 self.log.send(event, arguments)
 
 

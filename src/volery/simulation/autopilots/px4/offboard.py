@@ -26,7 +26,7 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_TERRAIN_INT,
     LOCAL_NED,
 )
-from volery.simulation.autopilots.px4.events import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
+from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
 from volery.simulation.autopilots.px4.flight_modes import climb_share
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
