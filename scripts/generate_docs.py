@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from package_map import package_map
 from typer.main import get_command
 
 from volery.cli.main import app
@@ -361,9 +362,9 @@ def _cell(one: dict[str, Any]) -> str:
     return f"{one['caller']}<br>{' → '.join(one['aircraft'])}{broken}"
 
 
-def pages() -> dict[str, str]:
-    """File name and content."""
-    return {
+def pages() -> dict[Path, str]:
+    """Return each generated file with its content."""
+    reference = {
         "observables.md": MADE + observables(),
         "processors.md": MADE + processors(),
         "command-line.md": MADE + command_line(),
@@ -374,23 +375,27 @@ def pages() -> dict[str, str]:
         "model.md": MADE + model(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
+    return {
+        **{REFERENCE / name: text for name, text in reference.items()},
+        ROOT / "docs" / "images" / "packages.svg": package_map(),
+    }
 
 
 def main() -> int:
-    """Write, or check."""
-    stale = [name for name, text in pages().items() if not _same(REFERENCE / name, text)]
+    """Write the stale files; with --check print their names and return 1."""
+    stale = {
+        path: text
+        for path, text in pages().items()
+        if not path.exists() or path.read_text(encoding="utf-8") != text
+    }
     if "--check" in sys.argv:
-        for name in stale:
-            print(f"docs/reference/{name} is not up to date: run 'make docs'")
+        for path in stale:
+            print(f"{path.relative_to(ROOT)} is not up to date: run 'make docs'")
         return 1 if stale else 0
-    REFERENCE.mkdir(parents=True, exist_ok=True)
-    for name in stale:
-        (REFERENCE / name).write_text(pages()[name], encoding="utf-8")
+    for path, text in stale.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
     return 0
-
-
-def _same(path: Path, text: str) -> bool:
-    return path.exists() and path.read_text(encoding="utf-8") == text
 
 
 if __name__ == "__main__":
