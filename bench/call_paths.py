@@ -37,7 +37,7 @@ SOURCE = Path(str(volery.__file__)).parent
 MESSAGES, GOTOS = 3000, 40
 ROUNDS = 3
 WARM_UP, TRACED = 200, 20
-"""Messages before measuring begins, and how many of those after it are traced."""
+"""Messages before measuring begins, and how many of the last ones are traced."""
 
 TALKER = """
 import sys
@@ -144,7 +144,7 @@ class Probe:
 
 def publish(model: str) -> Probe:
     """Measure publish to callback in *model*."""
-    probe = Probe(MESSAGES, frozenset(range(WARM_UP, WARM_UP + TRACED)))
+    probe = Probe(MESSAGES, frozenset(range(MESSAGES - TRACED, MESSAGES)))
     sys.modules["call_paths_probe"] = SimpleNamespace(  # type: ignore[assignment]  # the components import it
         begin=probe.begin, end=probe.end, count=probe.count
     )
