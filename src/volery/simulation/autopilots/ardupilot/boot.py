@@ -28,6 +28,11 @@ def banner(name: str) -> bytes:
     return BANNER.format(name=name).encode()
 
 
+def action_event(seconds: float, act: VehicleAction) -> BootEvent:
+    """Return an event that executes an action."""
+    return BootEvent(round(seconds * S), act)
+
+
 def texts_event(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
     """Return an event that sends these status texts."""
 
@@ -35,7 +40,7 @@ def texts_event(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
         for text in texts:
             vehicle.send_text(severity, text)
 
-    return BootEvent(round(seconds * S), act)
+    return action_event(seconds, act)
 
 
 def announcement_event(seconds: float, *names: str) -> BootEvent:
@@ -46,7 +51,7 @@ def announcement_event(seconds: float, *names: str) -> BootEvent:
             if name in vehicle.parameters:
                 vehicle.output.parameter_changed(name)
 
-    return BootEvent(round(seconds * S), act)
+    return action_event(seconds, act)
 
 
 def measurement_event(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
@@ -56,17 +61,12 @@ def measurement_event(seconds: float, values: Sequence[tuple[str, float]]) -> Bo
         for name, value in values:
             vehicle.set_parameter(name, value)
 
-    return BootEvent(round(seconds * S), act)
+    return action_event(seconds, act)
 
 
 def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
     """Return raw bytes on the wire, as pairs of seconds after boot and data."""
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
-
-
-def action_event(seconds: float, act: VehicleAction) -> BootEvent:
-    """Return an event that executes an action."""
-    return BootEvent(round(seconds * S), act)
 
 
 def set_origin(vehicle: Vehicle) -> None:

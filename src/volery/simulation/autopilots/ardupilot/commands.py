@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from math import isfinite, isnan, nan, radians
+from math import isfinite, isnan, radians
 
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot.modes import (
@@ -304,7 +304,3 @@ def rover_commands(
         RETURN: to_mode(modes["RTL"]),
         SET_YAW_SPEED: on_set_yaw_speed,
     }
-
-
-NO_YAW = nan
-"""param4 that leaves the heading alone."""

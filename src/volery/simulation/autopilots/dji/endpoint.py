@@ -198,8 +198,8 @@ JOY = "sensor_msgs/msg/Joy"
 class _TopicGroup:
     """Topics of one period."""
 
-    def __init__(self, face: DjiEndpoint, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
-        self._face = face
+    def __init__(self, endpoint: DjiEndpoint, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
+        self._endpoint = endpoint
         self._check_every = max(1, SUBSCRIBER_CHECK_PERIOD // period)
         self._listed = listed
         self._subscribed: list[tuple[Topic, Publisher]] = []
@@ -210,11 +210,11 @@ class _TopicGroup:
         if self._round % self._check_every == 0:
             self._subscribed = [one for one in self._listed if one[1].subscribers()]
         self._round += 1
-        if not self._subscribed or not self._face.is_active:
+        if not self._subscribed or not self._endpoint.is_active:
             return
-        stamp = self._face.stamp()
+        stamp = self._endpoint.stamp()
         for topic, publisher in self._subscribed:
-            message = topic.build(self._face.controller, stamp)
+            message = topic.build(self._endpoint.controller, stamp)
             if message is not None:
                 publisher.publish(message)
 

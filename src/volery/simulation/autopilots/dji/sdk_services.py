@@ -49,6 +49,18 @@ def _response(kind: str, result: bool) -> Any:
     return cls(result=result)
 
 
+def _accepting(
+    prefix: str, package: str, *rows: tuple[str, str, Callable[[Any], bool]]
+) -> tuple[Served, ...]:
+    """Return services that answer whether a request is accepted, from rows of name, type and handler."""
+
+    def served(name: str, kind: str, handle: Callable[[Any], bool]) -> Served:
+        kind = f"{package}/srv/{kind}"
+        return Served(prefix + name, kind, lambda request: _response(kind, handle(request)))
+
+    return tuple(served(*row) for row in rows)
+
+
 class Services:
     """Services of one aircraft. ``on_reference`` is called once there is a local reference."""
 
@@ -60,37 +72,31 @@ class Services:
     def table(self, package: str) -> tuple[Served, ...]:
         """Return the services of the node of a package."""
         own = self._services_4_1() if package == NEW_NAMES else self._services_3_8()
-        below = f"{package}/"
-        return (*own, *(Served(below + name, kind, answer) for name, kind, answer in self._missions(package)))
-
-    def _served(self, name: str, kind: str, do: Callable[[Any], bool]) -> Served:
-        return Served(name, kind, lambda request: _response(kind, do(request)))
+        return (*own, *self._missions(package))
 
     # -- 3.8
 
     def _services_3_8(self) -> tuple[Served, ...]:
-        controller, package = self._controller, f"{OLD_NAMES}/srv"
-        served = self._served
-        below = f"{OLD_NAMES}/"
+        controller = self._controller
         return (
-            served(f"{below}activation", f"{package}/Activation", lambda _: controller.activate()),
-            served(
-                f"{below}sdk_control_authority",
-                f"{package}/SDKControlAuthority",
-                lambda request: controller.set_authority(bool(request.control_enable)),
+            *_accepting(
+                f"{OLD_NAMES}/",
+                OLD_NAMES,
+                ("activation", "Activation", lambda _: controller.activate()),
+                (
+                    "sdk_control_authority",
+                    "SDKControlAuthority",
+                    lambda request: controller.set_authority(bool(request.control_enable)),
+                ),
+                (
+                    "drone_arm_control",
+                    "DroneArmControl",
+                    lambda request: controller.motors(bool(request.arm)),
+                ),
+                ("drone_task_control", "DroneTaskControl", lambda request: self._task(request.task)),
+                ("set_local_pos_ref", "SetLocalPosRef", lambda _: self._set_reference()),
             ),
-            served(
-                f"{below}drone_arm_control",
-                f"{package}/DroneArmControl",
-                lambda request: controller.motors(bool(request.arm)),
-            ),
-            served(
-                f"{below}drone_task_control",
-                f"{package}/DroneTaskControl",
-                lambda request: self._task(request.task),
-            ),
-            served(f"{below}set_local_pos_ref", f"{package}/SetLocalPosRef", lambda _: self._set_reference()),
-            Served(f"{below}query_drone_version", f"{package}/QueryDroneVersion", self._version),
+            Served(f"{OLD_NAMES}/query_drone_version", f"{OLD_NAMES}/srv/QueryDroneVersion", self._version),
         )
 
     def _version(self, _request: Any) -> Any:
@@ -111,27 +117,24 @@ class Services:
     # -- 4.1
 
     def _services_4_1(self) -> tuple[Served, ...]:
-        controller, package = self._controller, f"{NEW_NAMES}/srv"
-        served = self._served
+        controller = self._controller
         controller.activate_at_power_on()
-        return (
-            served("flight_task_control", f"{package}/FlightTaskControl", self._flight_task),
-            served(
+        return _accepting(
+            "",
+            NEW_NAMES,
+            ("flight_task_control", "FlightTaskControl", self._flight_task),
+            (
                 "obtain_release_control_authority",
-                f"{package}/ObtainControlAuthority",
+                "ObtainControlAuthority",
                 lambda request: controller.set_authority(request.enable_obtain),
             ),
-            served(
-                "kill_switch",
-                f"{package}/KillSwitch",
-                lambda request: controller.kill() if request.enable else True,
-            ),
-            served("emergency_brake", f"{package}/EmergencyBrake", lambda _: controller.brake()),
-            served("set_local_pos_reference", f"{package}/SetLocalPosRef", lambda _: self._set_reference()),
-            served("set_joystick_mode", f"{package}/SetJoystickMode", self._joystick_mode),
-            served("joystick_action", f"{package}/JoystickAction", self._joystick_action),
-            served("set_go_home_altitude", f"{package}/SetGoHomeAltitude", self._go_home_altitude),
-            served("set_home_point", f"{package}/SetHomePoint", self._home_point),
+            ("kill_switch", "KillSwitch", lambda request: controller.kill() if request.enable else True),
+            ("emergency_brake", "EmergencyBrake", lambda _: controller.brake()),
+            ("set_local_pos_reference", "SetLocalPosRef", lambda _: self._set_reference()),
+            ("set_joystick_mode", "SetJoystickMode", self._joystick_mode),
+            ("joystick_action", "JoystickAction", self._joystick_action),
+            ("set_go_home_altitude", "SetGoHomeAltitude", self._go_home_altitude),
+            ("set_home_point", "SetHomePoint", self._home_point),
         )
 
     def _flight_task(self, request: Any) -> bool:
@@ -192,37 +195,35 @@ class Services:
     # -- missions, alike in both
 
     def _missions(self, package: str) -> tuple[Served, ...]:
-        controller, kinds = self._controller, f"{package}/srv"
-        upload, action = f"{kinds}/MissionWpUpload", f"{kinds}/MissionWpAction"
-        get_info, get_speed = f"{kinds}/MissionWpGetInfo", f"{kinds}/MissionWpGetSpeed"
-        set_speed, status = f"{kinds}/MissionWpSetSpeed", f"{kinds}/MissionStatus"
-        return (
-            self._served(
+        controller, prefix = self._controller, f"{package}/"
+
+        def query(name: str, kind: str, values: Callable[[], tuple[Any, ...]]) -> Served:
+            response = message_class(f"{package}/srv/{kind}_Response")
+            return Served(prefix + name, f"{package}/srv/{kind}", lambda _: response(*values()))
+
+        upload, action, set_speed = _accepting(
+            prefix,
+            package,
+            (
                 "mission_waypoint_upload",
-                upload,
+                "MissionWpUpload",
                 lambda request: controller.upload(request.waypoint_task.copy()),
             ),
-            self._served("mission_waypoint_action", action, self._mission_action),
-            Served(
-                "mission_waypoint_getInfo",
-                get_info,
-                lambda _: message_class(f"{get_info}_Response")(
-                    controller.task or message_class(f"{package}/msg/MissionWaypointTask")()
-                ),
-            ),
-            Served(
+            ("mission_waypoint_action", "MissionWpAction", self._mission_action),
+            ("mission_waypoint_setSpeed", "MissionWpSetSpeed", self._set_speed),
+        )
+        no_task = message_class(f"{package}/msg/MissionWaypointTask")
+        return (
+            upload,
+            action,
+            query("mission_waypoint_getInfo", "MissionWpGetInfo", lambda: (controller.task or no_task(),)),
+            query(
                 "mission_waypoint_getSpeed",
-                get_speed,
-                lambda _: message_class(f"{get_speed}_Response")(
-                    controller.task.idle_velocity if controller.task else 0.0
-                ),
+                "MissionWpGetSpeed",
+                lambda: (controller.task.idle_velocity if controller.task else 0.0,),
             ),
-            self._served("mission_waypoint_setSpeed", set_speed, self._set_speed),
-            Served(
-                "mission_status",
-                status,
-                lambda _: message_class(f"{status}_Response")(int(controller.task is not None), 0),
-            ),
+            set_speed,
+            query("mission_status", "MissionStatus", lambda: (int(controller.task is not None), 0)),
         )
 
     def _mission_action(self, request: Any) -> bool:

@@ -202,8 +202,8 @@ def energy(vehicle: Vehicle) -> Fields:
 def datalink_report(vehicle: Vehicle) -> Fields:
     """Return DATALINK_REPORT."""
     state = state_of(vehicle)
-    heard = state.last_uplink_ns != NEVER
-    silence = vehicle.kernel.now() - state.last_uplink_ns if heard else vehicle.uptime()
+    received = state.last_uplink_ns != NEVER
+    silence = vehicle.kernel.now() - state.last_uplink_ns if received else vehicle.uptime()
     return {
         "uplink_lost_time": to_unsigned(to_seconds(silence)),
         "uplink_nb_msgs": state.uplink_messages & 0xFFFF,

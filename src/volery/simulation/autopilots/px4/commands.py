@@ -201,16 +201,6 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def deny(_vehicle: Vehicle, _command: Command) -> int:
-    """Refuse PREFLIGHT_REBOOT_SHUTDOWN, as the firmware's simulator does."""
-    return DENIED
-
-
-def accept(_vehicle: Vehicle, _command: Command) -> int:
-    """Accept a command that has no effect."""
-    return ACCEPTED
-
-
 SHARED_COMMANDS: Mapping[int, Handler] = {
     RETURN: on_return,
     DO_SET_MODE: on_set_mode,
@@ -218,10 +208,10 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     SET_HOME: on_set_home,
     FLIGHT_TERMINATION: on_terminate,
     REPOSITION: on_reposition,
-    REBOOT: deny,
+    REBOOT: lambda _vehicle, _command: DENIED,  # as the firmware's simulator does
     MISSION_START: on_mission_start,
     ARM_DISARM: on_arm,
-    REQUEST_PROTOCOL: accept,
+    REQUEST_PROTOCOL: lambda _vehicle, _command: ACCEPTED,
 }
 
 COPTER_COMMANDS: Mapping[int, Handler] = {

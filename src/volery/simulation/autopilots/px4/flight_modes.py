@@ -137,9 +137,9 @@ class Descent(Land):
 class Return(Manoeuvre):
     """AUTO.RTL: climb, fly home, descend to RTL_DESCEND_ALT, land. ``report`` is called at each stage."""
 
-    def __init__(self, vehicle: Vehicle, told: Callable[[Vehicle, str, float, float], None]) -> None:
+    def __init__(self, vehicle: Vehicle, report: Callable[[Vehicle, str, float, float], None]) -> None:
         super().__init__(vehicle)
-        self._report = told
+        self._report = report
         self._stage = ""
         self._active: Manoeuvre = Hold(vehicle)
 

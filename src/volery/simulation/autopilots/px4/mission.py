@@ -85,12 +85,12 @@ def refuse_guided_item(_vehicle: Vehicle, _item: MissionItem) -> bool:
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """Send MISSION_ITEM_REACHED with its repetitions."""
 
-    def tell() -> None:
+    def send() -> None:
         vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
 
-    tell()
+    send()
     for again in range(1, REACHED_AGAIN + 1):
-        vehicle.kernel.call_at(vehicle.kernel.now() + again * REACHED_EVERY, tell)
+        vehicle.kernel.call_at(vehicle.kernel.now() + again * REACHED_EVERY, send)
 
 
 def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:

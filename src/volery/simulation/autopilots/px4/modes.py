@@ -218,9 +218,9 @@ class Commander:
         self.joystick.set_reference()
         self._fly(number)
 
-    def _fly(self, number: int, anew: bool = False) -> None:
+    def _fly(self, number: int, restart: bool = False) -> None:
         mode = self.vehicle.rules.modes[number]
-        if mode is not self.vehicle.mode or anew:
+        if mode is not self.vehicle.mode or restart:
             self.vehicle.enter_mode(mode)
 
     def restart_mode(self, number: int) -> None:
@@ -228,7 +228,7 @@ class Commander:
         again = self.vehicle.mode.number == number and self.failsafe_mode is None
         self._accept_mode(number)
         if again:
-            self._fly(number, anew=True)
+            self._fly(number, restart=True)
 
     def continue_with(self, number: int) -> None:
         """Enter the mode that follows after a mode has ended."""
