@@ -1,7 +1,8 @@
-"""ROS 2: nodes on real DDS, by the real rclpy of whatever installation this Python sees.
+"""ROS 2: nodes on real DDS, through the rclpy of the installation that this Python finds.
 
-Messages cross as CDR bytes, which are the same on both sides; rclpy's own classes are used where it leaves no
-choice, in services. rclpy knows the types that are installed as packages with it, and no others.
+Messages cross as CDR bytes, which are the same on both sides; rclpy's own classes are used only in services,
+where it requires them. rclpy supports the types of installed packages; other types are carried as bytes
+(``rclpy_types``).
 """
 
 from volery.ros.transports.ros2.graph import available, ros2_graph

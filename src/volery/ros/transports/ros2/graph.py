@@ -1,4 +1,4 @@
-"""The graph that ROS 2's nodes discover: one rclpy context, one thread that spins for all nodes here."""
+"""The graph that ROS 2 nodes discover: one rclpy context, one thread that spins all nodes of this process."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from volery.ros.transports.ros2.rclpy_endpoints import (
 from volery.ros.transports.transport_graph import TransportGraph
 
 DISCOVERY_S = 0.6
-"""How long after its start a process is taken to know who is there already."""
+"""Time after the start of a process within which discovery is assumed to be complete, s."""
 GOODBYE_S = 2.0
 WATCH_S = 1.0
-"""How often it looks for topics that carry several types."""
+"""Period of looking for topics that carry several types, s."""
 NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"
-"""What DDS calls the node of an end that was discovered before its node was."""
+"""Node name that DDS gives for an endpoint that was discovered before its node."""
 HIDDEN = "_volery"
-"""Names that begin so are the transport's own and are not shown."""
+"""Prefix of the names of the transport's own nodes, which are not shown."""
 _MISSING = (
     "ROS 2 needs rclpy, which this Python does not see: source your installation's setup.bash, or install "
     "the wheels with scripts/ros2-venv, and use that Python"
@@ -50,7 +50,7 @@ _MISSING = (
 
 
 def available() -> bool:
-    """Whether rclpy can be imported."""
+    """Return whether rclpy can be imported."""
     return find_spec("rclpy") is not None
 
 
@@ -72,19 +72,19 @@ class Ros2Node:
         check_type(self._node, topic, message_type, self.name)
         return Ros2Subscription(self._node, topic, message_type, qos, arrived)
 
-    def serve(self, name: str, kind: ServiceType, asked: OnRequest) -> Ros2ServiceServer:
-        """Offer a service."""
+    def serve(self, name: str, kind: ServiceType, requested: OnRequest) -> Ros2ServiceServer:
+        """Offer a service; raise ``UsageError`` if another node does."""
         for one in self._library.services():
             if one.name == name:
                 raise UsageError(f"node {self.name}: service {name} is served by {one.server} already")
-        return Ros2ServiceServer(self._node, name, kind, asked)
+        return Ros2ServiceServer(self._node, name, kind, requested)
 
     def client(self, name: str, kind: ServiceType) -> Ros2ServiceClient:
-        """Call a service."""
+        """Return a client of a service."""
         return Ros2ServiceClient(self._node, name, kind)
 
     def has_service(self, name: str) -> bool:
-        """Whether somebody is known to serve it."""
+        """Return whether a server has been discovered."""
         return bool(self._node.count_services(name))
 
     def _parameters(self, name: str) -> tuple[OwnParameters | OtherParameters, str]:
@@ -92,12 +92,12 @@ class Ros2Node:
         return (OwnParameters(self._node) if node == self.name else OtherParameters(self._node, node)), rest
 
     def get_parameter(self, name: str) -> Any:
-        """Of this node, or of the one whose name begins it."""
+        """Access a parameter of this node, or of the node whose name begins the parameter's."""
         of, rest = self._parameters(name)
         return of.get(rest)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Of this node, or of the one whose name begins it."""
+        """Access a parameter of this node, or of the node whose name begins the parameter's."""
         try:
             of, rest = self._parameters(name)
         except KeyError:
@@ -108,12 +108,12 @@ class Ros2Node:
         of.set(rest, value)
 
     def delete_parameter(self, name: str) -> None:
-        """Of this node."""
+        """Remove a parameter of this node."""
         of, rest = self._parameters(name)
         of.delete(rest)
 
     def prepare_close(self) -> None:
-        """Nothing need be known before."""
+        """Do nothing: rclpy needs no preparation."""
 
     def close(self) -> None:
         """Leave the graph."""
@@ -133,7 +133,7 @@ class Ros2Library:
         self._executor = import_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
         self._over = threading.Event()
         self._left: set[str] = set()
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
         self.say: Callable[[str], None] = lambda text: None
         self._own = self._create(
             f"{HIDDEN}_{os.getpid()}", "/", enable_rosout=False, start_parameter_services=False
@@ -157,7 +157,7 @@ class Ros2Library:
         while not self._over.is_set():
             if time.monotonic() - looked > WATCH_S:
                 looked = time.monotonic()
-                self._tell_of_types()
+                self._warn_of_types()
             try:
                 self._executor.spin_once(timeout_sec=0.5)
             except NoAnswerError:
@@ -166,21 +166,23 @@ class Ros2Library:
                 if not self._over.is_set():
                     self.say(f"rclpy: {type(error).__name__}: {error}")
 
-    def _tell_of_types(self) -> None:
-        """DDS leaves ends of different types unconnected without a word; each such topic is told once."""
+    def _warn_of_types(self) -> None:
+        """Warn once of each topic with several types, whose endpoints DDS silently leaves unconnected."""
         for name, kinds in self._own.get_topic_names_and_types():
-            if len(kinds) > 1 and name not in self._told:
+            if len(kinds) > 1 and name not in self._warned:
                 ends = self._own.get_publishers_info_by_topic(name)
                 ends += self._own.get_subscriptions_info_by_topic(name)
                 if any(one.node_name == NOT_KNOWN_YET for one in ends):
-                    continue  # the next look tells who it is
-                self._told.add(name)
+                    continue  # the next look has the node's name
+                self._warned.add(name)
                 by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
-                said = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
-                self.say(f"{name} carries several types, and who has different ones is not heard: {said}")
+                listed = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
+                self.say(
+                    f"{name} carries several types, and nodes with different types are not connected: {listed}"
+                )
 
     def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
-        """Make a node."""
+        """Create a node; raise ``UsageError`` if its name is taken."""
         full = names.node_name(name, namespace)
         if self._is_taken(full):
             raise UsageError(
@@ -189,7 +191,7 @@ class Ros2Library:
         return Ros2Node(self, name, namespace)
 
     def _is_taken(self, full: str) -> bool:
-        """A node of ours that has just left is seen for a moment longer."""
+        """Return whether a node name is taken; a node that has just left stays visible for a moment."""
         end = time.monotonic() + DISCOVERY_S
         while full in self.node_names():
             if full not in self._left or time.monotonic() > end:
@@ -198,32 +200,32 @@ class Ros2Library:
         return False
 
     def make(self, name: str, namespace: str) -> Any:
-        """A node of rclpy that is spun."""
+        """Create a node of rclpy and spin it."""
         node = self._create(name, namespace)
         self._executor.add_node(node)
         return node
 
     def remove(self, node: Any) -> None:
-        """A node leaves."""
+        """Remove a node from the graph."""
         self._left.add(names.join(node.get_namespace(), node.get_name()))
         self._executor.remove_node(node)
-        with suppress(Exception):  # rclpy destroys what may be in use by its wait; it is gone either way
+        with suppress(Exception):  # rclpy's wait may still use it; the node is removed either way
             node.destroy_node()
 
     def _wait_for_discovery(self) -> None:
-        """Whoever has just joined knows nobody yet."""
+        """Wait until the nodes that exist at the start of this process have been discovered."""
         left = self._began + DISCOVERY_S - time.monotonic()
         if left > 0:
             time.sleep(left)
 
     def node_names(self) -> list[str]:
-        """Whom it has discovered."""
+        """Return the discovered nodes, sorted."""
         self._wait_for_discovery()
         known = self._own.get_node_names_and_namespaces()
         return sorted({names.join(space, name) for name, space in known if not name.startswith(HIDDEN)})
 
     def topics(self) -> list[TopicState]:
-        """What it has discovered."""
+        """Return what has been discovered, by name."""
         self._wait_for_discovery()
         found = []
         for name, kinds in sorted(self._own.get_topic_names_and_types()):
@@ -234,7 +236,7 @@ class Ros2Library:
         return found
 
     def services(self) -> list[ServiceState]:
-        """What it has discovered."""
+        """Return what has been discovered, by name."""
         self._wait_for_discovery()
         servers: dict[str, tuple[str, str]] = {}
         for name, space in self._own.get_node_names_and_namespaces():
@@ -244,10 +246,10 @@ class Ros2Library:
         return [ServiceState(name, kind, server) for name, (kind, server) in sorted(servers.items())]
 
     def announce_clock(self) -> None:
-        """There is no word for it: each node has a parameter of its own."""
+        """Do nothing: in ROS 2 each node has a parameter of its own."""
 
     def close(self) -> None:
-        """Nothing is spun any longer."""
+        """Stop spinning and shut rclpy down."""
         self._over.set()
         self._executor.wake()
         self._thread.join(GOODBYE_S)
@@ -271,9 +273,16 @@ def ros2_graph(
     records: Records = record_all,
     epoch: Ns | None = None,
 ) -> TransportGraph:
-    """The graph of ROS 2 nodes in *domain* (``ROS_DOMAIN_ID`` if it is not given).
+    """Return the graph of the ROS 2 nodes in a domain.
 
-    ``UsageError`` where this Python sees no rclpy.
+    Args:
+        kernel: Clock and tasks of the nodes.
+        domain: DDS domain; None for ``ROS_DOMAIN_ID``.
+        records: Topics whose messages are recorded with their content.
+        epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
+
+    Raises:
+        UsageError: this Python finds no rclpy.
     """
     library = Ros2Library(domain)
     made = TransportGraph(kernel, library, records=records, epoch=epoch)

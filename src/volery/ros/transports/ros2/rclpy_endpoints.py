@@ -1,9 +1,7 @@
-"""Publishers, subscriptions, services and clients of rclpy, carrying bytes.
+"""Publishers, subscriptions, services, clients and parameters of rclpy. Messages cross as bytes.
 
-Parameters in ROS 2 belong to nodes: a node's own by rclpy, another's by its parameter services.
-
-A name below a node's full name is that node's: ``/ns/node/gains/p`` is ``gains.p`` of ``/ns/node``. There
-are no others.
+Parameters in ROS 2 belong to nodes: ``/ns/node/gains/p`` is the parameter ``gains.p`` of ``/ns/node``. A
+node's own are accessed through rclpy, those of other nodes through their parameter services.
 """
 
 from __future__ import annotations
@@ -24,13 +22,13 @@ from volery.ros.transports.ros2.rclpy_types import from_rclpy, rclpy_class, rclp
 
 
 def profile(qos: QoS) -> Any:
-    """Our quality of service in rclpy's words."""
-    words = import_module("rclpy.qos")
-    return words.QoSProfile(
+    """Return rclpy's profile of a QoS."""
+    rclpy_qos = import_module("rclpy.qos")
+    return rclpy_qos.QoSProfile(
         depth=qos.depth or 0,
-        history=words.HistoryPolicy.KEEP_ALL if qos.depth is None else words.HistoryPolicy.KEEP_LAST,
-        reliability=words.ReliabilityPolicy[qos.reliability.upper()],
-        durability=words.DurabilityPolicy[qos.durability.upper()],
+        history=rclpy_qos.HistoryPolicy.KEEP_ALL if qos.depth is None else rclpy_qos.HistoryPolicy.KEEP_LAST,
+        reliability=rclpy_qos.ReliabilityPolicy[qos.reliability.upper()],
+        durability=rclpy_qos.DurabilityPolicy[qos.durability.upper()],
     )
 
 
@@ -47,24 +45,24 @@ class Ros2Publisher:
         self._publisher = node.create_publisher(rclpy_class(message_type), topic, profile(offered))
 
     def send(self, data: bytes) -> None:
-        """Hand the bytes to DDS."""
+        """Publish a message's CDR bytes."""
         self._publisher.publish(data)
 
     def connected(self) -> int:
-        """How many subscriptions it is matched with."""
+        """Return the number of subscriptions it is matched with."""
         return int(self._publisher.get_subscription_count())
 
     def close(self) -> None:
-        """Take it away."""
+        """Remove it from the node."""
         self._node.destroy_publisher(self._publisher)
 
 
 class Ros2Subscription:
     """An rclpy subscription of bytes.
 
-    DDS leaves unconnected what does not fit, so where whatever is offered is wanted it is looked at again
-    whenever a publisher turns up: reliable unless one is not; with what is kept for those who come late if
-    all keep it. What is delivered twice over such a change is dropped by its time.
+    DDS leaves incompatible endpoints unconnected. A ``best_available`` subscription is therefore adapted
+    whenever a publisher is discovered: reliable unless one publisher is not, transient-local if all are.
+    Messages that are delivered twice over such a change are dropped by their source time.
     """
 
     def __init__(self, node: Any, topic: str, message_type: str, qos: QoS, arrived: OnMessage) -> None:
@@ -80,7 +78,7 @@ class Ros2Subscription:
         self._subscription = self._subscribe()
 
     def _fitting(self) -> QoS:
-        """The most that all publishers known by now offer, where that is wanted."""
+        """Return the strongest QoS that all publishers known by now offer, within the requested one."""
         offers = [one.qos_profile for one in self._node.get_publishers_info_by_topic(self._topic)]
         reliability, durability = self._wanted.reliability, self._wanted.durability
         if reliability == BEST_AVAILABLE:
@@ -111,7 +109,7 @@ class Ros2Subscription:
             self._arrived(ReceivedMessage(data, self._read, ""))
 
     def _look_again(self, event: Any) -> None:
-        """A publisher has turned up. Called within rclpy's wait, so what is to be done is done beside it."""
+        """Adapt to a new publisher, in a thread, since this is called within rclpy's wait."""
         if BEST_AVAILABLE in (self._wanted.reliability, self._wanted.durability):
             threading.Thread(target=self._adapt, daemon=True).start()
 
@@ -125,28 +123,28 @@ class Ros2Subscription:
                 self._subscription = self._subscribe()
 
     def connected(self) -> int:
-        """How many publishers there are that it hears."""
-        words = import_module("rclpy.qos")
+        """Return the number of compatible publishers."""
+        rclpy_qos = import_module("rclpy.qos")
         known = self._node.get_publishers_info_by_topic(self._topic)
         mine = profile(self._now)
-        bad = words.QoSCompatibility.ERROR
-        return sum(1 for one in known if words.qos_check_compatible(one.qos_profile, mine)[0] != bad)
+        bad = rclpy_qos.QoSCompatibility.ERROR
+        return sum(1 for one in known if rclpy_qos.qos_check_compatible(one.qos_profile, mine)[0] != bad)
 
     def close(self) -> None:
-        """Take it away."""
+        """Remove it from the node."""
         with self._guard:
             self._open = False
             self._node.destroy_subscription(self._subscription)
 
 
 class NoAnswerError(Exception):
-    """Leaves a service's callback where there is nothing to answer: ROS 2 has no word for failure."""
+    """Ends a service's callback without an answer: ROS 2 cannot report a failure."""
 
 
 class Ros2ServiceServer:
-    """An rclpy service; a request that fails is not answered, as ROS 2 has it."""
+    """An rclpy service; a request that fails is not answered, as in ROS 2."""
 
-    def __init__(self, node: Any, name: str, kind: ServiceType, asked: OnRequest) -> None:
+    def __init__(self, node: Any, name: str, kind: ServiceType, requested: OnRequest) -> None:
         types = rclpy_service(kind)
         self._node = node
         future_class = import_module("rclpy.task").Future
@@ -157,20 +155,20 @@ class Ros2ServiceServer:
             def done(answer: Message | None, problem: str) -> None:
                 if not answered.done():
                     answered.set_result(answer)
-                    node.executor.wake()  # it looks at what waits for a result only when it wakes
+                    node.executor.wake()  # the executor checks results only when it is woken
 
-            asked(from_rclpy(kind.request.__msgtype__, request), done)
+            requested(from_rclpy(kind.request.__msgtype__, request), done)
             answer = await answered
             if answer is None:
                 raise NoAnswerError
             return to_rclpy(answer, types.response)
 
-        # in a group that lets others in: a request that is being answered must not hold up its node
+        # reentrant: a request in progress must not block its node
         group = import_module("rclpy.callback_groups").ReentrantCallbackGroup()
         self._service = node.create_service(types.type, name, handle, callback_group=group)
 
     def close(self) -> None:
-        """Take it away."""
+        """Remove it from the node."""
         self._node.destroy_service(self._service)
 
 
@@ -183,9 +181,9 @@ class Ros2ServiceClient:
         self._client = node.create_client(self._types.type, name)
 
     def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
-        """Ask. Without a server rclpy would wait for ever, so that is looked at first."""
+        """Send the request, if a server has been discovered; rclpy would wait for one without limit."""
         if not self._client.service_is_ready():
-            done(None, "nobody serves it")
+            done(None, "no node serves it")
             return lambda: None
         future = self._client.call_async(to_rclpy(request, self._types.request))
 
@@ -204,16 +202,16 @@ class Ros2ServiceClient:
             self._client.remove_pending_request(future)
 
     def ready(self) -> bool:
-        """Whether a server has been discovered."""
+        """Return whether a server has been discovered."""
         return bool(self._client.service_is_ready())
 
     def close(self) -> None:
-        """Take it away."""
+        """Remove it from the node."""
         self._node.destroy_client(self._client)
 
 
 def check_type(node: Any, topic: str, message_type: str, who: str) -> None:
-    """``UsageError`` if the topic is known to carry another type: DDS would leave them unconnected."""
+    """Raise ``UsageError`` if the topic carries another type: DDS would leave the endpoints unconnected."""
     ends = (*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic))
     others = [one for one in ends if one.topic_type != message_type]
     if others:
@@ -228,7 +226,7 @@ PATIENCE_S = 5.0
 
 
 def owner(name: str, own: str, others: list[str]) -> tuple[str, str]:
-    """Whose parameter it is, and its name there (empty for all of them); ``KeyError`` if nobody's."""
+    """Return the node of a parameter, and the name there (empty for all); ``KeyError`` if there is none."""
     candidates = [one for one in (own, *others) if name == one or name.startswith(f"{one}/")]
     if not candidates:
         raise KeyError(name)
@@ -237,7 +235,7 @@ def owner(name: str, own: str, others: list[str]) -> tuple[str, str]:
 
 
 def leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A value, or each value of a namespace, by its dotted name."""
+    """Yield a value, or each value of a namespace, with its dotted name."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from leaves(f"{prefix}.{key}" if prefix else str(key), inner)
@@ -246,7 +244,7 @@ def leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def tree(prefix: str, values: dict[str, Any]) -> Any:
-    """The value at *prefix*, or what is below it as a ``dict``; ``KeyError`` where there is neither."""
+    """Return the value at `prefix`, or what is below it as a ``dict``; ``KeyError`` if there is neither."""
     if prefix in values:
         return values[prefix]
     made: dict[str, Any] = {}
@@ -263,13 +261,13 @@ def tree(prefix: str, values: dict[str, Any]) -> Any:
 
 
 class OwnParameters:
-    """Those of a node of this process."""
+    """Parameters of a node of this process."""
 
     def __init__(self, node: Any) -> None:
         self._node = node
 
     def get(self, prefix: str) -> Any:
-        """See ``tree``."""
+        """Return the value at `prefix`; see ``tree``."""
         values = {name: _plain(one.value) for name, one in self._node._parameters.items()}
         return tree(prefix, values)
 
@@ -293,7 +291,7 @@ class OwnParameters:
 
 
 class OtherParameters:
-    """Those of a node elsewhere, by its services."""
+    """Parameters of another node, through its parameter services."""
 
     def __init__(self, node: Any, name: str) -> None:
         self._node, self._name = node, name
@@ -314,7 +312,7 @@ class OtherParameters:
             self._node.destroy_client(client)
 
     def get(self, prefix: str) -> Any:
-        """See ``tree``."""
+        """Return the value at `prefix`; see ``tree``."""
         kind = self._services.ListParameters
         names = list(self._call(kind, "list_parameters", kind.Request()).result.names)
         kind = self._services.GetParameters
@@ -332,10 +330,10 @@ class OtherParameters:
                 raise UsageError(f"parameter {self._name}/{prefix}: refused: {one.reason}")
 
     def delete(self, prefix: str) -> None:
-        """Not possible from outside."""
+        """Raise ``UsageError``: only the node itself can remove its parameters."""
         raise UsageError(f"parameter {prefix} of {self._name}: in ROS 2 only the node itself can remove it")
 
 
 def _plain(value: Any) -> Any:
-    """Arrays as lists."""
+    """Return arrays and tuples as lists."""
     return value.tolist() if hasattr(value, "tolist") else list(value) if isinstance(value, tuple) else value

@@ -1,7 +1,8 @@
-"""Types whose packages are not installed, carried as bytes: rclpy needs type support of no package for them.
+"""Message and service classes for rclpy: those of installed packages, and raw ones that carry bytes.
 
-``carrier.cpp`` is type support that reads nothing of what it carries. It is compiled once for an installation
-of ROS 2 (under a second) and kept in the user's cache folder. It serves Fast DDS, the usual middleware.
+A raw class needs no installed package: ``carrier.cpp`` is type support that does not read the bytes it
+carries. It is compiled once per installation of ROS 2 (in less than a second), kept in the user's cache
+folder, and supports Fast DDS, the default middleware.
 
 Which of our types rclpy can carry, and their values as rclpy's in services.
 """
@@ -38,38 +39,40 @@ LIBRARIES = ("-lfastcdr", "-lrosidl_runtime_c")
 MIDDLEWARE = "rmw_fastrtps_cpp"
 
 
-_WAYS = {
+_CONVERSIONS = {
     "_CREATE_ROS_MESSAGE": "carrier_create",
     "_DESTROY_ROS_MESSAGE": "carrier_destroy",
     "_CONVERT_FROM_PY": "carrier_from_python",
     "_CONVERT_TO_PY": "carrier_to_python",
 }
-"""Where rclpy looks for what it does with a message, and who does it here."""
+"""Attributes in which rclpy looks for its conversions, and the functions that implement them."""
 
 
 HEADER = b"\x00\x01\x00\x00"
-"""Before the bytes of each message: plain CDR, little endian."""
+"""Header of each message's bytes: plain CDR, little endian."""
 
 
 def is_raw_class(cls: type[Any]) -> bool:
-    """Whether *cls* is one of these."""
+    """Return whether `cls` is a raw class."""
     return cls.__module__ == __name__
 
 
 def raw_message_class(name: str) -> type[Any]:
-    """A class that rclpy takes for the message type *name*: its objects have as ``data`` the CDR bytes behind
-    their header, and what arrives is such bytes. Raises ``UsageError`` where it cannot be built.
+    """Return a raw class of a message type for rclpy.
+
+    The attribute ``data`` of its objects is the CDR bytes behind their header; received messages are such
+    bytes. Raises ``UsageError`` if the type support cannot be built.
     """
     return _message_class(name, _message_support(name))
 
 
 def raw_service_class(kind: ServiceType) -> type[Any]:
-    """The same for a service type: ``Request`` and ``Response`` are such classes."""
+    """Return a raw class of a service type for rclpy; its ``Request`` and ``Response`` are raw classes."""
     names = kind.request.__msgtype__, kind.response.__msgtype__
     supports = [_message_support(name) for name in names]
     request, response = map(_message_class, names, supports)
     package, folder, label = kind.name.split("/")
-    digest = sha256(kind.name.encode()).digest()  # stands for its hash, which nobody compares
+    digest = sha256(kind.name.encode()).digest()  # in place of the type's hash, which is not compared
     support = _library().carrier_service(f"{package}::{folder}".encode(), label.encode(), digest, *supports)
     inside = {"Request": request, "Response": response}
     return _class(label, {"_TYPE_SUPPORT": support}, inside)
@@ -85,12 +88,12 @@ def _message_class(name: str, support: int) -> type[Any]:
     def make(self: Any, data: bytes = b"") -> None:
         self.data = data
 
-    ways = {place: getattr(_library(), way)() for place, way in _WAYS.items()}
+    ways = {place: getattr(_library(), way)() for place, way in _CONVERSIONS.items()}
     return _class(name.rpartition("/")[2], {"_TYPE_SUPPORT": support, **ways}, {"__init__": make})
 
 
 def _class(label: str, addresses: Mapping[str, int], inside: dict[str, Any]) -> type[Any]:
-    """rclpy looks for addresses at the class of the class."""
+    """Return a class with these addresses in its metaclass, where rclpy looks for them."""
     capsules: dict[str, Any] = {name: _capsule(address, None, None) for name, address in addresses.items()}
     made: type[Any] = type(f"Metaclass_{label}", (type,), capsules)(
         label, (), {**inside, "__module__": __name__}
@@ -108,7 +111,7 @@ _capsule.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
 
 @cache
 def _library() -> Any:
-    """``carrier.cpp``, compiled and loaded."""
+    """Return ``carrier.cpp``, compiled and loaded."""
     middleware = import_module("rclpy").get_rmw_implementation_identifier()
     if middleware != MIDDLEWARE:
         raise UsageError(f"such types are carried on {MIDDLEWARE} only, and this is {middleware}")
@@ -116,13 +119,13 @@ def _library() -> Any:
     text, pointer = ctypes.c_char_p, ctypes.c_void_p
     library.carrier_message.argtypes = (text, text, text)
     library.carrier_service.argtypes = (text, text, text, pointer, pointer)
-    for name in ("carrier_message", "carrier_service", *_WAYS.values()):
+    for name in ("carrier_message", "carrier_service", *_CONVERSIONS.values()):
         getattr(library, name).restype = pointer
     return library
 
 
 def _compiled() -> Path:
-    """The library for this installation, from the user's cache folder if it is there."""
+    """Return the path of the library for this installation, compiled unless the user's cache has it."""
     source = files("volery.ros.transports.ros2").joinpath("carrier.cpp").read_bytes()
     prefixes = _prefixes()
     key = sha256(b"\0".join((source, *(str(one).encode() for one in prefixes)))).hexdigest()[:20]
@@ -138,7 +141,7 @@ def _compiled() -> Path:
 
 
 def _prefixes() -> tuple[Path, ...]:
-    """Where this installation's headers and libraries are: the wheels' environment, or ROS's own folders."""
+    """Return the folders of this installation's headers and libraries: the wheels', or ROS's own."""
     named = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return tuple(Path(one) for one in (*filter(None, named), sys.prefix) if (Path(one) / "include").is_dir())
 
@@ -149,37 +152,38 @@ def _compile(source: bytes, prefixes: Sequence[Path], made: Path) -> None:
         raise UsageError("there is no C++ compiler to build a carrier with: apt install g++")
     includes = [f"-I{one / 'include' / inner}" for one in prefixes for inner in ("", *HEADERS)]
     places = [f"-L{one / 'lib'}" for one in prefixes]
-    fresh = made.with_suffix(f".{os.getpid()}")  # complete when it gets its name: others may build it, too
+    fresh = made.with_suffix(f".{os.getpid()}")  # renamed when complete: other processes may build it, too
     command = [compiler, "-std=c++17", "-O1", "-shared", "-fPIC", "-x", "c++", "-", "-o", str(fresh)]
     done = subprocess.run(
         [*command, *includes, *places, *LIBRARIES], input=source, capture_output=True, check=False
     )
     if done.returncode:
-        said = done.stderr.decode(errors="replace").partition("\n")[0]
-        raise UsageError(f"no carrier could be built with {compiler}: {said}")
+        output = done.stderr.decode(errors="replace").partition("\n")[0]
+        raise UsageError(f"no carrier could be built with {compiler}: {output}")
     fresh.rename(made)
 
 
 def distribution() -> str:
-    """``jazzy``, if the installation says so; else ``<distribution>``."""
+    """Return the name of the ROS distribution, such as ``jazzy``; ``<distribution>`` if it is unknown."""
     return os.environ.get("ROS_DISTRO") or "<distribution>"
 
 
 @cache
 def rclpy_class(name: str) -> Any:
-    """rclpy's class of a message type, or a carrier of its bytes where the package is not installed.
+    """Return rclpy's class of a message type, or a raw class if its package is not installed.
 
-    ``UsageError`` if neither can be, or if its class has other fields.
+    Raises:
+        UsageError: neither is available, or the installed class has other fields.
     """
     full = message_name(name)
     found = _installed(full)
     if found is None:
-        return _carried_as_bytes(full, lambda: raw_message_class(full))
+        return _raw_class(full, lambda: raw_message_class(full))
     _compare(full, found)
     return found
 
 
-def _carried_as_bytes(full: str, make: Callable[[], type[Any]]) -> type[Any]:
+def _raw_class(full: str, make: Callable[[], type[Any]]) -> type[Any]:
     try:
         return make()
     except UsageError as error:
@@ -192,7 +196,7 @@ def _carried_as_bytes(full: str, make: Callable[[], type[Any]]) -> type[Any]:
 
 
 def _installed(full: str) -> Any:
-    """rclpy's class, ``None`` if it has none."""
+    """Return rclpy's class of a type; None if its package is not installed."""
     package, kind, label = full.split("/")
     try:
         return getattr(import_module(f"{package}.{kind}"), label)
@@ -201,7 +205,7 @@ def _installed(full: str) -> Any:
 
 
 def _compare(full: str, found: Any) -> None:
-    """Bytes are exchanged as they are, so both must mean the same by them."""
+    """Raise ``UsageError`` if rclpy's class has other fields: the bytes are exchanged unchanged."""
     theirs, ours = found.get_fields_and_field_types(), idl_fields(full)
     if list(theirs.items()) != list(ours.items()):
         raise UsageError(
@@ -213,15 +217,15 @@ def _compare(full: str, found: Any) -> None:
 
 
 def carried(name: str) -> bool:
-    """Whether a message type is installed here, with our fields."""
+    """Return whether a message type is installed with the fields that volery defines."""
     try:
         return _installed(message_name(name)) is not None and rclpy_class(name) is not None
     except UsageError:
         return False
 
 
-class Rclpyed(NamedTuple):
-    """A service type of rclpy, and what translates its two halves."""
+class RclpyService(NamedTuple):
+    """rclpy's class of a service type with those of its request and response."""
 
     type: Any
     request: type[Any]
@@ -229,19 +233,19 @@ class Rclpyed(NamedTuple):
 
 
 @cache
-def rclpy_service(kind: ServiceType) -> Rclpyed:
-    """rclpy's class of a service type, or a carrier. ``UsageError`` as for messages."""
+def rclpy_service(kind: ServiceType) -> RclpyService:
+    """Return rclpy's class of a service type, or a raw one; ``UsageError`` as for messages."""
     found = _installed(kind.name)
     if found is None:
-        found = _carried_as_bytes(kind.name, lambda: raw_service_class(kind))
-        return Rclpyed(found, found.Request, found.Response)
+        found = _raw_class(kind.name, lambda: raw_service_class(kind))
+        return RclpyService(found, found.Request, found.Response)
     for half, ours in ((found.Request, kind.request), (found.Response, kind.response)):
         _compare(ours.__msgtype__, half)
-    return Rclpyed(found, found.Request, found.Response)
+    return RclpyService(found, found.Request, found.Response)
 
 
 def to_rclpy(message: Message, cls: type[Any]) -> Any:
-    """Our value as rclpy's."""
+    """Convert a message to rclpy's class `cls`."""
     data = to_cdr(message)
     if is_raw_class(cls):
         return cls(data[len(HEADER) :])
@@ -249,7 +253,7 @@ def to_rclpy(message: Message, cls: type[Any]) -> Any:
 
 
 def from_rclpy(name: str, message: Any) -> Any:
-    """rclpy's value as ours."""
+    """Convert a message of rclpy to the message type `name`."""
     if isinstance(message, bytes):
         return from_cdr(name, HEADER + message)
     return from_cdr(name, _serialization().serialize_message(message))
