@@ -158,10 +158,6 @@ def _battery(controller: FlightController, stamp: Ns) -> Any:
     return made
 
 
-def _anomaly(controller: FlightController, package: str) -> Any:
-    return message_class(f"{package}/msg/FlightAnomaly")(controller.anomalies)
-
-
 TOPICS: tuple[Topic, ...] = (
     Topic("attitude", "geometry_msgs/msg/QuaternionStamped", FAST, _attitude),
     Topic("imu", "sensor_msgs/msg/Imu", FAST, _imu),
@@ -186,7 +182,7 @@ REFERENCE = Topic("local_frame_ref", "sensor_msgs/msg/NavSatFix", 0, _local_fram
 def topics(package: str) -> tuple[Topic, ...]:
     """Return all periodic topics with the types of a package."""
     kind = f"{package}/msg/FlightAnomaly"
-    return (*TOPICS, Topic("flight_anomaly", kind, NORMAL, lambda one, _: _anomaly(one, package)))
+    return (*TOPICS, Topic("flight_anomaly", kind, NORMAL, lambda one, _: message_class(kind)(one.anomalies)))
 
 
 SUBSCRIBER_CHECK_PERIOD: Ns = 200 * MS

@@ -202,7 +202,8 @@ class FlightController:
         """Stop the motors, also in flight."""
         if self.vehicle.armed:
             self.vehicle.disarm()
-            self._report_stopped_motors()
+            self.vehicle.send_text(INFO, "motors stopped")
+            self.hover()
         return True
 
     def _start_motors(self) -> bool:
@@ -426,11 +427,6 @@ class FlightController:
         self.vehicle.send_text(WARNING, "battery critical")
         if self.vehicle.armed and not self.vehicle.landed:
             self._enter(DisplayMode.FORCE_AUTO_LANDING)
-
-    def _report_stopped_motors(self) -> None:
-        """Report that the motors stopped."""
-        self.vehicle.send_text(INFO, "motors stopped")
-        self.hover()
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
         self._requested_by_sdk = by_sdk

@@ -147,14 +147,11 @@ class Services:
             request.TASK_FORCE_LANDING: controller.land,
             request.TASK_FORCE_LANDING_AVOID_GROUND: controller.land,
             request.START_MOTOR: lambda: controller.motors(True),
-            request.STOP_MOTOR: lambda: self._on_ground() and controller.motors(False),
+            request.STOP_MOTOR: lambda: controller.vehicle.landed and controller.motors(False),
             request.TASK_EXIT_GO_HOME: lambda: controller.interrupt(DisplayMode.NAVI_GO_HOME),
             request.TASK_EXIT_LANDING: lambda: controller.interrupt(DisplayMode.AUTO_LANDING),
         }
         return request.task in tasks and tasks[request.task]()
-
-    def _on_ground(self) -> bool:
-        return self._controller.vehicle.landed
 
     def _joystick_mode(self, request: Any) -> bool:
         self._joystick = (

@@ -16,6 +16,11 @@ from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
 
 
+def _never(*_question: object) -> bool:
+    """Return False: the default of conditions."""
+    return False
+
+
 def _ignore(*_event: object) -> None:
     """Do nothing: the default of events."""
 
@@ -147,13 +152,13 @@ class MissionPolicy:
     """How missions are stored and read back."""
 
     upload: MissionUploadPolicy = field(default_factory=MissionUploadPolicy)
-    runs: Callable[[Vehicle], bool]
+    runs: Callable[[Vehicle], bool] = _never
     """Whether the mission may not be cleared now."""
     stored_item: Callable[[MissionItem], MissionItem | int]
     """Return an uploaded item as it is stored, or the MAV_MISSION_RESULT that refuses it."""
-    home_item: Callable[[Vehicle], MissionItem | None]
+    home_item: Callable[[Vehicle], MissionItem | None] = do_nothing
     """Return item 0 where the firmware stores its home position there."""
-    go_to_item: Callable[[Vehicle, MissionItem], bool]
+    go_to_item: Callable[[Vehicle, MissionItem], bool] = _never
     """Fly to an item that is sent outside an upload (``current`` 2)."""
     grew: Callable[[Vehicle, int], None] = _ignore
     """Called with the number of items after a change."""

@@ -13,6 +13,7 @@ from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi.flight_plan import (
     Block,
     Circle,
+    Condition,
     Deroute,
     FlightPlan,
     Go,
@@ -56,13 +57,9 @@ def on_ground(nav: Navigation) -> bool:
     return nav.vehicle.estimate.landed
 
 
-def stage_lasted(seconds: float) -> partial[bool]:
+def stage_lasted(seconds: float) -> Condition:
     """Return a condition that holds once the stage has lasted for that many seconds."""
-    return partial(_stage_lasted, seconds)
-
-
-def _stage_lasted(seconds: float, nav: Navigation) -> bool:
-    return nav.stage_time > seconds
+    return lambda nav: nav.stage_time > seconds
 
 
 _KILL = Once(partial(motors, on=False))

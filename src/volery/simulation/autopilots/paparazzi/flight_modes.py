@@ -13,7 +13,7 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
 from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
 LIFT_OFF_M, LIFT_OFF_M_S = 0.3, 0.1
 """Height [m] and climb rate [m/s] above which a set-point takes a standing vehicle off the ground."""
@@ -24,7 +24,7 @@ class Killed(Manoeuvre):
 
     def step(self) -> None:
         """Idle: motors cannot run in this mode."""
-        self.idle()
+        self.vehicle.drive(IDLE)
 
 
 class FailsafeDescent(Manoeuvre):
@@ -36,7 +36,9 @@ class FailsafeDescent(Manoeuvre):
         """Command the descent."""
         speed = self.vehicle.parameters["FAILSAFE_DESCENT_SPEED"]
         tuning = self.vehicle.tuning
-        self.drive(Setpoint(Control.CLIMB, climb=-speed, speed_down=max(0.1, speed), accel_z=tuning.accel_z))
+        self.vehicle.drive(
+            Setpoint(Control.CLIMB, climb=-speed, speed_down=max(0.1, speed), accel_z=tuning.accel_z)
+        )
 
 
 class FlyPlan(Manoeuvre):
@@ -65,10 +67,10 @@ class FlyPlan(Manoeuvre):
         self.landing = demand.vertical is Vertical.CLIMB and demand.climb < 0.0
         self.target = None if demand.vertical is Vertical.THROTTLE else enu_to_ned(demand.goal)
         if demand.vertical is Vertical.THROTTLE:
-            self.idle()
+            self.vehicle.drive(IDLE)
             return
         climbs = demand.vertical is Vertical.CLIMB
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.POSITION_CLIMB if climbs else Control.POSITION,
                 position=enu_to_ned(demand.target),
@@ -123,7 +125,7 @@ class HoldPlace(ManualFlight):
     def step(self) -> None:
         """Command position and yaw rate."""
         tuning = self.vehicle.tuning
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.POSITION,
                 position=self._place,
@@ -238,7 +240,7 @@ class Guided(Manoeuvre):
     def step(self) -> None:
         """Command the set-point."""
         wanted, tuning = self._setpoint, self.vehicle.tuning
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 _CONTROLS[wanted.plane_is_velocity, wanted.height_is_velocity],
                 position=(wanted.north, wanted.east, wanted.down),

@@ -51,10 +51,6 @@ FIRST_HEARTBEAT: Ns = 1_252 * MS
 """Recorded 1.19 to 1.34 s after boot."""
 
 
-def _origin_set(vehicle: Vehicle) -> None:
-    vehicle.flight.set_origin()
-
-
 def set_home_position(vehicle: Vehicle) -> None:
     """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.estimate.position_ok and vehicle.home is None:
@@ -68,7 +64,7 @@ def stand_on_ground(vehicle: Vehicle) -> None:
 
 EVENTS = (
     BootEvent(0, stand_on_ground),
-    BootEvent(ORIGIN, _origin_set),
+    BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin()),
     BootEvent(HOME, set_home_position),
     BootEvent(READY_AFTER - 50 * MS, set_home_position),
 )
@@ -197,10 +193,6 @@ PARAMETERS = ParameterPolicy(
 """Recorded: 877 parameters in 0.85 s."""
 
 
-def _refuse_interval(_vehicle: Vehicle, _number: int) -> int:
-    return FAILED
-
-
 def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmware:
     """Return the MAVLink rules of a vehicle of that MAV_TYPE with these commands."""
     return MavlinkFirmware(
@@ -209,7 +201,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             messages={**BUILDERS, "HEARTBEAT": partial(telemetry.heartbeat, kind=mav_type)},
             message_order=ORDER,
             link_uses=USES,
-            refuse_interval=_refuse_interval,
+            refuse_interval=lambda _vehicle, _message: FAILED,
             unknown_message=DENIED,
             on_mode_change=(),
             on_home_change=("GPS_GLOBAL_ORIGIN",),
@@ -227,10 +219,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             upload=MissionUploadPolicy(
                 mission.request_message, received="", falls_back_to_int=True, keeps_old=True
             ),
-            runs=mission.runs,
             stored_item=mission.stored_item,
-            home_item=mission.no_home_item,
-            go_to_item=mission.refuse_guided_item,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,

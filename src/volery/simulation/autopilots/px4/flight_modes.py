@@ -329,7 +329,7 @@ class PositionControl(ManualFlight):
         self._move(forward, right, passed)
         climb = self._climb()
         north, east = self._velocity
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.VELOCITY if self._held is None else Control.POSITION_CLIMB,
                 position=self._held or (0.0, 0.0, 0.0),

@@ -67,21 +67,6 @@ def stored_item(item: MissionItem) -> MissionItem | int:
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
 
 
-def no_home_item(_vehicle: Vehicle) -> MissionItem | None:
-    """Return None: item 0 is the first item of the mission."""
-    return None
-
-
-def runs(_vehicle: Vehicle) -> bool:
-    """Return False: the mission may be cleared at any time."""
-    return False
-
-
-def refuse_guided_item(_vehicle: Vehicle, _item: MissionItem) -> bool:
-    """Return False: an item outside an upload is refused."""
-    return False
-
-
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """Send MISSION_ITEM_REACHED with its repetitions."""
 
