@@ -1,1 +1,1 @@
-"""How a user's file becomes a running process."""
+"""A user's file becomes a running task: Python, files written for ROS, C++."""

@@ -1,7 +1,7 @@
-"""What a component's file may ask of the run it is part of: ``import volery`` and call.
+"""Calls that a component's file may make to its run: ``import volery``, then ``volery.now()`` and so on.
 
-Each call finds the run by itself: it is that of the flow of control that calls. All of them are interaction
-points: what the component has computed so far is served first.
+Each call finds the run by the flow of control that makes it. All of them are interaction points: what the
+component has computed so far is served first.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ from volery.kernel.task import Task
 from volery.trace.events import Charge, Milestone, Text
 
 SEVERITIES = {"error": 3, "warning": 4, "info": 6, "debug": 7}
-"""Words for the syslog severities that a component may use."""
+"""Syslog severities that a component may use."""
 
 _kernels: list[ReferenceType[Kernel]] = []
 
 
 def register_kernel(kernel: Kernel) -> None:
-    """From now on these calls find *kernel* when one of its tasks makes them. It is not kept alive."""
+    """Make ``kernel`` known to the calls of its tasks. It is not kept alive."""
     _kernels[:] = [known for known in _kernels if known() is not None and known() is not kernel]
     _kernels.append(ref(kernel))
 
 
 def caller(what: str) -> tuple[Kernel, Task]:
-    """The run and the flow of control that *what* was called in; ``UsageError`` if it is none of a run's."""
+    """Return the kernel and the task of the caller.
+
+    Raises:
+        UsageError: The caller is not a task of a run; the error names the call ``what``.
+    """
     for known in reversed(_kernels):
         kernel = known()
         task = kernel.current() if kernel is not None else None
@@ -39,61 +43,68 @@ def caller(what: str) -> tuple[Kernel, Task]:
 
 
 def component_of(task: Task) -> Instance | None:
-    """The component whose code *task* executes now; ``None`` for a mission or a script."""
-    place = task.context
-    return place.instance if isinstance(place, ComponentContext) else None
+    """Return the component whose code ``task`` executes now; None for a mission or a script."""
+    context = task.context
+    return context.instance if isinstance(context, ComponentContext) else None
 
 
 def now() -> float:
-    """Seconds since the start of the run."""
+    """Return the time since the start of the run, s."""
     with caller("volery.now()")[0] as kernel:
         return to_seconds(kernel.now())
 
 
 def sleep(seconds: float) -> None:
-    """Do nothing for so long. Ends an activation."""
+    """Block for ``seconds`` seconds of the run. This ends an activation."""
     waiting.sleep(caller("volery.sleep()")[0], from_seconds(seconds))
 
 
 def add_time(seconds: float, at_mhz: float | None = None, energy: float = 0.0) -> None:
-    """Charge the component with computing that is neither stated nor counted, such as a library's.
+    """Charge the component for computing that is neither stated nor counted, such as a library's.
 
-    *seconds* of execution time on its processor, at the frequency *at_mhz* if it is given: on a processor at
-    half of it the same work takes twice as long. *energy* in joules, where it is known. Where computing costs
-    nothing (a component of the environment, real hardware) this does nothing.
+    This does nothing where computing takes no simulated time: in a component of the environment or on real
+    hardware.
+
+    Args:
+        seconds: Execution time on the component's processor, s.
+        at_mhz: Frequency that the time is stated at, MHz, by default the processor's. At half of it the same
+            work takes twice as long.
+        energy: Energy of the computing, J, where it is known.
+
+    Raises:
+        UsageError: The time is negative, or the frequency is not above 0.
     """
     kernel, task = caller("volery.add_time()")
     instance = component_of(task)
-    if instance is None or instance.seat.processor is None:
+    if instance is None or instance.allocation.processor is None:
         return
-    amount = from_seconds(seconds * _slower(instance, at_mhz))
+    factor = 1.0
+    if at_mhz is not None:
+        if at_mhz <= 0.0:
+            raise UsageError(f"volery.add_time(at_mhz={at_mhz}): a frequency is above 0")
+        frequency_mhz = instance.allocation.frequency_mhz
+        factor = 1.0 if frequency_mhz is None else at_mhz / frequency_mhz
+    amount = from_seconds(seconds * factor)
     if amount < 0:
         raise UsageError(f"volery.add_time({seconds}): time cannot be taken back")
     task.charge(amount)
-    charge = Charge(kernel.now(), instance.name, instance.seat.processor.name, "stated", amount, 0, energy)
+    processor = instance.allocation.processor.name
     with kernel.guard:
-        kernel.record(charge)
-
-
-def _slower(instance: Instance, at_mhz: float | None) -> float:
-    """How many times longer work takes on the processor of *instance* than at *at_mhz*."""
-    if at_mhz is None:
-        return 1.0
-    if at_mhz <= 0.0:
-        raise UsageError(f"volery.add_time(at_mhz={at_mhz}): a frequency is above 0")
-    actual = instance.seat.frequency_mhz
-    return 1.0 if actual is None else at_mhz / actual
+        kernel.record(Charge(kernel.now(), instance.name, processor, "stated", amount, 0, energy))
 
 
 def note(kind: str, subject: str, state: str, detail: str = "") -> None:
-    """Record that something the application follows entered a state: ``note("parcel", "p-1", "ordered")``."""
+    """Record that something which the application follows has entered a state.
+
+    For example ``note("parcel", "p-1", "ordered")``.
+    """
     kernel, task = caller("volery.note()")
     with kernel:
         kernel.record(Milestone(kernel.now(), task.context.component, kind, subject, state, detail))
 
 
 def log(text: str, severity: str = "info") -> None:
-    """Record a line of text. *severity*: error, warning, info or debug."""
+    """Record a line of text; ``severity`` is error, warning, info or debug."""
     if severity not in SEVERITIES:
         raise UsageError(f"volery.log(severity={severity!r}): choose {', '.join(SEVERITIES)}")
     kernel, task = caller("volery.log()")

@@ -1,7 +1,7 @@
-"""A component that exists in a run: its object, its place, what it costs, and one call at a time.
+"""A component that exists in a run: its object, where it computes, what that costs, and one call at a time.
 
-Knows no model and no language: whoever builds the run says where it stands (``Allocation``), what its computing
-costs (``Pricing``) and hands it the object that a host made.
+An instance depends neither on the model nor on a language. The run states its ``Allocation`` and its
+``Pricing`` and gives it the object that a ``Program`` has made.
 """
 
 from __future__ import annotations
@@ -20,23 +20,25 @@ from volery.kernel.waiting import Lock, Signal, executing_in
 from volery.trace.events import Charge, Failure
 
 COMPONENT_MARK = "__volery_user__"
-"""A name that every module of a component has: it tells the user's part of a traceback from a library's."""
+"""A name in every module of a component, by which its frames are recognised in a traceback."""
 
 OnFailure = Callable[[str, Exception], None]
-"""Told the name of a component whose flow of control has ended with an error, and the error."""
+"""Called with the name of a component whose flow of control has ended with an error, and the error."""
 
 ReadSteps = Callable[[], int]
-"""Steps of Python code that were executed since it was last asked."""
+"""Returns the steps of counted code since the last call."""
 
 
 @dataclass(frozen=True)
 class Allocation:
-    """Where a component computes.
+    """Where a component computes, and its scheduling parameters.
 
-    ``processor`` ``None``: computing takes no simulated time. ``frequency_mhz`` is the processor's.
-    ``priority`` ``None``: the caller's; it is that of every passive component, and an active one states its
-    own. ``deadline`` counts from each release of an activation, ns; ``starts_at`` delays an active
-    component's ``run``.
+    Attributes:
+        processor: Processor, or None if computing takes no simulated time.
+        frequency_mhz: Frequency of the processor, MHz.
+        priority: Priority of an active component; None for a passive one, which has its caller's.
+        deadline: Deadline of an activation, relative to its release, ns.
+        starts_at: Time at which ``run`` of an active component starts, ns.
     """
 
     processor: ComputeResource | None = None
@@ -47,13 +49,13 @@ class Allocation:
 
     @property
     def is_active(self) -> bool:
-        """Whether it has a flow of control of its own."""
+        """Whether the component has a flow of control of its own."""
         return self.priority is not None
 
 
 @dataclass(frozen=True, eq=False)
 class ComponentContext(ExecutionContext):
-    """A place that knows whose it is, so that services called by user code find their component."""
+    """An execution context with its instance, so that calls of component code find their component."""
 
     instance: Instance = field(kw_only=True)
 
@@ -61,62 +63,67 @@ class ComponentContext(ExecutionContext):
 class Instance:
     """One component of the application or of its environment.
 
-    ``operations`` are the names it provides. ``counter`` gives the steps of counted code, where code is
-    counted: also for components whose steps cost nothing, lest others pay for them. ``object`` is ``None``
-    until its constructor has returned.
+    Args:
+        kernel: The run's kernel.
+        name: Name of the instance.
+        allocation: Where it computes.
+        pricing: What its computing costs.
+        operations: Names of the operations that it provides.
+        read_steps: Reader of the steps of counted code. A component whose steps cost nothing has one too, so
+            that its steps are not charged to others.
     """
 
     def __init__(
         self,
         kernel: Kernel,
         name: str,
-        seat: Allocation = Allocation(),
+        allocation: Allocation = Allocation(),
         pricing: Pricing = FREE,
         operations: tuple[str, ...] = (),
-        counter: ReadSteps | None = None,
+        read_steps: ReadSteps | None = None,
     ) -> None:
         self.kernel = kernel
         self.name = name
-        self.seat = seat
+        self.allocation = allocation
         self.pricing = pricing
         self.operations = operations
-        self.object: object | None = None
-        self.broken = ""  # why there will never be an object
+        self.object: object | None = None  # until its constructor has returned
         self.scope: Scope | None = None
-        self.failed: OnFailure = _forget
-        self._counter = counter
+        self.on_failure: OnFailure = lambda name, error: None
+        self._unavailable = ""  # why there will never be an object
+        self._read_steps = read_steps
         self._uncharged: Ns = 0
         self._lock = Lock(kernel, f"{name} (busy)")
-        self._made = Signal(kernel, f"{name} (being constructed)")
+        self._constructed = Signal(kernel, f"{name} (being constructed)")
         self.context = ComponentContext(
             name,
-            seat.processor,
-            seat.priority,
-            seat.deadline,
-            meter=self._read_meter if counter else None,
-            on_release=self._released if seat.is_active and pricing is not FREE else None,
+            allocation.processor,
+            allocation.priority,
+            allocation.deadline,
+            meter=self._read_meter if read_steps else None,
+            on_release=self._on_release if allocation.is_active and pricing is not FREE else None,
             instance=self,
         )
 
     def _read_meter(self) -> Ns:
-        steps = self._counter() if self._counter else 0
+        steps = self._read_steps() if self._read_steps else 0
         amount = round(steps * self.pricing.ns_per_step)
         self._uncharged += amount
         return amount
 
-    def complete(self, thing: object) -> None:
-        """Its constructor has returned *thing*: from now on it can be called."""
-        self.object = thing
-        self._made.notify()
+    def set_object(self, made: object) -> None:
+        """Set the constructed object; the component can be called from now on."""
+        self.object = made
+        self._constructed.notify()
 
-    def give_up(self, why: str) -> None:
-        """Its constructor has failed: whoever calls it is told so."""
-        self.broken = why
-        self._made.notify()
+    def set_unavailable(self, reason: str) -> None:
+        """Record that there will be no object; waiting and later calls raise ``ComponentError``."""
+        self._unavailable = reason
+        self._constructed.notify()
 
-    def _released(self, task: Task) -> None:
-        """An activation of it begins: *task* owes what the model states for one."""
-        self.flush()
+    def _on_release(self, task: Task) -> None:
+        """Charge ``task`` for an activation as the model states it."""
+        self.flush_charges()
         self._charge(task, "activation", self.pricing.activation(self.name))
 
     def _charge(self, task: Task, kind: str, cost: Cost) -> None:
@@ -125,89 +132,86 @@ class Instance:
             self._record_charge(kind, cost)
 
     def _record_charge(self, kind: str, cost: Cost) -> None:
-        processor = self.seat.processor
+        processor = self.allocation.processor
         where = processor.name if processor else ""
         with self.kernel.guard:
             self.kernel.record(Charge(self.kernel.now(), self.name, where, kind, cost.time, 0, cost.energy))
 
-    def flush(self) -> None:
-        """Record as one charge what was counted since the last."""
+    def flush_charges(self) -> None:
+        """Record what has been counted since the last record as one charge."""
         if self._uncharged:
             amount, self._uncharged = self._uncharged, 0
             self._record_charge("code", Cost(amount))
 
-    def fail(self, error: Exception, doing: str) -> ComponentError:
-        """Record that its code raised *error* while *doing*; returns what to raise instead."""
+    def component_error(self, error: Exception, doing: str) -> ComponentError:
+        """Record an error of the component's code in ``doing``; return the error to raise instead."""
         wrapped = ComponentError(self.name, f"{doing} raised {describe(error)}")
         with self.kernel as kernel:
             kernel.record(Failure(kernel.now(), self.name, wrapped.what))
         return wrapped
 
-    def report(self, error: Exception) -> None:
-        """Record that its flow of control has ended with *error* and tell whoever started it."""
-        with self.kernel as kernel:
-            kernel.record(Failure(kernel.now(), self.name, str(error)))
-        self.failed(self.name, error)
+    def run_guarded(self, body: Callable[[], object], doing: str) -> bool:
+        """Run component code at the root of a task; record and report its errors.
 
-    def guard(self, body: Callable[[], object], doing: str) -> bool:
-        """Run its code at the root of a task: what it raises is recorded and reported. True if nothing was
-        raised.
+        Returns:
+            Whether the code ended without an error.
         """
         try:
             body()
         except VoleryError as error:
-            self.report(error)
+            with self.kernel as kernel:
+                kernel.record(Failure(kernel.now(), self.name, str(error)))
+            self.on_failure(self.name, error)
         except Exception as error:
-            wrapped = self.fail(error, doing)
+            wrapped = self.component_error(error, doing)
             wrapped.__cause__ = error
-            self.failed(self.name, wrapped)
+            self.on_failure(self.name, wrapped)
         else:
             return True
         return False
 
     @contextmanager
-    def visited(self, task: Task, operation: str) -> Iterator[object]:
-        """*task* comes to this component's place to execute *operation*: one visitor at a time.
+    def serving(self, task: Task, operation: str) -> Iterator[object]:
+        """Execute ``operation`` in this component's context: one caller at a time.
 
-        What the operation costs is served here, before anything it does is seen and before the visitor
-        leaves. Gives the object.
+        The cost of the operation is served here, before its effects are visible and before the caller
+        leaves. Yields the object.
         """
         cost = self.pricing.operation(self.name, operation)
-        thing = self._ready()
+        made = self._wait_for_object()
         with self._lock:
             try:
                 with executing_in(self.kernel, self.context):
                     self._charge(task, f"operation:{operation}", cost)
-                    yield thing
+                    yield made
             finally:
-                self.flush()
+                self.flush_charges()
 
-    def _ready(self) -> object:
+    def _wait_for_object(self) -> object:
         if self.object is None:
-            self._made.wait_for(lambda: self.object is not None or self.broken)
+            self._constructed.wait_for(lambda: self.object is not None or self._unavailable)
             if self.object is None:
-                raise ComponentError(self.name, f"cannot be called: {self.broken}")
+                raise ComponentError(self.name, f"cannot be called: {self._unavailable}")
         return self.object
 
 
 class ForeignError(Exception):
-    """An error of code that is not Python: it says itself what it is."""
+    """An error of code that is not Python; its text describes it completely."""
 
 
 def describe(error: BaseException) -> str:
-    """``ValueError: no such parcel (delivery_central.py:41)``: what was raised, and where in their code."""
+    """Return what was raised, and where in the component's code.
+
+    For example ``ValueError: no such parcel (delivery_central.py:41)``.
+    """
     if isinstance(error, ForeignError):
         return str(error)
-    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     frames = [
         (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
     ]
-    theirs = [frame for frame in frames if COMPONENT_MARK in frame[0]] or frames
-    if not theirs:
-        return said
-    _, file, line = theirs[-1]
-    return f"{said} ({file.rpartition('/')[2]}:{line})"
-
-
-def _forget(name: str, error: Exception) -> None:
-    """What a component without anybody to tell does with its failure."""
+    own = [frame for frame in frames if COMPONENT_MARK in frame[0]] or frames
+    if not own:
+        return text
+    _, file, line = own[-1]
+    return f"{text} ({file.rpartition('/')[2]}:{line})"

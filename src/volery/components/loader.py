@@ -1,13 +1,13 @@
-"""A component's file and what it imports, as modules of one run.
+"""Import of a component's file and of the modules beside it, for one run.
 
-Files are executed as they are, with three differences that the file cannot see: modules whose meaning depends
-on the run (``time``, ``random``, ``queue``, ``threading``, ``rospy`` ...) are replaced by stand-ins *for
-these files only*; modules beside the component's file are loaded the same way; and, where code is counted,
-counters are compiled in. Nothing global is changed.
+Files are executed as they are, with three differences that the file cannot see. Modules that depend on the
+run (``time``, ``random``, ``queue``, ``threading``, ``rospy`` and so on) are replaced, for these files only.
+Modules beside the component's file are loaded in the same way. Where code is counted, counters are compiled
+in. Nothing global is changed: patching ``sys.modules`` would affect the simulation itself.
 
-Each instance of a component executes its own copy of the component's file, as its own process would. Modules
-beside it are executed once a run, so that the classes they define are the same for everybody: types that
-components exchange belong into a file of their own.
+Each instance executes its own copy of the component's file, as its own process would. Modules beside it are
+executed once a run, so that all components see the same classes: types that components exchange belong into
+a file of their own.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from volery.cost import StepCounter
 
 _PREFIX = "volery.user"
 USER_MODULE_PREFIX = f"{_PREFIX}."
-"""What the names of all modules of users begin with."""
+"""Prefix of the names of all modules of components."""
 SHARED_MODULE_PREFIX = f"{_PREFIX}.shared."
-"""And of those that components share: what is beside their files."""
+"""Prefix of the modules that components share: those beside their files."""
 FRAMEWORK_PACKAGE = "volery"
 
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A component's file, parsed. ``file`` is as it is to be named in messages."""
+    """A component's file, parsed."""
 
     path: Path
     tree: ast.Module
 
     def class_names(self) -> list[str]:
-        """Classes that the file defines or imports at top level."""
+        """Return the classes (and other names) that the file defines or imports at top level."""
         names = [node.name for node in self.tree.body if isinstance(node, ast.ClassDef)]
         for node in self.tree.body:
             if isinstance(node, ast.ImportFrom):
@@ -49,12 +49,12 @@ class SourceFile:
         return names
 
     def is_script(self) -> bool:
-        """Whether it has an ``if __name__ == "__main__":`` at top level."""
+        """Return whether the file has an ``if __name__ == "__main__":`` at top level."""
         tests = (node.test for node in self.tree.body if isinstance(node, ast.If))
         return any("__main__" in ast.unparse(test) for test in tests)
 
     def line_of(self, class_name: str, method: str = "") -> int:
-        """The line of a top-level class, or of one of its methods; 1 if it is not there."""
+        """Return the line of a top-level class or of its method; 1 if the file does not contain it."""
         for node in self.tree.body:
             if isinstance(node, ast.ClassDef) and node.name == class_name:
                 inside = (
@@ -65,8 +65,14 @@ class SourceFile:
 
 
 def parse(path: Path, where: Location | None = None) -> SourceFile:
-    """Read a component's file. ``ModelError`` (at *where*, the line that names it) if it is missing or no
-    Python.
+    """Parse a component's file.
+
+    Args:
+        path: The file.
+        where: Line of the model that names it, for error messages.
+
+    Raises:
+        ModelError: The file is missing or is not Python.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -86,24 +92,30 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
 class Loader:
     """Loads the files of one run.
 
-    ``stand_ins`` maps dotted module names to what is imported in their place. ``steps`` is the counter of
-    code, or ``None`` where code is not counted.
+    Attributes:
+        replacements: Modules that are imported in place of others, by dotted name.
+        steps: Counter of the code, or None where code is not counted.
+        libraries: Top-level names of imported libraries outside Python's own, whose code is not counted.
     """
 
-    stand_ins: Mapping[str, ModuleType] = field(default_factory=dict)
+    replacements: Mapping[str, ModuleType] = field(default_factory=dict)
     steps: StepCounter | None = None
     libraries: set[str] = field(default_factory=set)
-    """Top-level names of the libraries that the files import beside Python's own: they compute uncounted."""
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
         self._shared: dict[Path, ModuleType] = {}
 
     def load(self, source: SourceFile, name: str, as_main: bool = False) -> ModuleType:
-        """Execute a component's file for the instance called *name* and return its module.
+        """Execute a component's file for the instance ``name`` and return its module.
 
-        *as_main*: with ``__name__ == "__main__"``, for plain scripts; it may then block. ``ComponentError``
-        if a file is executed on loading and raises.
+        Args:
+            source: The file.
+            name: Name of the instance.
+            as_main: Execute it with ``__name__ == "__main__"``, as a script, which may block.
+
+        Raises:
+            ComponentError: The file raises an exception, unless it is executed ``as_main``.
         """
         full_name = f"{_PREFIX}.{name}.{source.path.stem}"
         code = self._compile(source)
@@ -142,21 +154,21 @@ class Loader:
             ) from error
         finally:
             if self.steps:
-                self.steps.take()  # loading is no part of what a component does
+                self.steps.take()  # loading is not charged
 
     def _builtins(self, folder: Path) -> dict[str, Any]:
-        names = vars(self.stand_ins.get("builtins", builtins))
+        names = vars(self.replacements.get("builtins", builtins))
         return {**names, "__import__": _Import(self, folder)}
 
     def sibling(self, name: str, folder: Path) -> ModuleType | None:
-        """The module or package *name* (dotted) beside the file that asks for it; ``None`` if none is."""
+        """Return the module or package ``name`` (dotted) beside the importing file, or None."""
         base = folder.joinpath(*name.split("."))
         for path in (base.with_name(base.name + ".py"), base / "__init__.py"):
             if path.is_file():
-                return self._share(path, name)
+                return self._load_shared(path, name)
         return None
 
-    def _share(self, path: Path, name: str) -> ModuleType:
+    def _load_shared(self, path: Path, name: str) -> ModuleType:
         known = self._shared.get(path)
         if known is not None:
             return known
@@ -199,7 +211,7 @@ class _Import:
         return self._top_of(name, found)
 
     def _find(self, name: str) -> ModuleType | None:
-        return self._loader.stand_ins.get(name) or self._loader.sibling(name, self._folder)
+        return self._loader.replacements.get(name) or self._loader.sibling(name, self._folder)
 
     def _real(
         self, name: str, globals_: Mapping[str, Any] | None, fromlist: tuple[str, ...] | None
@@ -211,7 +223,7 @@ class _Import:
         return module
 
     def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
-        """``from package import module``: the module has to be loaded before the name is looked up."""
+        """Load the modules of ``from package import module`` before the names are looked up."""
         for attribute in wanted:
             if attribute == "*" or attribute in vars(package):
                 continue
@@ -225,7 +237,7 @@ class _Import:
                 raise ImportError(str(error)) from None
 
     def _top_of(self, name: str, found: ModuleType) -> ModuleType:
-        """``import a.b.c`` binds ``a``, through which ``a.b.c`` is reached."""
+        """Return the module ``a`` for ``import a.b.c``, with ``b.c`` as its attribute."""
         parts = name.split(".")
         module = found
         for length in range(len(parts) - 1, 0, -1):
@@ -235,7 +247,7 @@ class _Import:
         return module
 
     def _relative(self, name: str, fromlist: tuple[str, ...], level: int) -> ModuleType:
-        """``from .name import a`` and ``from . import a``: beside the file, or *level* - 1 folders above."""
+        """Import ``from .name import a`` and ``from . import a``, ``level - 1`` folders above the file."""
         folder = self._folder
         for _ in range(level - 1):
             folder = folder.parent

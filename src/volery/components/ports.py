@@ -1,14 +1,9 @@
-"""A required port: an object with the operations of an interface.
+"""What a component's required ports are: ports to components, and vehicles as the environment observes them.
 
-A call moves the caller's own task to the callee: what the caller owes is served at its own place, the
-arguments travel, the task waits its turn, computes at the callee's place (its processor, its priority if it
-states one), pays there before the result leaves, and travels back. A call between two processors carries
-*copies* of arguments and result; on one processor both sides see the same objects.
-
-A vehicle as what surrounds it sees it: where it really is. For components of the environment only.
-
-A component of the application that requires a vehicle commands it and knows its autopilot's estimate. One of
-the environment, such as a beacon, a judge or an obstacle, is given this instead.
+A call moves the caller's own task to the callee: its pending execution time is served in its own context, the
+arguments travel, the task waits for the callee, executes in the callee's context (its processor, its priority
+if it states one), is charged there before the result leaves, and travels back. A call between two processors
+carries copies of arguments and result; on one processor both sides see the same objects.
 """
 
 from __future__ import annotations
@@ -27,33 +22,38 @@ from volery.kernel.task import Task
 from volery.trace.events import Call
 
 Transfer = Callable[[int], None]
-"""Blocks the current task until so many bytes are at the other end; raises if they do not get there."""
+"""Blocks the current task until a number of bytes has arrived at the other end; raises if they are lost."""
 
 Sent = TypeVar("Sent")
 
 HEADER_BYTES = 64
-"""Added to each direction of a call: TCP/IP headers (40) and the operation's name with framing."""
+"""Bytes added to each direction of a call: TCP/IP headers (40) and the operation's name with framing."""
 
 
 class Port:
-    """``port.operation(...)`` calls the component at the other end.
+    """A required port: ``port.operation(...)`` calls the component at the other end.
 
-    Raises what the callee raises if it is one of the project's errors, else ``ComponentError`` naming the
-    callee.
+    The call raises the callee's exception if it is one of the project's errors, else a ``ComponentError``
+    that names the callee.
     """
 
     def __init__(
-        self, kernel: Kernel, caller: str, callee: Instance, there: Transfer | None, back: Transfer | None
+        self,
+        kernel: Kernel,
+        caller: str,
+        callee: Instance,
+        request: Transfer | None,
+        reply: Transfer | None,
     ) -> None:
         self._kernel = kernel
         self._caller = caller
         self._callee = callee
-        self._there = there
-        self._back = back
+        self._request = request
+        self._reply = reply
 
     @property
     def component(self) -> str:
-        """The name of the component at the other end."""
+        """Name of the component at the other end."""
         return self._callee.name
 
     def __getattr__(self, operation: str) -> Callable[..., Any]:
@@ -72,7 +72,7 @@ class Port:
 
     def _call(self, operation: str, /, *args: Any, **kwargs: Any) -> Any:
         kernel = self._kernel
-        with kernel:  # the caller's code so far is served at the caller's place
+        with kernel:  # the caller's code so far is served in the caller's context
             start = kernel.now()
             task = kernel.current()
         if task is None:
@@ -81,7 +81,7 @@ class Port:
             )
         outcome = "ok"
         try:
-            return self._there_and_back(task, operation, args, kwargs)
+            return self._call_remote(task, operation, args, kwargs)
         except BaseException as error:
             outcome = type(error).__name__
             raise
@@ -89,23 +89,20 @@ class Port:
             with kernel.guard:
                 kernel.record(Call(start, kernel.now(), self._caller, self._callee.name, operation, outcome))
 
-    def _there_and_back(
-        self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
-    ) -> Any:
+    def _call_remote(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         callee = self._callee
         far = task.context.processor is not callee.context.processor
         if far:
-            args, kwargs = self._copied((args, kwargs), f"the arguments of {callee.name}.{operation}")
-        self._move(self._there, (args, kwargs))
-        with callee.visited(task, operation) as thing:
+            args, kwargs = self._copy((args, kwargs), f"the arguments of {callee.name}.{operation}")
+        self._transfer(self._request, (args, kwargs))
+        with callee.serving(task, operation) as thing:
             result = invoke(callee, thing, operation, args, kwargs)
             if far:
-                result = self._copied(result, f"the result of {callee.name}.{operation}")
-        self._move(self._back, result)
+                result = self._copy(result, f"the result of {callee.name}.{operation}")
+        self._transfer(self._reply, result)
         return result
 
-    def _copied(self, content: Sent, what: str) -> Sent:
-        """What arrives at another processor."""
+    def _copy(self, content: Sent, what: str) -> Sent:
         try:
             return deepcopy(content)
         except VoleryError:
@@ -113,28 +110,29 @@ class Port:
         except Exception as error:
             raise UsageError(f"{what} cannot be copied to another processor: {error}") from error
 
-    def _move(self, travel: Transfer | None, content: object) -> None:
-        if travel is not None:
+    def _transfer(self, transfer: Transfer | None, content: object) -> None:
+        if transfer is not None:
             with self._kernel:
-                travel(HEADER_BYTES + size_of(content))
+                transfer(HEADER_BYTES + size_of(content))
 
 
 def invoke(
     callee: Instance, thing: object, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
-    """The result of an operation of *callee*, whose object is *thing*. Errors as ``Port`` says."""
+    """Return the result of an operation of ``callee``, whose object is ``thing``. See ``Port`` for errors."""
     try:
         return getattr(thing, operation)(*args, **kwargs)
     except VoleryError:
         raise
     except Exception as error:
-        raise callee.fail(error, operation) from error
+        raise callee.component_error(error, operation) from error
 
 
 class PortList(Sequence[Port]):
-    """The ports of a requirement that is connected to several components, in the order of the model.
+    """A required port that is connected to several components, in the order of the model.
 
-    By index, or by the name of the component at the other end: ``drones[0]``, ``drones["drone_control_2"]``.
+    An element is accessed by index or by the name of the component at the other end: ``drones[0]``,
+    ``drones["drone_control_2"]``.
     """
 
     def __init__(self, ports: Sequence[Port]) -> None:
@@ -143,7 +141,7 @@ class PortList(Sequence[Port]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The components at the other ends."""
+        """Names of the components at the other ends."""
         return tuple(self._by_name)
 
     @overload
@@ -166,7 +164,10 @@ class PortList(Sequence[Port]):
 
 
 def size_of(value: object) -> int:
-    """Bytes that *value* takes on a network: 8 a number, text as UTF-8, 4 more for whatever has a length."""
+    """Return the size of a value on a network in bytes.
+
+    A number takes 8, a text its UTF-8 encoding; whatever has a length takes 4 more.
+    """
     if value is None or isinstance(value, bool):
         return 1
     if isinstance(value, str):
@@ -178,7 +179,7 @@ def size_of(value: object) -> int:
 
 
 def _parts(value: object) -> Iterable[object] | None:
-    """What *value* is made of, ``None`` if it is a number or the like."""
+    """Return the elements of a value, or None if it has none, as a number."""
     if isinstance(value, Mapping):
         return [*value.keys(), *value.values()]
     if isinstance(value, Collection):
@@ -189,8 +190,11 @@ def _parts(value: object) -> Iterable[object] | None:
     return list(state.values()) if state else None
 
 
-class Body:
-    """The vehicle called ``name``, by truth."""
+class ObservedVehicle:
+    """The true state of a vehicle, for components of the environment such as a beacon or an obstacle.
+
+    A component of the application commands the vehicle instead, and receives its autopilot's estimate.
+    """
 
     def __init__(self, kernel: Kernel, name: str, truth: Callable[[], Position]) -> None:
         self.name = name
@@ -199,6 +203,6 @@ class Body:
 
     @property
     def position(self) -> Position:
-        """Where it is, AMSL."""
+        """True position, with its altitude AMSL."""
         with self._kernel:
             return self._truth()

@@ -1,16 +1,15 @@
-"""The host of Python components: what is to run for an instance, and starting it.
+"""Programs of instances, and how an instance starts.
 
-A *program* is what becomes a component's object: a class of the user's file, a plain script, or a stub where
-there is no file yet. It is checked before anything starts and made in the component's own flow of control, so
-that a constructor may block, call ROS and cost time.
-
-What stands in for a component that has no file yet: takes its stated times, returns neutral values.
+A program makes a component's object: from a class of the user's file, a plain script, or a stub where there
+is no file yet. It is checked before anything starts. The object is constructed in the component's own flow of
+control, so a constructor may block, call ROS and take time.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,22 +26,26 @@ RUN = "run"
 
 
 class Program(Protocol):
-    """What becomes the object of an instance."""
+    """Makes and runs the object of an instance."""
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """Raise ``ModelError`` if these arguments do not fit, or if it does not provide what it should."""
+        """Raise ``ModelError`` if the program does not fit the model.
+
+        Args:
+            given: Names of the constructor's arguments.
+            operations: Names of the operations that it must provide.
+            active: Whether it must have a flow of control of its own.
+        """
 
     def make(self, given: Mapping[str, Any]) -> object:
-        """The object; may block."""
+        """Construct the object from arguments by name; may block."""
 
     def run(self, thing: object) -> None:
-        """The flow of control of an active component."""
+        """Run the flow of control of an active component."""
 
 
 class ClassProgram:
-    """A class without any base class of ours: arguments by name, operations as methods, ``run`` if it is
-    active.
-    """
+    """A plain class: arguments by name, operations as methods, a method ``run`` if it is active."""
 
     def __init__(self, cls: type, source: SourceFile) -> None:
         self._class = cls
@@ -74,7 +77,7 @@ class ClassProgram:
                 and parameter.name not in given
             ):
                 raise self._error(
-                    f"its constructor asks for {parameter.name!r}{did_you_mean(parameter.name, given)}, "
+                    f"its constructor requires {parameter.name!r}{did_you_mean(parameter.name, given)}, "
                     f"but the model gives {choices(given)}",
                     "__init__",
                 )
@@ -111,7 +114,7 @@ class ClassProgram:
 
 
 class ScriptProgram:
-    """A plain script, run as ``__main__`` in the component's flow of control. It provides no operations."""
+    """A plain script that runs as ``__main__`` in the component's flow of control, without operations."""
 
     def __init__(self, loader: Loader, source: SourceFile, name: str) -> None:
         self._loader = loader
@@ -119,7 +122,7 @@ class ScriptProgram:
         self._name = name
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """See ``Program``: a script takes no arguments and is called by nobody."""
+        """See ``Program``: a script takes no arguments and provides no operations."""
         where = Location(str(self._source.path), 1)
         for name in given:
             raise ModelError(
@@ -147,10 +150,18 @@ class ScriptProgram:
 def load_program(
     loader: Loader, name: str, path: Path, class_name: str, where: Location | None = None
 ) -> Program:
-    """What the instance called *name* is to run: *class_name* of the file at *path*.
+    """Load the program of an instance.
 
-    With an empty *class_name* the file is a script. ``ModelError`` (at *where*, the line that names the file)
-    if it is missing, is no Python or has no such class; ``ComponentError`` if it raises on being loaded.
+    Args:
+        loader: The run's loader.
+        name: Name of the instance.
+        path: File of the component.
+        class_name: Class in the file; empty for a script.
+        where: Line of the model that names the file.
+
+    Raises:
+        ModelError: The file is missing, is not Python or does not contain the class.
+        ComponentError: The file raises an exception while it is loaded.
     """
     source = parse(path, where)
     if not class_name:
@@ -166,17 +177,17 @@ def load_program(
 
 
 def script_or_class(path: Path, class_name: str, where: Location | None = None) -> str:
-    """Which of the two a file written for ROS is: empty for a script, else *class_name*.
+    """Return the class name of a file that is written for ROS, or "" if it is a script.
 
-    It is a script if it runs something when it is ``__main__``, or defines no such class. Errors as
-    ``load_program``'s.
+    A script has an ``if __name__ == "__main__":`` or does not contain the class. Errors as of
+    ``load_program``.
     """
     source = parse(path, where)
     return "" if source.is_script() or class_name not in source.class_names() else class_name
 
 
 def load_class(path: Path, class_name: str, loader: Loader | None = None) -> type:
-    """*class_name* of the file at *path*, for tests and tools; errors as ``load_program``'s."""
+    """Load a class from a file, for tests and tools. Errors as of ``load_program``."""
     source = parse(path)
     _require_class(source, class_name)
     cls: type = getattr((loader or Loader()).load(source, class_name), class_name)
@@ -184,9 +195,7 @@ def load_class(path: Path, class_name: str, loader: Loader | None = None) -> typ
 
 
 def load_function(loader: Loader, path: Path, function: str) -> Any:
-    """*function* of the file at *path*, for missions: ``def mission(drone: Drone)``. Errors as
-    ``load_program``'s.
-    """
+    """Load a function from a file, such as a mission. Errors as of ``load_program``."""
     source = parse(path)
     module = loader.load(source, path.stem)
     found = getattr(module, function, None)
@@ -212,32 +221,38 @@ def _require_class(source: SourceFile, class_name: str) -> None:
 def start(
     instance: Instance, program: Program, given: Mapping[str, Any], scope: Scope, failed: OnFailure
 ) -> Task:
-    """Start *instance*: construct its object from the arguments *given* and, if it is active, run it.
+    """Start an instance: construct its object and, if it is active, run it.
 
-    Checks first, so that nothing has started when something is
-    missing: ``ModelError``, ``EstimateError``. *failed* is told when its flow of control ends with an error;
-    whoever calls it meanwhile is told as well.
+    Args:
+        instance: The instance.
+        program: Its program.
+        given: Arguments of the constructor by name.
+        scope: Scope of its tasks.
+        failed: Called when its flow of control ends with an error; callers of its operations get an error.
+
+    Returns:
+        Its task.
+
+    Raises:
+        ModelError: The program does not fit the model; nothing has started.
+        EstimateError: A figure is missing; nothing has started.
     """
-    active = instance.seat.is_active
+    active = instance.allocation.is_active
     program.check(given, instance.operations, active)
     instance.pricing.check(instance.name, instance.operations, active)
     register_kernel(instance.kernel)
     instance.scope = scope
-    instance.failed = failed
+    instance.on_failure = failed
 
     def body() -> None:
-        if _construct(instance, program, given) and active:
-            sleep(instance.kernel, instance.seat.starts_at - instance.kernel.now())
-            instance.guard(lambda: program.run(instance.object), RUN)
+        made = instance.run_guarded(lambda: instance.set_object(program.make(given)), "its constructor")
+        if not made:
+            instance.set_unavailable("its constructor has failed")
+        elif active:
+            sleep(instance.kernel, instance.allocation.starts_at - instance.kernel.now())
+            instance.run_guarded(lambda: program.run(instance.object), RUN)
 
     return instance.kernel.spawn(body, instance.name, instance.context, scope)
-
-
-def _construct(instance: Instance, program: Program, given: Mapping[str, Any]) -> bool:
-    done = instance.guard(lambda: instance.complete(program.make(given)), "its constructor")
-    if not done:
-        instance.give_up("its constructor has failed")
-    return done
 
 
 _NEUTRAL: dict[str, Callable[[], object]] = {
@@ -252,9 +267,7 @@ _NEUTRAL: dict[str, Callable[[], object]] = {
 
 
 def neutral(returns: str) -> object:
-    """The neutral value of a type as a model writes it: ``""``, 0, False, an empty list for ``T[]``, else
-    ``None``.
-    """
+    """Return the neutral value of a model's type: ``""``, 0, False, ``[]`` for ``T[]``, else None."""
     written = returns.strip()
     if written.endswith("[]"):
         return []
@@ -263,24 +276,24 @@ def neutral(returns: str) -> object:
 
 
 class Stub:
-    """Provides operations that do nothing. The run charges what is stated for each."""
+    """An object whose operations return neutral values. The run charges the stated cost of each."""
 
     def __init__(self, operations: Mapping[str, str]) -> None:
         for name, returns in operations.items():
-            setattr(self, name, _returning(returns))
+            setattr(self, name, partial(self._return_neutral, returns))
 
-
-def _returning(returns: str) -> Callable[..., object]:
-    def operation(*args: object, **kwargs: object) -> object:
+    @staticmethod
+    def _return_neutral(returns: str, /, *args: object, **kwargs: object) -> object:
         return neutral(returns)
-
-    return operation
 
 
 class StubProgram:
-    """A ``Program`` without a file. *operations* maps each to its return type as the model writes it.
+    """The program of a component that has no file yet.
 
-    An active one is released each *period*, or once if it states none.
+    Args:
+        kernel: The run's kernel.
+        operations: Return type of each operation as the model writes it.
+        period: Period of the releases of an active component, ns; without one it is released once.
     """
 
     def __init__(self, kernel: Kernel, operations: Mapping[str, str], period: Ns | None = None) -> None:
@@ -289,14 +302,14 @@ class StubProgram:
         self._period = period
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """Fits everything."""
+        """Accept every model."""
 
     def make(self, given: Mapping[str, Any]) -> object:
-        """The stub."""
+        """Return the stub."""
         return Stub(self._operations)
 
     def run(self, thing: object) -> None:
-        """Be released each period."""
+        """Wait for the releases."""
         if self._period is None:
             return
         rate = Rate(self._kernel, self._period)

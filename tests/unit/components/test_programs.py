@@ -160,7 +160,7 @@ def check(desk, text, given, operations=(), active=False):
             (),
             False,
             3,
-            "Central: its constructor asks for 'routes' (did you mean 'route'?), "
+            "Central: its constructor requires 'routes' (did you mean 'route'?), "
             "but the model gives drones or route",
         ),
         (
@@ -294,11 +294,11 @@ def test_counted_code_is_charged_and_takes_its_time(tmp_path):
                     time.sleep(1)
         """,
     )
-    instance = Instance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), counter=steps.take)
+    instance = Instance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), read_steps=steps.take)
     program = load_program(loader, "loop", path, "Loop")
     start(instance, program, {}, desk.kernel.root, lambda *told: desk.failures.append(told))
     desk.kernel.run(10 * S)
-    instance.flush()
+    instance.flush_charges()
     slices = desk.of(Slice)
     assert desk.failures == []
     assert sum(ran.end - ran.start for ran in slices) == sum(charge.caller for charge in desk.of(Charge))

@@ -99,7 +99,7 @@ class FakeLanding:
 @pytest.fixture
 def bench(make_bench):
     made = make_bench()
-    made.loader.stand_ins["rospy"] = fake_rospy(made.kernel)
+    made.loader.replacements["rospy"] = fake_rospy(made.kernel)
     return made
 
 
@@ -249,7 +249,7 @@ def test_the_noise_of_the_beacon_repeats_with_the_seed(make_bench, city):
     ends = []
     for seed in (1, 1, 2):
         bench = make_bench(seed)
-        bench.loader.stand_ins["rospy"] = fake_rospy(bench.kernel)
+        bench.loader.replacements["rospy"] = fake_rospy(bench.kernel)
         landing = Landing(bench, city)
         landing.land()
         ends.append(landing.drone.east_north)

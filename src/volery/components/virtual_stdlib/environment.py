@@ -1,10 +1,8 @@
-"""``time`` and ``datetime`` on the clock of the run. Local time is UTC, on every machine.
+"""Replacements of ``time``, ``datetime``, ``random`` and ``print``, by which a process uses its environment.
 
-``random`` with a named stream for each component, seeded from the run's seed.
-
-``print``: what a component prints becomes a line of the trace, and goes to the standard error stream.
-
-The standard output belongs to the program that runs the components.
+Time is the time of the run; local time is UTC on every machine. Each component has a named stream of random
+numbers, seeded from the run's seed. Printed text becomes lines of the trace and goes to the standard error
+stream, since the standard output belongs to the program that runs the components.
 """
 
 from __future__ import annotations
@@ -14,18 +12,43 @@ import datetime as real_datetime
 import random as real_random
 import sys
 import time as real_time
+from collections.abc import Mapping
 from io import StringIO
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
+from volery.base.errors import choices
 from volery.base.seeds import stream
 from volery.base.time import Ns, S, from_seconds, to_seconds
-from volery.components.virtual_stdlib.module import make_module
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.trace.events import Text
 
+INFO = 6
+"""Severity of printed text, as in syslog."""
+
 _PURE = ("struct_time", "strptime", "asctime", "timezone", "tzname")
+_DRAWS = (
+    "betavariate", "binomialvariate", "choice", "choices", "expovariate", "gammavariate", "gauss",
+    "getrandbits", "getstate", "lognormvariate", "normalvariate", "paretovariate", "randbytes", "randint",
+    "random", "randrange", "sample", "seed", "setstate", "shuffle", "triangular", "uniform", "vonmisesvariate",
+    "weibullvariate",
+)  # fmt: skip
+
+
+def make_module(name: str, names: Mapping[str, Any]) -> ModuleType:
+    """Return a module with exactly the given names; any other raises an ``AttributeError`` with a reason."""
+    module = ModuleType(name, f"Replaces {name} in the files of a run's components.")
+    module.__dict__.update(names)
+
+    def missing(attribute: str) -> NoReturn:
+        raise AttributeError(
+            f"{name}.{attribute} is not available in the files of components, where time is the run's; "
+            f"there is {choices(key for key in names if not key.startswith('_'))}"
+        )
+
+    module.__dict__["__getattr__"] = missing
+    return module
 
 
 class _Clock:
@@ -34,7 +57,7 @@ class _Clock:
         self._epoch = epoch
 
     def monotonic_ns(self) -> Ns:
-        """Since the start of the run. An interaction point."""
+        """Return the time since the start of the run. This is an interaction point."""
         with self._kernel as kernel:
             return kernel.now()
 
@@ -63,7 +86,7 @@ class _Clock:
 
 
 def time_module(kernel: Kernel, epoch: Ns) -> ModuleType:
-    """Stands in for ``time``."""
+    """Return the replacement of ``time``."""
     clock = _Clock(kernel, epoch)
     names: dict[str, Any] = {name: getattr(real_time, name) for name in _PURE}
     names.update(timezone=0, tzname=("UTC", "UTC"), daylight=0, altzone=0)
@@ -76,7 +99,7 @@ def time_module(kernel: Kernel, epoch: Ns) -> ModuleType:
 
 
 def datetime_module(kernel: Kernel, epoch: Ns) -> ModuleType:
-    """Stands in for ``datetime``: ``now``, ``utcnow`` and ``today`` on the clock of the run."""
+    """Return the replacement of ``datetime``: ``now``, ``utcnow`` and ``today`` on the clock of the run."""
     clock = _Clock(kernel, epoch)
 
     class RunDatetime(real_datetime.datetime):
@@ -105,77 +128,40 @@ def datetime_module(kernel: Kernel, epoch: Ns) -> ModuleType:
     return make_module("datetime", {**names, "datetime": RunDatetime, "date": RunDate})
 
 
-_DRAWS = (
-    "betavariate",
-    "binomialvariate",
-    "choice",
-    "choices",
-    "expovariate",
-    "gammavariate",
-    "gauss",
-    "getrandbits",
-    "getstate",
-    "lognormvariate",
-    "normalvariate",
-    "paretovariate",
-    "randbytes",
-    "randint",
-    "random",
-    "randrange",
-    "sample",
-    "seed",
-    "setstate",
-    "shuffle",
-    "triangular",
-    "uniform",
-    "vonmisesvariate",
-    "weibullvariate",
-)
-
-
-class _Streams:
-    """One stream a component, made when it first draws. Who draws is read from the flow of control."""
-
-    def __init__(self, kernel: Kernel, seed: int) -> None:
-        self._kernel = kernel
-        self._seed = seed
-        self._streams: dict[str, real_random.Random] = {}
-
-    def mine(self) -> real_random.Random:
-        task = self._kernel.current()
-        component = task.context.component if task is not None else ""
-        if component not in self._streams:
-            self._streams[component] = stream(self._seed, f"component {component}")
-        return self._streams[component]
-
-
 def random_module(kernel: Kernel, seed: int) -> ModuleType:
-    """Stands in for ``random``. ``Random()`` without a seed takes one from the component's stream."""
-    streams = _Streams(kernel, seed)
+    """Return the replacement of ``random``.
+
+    Each component has a stream, created when it first draws; the component is that of the current task.
+    ``Random()`` without a seed takes one from the component's stream.
+    """
+    streams: dict[str, real_random.Random] = {}
+
+    def own_stream() -> real_random.Random:
+        task = kernel.current()
+        component = task.context.component if task is not None else ""
+        if component not in streams:
+            streams[component] = stream(seed, f"component {component}")
+        return streams[component]
 
     class Random(real_random.Random):
         def __init__(self, x: Any = None) -> None:
-            super().__init__(streams.mine().getrandbits(64) if x is None else x)
+            super().__init__(own_stream().getrandbits(64) if x is None else x)
 
-    def draw(name: str) -> Any:
-        def drawn(*args: Any, **kwargs: Any) -> Any:
-            return getattr(streams.mine(), name)(*args, **kwargs)
+    def drawing(name: str) -> Any:
+        def draw(*args: Any, **kwargs: Any) -> Any:
+            return getattr(own_stream(), name)(*args, **kwargs)
 
-        drawn.__name__ = name
-        return drawn
+        draw.__name__ = name
+        return draw
 
-    names: dict[str, Any] = {name: draw(name) for name in _DRAWS if hasattr(real_random.Random, name)}
+    names: dict[str, Any] = {name: drawing(name) for name in _DRAWS if hasattr(real_random.Random, name)}
     return make_module("random", {**names, "Random": Random, "SystemRandom": Random})
 
 
-INFO = 6
-"""Severity, as in syslog."""
-
-
 def builtins_module(kernel: Kernel) -> ModuleType:
-    """Stands in for ``builtins``, and for the names that are there without an import."""
+    """Return the replacement of ``builtins``, which is also used for names without an import."""
 
-    def say(
+    def record_print(
         *values: Any, sep: str | None = " ", end: str | None = "\n", file: Any = None, flush: bool = False
     ) -> None:
         if file is not None:
@@ -191,5 +177,5 @@ def builtins_module(kernel: Kernel) -> ModuleType:
                 kernel.record(Text(kernel.now(), task.context.component, INFO, text.rstrip()))
 
     module = ModuleType("builtins", real_builtins.__doc__)
-    module.__dict__.update(vars(real_builtins), print=say)
+    module.__dict__.update(vars(real_builtins), print=record_print)
     return module

@@ -1,6 +1,7 @@
-"""``threading`` on the flows of control of the run: a thread is a task at its component's place.
+"""Replacements of ``threading`` and ``queue`` on the tasks and the clock of the run.
 
-``queue`` on the clock of the run.
+A thread is a task in its component's context. The classes follow Python's own; only what they wait for
+differs.
 """
 
 from __future__ import annotations
@@ -10,20 +11,40 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from heapq import heappop, heappush
 from types import ModuleType, TracebackType
-from typing import Any
+from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
-from volery.base.time import from_seconds, to_seconds
+from volery.base.time import Ns, from_seconds, to_seconds
 from volery.components.component_api import component_of
-from volery.components.virtual_stdlib.module import KernelBound, bind, make_module, within
+from volery.components.virtual_stdlib.environment import make_module
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
-from volery.kernel.waiting import Signal
+
+
+class KernelBound:
+    """Base of the replaced classes: each run has a subclass of its own, bound to its kernel."""
+
+    kernel: ClassVar[Kernel]
+
+
+def bind(kernel: Kernel, kinds: Iterable[type[KernelBound]]) -> dict[str, Any]:
+    """Return the subclasses of ``kinds`` for one run, by name."""
+    return {kind.__name__: type(kind.__name__, (kind,), {"kernel": kernel}) for kind in kinds}
+
+
+def longest_wait(blocking: bool, timeout: float | None) -> Ns | None:
+    """Return the longest time to wait, ns, or None without a limit.
+
+    There is no limit without a timeout, or with the -1 of ``Lock.acquire``.
+    """
+    if not blocking:
+        return 0
+    return None if timeout is None or timeout < 0 else from_seconds(timeout)
 
 
 def threading_module(kernel: Kernel) -> ModuleType:
-    """Stands in for ``threading``."""
+    """Return the replacement of ``threading``."""
     names = bind(kernel, (Thread, Timer, Lock, RLock, Event, Semaphore, BoundedSemaphore, Condition))
     names["current_thread"] = lambda: waiting.current_task(kernel)
     names["get_ident"] = lambda: waiting.current_task(kernel).name
@@ -53,45 +74,42 @@ class Thread(KernelBound):
         self._ended = waiting.Signal(self.kernel, f"thread {self.name}")
 
     def start(self) -> None:
-        """Begin. Once only."""
+        """Start the thread; it can be started once."""
         if self._task is not None:
             raise RuntimeError("threads can only be started once")
         with self.kernel as kernel:
             instance = component_of(waiting.current_task(kernel))
             if instance is None:
                 raise UsageError("threading.Thread: only components start threads")
-            body = self._body(lambda: instance.guard(self.run, f"thread {self.name}"))
+
+            def body() -> None:
+                try:
+                    instance.run_guarded(self.run, f"thread {self.name}")
+                finally:
+                    self._over = True
+                    self._ended.notify()
+
             self._task = kernel.spawn(body, f"{instance.name}/{self.name}", instance.context, instance.scope)
 
-    def _body(self, run: Callable[[], object]) -> Callable[[], None]:
-        def body() -> None:
-            try:
-                run()
-            finally:
-                self._over = True
-                self._ended.notify()
-
-        return body
-
     def run(self) -> None:
-        """What it does; a class of its own may say it instead of a target."""
+        """Call the target; a subclass may override this instead."""
         if self._target is not None:
             self._target(*self._args, **self._kwargs)
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for its end."""
+        """Wait until the thread has ended."""
         if self._task is None:
             raise RuntimeError("cannot join thread before it is started")
-        self._ended.wait_for(lambda: self._over, within(True, timeout), ends_activation=True)
+        self._ended.wait_for(lambda: self._over, longest_wait(True, timeout), ends_activation=True)
 
     def is_alive(self) -> bool:
-        """Started and not ended."""
+        """Return whether the thread has started and not ended."""
         with self.kernel:
             return self._task is not None and not self._over
 
 
 class Timer(Thread):
-    """Calls a function once, after a while."""
+    """A thread that calls a function once after an interval."""
 
     def __init__(
         self,
@@ -105,19 +123,19 @@ class Timer(Thread):
         self._cancelled = False
 
     def cancel(self) -> None:
-        """It will not call."""
+        """Cancel the call."""
         with self.kernel:
             self._cancelled = True
 
     def run(self) -> None:
-        """Wait, then call."""
+        """Wait for the interval, then call the function."""
         waiting.sleep(self.kernel, from_seconds(self.interval))
         if not self._cancelled:
             super().run()
 
 
 class ContextManaged(KernelBound):
-    """What a ``with`` statement takes and gives back."""
+    """Base of objects that a ``with`` statement acquires and releases."""
 
     acquire: Callable[..., bool]
     release: Callable[..., None]
@@ -132,15 +150,15 @@ class ContextManaged(KernelBound):
 
 
 class Lock(ContextManaged):
-    """Held by at most one task."""
+    """A lock, held by at most one task."""
 
     def __init__(self) -> None:
         self._owner: Task | None = None
         self._free = waiting.Signal(self.kernel, type(self).__name__)
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Take it; False if it was not free in time."""
-        longest = within(blocking, timeout)
+        """Acquire the lock; return False if it was not free in time."""
+        longest = longest_wait(blocking, timeout)
         with self.kernel as kernel:
             if not self._free.wait_for(lambda: self._owner is None, longest, ends_activation=blocking):
                 return False
@@ -148,30 +166,30 @@ class Lock(ContextManaged):
             return True
 
     def release(self) -> None:
-        """Give it back. Never blocks, so that it also works in a task that is being ended."""
+        """Release the lock. It never blocks, so that it also works in a task that is being cancelled."""
         if self._owner is None:
             task = self.kernel.current()
             if task is not None and task.scope.cancelled:
-                return  # its end came while it waited to have the lock back
+                return  # it was cancelled while it waited to acquire the lock again
             raise RuntimeError("release unlocked lock")
         self._owner = None
         self._free.notify()
 
     def locked(self) -> bool:
-        """Whether somebody holds it."""
+        """Return whether the lock is held."""
         with self.kernel:
             return self._owner is not None
 
 
 class RLock(Lock):
-    """A lock that its holder may take again."""
+    """A lock that its owner may acquire again."""
 
     def __init__(self) -> None:
         super().__init__()
         self._depth = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Take it, once more if it is held by the current task."""
+        """Acquire the lock, once more if the current task owns it."""
         if self._owner is not None and self._owner is self.kernel.current():
             self._depth += 1
             return True
@@ -181,7 +199,7 @@ class RLock(Lock):
         return taken
 
     def release(self) -> None:
-        """Give it back as often as it was taken."""
+        """Release the lock; it is free after as many releases as acquisitions."""
         self._depth -= 1
         if self._depth <= 0:
             super().release()
@@ -197,12 +215,12 @@ class Event(KernelBound):
         self.clear = self._event.clear
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Block until it is raised; False if it was not in time."""
-        return self._event.wait(within(True, timeout))
+        """Wait until the flag is set; return False if it was not in time."""
+        return self._event.wait(longest_wait(True, timeout))
 
 
 class Semaphore(ContextManaged):
-    """Counts what is free."""
+    """A counting semaphore."""
 
     def __init__(self, value: int = 1) -> None:
         if value < 0:
@@ -211,8 +229,8 @@ class Semaphore(ContextManaged):
         self._free = waiting.Signal(self.kernel, type(self).__name__)
 
     def acquire(self, blocking: bool = True, timeout: float | None = None) -> bool:
-        """Take one; False if none was free in time."""
-        longest = within(blocking, timeout)
+        """Decrement the counter; return False if it was zero for too long."""
+        longest = longest_wait(blocking, timeout)
         with self.kernel:
             if not self._free.wait_for(lambda: self._value > 0, longest, ends_activation=blocking):
                 return False
@@ -220,49 +238,51 @@ class Semaphore(ContextManaged):
             return True
 
     def release(self, n: int = 1) -> None:
-        """Give *n* back. Never blocks."""
+        """Increment the counter by ``n``. It never blocks."""
         self._value += n
         self._free.notify()
 
 
 class BoundedSemaphore(Semaphore):
-    """A semaphore that no more can be given back to than it began with."""
+    """A semaphore whose counter cannot exceed its initial value."""
 
     def __init__(self, value: int = 1) -> None:
         super().__init__(value)
         self._most = value
 
     def release(self, n: int = 1) -> None:
-        """Give *n* back."""
+        """Increment the counter by ``n``."""
         if self._value + n > self._most:
             raise ValueError("Semaphore released too many times")
         super().release(n)
 
 
 class Condition(ContextManaged):
-    """A lock to wait under until somebody notifies."""
+    """A condition variable with its lock."""
 
     def __init__(self, lock: Lock | None = None) -> None:
         self._lock: Lock = lock or bind(self.kernel, (RLock,))["RLock"]()
         self.acquire = self._lock.acquire
         self.release = self._lock.release
-        self._told = waiting.Signal(self.kernel, "Condition")
+        self._notified = waiting.Signal(self.kernel, "Condition")
         self._waiting: list[list[bool]] = []
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Let go of the lock until notified; False if that did not happen in time."""
-        told: list[bool] = []
-        self._waiting.append(told)
+        """Release the lock until notified; return False if that did not happen in time."""
+        notified: list[bool] = []
+        self._waiting.append(notified)
         self._lock.release()
         try:
-            return self._told.wait_for(lambda: told, within(True, timeout), ends_activation=True)
+            return self._notified.wait_for(
+                lambda: notified, longest_wait(True, timeout), ends_activation=True
+            )
         finally:
-            if told in self._waiting:
-                self._waiting = [other for other in self._waiting if other is not told]
+            if notified in self._waiting:
+                self._waiting = [other for other in self._waiting if other is not notified]
             self._lock.acquire()
 
     def wait_for(self, predicate: Callable[[], Any], timeout: float | None = None) -> Any:
-        """Wait until *predicate* holds; its last value."""
+        """Wait until ``predicate`` holds; return its last value."""
         with self.kernel as kernel:
             end = None if timeout is None else kernel.now() + from_seconds(timeout)
         held = predicate()
@@ -276,31 +296,31 @@ class Condition(ContextManaged):
         return held
 
     def notify(self, n: int = 1) -> None:
-        """Wake the first *n* who wait."""
+        """Wake the first ``n`` waiting tasks."""
         with self.kernel:
-            for told in self._waiting[:n]:
-                told.append(True)
+            for notified in self._waiting[:n]:
+                notified.append(True)
             self._waiting = self._waiting[n:]
-            self._told.notify()
+            self._notified.notify()
 
     def notify_all(self) -> None:
-        """Wake all who wait."""
+        """Wake all waiting tasks."""
         self.notify(len(self._waiting))
 
 
 def queue_module(kernel: Kernel) -> ModuleType:
-    """Stands in for ``queue``."""
+    """Return the replacement of ``queue``."""
     names = bind(kernel, (Queue, SimpleQueue, LifoQueue, PriorityQueue))
     return make_module("queue", {**names, "Empty": real_queue.Empty, "Full": real_queue.Full})
 
 
 class Queue(KernelBound):
-    """First in, first out; ``maxsize`` 0 for no bound."""
+    """A queue, first in, first out; ``maxsize`` 0 means no bound."""
 
     def __init__(self, maxsize: int = 0) -> None:
         self.maxsize = maxsize
         self._items: Any = deque()
-        self._changed = Signal(self.kernel, type(self).__name__)
+        self._changed = waiting.Signal(self.kernel, type(self).__name__)
         self._unfinished = 0
 
     def _push(self, item: Any) -> None:
@@ -313,46 +333,50 @@ class Queue(KernelBound):
         return self.maxsize <= 0 or len(self._items) < self.maxsize
 
     def put(self, item: Any, block: bool = True, timeout: float | None = None) -> None:
-        """Append *item*; ``Full`` if there was no room in time."""
+        """Append ``item``; raise ``Full`` if there was no room in time."""
         with self.kernel:
-            if not self._changed.wait_for(self._has_room, within(block, timeout), ends_activation=block):
+            if not self._changed.wait_for(
+                self._has_room, longest_wait(block, timeout), ends_activation=block
+            ):
                 raise real_queue.Full
             self._push(item)
             self._unfinished += 1
             self._changed.notify()
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
-        """Take the next item; ``Empty`` if there was none in time."""
+        """Remove and return the next item; raise ``Empty`` if there was none in time."""
         with self.kernel:
-            if not self._changed.wait_for(lambda: self._items, within(block, timeout), ends_activation=block):
+            if not self._changed.wait_for(
+                lambda: self._items, longest_wait(block, timeout), ends_activation=block
+            ):
                 raise real_queue.Empty
             item = self._pop()
             self._changed.notify()
             return item
 
     def put_nowait(self, item: Any) -> None:
-        """Append *item* if there is room, else ``Full``."""
+        """Append ``item`` if there is room, else raise ``Full``."""
         self.put(item, block=False)
 
     def get_nowait(self) -> Any:
-        """Take the next item if there is one, else ``Empty``."""
+        """Remove and return the next item if there is one, else raise ``Empty``."""
         return self.get(block=False)
 
     def qsize(self) -> int:
-        """How many items wait."""
+        """Return the number of items."""
         with self.kernel:
             return len(self._items)
 
     def empty(self) -> bool:
-        """Whether no item waits."""
+        """Return whether the queue is empty."""
         return self.qsize() == 0
 
     def full(self) -> bool:
-        """Whether there is no room."""
+        """Return whether the queue is full."""
         return self.qsize() >= self.maxsize > 0
 
     def task_done(self) -> None:
-        """An item that was taken has been dealt with."""
+        """Record that an item has been processed."""
         with self.kernel:
             if self._unfinished <= 0:
                 raise ValueError("task_done() called too many times")
@@ -360,26 +384,26 @@ class Queue(KernelBound):
             self._changed.notify()
 
     def join(self) -> None:
-        """Wait until every item has been dealt with."""
+        """Wait until every item has been processed."""
         self._changed.wait_for(lambda: self._unfinished == 0, ends_activation=True)
 
 
 class SimpleQueue(Queue):
-    """First in, first out, without a bound."""
+    """A queue, first in, first out, without a bound."""
 
     def __init__(self) -> None:
         super().__init__()
 
 
 class LifoQueue(Queue):
-    """Last in, first out."""
+    """A queue, last in, first out."""
 
     def _pop(self) -> Any:
         return self._items.pop()
 
 
 class PriorityQueue(Queue):
-    """Smallest out first."""
+    """A queue, smallest item first."""
 
     def __init__(self, maxsize: int = 0) -> None:
         super().__init__(maxsize)

@@ -1,7 +1,4 @@
-"""Vehicles that components command by ROS messages alone: somebody brings them down at the end of a run.
-
-From a model to its running components: instances, ports, programs, nodes and the vehicles they command.
-"""
+"""From a model to its running components: instances, ports, programs, nodes and the vehicles they command."""
 
 from __future__ import annotations
 
@@ -47,9 +44,9 @@ if TYPE_CHECKING:
 
 
 class UnattendedVehicle:
-    """See ``ending.Lands``: joins *graph* for the way down only, and commands what ``open_on`` opens there.
+    """Vehicle that components command by ROS messages only, without a port.
 
-    A vehicle that no computer commands in the end is left to its autopilot.
+    At the end of the run it joins *graph* and lands through the driver that ``open_on`` opens there.
     """
 
     def __init__(self, graph: RosGraph, name: str, open_on: Callable[[Node], Vehicle]) -> None:
@@ -58,7 +55,7 @@ class UnattendedVehicle:
         self._open_on = open_on
 
     def come_to_rest(self) -> str:
-        """Land it if it is armed and nobody else has it; says what was done."""
+        """Land the vehicle if it is armed and no operator controls it. Return what was done."""
         vehicle = self._open_on(self._graph.node(f"safety_of_{self.name}"))
         vehicle.wait_connected()
         return vehicle.come_to_rest()
@@ -68,13 +65,13 @@ INTERFACES = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
 """By the kind of vehicle."""
 
 PYTHON_ROS = ("rospy", "rclpy")
-"""Languages whose files import interfaces of ROS."""
+"""Languages whose files import ROS message packages."""
 
 
 class LateBoundProgram:
-    """A program whose object is also given what it can only be given in its own flow of control.
+    """Program whose object also gets values that are made in its own task.
 
-    *connect* joins the graph and so costs time; that is the component's.
+    ``connect`` joins the graph, and the component is charged for it.
     """
 
     def __init__(
@@ -99,8 +96,9 @@ class LateBoundProgram:
 
 @dataclass(frozen=True)
 class BuiltComponents:
-    """Components that are ready to start. ``start`` starts them in the order of the model; ``finish`` is for
-    when all have ended.
+    """Components that are ready to start.
+
+    ``starters`` are in the order of the model. ``finish`` is called when all components have ended.
     """
 
     starters: tuple[Callable[[], object], ...]
@@ -110,12 +108,12 @@ class BuiltComponents:
     finish: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Every check comes first: nothing has started when something is missing."""
+        """Start all components. Each starter was made, and checked, before the first one starts."""
         for starter in self.starters:
             starter()
 
     def warnings(self) -> list[str]:
-        """What the counting of code has left out, and what is doubtful about it."""
+        """Return what the counting of code has left out, and doubts about it."""
         if self.loader.steps is None or not self.loader.libraries:
             return list(self.doubts)
         names = ", ".join(sorted(self.loader.libraries))
@@ -124,15 +122,19 @@ class BuiltComponents:
 
 
 Truth = Callable[[], Position]
-"""Where a vehicle really is."""
+"""Returns the true position of a vehicle."""
 
 
 @dataclass(frozen=True)
 class ProcessPart:
-    """The part of a model that one process runs: its instances, its graph, and its way to the others.
+    """Part of a model that one process runs.
 
-    ``reach(caller, callee)`` gives the port of an instance here to one that is elsewhere. ``nodes`` are those
-    that instances have already, by the instances' names; ``truth`` says where a vehicle really is.
+    Attributes:
+        graph: The real graph.
+        instances: Instances of this process.
+        reach: ``reach(caller, callee)`` returns the port of an instance of this process to one of another.
+        nodes: Nodes that already exist, by the names of their instances.
+        truth: Returns the function for the true position of a vehicle.
     """
 
     graph: RosGraph
@@ -143,9 +145,9 @@ class ProcessPart:
 
 
 class Builder:
-    """Makes the components of one run, or of the *part* of it that is this process's.
+    """Builder of the components of one run, or of the *part* of it in this process.
 
-    Without an *airfield* the vehicles are elsewhere.
+    Without a *fleet* the vehicles are in another process.
     """
 
     def __init__(
@@ -169,11 +171,11 @@ class Builder:
         self._models = part.instances if part else system.instances
         self._graph: RosGraph = part.graph if part else EmbeddedGraph(kernel, platform.tariff, platform.route)
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
-        self._lands: dict[str, Landable] = {}
+        self._landable: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}
 
     def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
-        """Load every file, make every instance, connect every port."""
+        """Load every file, create every instance, connect every port."""
         steps = StepCounter() if fidelity == "code" else None
         for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:
@@ -206,7 +208,7 @@ class Builder:
         )
 
     def _operations(self, model: InstanceModel) -> dict[str, str]:
-        """The operations that it provides, and what each returns."""
+        """Return the operations that an instance provides, with the type that each returns."""
         return {
             name: signature.returns
             for interface in model.component.provides.values()
@@ -217,7 +219,7 @@ class Builder:
         instance = self._instances[model.name]
         program = self._program(model, loader)
         given = self._given(model)
-        if not isinstance(program, ScriptProgram):  # a script has its parameters from ROS
+        if not isinstance(program, ScriptProgram):  # a script reads its parameters from ROS
             given = {**model.parameters, **given}
         if commanded_by(model):
             commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
@@ -242,7 +244,7 @@ class Builder:
     # -- ports
 
     def _given(self, model: InstanceModel) -> dict[str, Any]:
-        """What its ports are connected to, by the ports' names; the vehicles that it commands come later."""
+        """Return the connected objects by port, except for the vehicles that the instance commands."""
         found: dict[str, Any] = {}
         for connection in model.connections.values():
             kind = _kind(connection)
@@ -257,7 +259,7 @@ class Builder:
         return found
 
     def _body(self, vehicle: str) -> ObservedVehicle:
-        assert self._fleet is not None, "components of the environment live where the vehicles are"
+        assert self._fleet is not None, "components of the environment are in the process of the vehicles"
         return ObservedVehicle(self._kernel, vehicle, self._fleet.truth(vehicle))
 
     def _port(self, model: InstanceModel, callee: str) -> Port:
@@ -274,7 +276,7 @@ class Builder:
         )
 
     def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
-        """Join the graph and command vehicles over it."""
+        """Join the graph and return the vehicles that the instance commands, by port."""
         node = self._nodes.get(model.name)
         if node is None:
             node = self._graph.node(model.name, model.namespace, remaps=model.remap)
@@ -289,8 +291,8 @@ class Builder:
 
     def _vehicle(self, node: Node, name: str, interface: str) -> Drone | Rover:
         vehicle = self._open(node, name, interface)
-        self._lands.setdefault(name, vehicle)  # one of its commanders brings it down in the end
-        self._ending.vehicles = tuple(self._lands.values())
+        self._landable.setdefault(name, vehicle)  # its first commander lands it at the end
+        self._ending.vehicles = tuple(self._landable.values())
         return vehicle
 
     def _open(self, node: Node, name: str, interface: str) -> Drone | Rover:
@@ -309,27 +311,27 @@ class Builder:
         commanded = {name for model in self._system.instances for name in commanded_by(model)}
         for vehicle in self._system.vehicles:
             if vehicle.name in commanded or vehicle.processor is not None:
-                graph_access(
-                    vehicle.autopilot, vehicle.name
-                )  # one that cannot be served is told before the start
+                graph_access(vehicle.autopilot, vehicle.name)  # raises before anything starts
                 if vehicle.name not in commanded:
-                    self._leave_unattended(vehicle.name, INTERFACES[vehicle.kind])
+                    self._add_unattended(vehicle.name, INTERFACES[vehicle.kind])
                 yield partial(self._serve, self._fleet, vehicle.name, vehicle.processor)
 
-    def _leave_unattended(self, name: str, interface: str) -> None:
+    def _add_unattended(self, name: str, interface: str) -> None:
         opened = partial(self._open, name=name, interface=interface)
-        self._lands[name] = UnattendedVehicle(self._graph, name, opened)
-        self._ending.vehicles = tuple(self._lands.values())
+        self._landable[name] = UnattendedVehicle(self._graph, name, opened)
+        self._ending.vehicles = tuple(self._landable.values())
 
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
 
     def _serve(self, fleet: SimulatedFleet, name: str, processor: str | None) -> None:
-        """In the root scope: it must outlive the components, for the way down."""
-        place = ExecutionContext(node_name(name), self._platform.processors[processor] if processor else None)
-        serve_on_graph(self._graph, fleet, name, graph_access(self._autopilot(name), name), place)
+        """Serve a vehicle in the root scope: its node outlives the components, for the landing."""
+        context = ExecutionContext(
+            node_name(name), self._platform.processors[processor] if processor else None
+        )
+        serve_on_graph(self._graph, fleet, name, graph_access(self._autopilot(name), name), context)
 
 
 def _kind(connection: Connection) -> TargetKind | None:
-    """Of what it is connected to; all targets of a connection are of one kind."""
+    """Return the kind of a connection's targets, which is the same for all of them."""
     return connection.targets[0].kind if connection.targets else None

@@ -1,18 +1,14 @@
-"""Processors and networks of a run: what serves computing, what computing costs there, what travels between.
+"""Processors and networks of a run: who executes what, its price, background load, power draw.
 
 Graph and components report what they do; ``cost`` prices it; this module joins the two for the processors of
-one allocation. Nodes and components that are allocated to no processor compute and communicate in no time.
+one allocation. Nodes and components without a processor compute and communicate in no time.
 
-What else runs on a computer: the model's ``load``, a share of each core that components do not get.
+The background load of a processor (``load`` in the model) is a share of each core that components do not get.
+Its executions have a priority above any component, one each ``LOAD_PERIOD`` and core. Their lengths are
+random and seeded, so the same run has the same load.
 
-It is more urgent than any component, as interrupts and a reserved share are, and comes in pieces: one each
-``LOAD_PERIOD`` and core, of the stated share of it on average. How the pieces differ is seeded, so the same run
-has the same load, whatever runs on the machine that simulates it.
-
-On-board computers drain the battery of the vehicle that feeds them.
-
-Their busy time is looked at once a period, and what they drew on average goes to the vehicle's body as
-payload power for the next period: the battery is late by one period and misses nothing but the last one.
+A computer on board drains the battery of its vehicle. Once each ``FEED_PERIOD`` its mean power of the last
+period becomes the payload power of the next one.
 """
 
 from __future__ import annotations
@@ -45,60 +41,60 @@ if TYPE_CHECKING:
 
 LOAD_PERIOD: Ns = 10 * MS
 LOAD_PRIORITY = 1 << 30
-"""Above the priority of any component."""
+"""Greater than the priority of any component."""
 LOAD_VARIATION = 0.5
-"""By so much of what it may be, a piece is shorter or longer than the share of a period."""
+"""Greatest variation of an execution, as a share of what keeps it between zero and the whole period."""
 
 
 def load_name(processor: str) -> str:
-    """Under this name its computing stands among the components."""
+    """Return the component name of the background load of *processor*."""
     return f"{processor} (load)"
 
 
 def start_background_load(kernel: Kernel, processor: Processor, model: ProcessorModel, seed: int) -> None:
-    """Let the load of *model*, if it has one, run on *processor*; core after core begins within a period."""
+    """Start the load of *model*, if it has one; the cores start evenly spread over one period."""
     if model.load <= 0.0:
         return
     for core in range(model.cores):
-        place = ExecutionContext(load_name(model.name), processor, LOAD_PRIORITY)
-        pieces = _CoreLoad(kernel, processor, place, model.load, seed, core)
-        kernel.call_at(kernel.now() + LOAD_PERIOD * core // model.cores, pieces.begin)
+        context = ExecutionContext(load_name(model.name), processor, LOAD_PRIORITY)
+        load = _CoreLoad(kernel, processor, context, model.load, seed, core)
+        kernel.call_at(kernel.now() + LOAD_PERIOD * core // model.cores, load.begin)
 
 
 class _CoreLoad:
-    """The load of one core."""
+    """Background load of one core."""
 
     def __init__(
         self,
         kernel: Kernel,
         processor: Processor,
-        place: ExecutionContext,
+        context: ExecutionContext,
         share: float,
         seed: int,
         core: int,
     ) -> None:
         self._kernel = kernel
-        self._run = partial(processor.load, place)
+        self._run = partial(processor.load, context)
         self._mean = share * LOAD_PERIOD
-        self._most_off = LOAD_VARIATION * min(share, 1.0 - share) * LOAD_PERIOD
+        self._variation = LOAD_VARIATION * min(share, 1.0 - share) * LOAD_PERIOD
         self._random = stream(seed, f"load/{processor.name}/{core}")
 
     def begin(self) -> None:
-        """From now on, each period."""
-        self._kernel.every(LOAD_PERIOD, self._piece)
+        """Execute once each period, from now on."""
+        self._kernel.every(LOAD_PERIOD, self._execute)
 
-    def _piece(self) -> None:
-        self._run(round(self._mean + self._random.uniform(-self._most_off, self._most_off)))
+    def _execute(self) -> None:
+        self._run(round(self._mean + self._random.uniform(-self._variation, self._variation)))
 
 
 CALL_WITHIN: Ns = 10 * S
-"""A call whose arguments or result have not arrived by then raises ``LinkLost`` at its caller."""
+"""Deadline for the transfer of a call's arguments or result; after it the caller gets ``LinkLost``."""
 
 NO_COST = Price(0, 0)
 
 
 def commanded_by(instance: Instance) -> tuple[str, ...]:
-    """The vehicles that *instance* commands. A component of the environment sees bodies and commands none."""
+    """Return the vehicles that *instance* commands. A component of the environment only observes vehicles."""
     if instance.is_environment:
         return ()
     return tuple(
@@ -110,18 +106,18 @@ def commanded_by(instance: Instance) -> tuple[str, ...]:
 
 
 def is_node(instance: Instance) -> bool:
-    """True if *instance* is a node of the graph: by its language, or because it commands a vehicle."""
+    """Return True if *instance* is a node of the graph, by its language or because it commands a vehicle."""
     return bool(commanded_by(instance)) or instance.component.language in ROS_LANGUAGES
 
 
 def ros_language(instance: Instance) -> str:
-    """The language whose client library its calls into ROS are charged as."""
+    """Return the language of the client library that its ROS calls are charged as."""
     language = instance.component.language
     return "roscpp" if language == "c++" else language
 
 
 VEHICLE_NODE_LANGUAGE = "roscpp"
-"""The node that serves a vehicle stands for MAVROS, which is written with roscpp."""
+"""The node that serves a vehicle represents MAVROS, which uses roscpp."""
 
 
 def _stated_costs(figures: Iterable[Figure]) -> tuple[StatedCost, ...]:
@@ -129,7 +125,7 @@ def _stated_costs(figures: Iterable[Figure]) -> tuple[StatedCost, ...]:
 
 
 class Platform:
-    """The computers of one run."""
+    """Processors and networks of one run, and the prices of computing on them."""
 
     def __init__(self, system: System, kernel: VirtualKernel, seed: int, fidelity: str) -> None:
         self._system = system
@@ -170,10 +166,10 @@ class Platform:
             stream=stream(seed, f"network/{model.name}"),
         )
 
-    # -- what components are given
+    # -- for components
 
     def allocation(self, instance: Instance) -> Allocation:
-        """Where *instance* computes."""
+        """Return the processor, priority, deadline and start of an instance."""
         activity = instance.activity
         priority = activity.priority if activity else None
         deadline = activity.deadline_ns if activity else None
@@ -184,7 +180,7 @@ class Platform:
         return Allocation(self.processors[instance.processor], frequency, priority, deadline, start)
 
     def pricing(self, instance: Instance) -> Pricing:
-        """What the own computing of *instance* costs, at this run's fidelity."""
+        """Return the pricing of an instance's own computing at the fidelity of the run."""
         if instance.processor is None:
             return FREE
         component, prices = instance.component, self.prices[instance.processor]
@@ -202,7 +198,7 @@ class Platform:
         operations = {name: _stated_costs(figures) for name, figures in component.operations.items()}
         return prices.stated(instance.name, operations, _stated_costs(component.activation or ()))
 
-    # -- what the graph is given
+    # -- for the graph
 
     def tariff(self, node: NodeId) -> Tariff | None:
         """Return the prices of a node's calls into ROS; None if no processor executes it."""
@@ -217,10 +213,8 @@ class Platform:
             self.warnings.update(dict.fromkeys(known.warnings))
         return known
 
-    def foresee(self) -> None:
-        """Look up every law that nodes will need, so that what is missing or doubtful is known before the
-        start.
-        """
+    def look_up_prices(self) -> None:
+        """Look up every price that the run will need, so that errors and warnings come before the start."""
         for instance in self._system.instances:
             self.pricing(instance)
             if instance.processor is not None and is_node(instance):
@@ -230,21 +224,21 @@ class Platform:
                 self._tariff(vehicle.processor, VEHICLE_NODE_LANGUAGE)
 
     def route(self, sender: NodeId, receiver: NodeId) -> Route | None:
-        """How messages get from node to node: over the network between their processors, if there is one."""
+        """Return the route between two nodes over the network of their processors, or None without one."""
         network = self._network_between(sender.processor, receiver.processor)
         if network is None:
             return None
 
-        def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
+        def route(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
             if reliable:
                 network.send_reliable(size, deliver, f"{sender.name}>{receiver.name}")
             else:
                 network.send(size, deliver, lost)
 
-        return way
+        return route
 
     def travel(self, one: str | None, other: str | None) -> Transfer | None:
-        """How the arguments of a call get from processor to processor; ``None`` where that takes no time."""
+        """Return the transfer of call arguments between two processors, or None if it takes no time."""
         network = self._network_between(one or "", other or "")
         if network is None:
             return None
@@ -259,7 +253,7 @@ class Platform:
     # -- power
 
     def powered_by(self) -> Mapping[str, tuple[str, ...]]:
-        """Vehicle -> processors that drain its battery."""
+        """Return {vehicle: processors that drain its battery}."""
         found: dict[str, tuple[str, ...]] = {}
         for model in self._system.processors:
             if model.powered_by is not None:
@@ -267,7 +261,15 @@ class Platform:
         return found
 
     def watts(self, processor: str, busy_cores: float) -> float:
-        """What a processor draws with so many cores busy on average; ``EstimateError`` without figures."""
+        """Return the power of a processor.
+
+        Args:
+            processor: Name of the processor.
+            busy_cores: Mean number of busy cores.
+
+        Raises:
+            EstimateError: The catalogue has no power figures for the processor.
+        """
         return self.prices[processor].watts(busy_cores)
 
 
@@ -275,7 +277,7 @@ FEED_PERIOD: Ns = 500 * MS
 
 
 class PowerFeed:
-    """Feeds the computers of one platform from the batteries of one airfield."""
+    """Draws the power of the computers from the batteries of their vehicles."""
 
     def __init__(self, kernel: Kernel, platform: Platform, fleet: SimulatedFleet) -> None:
         self._kernel = kernel
@@ -283,7 +285,7 @@ class PowerFeed:
         self._fleet = fleet
         self._fed = platform.powered_by()
         self._busy: dict[str, Ns] = {name: 0 for names in self._fed.values() for name in names}
-        self._then: Ns = kernel.now()
+        self._last: Ns = kernel.now()
         for name in self._busy:
             self._check(name)
         for vehicle, names in self._fed.items():
@@ -299,14 +301,14 @@ class PowerFeed:
 
     def _feed(self) -> None:
         now = self._kernel.now()
-        if now == self._then:
+        if now == self._last:
             return
         for vehicle, names in self._fed.items():
             self._fleet.flights[vehicle].payload_power(sum(self._watts(name, now) for name in names))
-        self._then = now
+        self._last = now
 
     def _watts(self, processor: str, now: Ns) -> float:
         busy = self._platform.processors[processor].busy_ns(now)
-        cores = (busy - self._busy[processor]) / (now - self._then)
+        cores = (busy - self._busy[processor]) / (now - self._last)
         self._busy[processor] = busy
         return self._platform.watts(processor, cores)

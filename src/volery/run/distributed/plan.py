@@ -83,7 +83,7 @@ class HostPlatform(Platform):
         virtual = cast("VirtualKernel", kernel)  # without processors only its clock is used
         super().__init__(system, virtual, seed, fidelity)
 
-    def foresee(self) -> None:
+    def look_up_prices(self) -> None:
         """Do nothing: nothing is priced."""
 
     def allocation(self, instance: Instance) -> Allocation:
