@@ -104,7 +104,7 @@ class Bridge:
         self.names = _names(address, wanted.names)
         self.namespace = wanted.namespace or NAMESPACES[self.names]
         self.kernel: VirtualKernel | WallKernel
-        in_simulation = address.carrier == "sim"
+        in_simulation = address.transport == "sim"
         self.kernel = VirtualKernel(record, pace=wanted.speed) if in_simulation else WallKernel(record)
         self._graphs = RealGraphs(self.kernel)
         self._interpreted = self.names not in _own_names(address)
@@ -122,7 +122,7 @@ class Bridge:
 
     def _direct_link(self, address: Address, wanted: BridgeOptions) -> Link:
         """Return the link to an autopilot with the protocol of the names."""
-        if address.carrier == "sim":
+        if address.transport == "sim":
             vehicle = parse_simulated(address, address.driver)
             return _fleet(self.kernel, vehicle, wanted.seed).link_for(vehicle)
         address.only("baud", "system", LOCAL_PORT, REPLY_PORT)
@@ -131,11 +131,11 @@ class Bridge:
     def _interpreter(self, address: Address, wanted: BridgeOptions) -> Link:
         """Return a link to an interpreter, for an autopilot with another protocol."""
         name, factory = address.driver, drivers.load(address.driver)
-        if address.carrier == "sim":
+        if address.transport == "sim":
             vehicle = parse_simulated(address, address.driver)
             fleet = _fleet(self.kernel, vehicle, wanted.seed)
             driver = open_simulated_driver(self.kernel, fleet, vehicle, wanted.seed)
-        elif address.carrier in GRAPHS:
+        elif address.transport in GRAPHS:
             driver = self._graphs.driver(name, address)
         else:
             assert factory.on_link is not None, "checked when the names were chosen"
@@ -202,7 +202,7 @@ def _check(wanted: BridgeOptions) -> None:
 def _own_names(address: Address) -> tuple[str, ...]:
     """Return the names that are made for the protocol of the autopilot at *address*."""
     factory = drivers.load(address.driver)
-    if factory.on_link is None or address.carrier in ON_A_GRAPH:
+    if factory.on_link is None or address.transport in ON_A_GRAPH:
         return ()
     return NAMES.get(factory.codec.name, ())
 
@@ -228,10 +228,10 @@ def _names(address: Address, wanted: str) -> str:
 def _check_graph_names(address: Address, wanted: str) -> None:
     """Check that a vehicle which is a ROS node itself is bridged under other names than its own."""
     factory = drivers.load(address.driver)
-    if factory.on_link is not None and address.carrier not in ON_A_GRAPH:
+    if factory.on_link is not None and address.transport not in ON_A_GRAPH:
         return
     own = factory.graph_names
-    if own in MAVLINK_NAMES or address.carrier == EMBEDDED:
+    if own in MAVLINK_NAMES or address.transport == EMBEDDED:
         raise CapabilityError(
             f"{address}: the vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
         )

@@ -1,8 +1,8 @@
-"""How a run ends, whatever ends it: time, a goal that is reached, a failure, Ctrl-C, SIGTERM.
+"""How a run ends, whatever ends it: time, a goal, a failure, Ctrl-C, SIGTERM.
 
-The order is always the same: components are cancelled; safety tasks bring every armed vehicle down that no
-operator has taken, while components do what they want done last; the rest is cancelled; the kernel names
-whoever would not go. The first signal does this, a second one is hard.
+The order is always the same. The components are cancelled. Safety tasks land every armed vehicle that no
+operator controls, while components execute their final callbacks. The rest is cancelled, and the kernel names
+the tasks that did not end. The first signal starts this; a second one stops at once.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from volery.trace.events import Failure
 FOREVER: Ns = 2**63 - 1
 
 SAFETY_WITHIN: Ns = 10 * MINUTE
-"""Of run time: a vehicle that is not down by then is left to its autopilot, and named."""
+"""Run time until a vehicle that has not landed is left to its autopilot and reported."""
 
 FAREWELL_WITHIN: Ns = 5 * S
-"""Of run time: what a component does last and has not done by then is cut off, and named."""
+"""Run time until a final callback that has not returned is cancelled and reported."""
 
 
 class Landable(Protocol):
-    """A vehicle, or whoever answers for some."""
+    """A vehicle, or a process that commands vehicles."""
 
     @property
     def name(self) -> str:
-        """Who."""
+        """Name in messages."""
 
     def come_to_rest(self) -> object:
-        """Bring down what is armed and nobody else's; blocks until that is done."""
+        """Block until every armed vehicle that no operator controls has landed."""
 
 
 class Ending:
-    """Decides once why a run ends, and ends it."""
+    """Ends a run, for the first reason that is reported."""
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
@@ -56,37 +56,37 @@ class Ending:
         self.error: VoleryError | None = None
         self.begun = False
         self._farewells: list[tuple[ExecutionContext, Callable[[], object]]] = []
-        self._left = 0
+        self._pending = 0
 
     def failed(self, who: str, error: Exception) -> None:
-        """A component's flow of control has ended with *error*."""
+        """End the run because a task of *who* has raised *error*."""
         if isinstance(error, VoleryError) and self.error is None:
             self.error = error
         self.begin("failed", f"{error}" if who in str(error) else f"{who}: {error}")
 
     def begin(self, status: Status, reason: str) -> None:
-        """End the run, for the first reason that is given."""
+        """End the run. Later calls have no effect."""
         if self.begun:
             return
         self.begun = True
         self.status, self.reason = status, reason
         self._kernel.cancel(self.users, reason)
-        self._left = len(self.vehicles) + len(self._farewells)
+        self._pending = len(self.vehicles) + len(self._farewells)
         for vehicle in self.vehicles:
             name = f"safety of {vehicle.name}"
-            self._kernel.spawn(partial(self._bring_down, vehicle), name, ExecutionContext(name), self._safety)
-        for place, last in self._farewells:
-            self._part_with(place, last)
-        if not self._left:
+            self._kernel.spawn(partial(self._land, vehicle), name, ExecutionContext(name), self._safety)
+        for context, last in self._farewells:
+            self._run_farewell(context, last)
+        if not self._pending:
             self._kernel.cancel(self._kernel.root, reason)
         self._kernel.call_at(self._kernel.now() + SAFETY_WITHIN, self._give_up)
 
-    def farewell(self, place: ExecutionContext, last: Callable[[], object]) -> None:
-        """Have *last* done at *place* when the run ends, after the components have been cancelled."""
-        self._farewells.append((place, last))
+    def farewell(self, context: ExecutionContext, last: Callable[[], object]) -> None:
+        """Call *last* in *context* when the run ends, after the components have been cancelled."""
+        self._farewells.append((context, last))
 
-    def _part_with(self, place: ExecutionContext, last: Callable[[], object]) -> None:
-        who = place.component
+    def _run_farewell(self, context: ExecutionContext, last: Callable[[], object]) -> None:
+        who = context.component
         scope = self._safety.child(f"farewell of {who}")
 
         def body() -> None:
@@ -96,27 +96,29 @@ class Ending:
                 what = f"failed at the end of the run: {type(error).__name__}: {error}"
                 self._kernel.record(Failure(self._kernel.now(), who, what))
             finally:
-                self._one_less()
+                self._finish_one()
 
-        def cut_off() -> None:
+        def cancel() -> None:
             if scope.tasks:
                 what = f"was not through {FAREWELL_WITHIN // S} s after the end of the run"
                 self._kernel.record(Failure(self._kernel.now(), who, what))
                 self._kernel.cancel(scope, self.reason)
 
-        self._kernel.spawn(body, f"{who} (at the end)", replace(place, deadline=None, on_release=None), scope)
-        self._kernel.call_at(self._kernel.now() + FAREWELL_WITHIN, cut_off)
+        self._kernel.spawn(
+            body, f"{who} (at the end)", replace(context, deadline=None, on_release=None), scope
+        )
+        self._kernel.call_at(self._kernel.now() + FAREWELL_WITHIN, cancel)
 
-    def _bring_down(self, vehicle: Landable) -> None:
+    def _land(self, vehicle: Landable) -> None:
         try:
             vehicle.come_to_rest()
         except VoleryError as error:
             self._kernel.record(Failure(self._kernel.now(), vehicle.name, f"not brought down: {error}"))
-        self._one_less()
+        self._finish_one()
 
-    def _one_less(self) -> None:
-        self._left -= 1
-        if not self._left:
+    def _finish_one(self) -> None:
+        self._pending -= 1
+        if not self._pending:
             self._kernel.cancel(self._kernel.root, self.reason)
 
     def _give_up(self) -> None:
@@ -126,10 +128,10 @@ class Ending:
             self._kernel.cancel(self._kernel.root, self.reason)
 
     def pass_time(self) -> list[str]:
-        """Let things happen until the run has ended; returns the flows of control that would not go."""
+        """Execute the run to its end. Return the names of tasks that did not end."""
         try:
             self._kernel.run(FOREVER)
-        except VoleryError as error:  # a deadlock, or code that froze time: the vehicles still come down
+        except VoleryError as error:  # a deadlock, or code that froze time: the vehicles still land
             self.failed("run", error)
             self._kernel.run(FOREVER)
         except KeyboardInterrupt:
@@ -137,27 +139,25 @@ class Ending:
         return self._kernel.close(self.reason)
 
     def stop_hard(self, status: Status, reason: str) -> None:
-        """Nothing more happens; vehicles stay where they are."""
+        """Stop at once; vehicles are left where they are."""
         self.begun = True
         self.status, self.reason = status, reason
 
     @contextmanager
     def signals(self) -> Iterator[None]:
-        """SIGINT and SIGTERM end the run in order; a second one raises ``KeyboardInterrupt`` where it
-        strikes.
-        """
+        """Let SIGINT and SIGTERM end the run in order, and a second one raise ``KeyboardInterrupt``."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
 
-        def strike(number: int, frame: FrameType | None) -> None:
-            if self.begun or struck:
+        def handle(number: int, frame: FrameType | None) -> None:
+            if self.begun or received:
                 raise KeyboardInterrupt
-            struck.append(number)
+            received.append(number)
             self._kernel.post(lambda: self.begin("interrupted", f"{signal.Signals(number).name} received"))
 
-        struck: list[int] = []
-        before = {number: signal.signal(number, strike) for number in (signal.SIGINT, signal.SIGTERM)}
+        received: list[int] = []
+        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
         finally:

@@ -1,4 +1,4 @@
-"""What a run says of itself while it goes on, for whoever shows it."""
+"""Progress of a run while it executes, for the user interface."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ PERIOD: Ns = S
 
 @dataclass(frozen=True)
 class VehicleProgress:
-    """A vehicle as it is now: the autopilot's mode, whether it is armed, metres above the ground (of a real
-    one, above home).
-    """
+    """Present state of a vehicle. ``height`` is metres above the ground, or above home for a real vehicle."""
 
     name: str
     mode: str
@@ -28,7 +26,7 @@ class VehicleProgress:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands. ``limit`` is when it ends at the latest; ``parcels`` counts parcels by state."""
+    """Present state of a run. ``limit`` is its latest end or 0, ``parcels`` the number by state."""
 
     now: Ns
     limit: Ns
@@ -37,44 +35,51 @@ class Progress:
 
 
 ReadVehicles = Callable[[], tuple[VehicleProgress, ...]]
-"""What vehicles do now."""
+"""Returns the present state of the vehicles."""
 
 Show = Callable[[Progress], None]
-"""Called about once a simulated second. It must not block and changes nothing."""
+"""Called about once a simulated second. It must not block."""
 
 
 Tell = Callable[[str], None]
-"""Called with a line that is worth reading at once. It must not block and changes nothing."""
+"""Called with a line that the user should read at once. It must not block."""
 
 
 class LostLinkReporter:
-    """Passes on what vehicles are known to do if their commander falls silent. A tap of a run's stream."""
+    """Stream tap that reports what each vehicle does when the link to its commander is lost."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell
 
     def __call__(self, event: Event) -> None:
-        """Follow texts."""
+        """Report a text about the loss of the link."""
         if isinstance(event, Text) and event.text.startswith(ON_LINK_LOSS):
             self._tell(f"{event.source}: {event.text}")
 
 
 class ProgressReporter:
-    """Tells *show* how a run goes; *look* says what its vehicles do. A tap of its stream."""
+    """Stream tap that reports the progress of a run periodically.
 
-    def __init__(self, kernel: Kernel, limit: Ns, look: ReadVehicles, show: Show) -> None:
+    Args:
+        kernel: Clock of the run.
+        limit: Latest end of the run, 0 for none.
+        read: Returns the state of the vehicles.
+        show: Receives the progress.
+    """
+
+    def __init__(self, kernel: Kernel, limit: Ns, read: ReadVehicles, show: Show) -> None:
         self._kernel = kernel
         self._limit = limit
-        self._look = look
+        self._read = read
         self._show = show
         self._parcels: dict[str, str] = {}
-        kernel.every(PERIOD, self._tell)
+        kernel.every(PERIOD, self._report)
 
     def __call__(self, event: Event) -> None:
-        """Follow parcels."""
+        """Count parcels by state."""
         if isinstance(event, Milestone) and event.kind == "parcel":
             self._parcels[event.subject] = event.state
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         parcels = dict(Counter(self._parcels.values()))
-        self._show(Progress(self._kernel.now(), self._limit, self._look(), parcels))
+        self._show(Progress(self._kernel.now(), self._limit, self._read(), parcels))

@@ -1,4 +1,4 @@
-"""The books of a run whose process has died, closed by whoever survived it."""
+"""Recovery of a run whose process has died: its recording is finished by the process that survived."""
 
 from __future__ import annotations
 
@@ -18,20 +18,28 @@ from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
 CUT_FILE = "trace-cut.mcap"
-"""The trace as the process left it, while it is written anew."""
+"""Name of the truncated trace while the trace is written again."""
 
 
 def recover_run(
     system: System, out: Path | None, seed: int, fidelity: str, error: VoleryError, blamed: str
 ) -> Run:
-    """A ``Run`` that failed with *error*, with all that its trace in *out* still says.
+    """Return a failed ``Run`` from what its process has recorded.
 
-    The trace is written anew up to where it was cut, then the failure of *blamed*, the verdicts and the
-    usual documents. Without *out* there is the failure alone.
+    The trace is written again up to its truncation, followed by the failure, the verdicts and the usual
+    documents.
+
+    Args:
+        system: The model.
+        out: Run folder; None if nothing was kept.
+        seed: Seed of the run.
+        fidelity: Fidelity of the run.
+        error: What ended the process.
+        blamed: Component that failed, or ``run``.
     """
     cut = _set_aside(out) if out is not None else None
     platform = Platform(system, VirtualKernel(), seed, fidelity)
-    platform.foresee()
+    platform.look_up_prices()
     setup = setup_of(system, platform, seed, fidelity)
     recording = Recording(setup, out, attachments_of(system))
     observers = Observers(system.requirements, setup)
@@ -53,7 +61,7 @@ def _set_aside(out: Path) -> Path | None:
 
 
 def _events(cut: Path | None) -> Iterator[Event]:
-    """What the trace says; nothing if it was cut before it said anything."""
+    """Yield the events of the truncated trace; none if it ends before its header."""
     if cut is None:
         return
     try:

@@ -51,7 +51,7 @@ class VehicleServer:
         self.addresses = [one for one, _ in stations]
         self.links: list[CodedLink] = []
         for place, (one, use) in enumerate(stations):
-            link = listen(self.kernel, one, joined=partial(self._greet, place), codec=codec)
+            link = listen(self.kernel, one, on_connect=partial(self._greet, place), codec=codec)
             self.links.append(link)
             self._autopilot.connect(link, use=use)
 

@@ -34,15 +34,15 @@ from volery.trace.events import Text
 FIDELITIES = ("times", "code")
 LATER = ("firmware", "hardware")
 WHO, WARNING = "volery", 4
-"""Under this name and severity a run says what is doubtful about it."""
+"""Source and severity of the warnings of a run."""
 
 NOT_MODELLED = "its components compute on this machine and not on the model's processors"
 
 PATIENCE_S = 30.0
-"""Seconds on the wall that a component may compute without letting virtual time go on."""
+"""Wall seconds that a component may compute without letting virtual time pass."""
 
 GOAL_PERIOD: Ns = 100 * MS
-"""How often it is looked whether the model's ``until`` holds."""
+"""Period at which the model's ``until`` is checked."""
 
 
 def simulate(
@@ -53,13 +53,23 @@ def simulate(
     allocation: str | None = None,
     overrides: Iterable[str] = (),
 ) -> Run:
-    """Run *model* (a file, a folder with a ``model.yaml``, or a ``System``) in virtual time.
+    """Simulate a model in virtual time and return its record.
 
-    The same model, options and seed give the same trace, byte for byte. ``scenario``, ``allocation`` and
-    ``overrides`` (``path=value``) choose a variant of a model that is read from a file.
+    The same model, options and seed give the same trace, byte for byte.
 
-    Raises ``ModelError`` and ``UsageError`` before anything has started; what happens later is in the
-    ``Run``.
+    Args:
+        model: A file, a folder with a ``model.yaml``, or a ``System``.
+        options: Fidelity, seed, pace, run folder and progress reports.
+        scenario: Scenario of a model that is read from a file.
+        allocation: Allocation of a model that is read from a file; None for its first.
+        overrides: Changes ``path=value`` of a model that is read from a file.
+
+    Returns:
+        The run. An error during the simulation is its ``error`` and is not raised.
+
+    Raises:
+        ModelError: The model is wrong; nothing has started.
+        UsageError: An option is wrong; nothing has started.
     """
     _check_fidelity(options.fidelity)
     if isinstance(model, System):
@@ -72,7 +82,7 @@ def simulate(
 
 
 def _simulated(system: System, options: Options) -> Run:
-    """In this process."""
+    """Run in this process."""
     simulation = _OnGraph(system, options) if options.graph else _Simulation(system, options, options.pace)
     try:
         simulation.prepare()
@@ -82,7 +92,7 @@ def _simulated(system: System, options: Options) -> Run:
 
 
 def _supervised(system: System, options: Options) -> Run:
-    """In a process of its own: C++ components may end it."""
+    """Run in a child process, which a C++ component may crash."""
     traced = options.traces is not None
     ready = compile_all(system, system.instances, options.fidelity, options.tell, traced=traced)
     if not ready:
@@ -105,7 +115,7 @@ def _check_fidelity(fidelity: str) -> None:
 
 
 class _Simulation:
-    """One execution of ``simulate``, with everything in this process."""
+    """One execution of ``simulate`` with all components in this process."""
 
     def __init__(self, system: System, options: Options, pace: float | None = None) -> None:
         self._system = system
@@ -116,7 +126,7 @@ class _Simulation:
     def _platform(self) -> Platform:
         options = self._options
         platform = Platform(self._system, self._kernel, options.seed, options.fidelity)
-        platform.foresee()
+        platform.look_up_prices()
         return platform
 
     def _setup(self, platform: Platform) -> RunSetup:
@@ -127,18 +137,18 @@ class _Simulation:
         return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
     def prepare(self) -> None:
-        """Make what the run is made of. Raises what is wrong with the model."""
+        """Create all parts of the run. Raises what is wrong with the model."""
         system, kernel, options = self._system, self._kernel, self._options
         platform = self._platform()
         setup = self._setup(platform)
-        surroundings = system.environment
+        environment = system.environment
         self._fleet = SimulatedFleet(
             kernel,
             system.vehicles,
-            surroundings.origin,
-            surroundings.wind,
+            environment.origin,
+            environment.wind,
             options.seed,
-            through_bytes=with_faulty_links(surroundings),
+            through_bytes=with_faulty_links(environment),
         )
         self._built = self._build(platform)
         self._recording = Recording(setup, options.out, attachments_of(system))
@@ -148,7 +158,7 @@ class _Simulation:
         if system.limits.until is not None:
             self._goal = Observers((system.limits.until,), setup)
             self._recording.stream.tap(self._goal)
-            kernel.every(GOAL_PERIOD, self._look_at_goal)
+            kernel.every(GOAL_PERIOD, self._check_goal)
         if options.show is not None:
             reporter = ProgressReporter(kernel, system.limits.duration_ns, self._fleet.progress, options.show)
             self._recording.stream.tap(reporter)
@@ -158,18 +168,18 @@ class _Simulation:
             kernel,
             self._fleet,
             FleetLinks(self._fleet),
-            surroundings.wind,
+            environment.wind,
             platform.processors,
             platform.networks,
         )
-        inject(surroundings.faults, affected)
+        inject(environment.faults, affected)
 
-    def _look_at_goal(self) -> None:
+    def _check_goal(self) -> None:
         if self._goal.all_hold(self._kernel.now()):
             self._ending.begin("completed", "its goal is reached")
 
     def run(self) -> Run:
-        """Start, let time pass, end in order, close the books; also if the house itself has a fault."""
+        """Start, let time pass, end in order and finish the recording, even after an internal error."""
         kernel, ending = self._kernel, self._ending
         kernel.call_at(self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up"))
         try:
@@ -186,7 +196,7 @@ class _Simulation:
         self._built.start()
 
     def leave(self) -> list[str]:
-        """Leave nothing behind; returns the names of those that would not go."""
+        """Leave the graph, if any. Return the names of components that had to be killed."""
         return []
 
     def _close(self, left: Sequence[str]) -> Run:
@@ -214,7 +224,7 @@ class _OnGraph(_Simulation):
         pace = options.pace or 1.0
         system, self._unjudged = without_computers(system)
         super().__init__(system, options, pace)
-        self._apart = DistributedRun(
+        self._distributed = DistributedRun(
             system, self._kernel, self._ending, GraphSettings(options.graph, pace, options.seed)
         )
 
@@ -228,13 +238,13 @@ class _OnGraph(_Simulation):
         return setup_of(unallocated(self._system), platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        return self._apart.build(platform, self._fleet)
+        return self._distributed.build(platform, self._fleet)
 
     def _start(self) -> None:
-        self._apart.start()
+        self._distributed.start()
         super()._start()
-        self._apart.go()
+        self._distributed.go()
 
     def leave(self) -> list[str]:
         """See ``_Simulation.leave``."""
-        return self._apart.close()
+        return self._distributed.close()

@@ -1,8 +1,8 @@
-"""A run in a process of its own, so that C++ code that crashes ends that process and nothing else.
+"""A run in a child process, so that a crash of C++ code ends that process and nothing else.
 
-The child does what ``simulate`` does and sends its ``Run``. If a component of it crashes, the child tells
-which one and is gone; the parent then closes the books: the trace as far as it was written, the failure, the
-verdicts, the documents.
+The child executes the run and sends its ``Run``. If a component crashes, the child reports which one and
+dies. The parent then finishes the recording: the trace as far as it was written, the failure, the verdicts,
+the documents.
 """
 
 from __future__ import annotations
@@ -28,53 +28,57 @@ from volery.run.progress import Progress, Show
 from volery.run.result import Run
 
 Work = Callable[[Show | None], Run]
-"""The run itself, given what it is to show its progress with."""
+"""Executes the run, given the function that shows its progress."""
 
 RecoverRun = Callable[[VoleryError, str], Run]
-"""Closes the books of a run that has died of an error, blamed on a component or on ``run``."""
+"""Finishes the recording of a run that died of an error, blamed on a component or on ``run``."""
 
 _PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True)
 class Supervision:
-    """What a supervisor needs to know: the runtime of C++ components, and how long one may compute."""
+    """Runtime and libraries of the C++ components, and the wall seconds that one may compute at a time."""
 
     framework: Path
     libraries: dict[str, Path]
     patience_s: float
 
 
-def run_supervised(work: Work, show: Show | None, supervision: Supervision, salvage: RecoverRun) -> Run:
-    """Do *work* in a child process; what it raises is raised here.
+def run_supervised(work: Work, show: Show | None, supervision: Supervision, recover: RecoverRun) -> Run:
+    """Execute a run in a child process and return its result. An exception of the child is raised here.
 
-    SIGINT and SIGTERM are passed on. If the child dies, *salvage* says what is left of the run.
+    Args:
+        work: The run.
+        show: Receives the progress.
+        supervision: What the child watches.
+        recover: Makes the result if the child dies.
     """
-    context = get_context("fork")  # the model is there already, as it is
+    context = get_context("fork")  # the child inherits the model
     ours, theirs = context.Pipe(duplex=False)
-    report, told = os.pipe()
+    report, crash_pipe = os.pipe()
     child = context.Process(
-        target=_child_main, args=(work, show is not None, supervision, theirs, told), name="run"
+        target=_child_main, args=(work, show is not None, supervision, theirs, crash_pipe), name="run"
     )
     sys.stdout.flush()
     sys.stderr.flush()
     child.start()
     theirs.close()
-    os.close(told)
+    os.close(crash_pipe)
     try:
-        with _signals_passed_on(child):
+        with _signals_forwarded(child):
             result = _listen(ours, show)
             child.join()
-        return result or _recover(child, read_crash(report, supervision.libraries), salvage)
+        return result or _recover(child, read_crash(report, supervision.libraries), recover)
     finally:
-        child.kill()  # only if it is still there: what broke off was the listening
+        child.kill()  # still running only after an exception above
         child.join()
         ours.close()
         os.close(report)
 
 
 def _listen(ours: Connection, show: Show | None) -> Run | None:
-    """Show what the child sends until it sends its result, or ends without one."""
+    """Show the progress that the child sends until its result, or return None if it ends without one."""
     while True:
         try:
             kind, content = ours.recv()
@@ -89,25 +93,25 @@ def _listen(ours: Connection, show: Show | None) -> Run | None:
             return run
 
 
-def _recover(child: BaseProcess, crash: Crash | None, salvage: RecoverRun) -> Run:
+def _recover(child: BaseProcess, crash: Crash | None, recover: RecoverRun) -> Run:
     if crash is not None:
-        return salvage(crash.error(), crash.component)
+        return recover(crash.error(), crash.component)
     code = child.exitcode or 0
     how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
-    return salvage(VoleryError(f"the process that ran the components was ended: {how}"), "run")
+    return recover(VoleryError(f"the process that ran the components was ended: {how}"), "run")
 
 
 @contextmanager
-def _signals_passed_on(child: BaseProcess) -> Iterator[None]:
+def _signals_forwarded(child: BaseProcess) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def pass_on(number: int, frame: FrameType | None) -> None:
+    def forward(number: int, frame: FrameType | None) -> None:
         if child.pid is not None and child.is_alive():
             os.kill(child.pid, number)
 
-    before = {number: signal.signal(number, pass_on) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
@@ -118,12 +122,12 @@ def _signals_passed_on(child: BaseProcess) -> Iterator[None]:
 # -- in the child
 
 
-def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connection, told: int) -> None:
-    os.setpgid(0, 0)  # Ctrl-C reaches the parent, which passes it on
+def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connection, crash_pipe: int) -> None:
+    os.setpgid(0, 0)  # Ctrl-C reaches the parent, which forwards it
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    framework_runtime(supervision.framework).supervise(told, supervision.patience_s)
+    framework_runtime(supervision.framework).supervise(crash_pipe, supervision.patience_s)
 
     def show(progress: Progress) -> None:
         to.send(("show", progress))

@@ -1,8 +1,8 @@
-"""C++ components that count what they compute, compiled for the core that they are allocated to.
+"""C++ components: compiled before a run, counted or traced, made into programs.
 
-C++ components that tell which blocks of their code they enter, for the core that they are allocated to.
-
-C++ components of a model: compiled before a run, made into programs for it.
+At fidelity ``code`` a component is compiled with one counter for each basic block; counts times the costs of
+the blocks on the core of its processor are charged. To profile components, they are compiled to record the
+sequence of blocks instead.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ _FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros)')
 
 
 def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None:
-    """The core that the code of *instance* is counted for.
+    """Return the core that the code of *instance* is counted for.
 
-    ``None`` if it is not counted so: at another fidelity than ``code``, for other languages, where there is
-    no processor, and where nothing is known of its core.
+    None if the code is not counted: at another fidelity than ``code``, in another language, without a
+    processor, or if the catalogue has no model of the core.
     """
     component = instance.component
     counts = fidelity == "code" and component.path and component.language in CPP_LANGUAGES
@@ -70,12 +70,12 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
 
 
 def compiler_options(include: Sequence[Path], flags: Sequence[str]) -> list[str]:
-    """What the compiler of counted and traced code is told."""
+    """Return the compiler options of counted and traced code."""
     return ["-std=c++17", "-fPIC", *(option for path in include for option in ("-I", str(path))), *flags]
 
 
 class CountingCompiler:
-    """A ``Compile`` for a core at a frequency. What is compiled is kept as the compiler's own objects are."""
+    """Compiler of counted code for a core at a frequency. Objects are cached like those of the compiler."""
 
     def __init__(self, law: CoreLaw, frequency_mhz: float) -> None:
         self._law, self._mhz = law, frequency_mhz
@@ -85,7 +85,7 @@ class CountingCompiler:
     def __call__(
         self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
     ) -> list[Path]:
-        """One object that counts its blocks. What does not compile is told in the compiler's words first."""
+        """Compile sources to one object that counts its blocks. Plain compilation first reports errors."""
         plain = compile_each(tools, sources, include, flags)
         made = cache_folder() / f"{self._digest(plain)}.o"
         costs = made.with_suffix(".npz")
@@ -146,11 +146,11 @@ class CountingCompiler:
 
 
 WINDOW, STRIDE = 1024, 4096
-"""Blocks that are told of so many: a run may enter billions."""
+"""Blocks that are recorded, of how many: a run may enter billions."""
 
 
 class TracingCompiler:
-    """A ``Compile`` for a core. ``program`` is what was compiled."""
+    """Compiler of traced code for a core. ``program`` is the result."""
 
     def __init__(self, law: CoreLaw) -> None:
         self.law = law
@@ -159,7 +159,7 @@ class TracingCompiler:
     def __call__(
         self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
     ) -> list[Path]:
-        """One object that tells, and what it tells it to. The compiler's own words come first."""
+        """Compile sources to objects that record their blocks. Plain compilation first reports errors."""
         from volery.cost.native import compile_program, runtime_objects
 
         compile_each(tools, sources, include, flags)
@@ -174,7 +174,7 @@ class TracingCompiler:
         return kept
 
     def begin(self, library: LoadedLibrary, file: Path) -> None:
-        """Have a library that was compiled so tell it to *file*, until its ``volery_end`` is called."""
+        """Make a library record its blocks to *file* until its ``volery_end`` is called."""
         from volery.cost.native import cache_settings
 
         library.function("volery_model_caches")(cache_settings(self.law.memory).encode())
@@ -187,17 +187,17 @@ _ROSCPP = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
 
 
 def is_cpp(component: Component) -> bool:
-    """Whether there is C++ to be compiled for it."""
+    """Return True if the component has C++ code."""
     return bool(component.path) and component.language in LANGUAGES
 
 
 def has_cpp(system: System) -> bool:
-    """Whether a component of *system* is written in C++."""
+    """Return True if a component of *system* has C++ code."""
     return any(is_cpp(instance.component) for instance in system.instances)
 
 
 class CompiledInstance(NamedTuple):
-    """What an instance is to run; how its code counts itself, or tells what it executes, if it does."""
+    """Compiled code of an instance, and how it is counted or traced, if at all."""
 
     compiled: CompiledComponent
     counting: CountingCompiler | None = None
@@ -212,11 +212,21 @@ def compile_all(
     *,
     traced: bool = False,
 ) -> dict[str, CompiledInstance]:
-    """What the C++ components among *instances* are to run, by their names, compiled if it is not yet. Those
-    whose code would be counted tell what they execute where it is to be *traced*.
+    """Compile the C++ components among *instances*, or take them from the cache.
 
-    ``ModelError`` with the compiler's words for one that does not compile; ``UsageError`` if there is no
-    compiler, but nothing at fidelity ``times``, where components without code take their stated times.
+    Args:
+        system: The model.
+        instances: Instances of this process.
+        fidelity: Fidelity of the run. At ``times`` a missing compiler is no error: nothing is returned.
+        tell: Receives the progress.
+        traced: Trace the components whose code would be counted.
+
+    Returns:
+        The compiled instances by name.
+
+    Raises:
+        ModelError: A component does not compile; has the compiler's message.
+        UsageError: There is no compiler.
     """
     if fidelity == "times" and not has_compiler():
         return {}
@@ -237,18 +247,18 @@ def _compile(
     how: CoreLaw | TracingCompiler | None,
 ) -> CompiledInstance:
     component = instance.component
-    face = _ROSCPP if component.language == "roscpp" else ClientLibrary()
-    wanted = describe_component(system, component)
+    library = _ROSCPP if component.language == "roscpp" else ClientLibrary()
+    description = describe_component(system, component)
     if how is None or instance.processor is None:
-        return CompiledInstance(compile_component(wanted, face, tell))
+        return CompiledInstance(compile_component(description, library, tell))
     if isinstance(how, TracingCompiler):
-        return CompiledInstance(compile_component(wanted, face, tell, how), tracing=how)
+        return CompiledInstance(compile_component(description, library, tell, how), tracing=how)
     counting = CountingCompiler(how, system.processor(instance.processor).frequency_mhz)
-    return CompiledInstance(compile_component(wanted, face, tell, counting), counting)
+    return CompiledInstance(compile_component(description, library, tell, counting), counting)
 
 
 def describe_component(system: System, component: Component) -> CppComponent:
-    """*component* as the compiler needs to know it."""
+    """Return the description of *component* for its compilation."""
     path = system.file_of(component)
     for port in component.requires.values():
         _check_port(component, port.name, port.interface)
@@ -270,7 +280,7 @@ def describe_component(system: System, component: Component) -> CppComponent:
 
 
 def _class_of(component: Component, system: System) -> str:
-    """Its class, empty for a program of its own."""
+    """Return the class of a component, empty for a program with its own ``main``."""
     if component.stated_class:
         return component.class_name
     sources = find_sources(system.file_of(component), component.where)
@@ -279,12 +289,12 @@ def _class_of(component: Component, system: System) -> str:
 
 def _check_port(component: Component, port: str, interface: str) -> None:
     if interface == ENVIRONMENT_INTERFACE or (interface in VEHICLE_INTERFACES and interface != DRONE):
-        what = f"a C++ component cannot require {interface}, but the model's interfaces and {DRONE}"
+        what = f"a C++ component cannot require {interface}; use the interfaces of the model or {DRONE}"
         raise ModelError(what, f"components.{component.name}.requires.{port}", component.where)
 
 
 class CppPrograms:
-    """Makes the programs of the C++ components of one run."""
+    """Programs of the C++ components of one run."""
 
     def __init__(
         self,
@@ -297,7 +307,7 @@ class CppPrograms:
     ) -> None:
         self._kernel = kernel
         self._traces = traces
-        self._told: list[LoadedLibrary] = []
+        self._traced: list[LoadedLibrary] = []
         self._graph = graph
         self._ready = ready
         self._launches = launches
@@ -305,7 +315,7 @@ class CppPrograms:
         self.meters = {name: StepMeter() for name, one in ready.items() if one.counting is not None}
 
     def warnings(self, instances: Iterable[InstanceModel]) -> list[str]:
-        """What is doubtful about what they count, and who of *instances* could not be compiled."""
+        """Return doubts about the counted costs, and which of *instances* could not be compiled."""
         said = {one.counting.estimated: None for one in self._ready.values() if one.counting is not None}
         missing = [one.name for one in instances if is_cpp(one.component) and one.name not in self]
         if missing:
@@ -315,11 +325,11 @@ class CppPrograms:
         return [warning for warning in said if warning]
 
     def __contains__(self, name: str) -> bool:
-        """Whether the instance called *name* has a program here."""
+        """Return True if the instance *name* has a program."""
         return name in self._ready
 
     def program(self, model: InstanceModel) -> CppProgram:
-        """What the instance is to run."""
+        """Return the program of an instance."""
         compiled, counting, tracing = self._ready[model.name]
         if model.component.language == "roscpp":
             launch = self._launches.get(model.name, Launch())
@@ -337,9 +347,9 @@ class CppPrograms:
 
     def _trace(self, tracing: TracingCompiler, file: Path, library: LoadedLibrary) -> None:
         tracing.begin(library, file)
-        self._told.append(library)
+        self._traced.append(library)
 
     def finish(self) -> None:
-        """What they have to tell of themselves is told."""
-        for library in self._told:
+        """End the traces of all libraries."""
+        for library in self._traced:
             library.function("volery_end")()

@@ -93,7 +93,7 @@ def open_vehicles(
     addresses = {name: parse(url) for name, url in urls.items()}
     for address in addresses.values():
         drivers.load(address.driver)  # report an unknown name before anything else
-    if any(address.carrier != "sim" for address in addresses.values()):
+    if any(address.transport != "sim" for address in addresses.values()):
         return _open_real(addresses, kinds, stated)
     return _open_simulated(addresses, kinds, stated)
 
@@ -145,17 +145,17 @@ def _open_real(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
     for address in addresses.values():
-        if address.carrier == "sim":
+        if address.transport == "sim":
             raise CapabilityError(
                 f"{address}: simulated and real vehicles have different clocks; fly them in separate runs"
             )
-        if address.carrier == EMBEDDED:
+        if address.transport == EMBEDDED:
             raise CapabilityError(
                 f"{address}: vehicles on the embedded graph are commanded by components of a model; "
                 f"on real ROS it is {address.driver}+ros1:// or {address.driver}+ros2://"
             )
     kernel = WallKernel()
-    by_graph = {name: one for name, one in addresses.items() if one.carrier in GRAPHS}
+    by_graph = {name: one for name, one in addresses.items() if one.transport in GRAPHS}
     links = _RealLinks(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
     graphs = RealGraphs(kernel)
     try:
@@ -188,7 +188,7 @@ class RealGraphs:
         open_driver = drivers.load(address.driver).on_graph
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over a link, not over a ROS graph")
-        node = self.graph(address.carrier).node(
+        node = self.graph(address.transport).node(
             f"volery_{name}", anonymous=True, context=ExecutionContext(name)
         )
         namespace = address.path.rstrip("/")
@@ -226,7 +226,7 @@ class _RealLinks:
         systems = [self._addresses[name].options.get("system", "") for name in names]
         if "" in systems or len(set(systems)) < len(systems):
             raise UsageError(
-                f"{' and '.join(names)} share one {first.carrier} address; give each its system id, "
+                f"{' and '.join(names)} share one {first.transport} address; give each its system id, "
                 f"as in {first.text.partition('?')[0]}?system=1"
             )
         for other in others:
@@ -264,7 +264,7 @@ class _RealLinks:
 
 def _endpoint(address: Address) -> tuple[object, ...]:
     """Return what two vehicles behind one link have in common."""
-    return address.carrier, address.host, address.port, address.path
+    return address.transport, address.host, address.port, address.path
 
 
 def for_driver(address: Address) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The names that point out of a model, as this installation knows them."""
+"""The names outside a model that it may use, as this installation defines them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from volery.requirements.observables import OBSERVABLES
 from volery.simulation.autopilots.firmware import firmwares
 
 LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
-"""Languages of components that run today."""
+"""Languages of components that can run."""
 
 
 def vocabulary() -> Vocabulary:
-    """What a model is checked against."""
+    """Return the names that a model is checked against."""
     autopilots = frozenset(firmwares.names())
     return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, _kinds)
 
