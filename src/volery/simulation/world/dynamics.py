@@ -170,6 +170,18 @@ def rotation_matrix(row: Array, at: int, to: int) -> None:
 
 
 @njit(cache=False)
+def write_quaternion(row: Array, to: int, roll: float, pitch: float, yaw: float) -> None:
+    """Write the quaternion of roll, pitch and yaw [rad] to column *to*."""
+    sr, cr = sine_cosine(0.5 * roll)
+    sp, cp = sine_cosine(0.5 * pitch)
+    sy, cy = sine_cosine(0.5 * yaw)
+    row[to] = cr * cp * cy + sr * sp * sy
+    row[to + 1] = sr * cp * cy - cr * sp * sy
+    row[to + 2] = cr * sp * cy + sr * cp * sy
+    row[to + 3] = cr * cp * sy - sr * sp * cy
+
+
+@njit(cache=False)
 def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Rotate a vector from body axes to east, north, up."""
     return (

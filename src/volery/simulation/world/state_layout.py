@@ -2,8 +2,8 @@
 
 Each field is declared once, in order, with its width, unit and axes; its column follows from the fields
 before it, so two fields cannot overlap and a new field only shifts the later ones. The columns are module
-constants, which numba compiles into the code as literals. Structured arrays were rejected: the integrator
-treats the first columns as one vector, which records do not allow without copies.
+constants, which numba compiles into the code as literals. Structured arrays are as fast (measured), but were
+rejected: the integrator treats the first columns as one vector, for which records need overlapping fields.
 
 Prefixes: ``S_`` state, ``U_`` inputs, ``M_`` measurements, ``P_`` parameters, ``W_`` scratch. The flight
 stack continues the layout with ``Layout(after=WORLD_LAYOUT)``. SI units.

@@ -35,11 +35,10 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     K_USED_GPS,
     K_USED_MAG,
     K_VELOCITY,
-    W_CORRECTION,
     W_DCM,
 )
-from volery.simulation.world.arithmetic import arc_tangent2, sine_cosine, wrap_angle
-from volery.simulation.world.dynamics import rotation_matrix
+from volery.simulation.world.arithmetic import arc_tangent2, wrap_angle
+from volery.simulation.world.dynamics import rotation_matrix, write_quaternion
 from volery.simulation.world.sensors import RTK_FIX
 from volery.simulation.world.state_layout import (
     BIAS_SIGMA,
@@ -97,12 +96,7 @@ def _euler(row: Array) -> None:
 @njit(cache=False)
 def _rotate_attitude(row: Array, x: float, y: float, z: float) -> None:
     """Rotate the attitude by a small angle about body axes [rad]."""
-    w0, x0, y0, z0 = (
-        row[K_ATTITUDE],
-        row[K_ATTITUDE + 1],
-        row[K_ATTITUDE + 2],
-        row[K_ATTITUDE + 3],
-    )
+    w0, x0, y0, z0 = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     w1 = w0 - x0 * x - y0 * y - z0 * z
     x1 = x0 + w0 * x + y0 * z - z0 * y
@@ -125,31 +119,21 @@ def _horizontal(row: Array, x: float, y: float, z: float) -> tuple[float, float]
 
 
 @njit(cache=False)
-def _correct_attitude(row: Array, integral: float) -> None:
-    """Rotate the attitude by W_CORRECTION, and move the gyro bias by -*integral* of it."""
-    for axis in range(3):
-        angle = (
-            row[W_DCM + axis] * row[W_CORRECTION]
-            + row[W_DCM + 3 + axis] * row[W_CORRECTION + 1]
-            + row[W_DCM + 6 + axis] * row[W_CORRECTION + 2]
-        )
-        row[K_GYRO_BIAS + axis] -= integral * angle
-    bx = (
-        row[W_DCM] * row[W_CORRECTION]
-        + row[W_DCM + 3] * row[W_CORRECTION + 1]
-        + row[W_DCM + 6] * row[W_CORRECTION + 2]
-    )
-    by = (
-        row[W_DCM + 1] * row[W_CORRECTION]
-        + row[W_DCM + 4] * row[W_CORRECTION + 1]
-        + row[W_DCM + 7] * row[W_CORRECTION + 2]
-    )
-    bz = (
-        row[W_DCM + 2] * row[W_CORRECTION]
-        + row[W_DCM + 5] * row[W_CORRECTION + 1]
-        + row[W_DCM + 8] * row[W_CORRECTION + 2]
-    )
-    _rotate_attitude(row, bx, by, bz)
+def _correct_attitude(row: Array, north: float, east: float, down: float, share: float) -> None:
+    """Rotate the attitude by a small rotation, and move the gyro bias by -*share* of it.
+
+    Args:
+        row: State row.
+        north: Rotation about north [rad]; likewise ``east`` and ``down``.
+        share: Share of the rotation that is attributed to the bias [1/s].
+    """
+    x = row[W_DCM] * north + row[W_DCM + 3] * east + row[W_DCM + 6] * down
+    y = row[W_DCM + 1] * north + row[W_DCM + 4] * east + row[W_DCM + 7] * down
+    z = row[W_DCM + 2] * north + row[W_DCM + 5] * east + row[W_DCM + 8] * down
+    row[K_GYRO_BIAS] -= share * x
+    row[K_GYRO_BIAS + 1] -= share * y
+    row[K_GYRO_BIAS + 2] -= share * z
+    _rotate_attitude(row, x, y, z)
 
 
 @njit(cache=False)
@@ -293,10 +277,7 @@ def _fuse_gps(row: Array) -> None:
     north, east = share * row[K_ACCEL_BIAS], share * row[K_ACCEL_BIAS + 1]
     row[K_ACCEL_BIAS] -= north
     row[K_ACCEL_BIAS + 1] -= east
-    row[W_CORRECTION] = east / row[P_GRAVITY]
-    row[W_CORRECTION + 1] = -north / row[P_GRAVITY]
-    row[W_CORRECTION + 2] = 0.0
-    _correct_attitude(row, _TILT_INTEGRAL / _TILT_GAIN)
+    _correct_attitude(row, east / row[P_GRAVITY], -north / row[P_GRAVITY], 0.0, _TILT_INTEGRAL / _TILT_GAIN)
     row[K_GPS_AGE] = 0.0
 
 
@@ -306,10 +287,7 @@ def _fuse_gravity(row: Array, gravity: float) -> None:
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     north, east = _horizontal(row, fx, fy, fz)
     share = _GRAVITY_GAIN * _FUSE_S / gravity
-    row[W_CORRECTION] = -east * share
-    row[W_CORRECTION + 1] = north * share
-    row[W_CORRECTION + 2] = 0.0
-    _correct_attitude(row, 0.02)
+    _correct_attitude(row, -east * share, north * share, 0.0, 0.02)
 
 
 @njit(cache=False)
@@ -320,10 +298,7 @@ def _fuse_heading(row: Array) -> None:
     declination = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
     error = wrap_angle(arc_tangent2(east, north) - declination)
     row[K_HEADING_ERROR] = error
-    row[W_CORRECTION] = 0.0
-    row[W_CORRECTION + 1] = 0.0
-    row[W_CORRECTION + 2] = -_HEADING_GAIN * _FUSE_S * error
-    _correct_attitude(row, _HEADING_INTEGRAL / _HEADING_GAIN)
+    _correct_attitude(row, 0.0, 0.0, -_HEADING_GAIN * _FUSE_S * error, _HEADING_INTEGRAL / _HEADING_GAIN)
 
 
 @njit(cache=False)
@@ -359,21 +334,12 @@ def _align(row: Array) -> None:
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
     roll = arc_tangent2(-fy, -fz)
     pitch = arc_tangent2(fx, sqrt(fy * fy + fz * fz))
-    sr, cr = sine_cosine(0.5 * roll)
-    sp, cp = sine_cosine(0.5 * pitch)
-    row[K_ATTITUDE] = cr * cp
-    row[K_ATTITUDE + 1] = sr * cp
-    row[K_ATTITUDE + 2] = cr * sp
-    row[K_ATTITUDE + 3] = -sr * sp
+    write_quaternion(row, K_ATTITUDE, roll, pitch, 0.0)
     rotation_matrix(row, K_ATTITUDE, W_DCM)
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
     north, east = _horizontal(row, mx, my, mz)
     yaw = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD]) - arc_tangent2(east, north)
-    sy, cy = sine_cosine(0.5 * yaw)
-    row[K_ATTITUDE] = cr * cp * cy + sr * sp * sy
-    row[K_ATTITUDE + 1] = sr * cp * cy - cr * sp * sy
-    row[K_ATTITUDE + 2] = cr * sp * cy + sr * cp * sy
-    row[K_ATTITUDE + 3] = cr * cp * sy - sr * sp * cy
+    write_quaternion(row, K_ATTITUDE, roll, pitch, yaw)
     row[K_ALIGNED] = 1.0
 
 

@@ -41,7 +41,6 @@ assert FLIGHT_LAYOUT.start == WORLD
 
 # --- scratch ---
 W_DCM = _add("W_DCM", "1", f"matrix from body ({FRD}) to {NED}", 9, "3 x 3 by rows")
-W_CORRECTION = _add("W_CORRECTION", "rad", "small rotation that corrects the estimated attitude", 3, NED)
 
 # --- commands: C_CONTROL to C_JERK in the order of ``Setpoint.row`` ---
 C_CONTROL = _add("C_CONTROL", "1", "a Control")

@@ -59,6 +59,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     VELOCITY_HEIGHT,
 )
 from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, wrap_angle
+from volery.simulation.world.dynamics import write_quaternion
 from volery.simulation.world.state_layout import Array
 
 
@@ -127,12 +128,6 @@ def controls_horizontal(control: int) -> bool:
 
 
 @njit(cache=False)
-def _controls_vertical(control: int) -> bool:
-    """Return whether a control determines vertical motion."""
-    return controls_horizontal(control) or control == CLIMB
-
-
-@njit(cache=False)
 def _cos_tilt(row: Array) -> float:
     """Return the cosine of the tilt, at least one half."""
     x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
@@ -164,7 +159,7 @@ def _enter_control(row: Array, control: int, before: int) -> None:
     """
     grounded = before in (OFF, IDLE)
     for axis in range(3):
-        known = controls_horizontal(before) if axis < 2 else _controls_vertical(before)
+        known = controls_horizontal(before) or (axis == 2 and before == CLIMB)
         if not known:
             row[K_TARGET + axis] = row[K_POSITION + axis]
             row[K_TARGET_VELOCITY + axis] = row[K_VELOCITY + axis]
@@ -280,13 +275,7 @@ def _set_target_angles(row: Array, roll: float, pitch: float) -> None:
     row[K_TARGET_EULER] = roll
     row[K_TARGET_EULER + 1] = pitch
     row[K_TARGET_EULER + 2] = yaw
-    sr, cr = sine_cosine(0.5 * roll)
-    sp, cp = sine_cosine(0.5 * pitch)
-    sy, cy = sine_cosine(0.5 * yaw)
-    row[K_TARGET_QUATERNION] = cr * cp * cy + sr * sp * sy
-    row[K_TARGET_QUATERNION + 1] = sr * cp * cy - cr * sp * sy
-    row[K_TARGET_QUATERNION + 2] = cr * sp * cy + sr * cp * sy
-    row[K_TARGET_QUATERNION + 3] = cr * cp * sy - sr * sp * cy
+    write_quaternion(row, K_TARGET_QUATERNION, roll, pitch, yaw)
 
 
 @njit(cache=False)

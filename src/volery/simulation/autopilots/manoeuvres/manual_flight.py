@@ -9,7 +9,7 @@ from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, root_speed
 from volery.simulation.autopilots.manual_control import StickPositions
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
 GRAVITY = 9.80665
 
@@ -48,9 +48,9 @@ class Stabilize(ManualFlight):
         """Pass the sticks on."""
         pilot, tuning = self.pilot, self.vehicle.tuning
         if pilot.throttle <= 0.0:
-            self.idle()
+            self.vehicle.drive(IDLE)
             return
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.ATTITUDE,
                 roll=pilot.roll * tuning.tilt,
@@ -88,7 +88,7 @@ class AltitudeHold(ManualFlight):
     def step(self) -> None:
         """Pass the sticks on."""
         pilot, tuning = self.pilot, self.vehicle.tuning
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.CLIMB,
                 roll=pilot.roll * tuning.tilt,
@@ -187,7 +187,7 @@ class Loiter(ManualFlight):
         rate = pilot.yaw * tuning.pilot_yaw_rate
         north, east = self._velocity
         held = self._held
-        self.drive(
+        self.vehicle.drive(
             Setpoint(
                 Control.VELOCITY if held is None else Control.POSITION_CLIMB,
                 position=held or (0.0, 0.0, 0.0),

@@ -240,7 +240,7 @@ class Return(Manoeuvre):
     def step(self) -> None:
         """Change to the next stage when one is done."""
         stage, now = self._stage, self.vehicle.kernel.now()
-        if self._name == "climb" and self._has_climbed(stage):
+        if self._name == "climb" and isinstance(stage, ToPoint) and stage.arrived(passing=True):
             self._begin("fly", ToPoint(self.vehicle, self._home))
         elif self._name == "fly" and isinstance(stage, ToPoint) and stage.arrived():
             self._waiting_since = now
@@ -248,9 +248,6 @@ class Return(Manoeuvre):
         elif self._name == "wait" and now - self._waiting_since >= self.vehicle.tuning.return_wait:
             self._finish()
         self._stage.step()
-
-    def _has_climbed(self, stage: Manoeuvre) -> bool:
-        return isinstance(stage, ToPoint) and stage.arrived(passing=True)
 
     def _finish(self) -> None:
         final = self.vehicle.tuning.return_final

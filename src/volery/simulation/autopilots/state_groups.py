@@ -1,0 +1,130 @@
+"""The state of a simulated vehicle by owner: home, arming, ground, commanded limits, failsafes, reports.
+
+``Vehicle`` holds one of each, and replaces all of them at a boot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from volery.base.frames import Vector
+from volery.base.time import Ns
+from volery.simulation.autopilots.manual_control import NEVER
+
+
+class Home(NamedTuple):
+    """Home position.
+
+    Args:
+        latitude: Latitude [degrees].
+        longitude: Longitude [degrees].
+        amsl: Height above mean sea level [m].
+        ned: The same point north, east, down about the estimator's origin [m].
+        by_user: Whether a user has set a home since boot: arming then does not move it.
+    """
+
+    latitude: float
+    longitude: float
+    amsl: float
+    ned: Vector
+    by_user: bool = False
+
+
+@dataclass
+class ArmingState:
+    """Arming, changed by ``Vehicle.arm``, ``Vehicle.disarm`` and the firmware's checks. Times in ns."""
+
+    armed: bool = False
+    armed_at: Ns = NEVER
+    disarmed_at: Ns = NEVER
+    refused_at: Ns = NEVER
+    """Time at which arming was last refused."""
+    checks_passed: bool = False
+    """Result of the last arming checks, for firmwares that check regularly."""
+
+
+@dataclass
+class GroundState:
+    """Whether the vehicle stands on the ground, as its autopilot has found. Times in ns."""
+
+    landed: bool = False
+    landed_at: Ns = NEVER
+    idle_since: Ns = NEVER
+    """Since when an armed vehicle has stood on the ground without a request to take off."""
+    flight_time: Ns = 0
+    """Time in flight since boot, where the firmware counts it."""
+    lifted: bool = False
+    """Whether the landed detector has reported flight since the motors came up."""
+    takeoff_requested_at: Ns = NEVER
+    takeoff_last_requested_at: Ns = NEVER
+
+    def arm(self, now: Ns) -> None:
+        """Start to wait for a request to take off."""
+        self.idle_since = now
+        self.takeoff_requested_at = NEVER
+
+    def leave(self, now: Ns) -> None:
+        """Begin a flight: the motors come up now."""
+        self.landed = self.lifted = False
+        self.takeoff_last_requested_at = now
+
+    def update(self, now: Ns, on_ground: bool, takeoff_requested: bool, abandoned_after: Ns) -> None:
+        """Update the state of an armed vehicle in flight.
+
+        It has landed once the detector reports ground after flight, or once it has stood on the ground
+        without a request to take off for *abandoned_after*.
+
+        Args:
+            now: The time [ns].
+            on_ground: Report of the landed detector.
+            takeoff_requested: Whether the manoeuvre requests to take off, on the ground.
+            abandoned_after: Time after which a take-off that never left the ground ends [ns].
+        """
+        self.lifted = self.lifted or not on_ground
+        if not on_ground or takeoff_requested:
+            self.takeoff_last_requested_at = now
+        if on_ground and (self.lifted or now - self.takeoff_last_requested_at >= abandoned_after):
+            self.landed = True
+            self.landed_at = self.idle_since = now
+            self.takeoff_requested_at = NEVER
+
+
+@dataclass
+class CommandedLimits:
+    """Limits and heading that commands and mission items have set for the present mode; ``None``: not set."""
+
+    speed: float | None = None
+    """Horizontal speed [m/s]."""
+    speed_up: float | None = None
+    """Climb rate [m/s]."""
+    speed_down: float | None = None
+    """Descent rate [m/s]."""
+    yaw: float | None = None
+    """Heading, clockwise from north [rad]."""
+
+
+@dataclass
+class FailsafeState:
+    """Failsafes in force, and what the conditions of failsafes remember."""
+
+    active: set[str] = field(default_factory=set)
+    """Names of the failsafes whose condition is true."""
+    station_last_ns: Ns = NEVER
+    """Time of the last message of the ground station that controls the vehicle [ns]."""
+    low_voltage_since: dict[str, Ns] = field(default_factory=dict)
+    """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""
+
+
+@dataclass
+class ReportState:
+    """What a firmware has reported since boot."""
+
+    sent_once: set[str] = field(default_factory=set)
+    """Texts that are sent once after a boot."""
+    arming_checks_at: Ns = 0
+    """Uptime of the last report of failed arming checks [ns]."""
+    counters_at: Ns = 0
+    """Uptime at which operating hours were last stored [ns]."""
+    contacts: int = 0
+    """Number of touch-downs reported."""
