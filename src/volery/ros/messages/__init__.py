@@ -1,8 +1,7 @@
-"""ROS message types: definitions, values, and their bytes. The only room that imports rosbags.
+"""ROS message types: definitions, values and their encodings. The only package that imports rosbags.
 
-Within one process a message is a value of the class that this room makes for its type, in the definitions of
-ROS 2 Humble; the few packages that the stores lack are written out in ``definitions/``. Knows nobody but
-``base``: it must not know what a graph is, nor who sends what.
+Within one process a message is a value of the class that this package makes for its type, after the
+definitions of ROS 2 Humble; packages that rosbags lacks are in ``definitions/``. Depends on ``base`` only.
 """
 
 from volery.ros.messages.cdr import cdr_size, from_cdr, to_cdr

@@ -1,4 +1,4 @@
-"""Writing recordings of ROS topics: rosbag 1, or MCAP as a rosbag 2."""
+"""Writers of recordings: rosbag 1, or rosbag 2 in MCAP."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from volery.ros.messages.ros1 import ros1_type, to_ros1
 from volery.ros.messages.store import message_class, message_name, store
 
 _METADATA_VERSION: Literal[9] = 9
-"""Of rosbag2's metadata.yaml: Jazzy and later write it, Iron and later read it."""
+"""Version of rosbag2's metadata.yaml; Jazzy and later write it, Iron and later read it."""
 
 
 class BagWriter(Protocol):
-    """A recording that is being written. A context; it must be closed to be complete."""
+    """A recording in progress; a context manager. It must be closed to be complete."""
 
     def write(self, topic: str, at: Ns, message: Message) -> None:
-        """Add a message. ``UsageError`` if its type cannot be written in this format."""
+        """Add a message at time `at`, ns; raise ``UsageError`` if this format does not support its type."""
 
     def close(self) -> None:
-        """Finish it."""
+        """Complete the recording."""
 
     def __enter__(self) -> Self: ...
 
@@ -63,7 +63,7 @@ class _Writer:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Finish it."""
+        """Complete the recording."""
         self._writer.close()
 
     def __enter__(self) -> Self:
@@ -76,7 +76,7 @@ class _Writer:
 
 
 class Rosbag1Writer(_Writer):
-    """A ``.bag`` file, which Debian's ``rosbag`` and ROS 1 read."""
+    """Writer of a ``.bag`` file, which ROS 1 and Debian's ``rosbag`` read."""
 
     def __init__(self, path: Path) -> None:
         path.unlink(missing_ok=True)
@@ -95,7 +95,7 @@ class Rosbag1Writer(_Writer):
 
 
 class Rosbag2Writer(_Writer):
-    """A folder with an MCAP file, which ``ros2 bag``, Foxglove and PlotJuggler read."""
+    """Writer of a folder with an MCAP file, which ``ros2 bag``, Foxglove and PlotJuggler read."""
 
     def __init__(self, path: Path) -> None:
         if path.is_dir() and (path / "metadata.yaml").exists():
@@ -113,9 +113,12 @@ class Rosbag2Writer(_Writer):
 
 
 def create_bag(path: Path) -> BagWriter:
-    """A recording at *path*, an older one of that kind replaced: ``NAME.bag`` is a rosbag 1, any other name
-    the folder of a rosbag 2 in MCAP.
+    """Begin a recording; an older one of the same kind is replaced.
 
-    Raises ``UsageError`` if it cannot be written there.
+    Args:
+        path: ``NAME.bag`` for a rosbag 1, any other name for the folder of a rosbag 2 in MCAP.
+
+    Raises:
+        UsageError: it cannot be written there.
     """
     return Rosbag1Writer(path) if path.suffix == ".bag" else Rosbag2Writer(path)

@@ -1,10 +1,7 @@
-"""Recordings of ROS topics: rosbag 1, rosbag 2 and MCAP, read and written alike.
+"""Readers of recordings: rosbag 1, rosbag 2 and MCAP.
 
-Times are nanoseconds as the recording has them: since the Unix epoch, or since the start of a simulated run.
-
-What can still be read of a recording that was cut short: record after record from the start.
-
-A rosbag 1 or an MCAP file whose writer was killed has no index. Both are sequences of records nevertheless.
+Times are ns as in the recording: since the Unix epoch, or since the start of a simulated run. A rosbag 1 or
+MCAP file whose writer was killed has no index; it is recovered record by record from the start.
 """
 
 from __future__ import annotations
@@ -42,11 +39,11 @@ _LENGTH = struct.Struct("<I")
 _STAMP = struct.Struct("<II")
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _LARGEST = 1 << 30
-"""Bytes; a record that says it is longer is damaged."""
+"""Length, bytes, above which a record is taken as damaged."""
 
 
 class RawMessage(NamedTuple):
-    """A message as it lies in the file, and what its connection says of its type."""
+    """An encoded message of a recording, with type and definition of its connection."""
 
     at: Ns
     topic: str
@@ -56,7 +53,7 @@ class RawMessage(NamedTuple):
 
 
 def recover_rosbag1(path: Path) -> Iterator[RawMessage]:
-    """The whole messages of a rosbag of format 2.0, in the order of the file."""
+    """Yield the complete messages of a rosbag of format 2.0, in the order of the file."""
     connections: dict[bytes, dict[str, bytes]] = {}
     with path.open("rb") as file:
         file.readline()
@@ -86,19 +83,19 @@ def _rosbag1_message(
 
 
 def _records(file: BinaryIO) -> Iterator[tuple[dict[str, bytes], bytes]]:
-    """Header and data of each record that is whole, and what there is of a chunk at the end."""
+    """Yield header and data of each complete record, and the part of a chunk at the end."""
     while True:
         header, whole = _block(file)
         if not whole:
             return
         fields = _fields(header)
         data, whole = _block(file)
-        if whole or fields.get("op") == bytes([_CHUNK]):  # of the last chunk there is at least a part
+        if whole or fields.get("op") == bytes([_CHUNK]):  # the last chunk may be incomplete
             yield fields, data
 
 
 def _block(file: BinaryIO) -> tuple[bytes, bool]:
-    """What there is of a block, and whether that is all of it."""
+    """Return a block's data, and whether it is complete."""
     head = file.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return b"", False
@@ -120,7 +117,7 @@ def _fields(header: bytes) -> dict[str, bytes]:
 
 
 def _unpacked(header: dict[str, bytes], data: bytes) -> bytes:
-    """A chunk's content; nothing of one that cannot be unpacked."""
+    """Return a chunk's content, decompressed; empty if it is damaged."""
     try:
         compression = header.get("compression", b"none")
         if compression == b"bz2":
@@ -131,7 +128,7 @@ def _unpacked(header: dict[str, bytes], data: bytes) -> bytes:
 
 
 def recover_mcap(path: Path) -> Iterator[RawMessage]:
-    """The whole messages of an MCAP file, in the order of the file."""
+    """Yield the complete messages of an MCAP file, in the order of the file."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     with path.open("rb") as file:
@@ -148,18 +145,18 @@ def recover_mcap(path: Path) -> Iterator[RawMessage]:
                     text = schema.data.decode(errors="replace") if schema else ""
                     yield RawMessage(record.log_time, channel.topic, name, text, record.data)
         except (McapError, struct.error, EOFError, ValueError, RuntimeError):
-            return  # here the file ends, or is damaged
+            return  # the file ends here or is damaged
 
 
 OF_THE_RUN = "/volery/"
-"""How the topics begin on which a run's trace keeps what is no ROS message."""
+"""Prefix of the topics of a run's trace that carry no ROS messages."""
 
 ROSBAG1, ROSBAG2, MCAP = "rosbag 1", "rosbag 2", "MCAP"
 _SUFFIXES = {".bag": ROSBAG1, ".mcap": MCAP, ".db3": ROSBAG2}
 
 
 class BagTopic(NamedTuple):
-    """A recorded topic: its type (``package/msg/Name``) and how many messages there are of it."""
+    """A recorded topic, its type (``package/msg/Name``) and its number of messages."""
 
     name: str
     type: str
@@ -176,10 +173,16 @@ class BagMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class Bag:
-    """A recording. ``start`` and ``end`` are the times of its first and last message.
+    """A recording.
 
-    ``complete`` is False if it was cut short: then what is whole is read. ``unreadable`` says, by topic, why
-    messages of it cannot be read.
+    Attributes:
+        path: The file or folder.
+        format: ``ROSBAG1``, ``ROSBAG2`` or ``MCAP``.
+        topics: All recorded topics, by name.
+        start: Time of the first message, ns.
+        end: Time of the last message, ns.
+        complete: False if the recording was cut short; its complete messages are read.
+        unreadable: Reasons why messages of a topic cannot be decoded, by topic.
     """
 
     path: Path
@@ -192,20 +195,18 @@ class Bag:
 
     @property
     def usual(self) -> list[str]:
-        """The topics that are meant where none is named: all that can be read, but for what a run says of
-        itself.
-        """
+        """Topics that are read by default: all that can be decoded, without those of a run's trace."""
         names = (topic.name for topic in self.topics if not topic.name.startswith(OF_THE_RUN))
         return [name for name in names if name not in self.unreadable]
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """The messages of *topics* (of all that can be read), in the order of time."""
+        """Yield the messages of `topics` (by default of all that can be decoded), in order of time."""
         readable = {topic.name: topic.type for topic in self.topics if topic.name not in self.unreadable}
         wanted = readable if topics is None else {name: readable[name] for name in topics if name in readable}
         decode = from_ros1 if self.format == ROSBAG1 else from_cdr
         for raw in self._raw():
             if raw.topic in wanted:
-                with suppress(UsageError, ValueError, IndexError):  # a message that is damaged is left out
+                with suppress(UsageError, ValueError, IndexError):  # damaged messages are skipped
                     yield BagMessage(raw.at, raw.topic, decode(wanted[raw.topic], raw.data))
 
     def _raw(self) -> Iterator[RawMessage]:
@@ -219,9 +220,13 @@ class Bag:
 
 
 def open_bag(path: Path) -> Bag:
-    """The recording at *path*: a ``.bag`` or ``.mcap`` file, or the folder of a rosbag 2.
+    """Open a recording.
 
-    Raises ``UsageError`` if there is none, or nothing of it can be read.
+    Args:
+        path: A ``.bag`` or ``.mcap`` file, or the folder of a rosbag 2.
+
+    Raises:
+        UsageError: there is none, or nothing of it can be read.
     """
     if not path.exists():
         raise UsageError(f"no recording {path}")
@@ -277,7 +282,7 @@ def _salvaged(path: Path, kind: str, problem: str) -> Bag:
 
 
 def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl: bool = False) -> None:
-    """Types that nobody knows are defined as the recording says."""
+    """Define unknown types from the recording's definitions."""
     if name in store().fielddefs:
         return
     parse: Callable[..., Any] = get_types_from_idl if idl else get_types_from_msg

@@ -22,7 +22,7 @@ def _codec(name: str) -> rosbags.Msgdef[object]:
 
 @cache
 def _has_lists(name: str) -> bool:
-    """Whether lists or arrays are anywhere in the type, so that a message may need to be made ready first."""
+    """Return whether the type contains lists or arrays, which must be converted before encoding."""
     for _, (kind, detail) in store().fielddefs[name][1]:
         if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
             return True
@@ -32,14 +32,14 @@ def _has_lists(name: str) -> bool:
 
 
 def to_cdr(message: Message) -> bytes:
-    """The message's bytes. Raises ``UsageError`` where a value does not fit its field."""
+    """Encode a message; raise ``UsageError`` if a value does not fit its field."""
     if _has_lists(message.__msgtype__):
         message = message.copy()
     return copied_to_cdr(message)
 
 
 def copied_to_cdr(message: Message) -> bytes:
-    """``to_cdr`` for what ``Message.copy`` has returned; saves making it ready again."""
+    """Encode a message that ``Message.copy`` has returned, without preparing it again."""
     name = message.__msgtype__
     codec = _codec(name)
     try:
@@ -52,7 +52,7 @@ def copied_to_cdr(message: Message) -> bytes:
 
 
 def cdr_size(message: Message) -> int:
-    """How many bytes ``to_cdr`` would give."""
+    """Return the number of bytes that ``to_cdr`` would give."""
     codec = _codec(message.__msgtype__)
     if codec.size_cdr:
         return 4 + codec.size_cdr
@@ -60,7 +60,7 @@ def cdr_size(message: Message) -> int:
 
 
 def _culprit(message: Message) -> str:
-    """The first field whose value cannot be encoded, in words."""
+    """Describe the first field whose value cannot be encoded."""
     for label, (kind, detail) in store().fielddefs[message.__msgtype__][1]:
         value: Any = getattr(message, label, None)
         if kind == rosbags.Nodetype.NAME:
@@ -92,7 +92,7 @@ def _fits(base: str, value: Any) -> bool:
 
 
 def from_cdr(name: str, data: bytes | memoryview) -> Any:
-    """The message of type *name* that these bytes are. Raises ``UsageError`` if they are not one."""
+    """Decode a message of type `name`; raise ``UsageError`` if the bytes are no such message."""
     full = message_name(name)
     _codec(full)
     try:

@@ -1,7 +1,4 @@
-"""What the numbers in DJI's messages mean, for those who send them and those who read them.
-
-From the public definitions of the packages ``dji_sdk`` 3.8 and ``dji_osdk_ros`` 4.1.
-"""
+"""Constants of DJI's messages, from the public definitions of ``dji_sdk`` 3.8 and ``dji_osdk_ros`` 4.1."""
 
 from __future__ import annotations
 
@@ -10,18 +7,18 @@ from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
 OLD_NAMES, NEW_NAMES = "dji_sdk", "dji_osdk_ros"
-"""The packages, and what their topics begin with."""
+"""The packages, and the prefixes of their topics."""
 
 HEALTHY_GPS = 4
-"""From this ``gps_health`` on position, velocity and the local reference are to be trusted."""
+"""Least ``gps_health`` at which position, velocity and the local reference are reliable."""
 
 M100 = "M100"
 HARDWARE: Mapping[str, int] = {"A3": 0x03020100, "N3": 0x03030100, "M100": 0x03010A00, "M600": 0x03040100}
-"""What ``query_drone_version`` answers. Of the versions only that of the M100 is documented."""
+"""Answers of ``query_drone_version``; only the version of the M100 is documented."""
 
 
 class DisplayMode(IntEnum):
-    """``display_mode``: how the aircraft flies."""
+    """Flight modes in ``display_mode``."""
 
     MANUAL_CTRL = 0
     ATTITUDE = 1
@@ -39,7 +36,7 @@ class DisplayMode(IntEnum):
 
 
 def display_name(number: int) -> str:
-    """The mode by its public name."""
+    """Return the public name of a mode."""
     try:
         return DisplayMode(number).name
     except ValueError:
@@ -47,7 +44,7 @@ def display_name(number: int) -> str:
 
 
 class FlightStatus(IntEnum):
-    """``flight_status`` of all aircraft but the M100."""
+    """``flight_status`` of all aircraft except the M100."""
 
     STOPPED = 0
     ON_GROUND = 1
@@ -65,12 +62,12 @@ class M100Status(IntEnum):
 
 
 class Flag(IntFlag):
-    """The byte of a set-point that says how its four numbers are meant."""
+    """Control flag of a set-point: meaning and frame of its four numbers."""
 
     STABLE = 0x01
-    """Brake and hold where the horizontal numbers are zero."""
+    """Brake and hold position if the horizontal numbers are zero."""
     BODY = 0x02
-    """Forward and left of the aircraft; without it east and north."""
+    """Body frame (forward, left); without it east and north."""
     YAW_RATE = 0x08
     VERTICAL_POSITION = 0x10
     VERTICAL_THRUST = 0x20
@@ -80,14 +77,14 @@ class Flag(IntFlag):
 
 
 HORIZONTAL, VERTICAL = 0xC0, 0x30
-"""The bits of the flag that say what the horizontal and the vertical numbers are."""
+"""Bits of the flag for the horizontal and the vertical numbers."""
 
 POSITION_YAW = 0x91
 VELOCITY_YAW_RATE = 0x49
 ANGLE_YAW_RATE_HEIGHT = 0x1B
 ANGLE_YAW_RATE_CLIMB = 0x0B
 ANGLE_YAW_RATE_THRUST = 0x2B
-"""Flags in use: the three that have a topic of their own, and two for sticks."""
+"""Flags in use: the three with a topic of their own, and two for manual control."""
 
 SETPOINT = "flight_control_setpoint_"
 SETPOINT_TOPICS: Mapping[str, int] = {
@@ -95,21 +92,21 @@ SETPOINT_TOPICS: Mapping[str, int] = {
     f"{SETPOINT}ENUvelocity_yawrate": VELOCITY_YAW_RATE,
     f"{SETPOINT}rollpitch_yawrate_zposition": ANGLE_YAW_RATE_HEIGHT,
 }
-"""Topics of set-points by their flag; any other flag goes by the topic ``...generic``."""
+"""Flags of the set-point topics; other flags use the topic ``...generic``."""
 
 
 class Range(NamedTuple):
-    """From, to, both included."""
+    """Closed interval."""
 
     lowest: float
     highest: float
 
 
 SETPOINT_HEIGHTS = Range(0.0, 120.0)
-"""Metres above the point of take-off that a set-point may ask for."""
+"""Heights of set-points, m above the take-off point."""
 
 GO_HOME_ALTITUDES = Range(20.0, 500.0)
-"""Metres above home that a program may ask for as the height of the way home; assumed."""
+"""Heights of the flight home that a program may set, m above home; assumed."""
 
 MISSION_SPEEDS = Range(2.0, 15.0)
-"""Metres per second of a waypoint mission."""
+"""Speeds of a waypoint mission, m/s."""

@@ -1,9 +1,7 @@
-"""The classes of message values: every field has a default, an unknown one is an error, a copy is cheap.
+"""Classes of message values: every field has a default, an unknown field is an error, copies are cheap.
 
-A class is a slotted dataclass. Arrays of numbers are numpy arrays of the field's type; a list is taken where
-one is assigned, and becomes an array when the message is copied (as publishing does).
-
-Copies of messages without sequences, by code written for each type: half the time of going by fields.
+A class is a slotted dataclass. Arrays of numbers are numpy arrays of the field's type; an assigned list
+becomes an array when the message is copied, as by publishing.
 """
 
 from __future__ import annotations
@@ -22,9 +20,10 @@ Copy = Callable[[Any], Any]
 
 
 def plain_copy(cls: Any, fields: list[Any]) -> Copy | None:
-    """What copies a message of type *cls*; ``None`` where a sequence or an array is anywhere in it.
+    """Return a generated function that copies messages of type `cls`; None if it has sequences or arrays.
 
-    The copy takes whatever has the fields, and raises ``AttributeError`` where one is missing.
+    Generated code takes half the time of a loop over the fields. The function accepts every object that has
+    the fields, and raises ``AttributeError`` if one is missing.
     """
     writing = _Writing()
     made = writing.expression(cls, fields, "message")
@@ -37,14 +36,14 @@ def plain_copy(cls: Any, fields: list[Any]) -> Copy | None:
 
 
 class _Writing:
-    """The body of one copying function: nested messages get a name before their fields are read."""
+    """Source of one copying function; nested messages are assigned to variables first."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.names: dict[str, Any] = {}
 
     def expression(self, cls: Any, fields: list[Any], of: str) -> str | None:
-        """The text that makes a *cls* of the fields of the variable *of*."""
+        """Return the expression that makes a `cls` of the fields of the variable `of`."""
         kind = f"kind_{len(self.names)}"
         self.names[kind] = cls
         values = []
@@ -67,7 +66,7 @@ Copier = Callable[[Any], Any]
 
 
 class Message:
-    """A ROS message. Its type's name is ``__msgtype__``, its fields' names are ``__match_args__``."""
+    """A ROS message; ``__msgtype__`` is its type's name, ``__match_args__`` the names of its fields."""
 
     __slots__ = ()
     __msgtype__: ClassVar[str] = ""
@@ -76,7 +75,7 @@ class Message:
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
     _plain: ClassVar[Callable[[Any], Any] | None] = None
     fields_of: ClassVar[list[Field]] = []
-    """The fields of the type, for this room."""
+    """Fields of the type. Private to this package."""
     __hash__: ClassVar[Any] = None  # messages are mutable values
 
     if TYPE_CHECKING:  # each class has the fields of its type
@@ -84,17 +83,14 @@ class Message:
         def __init__(self, *values: Any, **fields: Any) -> None: ...
 
     def copy(self) -> Any:
-        """The message as it is now, lists made arrays.
-
-        ``UsageError`` where a value does not fit its field.
-        """
+        """Return a copy with lists converted to arrays; ``UsageError`` if a value does not fit."""
         plain = type(self)._plain
         if plain is None:
             return self._copied_by_fields()
         try:
             return plain(self)
         except AttributeError:
-            return self._copied_by_fields()  # which says what is wrong
+            return self._copied_by_fields()  # raises an error that names the field
 
     def _copied_by_fields(self) -> Any:
         cls = type(self)
@@ -121,7 +117,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 class Header(Message):
-    """A header. ROS 1's ``seq`` may be written; ROS 2 does not carry it, so it reads as 0."""
+    """A header. ROS 1's ``seq`` may be assigned but is always 0, as ROS 2 has no such field."""
 
     __slots__ = ()
 
@@ -132,11 +128,11 @@ class Header(Message):
 
     @seq.setter
     def seq(self, value: int) -> None:
-        """Accepted and forgotten."""
+        """Ignore the value."""
 
 
 class Nothing(Message):
-    """A type without fields; its encoding has one byte that says nothing."""
+    """A type without fields; its encoding has one unused byte."""
 
     __slots__ = ()
     structure_needs_at_least_one_member = 0
@@ -145,7 +141,7 @@ class Nothing(Message):
 
 
 _ROS2_DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
-"""Defaults that the ROS 2 definitions state; all others are zero, false or empty."""
+"""Defaults in the ROS 2 definitions; all others are zero, false or empty."""
 
 
 class Field(NamedTuple):
@@ -163,7 +159,7 @@ class Field(NamedTuple):
 def make_class(
     name: str, base: type[Message], constants: dict[str, Any], fields: list[Field]
 ) -> type[Message]:
-    """The class of the values of type *name* (``package/msg/Name``), made of *base*."""
+    """Create the class of message type `name` (``package/msg/Name``), derived from `base`."""
     package, kind, label = name.split("/")
     members = []
     copiers = []

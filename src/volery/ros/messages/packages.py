@@ -1,10 +1,8 @@
-"""Packages of interfaces as modules, so that a file may say ``from std_msgs.msg import String``.
-
-Interfaces that lie beside a user's file, or in packages that the environment names.
+"""Interface packages as modules, for ``from std_msgs.msg import String``, and packages beside a user's file.
 
 ``from robot_msgs.msg import Wheels`` in a file finds ``robot_msgs/msg/Wheels.msg`` beside the file, in the
-package that the file is part of, or in a folder of ``ROS_PACKAGE_PATH`` or ``AMENT_PREFIX_PATH``; and what
-its types are made of likewise.
+file's own package, or in a folder of ``ROS_PACKAGE_PATH`` or ``AMENT_PREFIX_PATH``, and its nested types
+likewise.
 """
 
 from __future__ import annotations
@@ -21,11 +19,11 @@ from volery.base.errors import Location, ModelError, UsageError, choices, did_yo
 from volery.ros.messages.store import action_types, define_all, message_class, service, service_types, types
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
-"""Types that ROS 1 spells otherwise: by package, its name and ours."""
+"""Types with another spelling in ROS 1: by package, ROS 1's name and ROS 2's."""
 
 
 class _Definitions(ModuleType):
-    """``package.msg``, ``package.srv`` or ``package.action``; a class is made when it is first asked for."""
+    """Module ``package.msg``, ``package.srv`` or ``package.action``, whose classes are created on demand."""
 
     def __init__(self, package: str, kind: str, names: list[str]) -> None:
         super().__init__(f"{package}.{kind}", f"The {kind} types of {package}.")
@@ -51,7 +49,7 @@ class _Definitions(ModuleType):
 
 
 def service_class(full: str) -> type:
-    """What ``from package.srv import Name`` gives: a class that carries ``Request`` and ``Response``."""
+    """Return the class of ``from package.srv import Name``, with ``Request`` and ``Response``."""
     pair = service(full)
     members = {
         "_type": full,
@@ -64,7 +62,7 @@ def service_class(full: str) -> type:
 
 
 def _action_class(full: str) -> type:
-    """What ``from package.action import Name`` gives."""
+    """Return the class of ``from package.action import Name``."""
     inner = full.replace("/action/", "/msg/")
     members = {
         "_type": full,
@@ -84,7 +82,7 @@ _MAKERS: dict[str, Callable[[str], type]] = {
 
 
 def modules() -> dict[str, ModuleType]:
-    """All packages: ``std_msgs``, ``std_msgs.msg``, ``std_srvs.srv`` and so on, by the name of the import."""
+    """Return the modules of all packages (``std_msgs``, ``std_msgs.msg``, ...), by their import names."""
     found: dict[str, ModuleType] = {}
     for kind, names in (("msg", types()), ("srv", service_types()), ("action", action_types())):
         by_package: dict[str, list[str]] = {}
@@ -101,21 +99,21 @@ def modules() -> dict[str, ModuleType]:
 
 KINDS = ("msg", "srv", "action")
 _LEVELS = 3
-"""How far above the file its package may begin."""
+"""Number of levels above a file in which its package may begin."""
 _FIELD = re.compile(r"^\s*(\w+)/(?:msg/)?\w+(?:\[[^]]*\])?\s+\w", re.MULTILINE)
 _NAME = re.compile(r"<name>\s*([\w-]+)\s*</name>")
 
 
 def define_imported(file: Path) -> list[str]:
-    """``define_packages`` for what a Python file imports."""
+    """Define the interfaces that a Python file imports; see ``define_packages``."""
     return define_packages(file, _imported(file))
 
 
 def define_packages(file: Path, packages: Iterable[str]) -> list[str]:
-    """Define the interfaces of *packages*, which *file* speaks of, if nobody has; returns those it found.
+    """Define the interfaces of `packages`, used in `file`, unless they are known; return those found.
 
-    ``ModelError`` at the interface's file where one is no definition. Packages that are nowhere are left to
-    whoever then misses them.
+    Raises ``ModelError`` at the interface's file if it is no definition. Packages that are not found are
+    ignored.
     """
     known = {name.partition("/")[0] for name in (*types(), *service_types(), *action_types())}
     known -= _from_files.keys()  # another file may mean another package by the same name
@@ -141,11 +139,11 @@ def define_packages(file: Path, packages: Iterable[str]) -> list[str]:
 
 
 _from_files: dict[str, str] = {}
-"""What was read from files so far: texts by name, and the packages' own names."""
+"""Definitions read from files so far, by name, and the packages' own names."""
 
 
 def _imported(file: Path) -> list[str]:
-    """The packages of whose interfaces the file speaks, in order."""
+    """Return the packages whose interfaces the file imports, in order."""
     found: dict[str, None] = {}
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -165,7 +163,7 @@ def _texts(package: str, folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def _folder_of(package: str, file: Path) -> Path | None:
-    """Where *package* has its interfaces, as far as *file* can know."""
+    """Return the folder of a package's interfaces, searched from `file` and the environment."""
     return next((folder for folder in _candidates(package, file) if _is_package(folder, package)), None)
 
 

@@ -1,10 +1,9 @@
-"""Messages as ROS 1 has them: names, checksums, definitions, and bytes.
+"""ROS 1's view of messages: names, checksums, definitions, field layouts and bytes.
 
-The values are the same as everywhere; only their encoding differs. ROS 1's ``Header`` has a ``seq`` that ROS
-2 dropped: it is written as 0 (who publishes counts it) and forgotten when read. Where the definitions of the
-two differ in more than the spelling of a field, the type cannot be carried, and an error says so.
-
-What a type is made of, for generators of code in other languages: names and order as ROS 1 has them.
+Values are those of ROS 2; only their encoding differs. ROS 1's ``Header`` has a ``seq`` that ROS 2 dropped:
+it is encoded as 0 (publishers of ROS 1 count it) and dropped when decoded. A type whose definitions differ in
+more than the spelling of a field cannot be carried, and an error says so. The field layouts are for code
+generators.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duratio
 
 
 class Ros1Type(NamedTuple):
-    """A message type in ROS 1: ``package/Name``, its MD5 sum, its full text, whether a header comes first."""
+    """A message type in ROS 1: ``package/Name``, MD5 sum, full text, whether its first field is a header."""
 
     name: str
     md5: str
@@ -44,12 +43,12 @@ class Ros1Service(NamedTuple):
 
 @cache
 def _noetic() -> rosbags.Typestore:
-    """The definitions of ROS 1 Noetic; what it lacks is added from ours when it is asked for."""
+    """Return the definitions of ROS 1 Noetic; types that it lacks are added on demand."""
     return rosbags.get_typestore(rosbags.Stores.ROS1_NOETIC)
 
 
 def definition_store(full: str) -> rosbags.Typestore:
-    """Noetic's store with type *full* in it. ``UsageError`` if Noetic's differs from ours in its layout."""
+    """Return Noetic's store with type `full`; ``UsageError`` if its layout differs in ROS 1 and ROS 2."""
     ours, noetic = store(), _noetic()
     for _, what in ours.fielddefs[full][1]:
         inner = _nested(what)
@@ -70,7 +69,7 @@ def _nested(what: Any) -> str:
 
 
 def _layout(of: rosbags.Typestore, full: str) -> list[Any]:
-    """The types of the fields; ``seq`` of a header apart, their names do not matter to the bytes."""
+    """Return the types of the fields without a header's ``seq``; names do not matter to the bytes."""
     return [_plain(what) for name, what in of.fielddefs[full][1] if not (full == _HEADER and name == "seq")]
 
 
@@ -82,7 +81,7 @@ def _plain(what: Any) -> Any:
 
 
 def ros1_name(name: str) -> str:
-    """``std_msgs/msg/String`` as ``std_msgs/String``; services likewise."""
+    """Return a type's name in ROS 1: ``std_msgs/String`` for ``std_msgs/msg/String``; services likewise."""
     package, _, label = name.replace("/msg/", "/").replace("/srv/", "/").partition("/")
     for theirs, ours in ROS1_SPELLING.get(package, {}).items():
         if label == ours:
@@ -91,14 +90,14 @@ def ros1_name(name: str) -> str:
 
 
 def our_name(name: str) -> str:
-    """``std_msgs/String`` as ``std_msgs/msg/String``; the type need not be known."""
+    """Return the full name of a type of ROS 1, known or not: ``std_msgs/msg/String``."""
     package, _, label = name.partition("/")
     return f"{package}/msg/{ROS1_SPELLING.get(package, {}).get(label, label)}" if label else name
 
 
 @cache
 def ros1_type(name: str) -> Ros1Type:
-    """What ROS 1 knows of a message type. ``UsageError`` if unknown, or if ROS 1's has other fields."""
+    """Return a message type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
     full = message_name(name)
     text, checksum = definition_store(full).generate_msgdef(full, ros_version=1)
     fields = store().fielddefs[full][1]
@@ -107,7 +106,7 @@ def ros1_type(name: str) -> Ros1Type:
 
 @cache
 def ros1_service(name: str) -> Ros1Service:
-    """What ROS 1 knows of a service type."""
+    """Return a service type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
     kind = service(service_name(name))
     label = ros1_name(kind.name)
     halves = []
@@ -118,7 +117,7 @@ def ros1_service(name: str) -> Ros1Service:
 
 
 def _hashed(full: str) -> str:
-    """The text whose MD5 sum is that of the type: constants, then fields, nested types by their sums."""
+    """Return the text whose MD5 sum is the type's: constants, then fields, nested types as their sums."""
     noetic = definition_store(full)
     constants, fields = noetic.fielddefs[full]
     lines = [f"{kind} {name}={value}" for name, kind, value in constants]
@@ -141,19 +140,19 @@ def _hashed_type(what: Any) -> str:
 
 
 def to_ros1(message: Message) -> bytes:
-    """The message's bytes in ROS 1. Raises ``UsageError`` where a value does not fit its field."""
+    """Encode a message for ROS 1; raise ``UsageError`` if a value does not fit its field."""
     name = message.__msgtype__
     ros1_type(name)
     return cdr_to_ros1(name, to_cdr(message))
 
 
 def cdr_to_ros1(name: str, data: bytes) -> bytes:
-    """CDR bytes of type *name* as ROS 1's."""
+    """Convert CDR bytes of type `name` to ROS 1's."""
     return bytes(store().cdr_to_ros1(data, name))
 
 
 def from_ros1(name: str, data: bytes | memoryview) -> Any:
-    """The message of type *name* that these bytes of ROS 1 are. Raises ``UsageError`` if they are not one."""
+    """Decode ROS 1 bytes as a message of type `name`; raise ``UsageError`` if they are no such message."""
     full = message_name(name)
     message_class(full)
     try:
@@ -163,7 +162,7 @@ def from_ros1(name: str, data: bytes | memoryview) -> Any:
 
 
 FILLER = "structure_needs_at_least_one_member"
-"""The byte that the encoding of a type without fields has."""
+"""Field of one byte in the encoding of a type without fields."""
 
 
 class FieldLayout(NamedTuple):
@@ -189,7 +188,7 @@ class Constant(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """A message type: its name here (``package/msg/Name``) and in ROS 1 (``package/Name``), and its parts."""
+    """A message type: full name (``package/msg/Name``), ROS 1 name (``package/Name``), and its parts."""
 
     name: str
     label: str
@@ -198,7 +197,7 @@ class Layout(NamedTuple):
 
 
 def ros1_layout(name: str) -> Layout:
-    """The layout of a message type, in ROS 1's names. ``UsageError`` if unknown or if ROS 1's is another."""
+    """Return a message type's layout in ROS 1; ``UsageError`` if it is unknown or differs there."""
     full = message_name(name)
     message_class(full)
     constants, fields = definition_store(full).fielddefs[full]

@@ -1,6 +1,6 @@
-"""Times and durations as message values that one can reckon with.
+"""Times and durations as message values with arithmetic.
 
-They also answer to ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``), so that files written for it work.
+They also support ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``), so that files written for it work.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _SECOND = 1_000_000_000
 
 
 class Stamp(Message):
-    """What times and durations share. Anything with ``sec`` and ``nanosec`` may be the other operand."""
+    """Base of times and durations. Every object with ``sec`` and ``nanosec`` may be the other operand."""
 
     __slots__ = ()
     if TYPE_CHECKING:  # the fields of the types that are made of this
@@ -41,17 +41,17 @@ class Stamp(Message):
         self.nanosec = value
 
     def to_nsec(self) -> int:
-        """Nanoseconds."""
+        """Return the value in ns."""
         return int(self.sec * _SECOND + self.nanosec)
 
     def to_sec(self) -> float:
-        """Seconds, with the last digit that ROS 1's own has."""
+        """Return the value in s, rounded as in ROS 1."""
         return float(self.sec + self.nanosec / _SECOND)
 
     to_time = to_sec
 
     def is_zero(self) -> bool:
-        """Whether nothing was ever set."""
+        """Return whether the value is 0."""
         return self.to_nsec() == 0
 
     def __bool__(self) -> bool:
@@ -79,7 +79,7 @@ class Stamp(Message):
 
 
 def nanoseconds(value: Any) -> int:
-    """A stamp as nanoseconds; a ``TypeError`` for anything that is none."""
+    """Return a stamp in ns; raise ``TypeError`` for any other object."""
     try:
         return int(value.sec * _SECOND + value.nanosec)
     except AttributeError:
@@ -91,15 +91,15 @@ def _is_time(value: Any) -> bool:
 
 
 class DurationValue(Stamp):
-    """A span of time; may be negative (then ``sec`` is, and ``nanosec`` counts upward)."""
+    """A duration. If negative, ``sec`` is negative and ``nanosec`` counts upward."""
 
     __slots__ = ()
     kind: ClassVar[type[DurationValue]]
-    """The class of the message type, for results."""
+    """Class of the message type, used for results."""
 
     @classmethod
     def of(cls, ns: int) -> DurationValue:
-        """From nanoseconds."""
+        """Return the value of `ns` nanoseconds."""
         return DurationValue.kind(*divmod(ns, _SECOND))
 
     def __add__(self, other: Any) -> Any:
@@ -134,11 +134,11 @@ class TimeValue(Stamp):
 
     __slots__ = ()
     kind: ClassVar[type[TimeValue]]
-    """The class of the message type, for results."""
+    """Class of the message type, used for results."""
 
     @classmethod
     def of(cls, ns: int) -> TimeValue:
-        """From nanoseconds."""
+        """Return the value of `ns` nanoseconds."""
         return TimeValue.kind(*divmod(ns, _SECOND))
 
     def __add__(self, other: Any) -> TimeValue:

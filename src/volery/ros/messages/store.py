@@ -1,8 +1,7 @@
-"""Which types there are, and one of each on demand.
+"""Message, service and action types: known definitions, new ones, and one class of each on demand.
 
-An interface file's text as the messages that it stands for.
-
-How the classes of rclpy spell their fields' types, so that theirs and ours can be compared.
+Interface files are parsed into the messages that they define, as ROS 2 names them. IDL spellings of field
+types serve the comparison with rclpy's classes.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ _ID = "unique_identifier_msgs/UUID goal_id\n"
 
 
 def interface_messages(name: str, text: str) -> dict[str, str]:
-    """The messages behind ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``, by name.
+    """Return the texts of the messages that an interface file defines, by name.
 
     A service has ``Name_Request`` and ``Name_Response``. An action has what ROS 2 makes of it: ``Name_Goal``,
     ``Name_Result``, ``Name_Feedback``, the services ``Name_SendGoal`` and ``Name_GetResult``, and
@@ -64,7 +63,7 @@ _services: dict[str, ServiceType] = {}
 
 
 class ServiceType(NamedTuple):
-    """A service's name (``package/srv/Name``) and the classes of its request and response."""
+    """A service type's name (``package/srv/Name``) and the classes of its request and response."""
 
     name: str
     request: type[Message]
@@ -73,7 +72,7 @@ class ServiceType(NamedTuple):
 
 @cache
 def store() -> rosbags.Typestore:
-    """The types of ROS 2 Humble and those of ``definitions/``. For this room only."""
+    """Return the types of ROS 2 Humble and of ``definitions/``. Private to this package."""
     humble = rosbags.get_typestore(rosbags.Stores.ROS2_HUMBLE)
     texts: dict[str, str] = {}
     written_out = files("volery.ros.messages").joinpath("definitions").iterdir()
@@ -107,7 +106,7 @@ def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
 
 
 def _inner_type(what: Any) -> str:
-    """The message type that a field is made of; empty for numbers and strings."""
+    """Return the message type of a field or of its elements; empty for numbers and strings."""
     kind, detail = what
     if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         return _inner_type(detail[0])
@@ -115,16 +114,20 @@ def _inner_type(what: Any) -> str:
 
 
 def define(name: str, text: str) -> None:
-    """Add a type of your own from the text of its ``.msg``, ``.srv`` or ``.action`` file.
+    """Define a type from the text of its ``.msg``, ``.srv`` or ``.action`` file.
 
-    *name* is ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``. ``UsageError`` if the
-    text is no definition or the name is taken by another one.
+    Args:
+        name: ``package/msg/Name``, ``package/srv/Name`` or ``package/action/Name``.
+        text: The definition.
+
+    Raises:
+        UsageError: the text is no definition, or the name has another one.
     """
     define_all({name: text})
 
 
 def define_all(texts: Mapping[str, str]) -> None:
-    """``define`` several types, which may be made of each other."""
+    """Define several types, which may contain each other; see ``define``."""
     found: dict[str, str] = {}
     for name, text in texts.items():
         found.update(interface_messages(name, text))
@@ -132,24 +135,24 @@ def define_all(texts: Mapping[str, str]) -> None:
 
 
 def types() -> list[str]:
-    """The names of all message types, sorted."""
+    """Return the names of all message types, sorted."""
     return sorted(name for name in store().fielddefs if name.split("/")[1] == "msg")
 
 
 def type_hash(name: str) -> bytes:
-    """The 32 bytes of a message type's RIHS01 hash, by which ROS 2 knows whether two mean the same by it."""
+    """Return the 32 bytes of a type's RIHS01 hash, by which ROS 2 compares definitions."""
     return bytes.fromhex(store().hash_rihs01(name).rpartition("_")[2])
 
 
 def service_types() -> list[str]:
-    """The names of all service types, sorted; an action's are not among them."""
+    """Return the names of all service types without those of actions, sorted."""
     ending = "_Request"
     names = (name for name in store().fielddefs if name.endswith(ending) and "/srv/" in name)
     return sorted(name.removesuffix(ending) for name in names)
 
 
 def action_types() -> list[str]:
-    """The names of all action types, sorted."""
+    """Return the names of all action types, sorted."""
     ending = "_FeedbackMessage"
     return sorted(name.removesuffix(ending) for name in store().fielddefs if name.endswith(ending))
 
@@ -168,9 +171,9 @@ def _unknown(what: str, name: str, known: list[str]) -> UsageError:
 
 
 def message_name(name: str) -> str:
-    """``std_msgs/String`` or ``std_msgs/msg/String`` as ``std_msgs/msg/String``.
+    """Return a message type's full name: ``std_msgs/msg/String`` for ``std_msgs/String``.
 
-    A ``UsageError`` if unknown.
+    Raises ``UsageError`` if it is unknown.
     """
     if name in store().fielddefs:
         return name
@@ -181,9 +184,9 @@ def message_name(name: str) -> str:
 
 
 def service_name(name: str) -> str:
-    """``std_srvs/Trigger`` or ``std_srvs/srv/Trigger`` as ``std_srvs/srv/Trigger``.
+    """Return a service type's full name: ``std_srvs/srv/Trigger`` for ``std_srvs/Trigger``.
 
-    A ``UsageError`` if unknown.
+    Raises ``UsageError`` if it is unknown.
     """
     full = _full(name, "srv")
     if f"{full}_Request" not in store().fielddefs:
@@ -192,7 +195,7 @@ def service_name(name: str) -> str:
 
 
 def message_class(name: str) -> type[Message]:
-    """The class of a message type; made when first asked for."""
+    """Return the class of a message type, created on demand; raise ``UsageError`` if the type is unknown."""
     known = _classes.get(name)
     if known:
         return known
@@ -222,7 +225,7 @@ _FILLER = "structure_needs_at_least_one_member"
 
 
 def _introduce(made: Any) -> None:
-    """Tell times and durations of each other: the difference of two times is a duration."""
+    """Set the result classes of time arithmetic: the difference of two times is a duration."""
     if issubclass(made, TimeValue):
         TimeValue.kind = made
         message_class(_DURATION)
@@ -246,7 +249,7 @@ def _describe(name: str, what: Any) -> Field:
 
 
 def service(name: str) -> ServiceType:
-    """A service type: its request and its response class."""
+    """Return a service type with its request and response classes."""
     known = _services.get(name)
     if known:
         return known
@@ -257,7 +260,7 @@ def service(name: str) -> ServiceType:
 
 
 def new(name: str, /, **fields: Any) -> Any:
-    """A message of type *name*; fields not given have their defaults, a nested one may be a ``dict``.
+    """Return a new message of type `name`; other fields have defaults, a nested one may be a ``dict``.
 
     Raises ``UsageError`` for an unknown type or field.
     """
@@ -283,12 +286,12 @@ def _nested(cls: type[Message], key: str, value: dict[str, Any]) -> Any:
 
 
 def request(name: str, /, **fields: Any) -> Any:
-    """A request of service type *name*, like ``new``."""
+    """Return a new request of service type `name`; see ``new``."""
     return new(f"{service_name(name)}_Request", **fields)
 
 
 def definition(name: str) -> str:
-    """A type's text in ROS 2's ``.msg`` format, those it is made of included (MCAP's ``ros2msg``)."""
+    """Return a type's definition in ``.msg`` format with its nested types (MCAP's ``ros2msg``)."""
     return store().generate_msgdef(message_name(name), ros_version=2)[0]
 
 
@@ -297,14 +300,14 @@ _SPELLED = {"float32": "float", "float64": "double", "bool": "boolean", "byte": 
 
 @cache
 def idl_fields(name: str) -> dict[str, str]:
-    """The types of a message's fields by their names: ``{"data": "sequence<double>"}``."""
+    """Return the IDL types of a message's fields by name: ``{"data": "sequence<double>"}``."""
     fields = store().fielddefs[message_name(name)][1]
     return {label: _spell(what) for label, what in fields if label != "structure_needs_at_least_one_member"}
 
 
 @cache
 def nested_types(name: str) -> tuple[str, ...]:
-    """The message types that *name* is made of directly."""
+    """Return the message types that are fields, or elements of fields, of type `name`."""
     inner = (_inner(what) for _, what in store().fielddefs[message_name(name)][1])
     return tuple(sorted({one for one in inner if one}))
 
