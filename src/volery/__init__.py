@@ -1,8 +1,8 @@
 """volery: model a drone-and-rover service once, simulate it, fly it, and learn what it costs the computers.
 
-The names that most programs need are imported when they are first used, so that ``import volery`` is light. They
-are listed once, in the imports below, which type checkers and editors read. At run time the same lines are read
-from this file, because a second list would have to be kept in agreement with them.
+The names that most programs need are imported when they are first used, so that ``import volery`` is light.
+They are listed once, in the imports below, which type checkers and editors read. At run time the same lines
+are read from this file, because a second list would have to be kept in agreement with them.
 """
 
 from __future__ import annotations

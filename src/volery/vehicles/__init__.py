@@ -1,4 +1,4 @@
-"""Drone and Rover: blocking operations, seen on telemetry; and what a driver is."""
+"""The flying API: vehicles with blocking operations, and what a driver of an autopilot is."""
 
 from volery.vehicles.driver import Capability, Driver, DriverFactory, drivers
 from volery.vehicles.drone import Drone

@@ -1,19 +1,17 @@
-"""Where a vehicle is reached: one URL is a driver plus a carrier.
+"""Where a vehicle is reached: an address is a URL of driver, transport and options.
 
 ```
-sim:ardupilot?home=46.0828,-103.899,900     simulated here
-ardupilot+tcp://127.0.0.1:5760              connects there
-ardupilot+udp://:14550                      binds, answers the first who speaks
-ardupilot+udp://10.0.0.7:14551              sends there
+sim:ardupilot?home=46.0828,-103.899,900     simulated in this program
+ardupilot+tcp://127.0.0.1:5760              connects to a server
+ardupilot+udp://:14550                      binds the port and answers the first sender
+ardupilot+udp://10.0.0.7:14551              sends to a host
 ardupilot+serial:///dev/ttyUSB0?baud=57600  a radio or a cable
-mavros+graph:///drone_1                     topics and services of a graph, under that namespace
+mavros+graph:///drone_1                     topics and services of a graph, below that namespace
 ```
 
-Listening uses the same form without a driver: ``tcp://127.0.0.1:5760``, ``udp://127.0.0.1:14550``.
-
-From an address to an open link. ``sim`` and ``graph`` are not carriers of bytes: ``run`` supplies them.
-
-Options of an address that are the drivers' own.
+Addresses to listen at have the same form without a driver: ``tcp://127.0.0.1:5760``,
+``udp://127.0.0.1:14550``. Links are opened here for tcp, udp and serial; the package ``run`` supplies
+simulated vehicles and graphs.
 """
 
 from __future__ import annotations
@@ -33,12 +31,26 @@ from volery.links.tcp_link import TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
 
 TRANSPORTS = ("graph", "ros1", "ros2", "serial", "sim", "tcp", "udp")
-"""How a driver can reach an autopilot."""
 
 EXAMPLES = (
     "sim:ardupilot, ardupilot+tcp://127.0.0.1:5760, ardupilot+udp://:14550, "
     "ardupilot+serial:///dev/ttyUSB0?baud=57600 or mavros+graph:///drone_1"
 )
+
+DEFAULT_BAUD = 57_600
+USUAL_BAUD = {"pprzlink": 115_200}
+"""Default baud rate by protocol, where it differs."""
+ANY_HOST = "0.0.0.0"
+LOCAL_PORT = "from"
+"""Option of a UDP address with a host: the local port to send from and listen at."""
+REPLY_PORT = "uplink"
+"""Option of a UDP address without a host: the sender's port for replies, if it differs from its source port."""
+LAST_PORT = 65_535
+
+MAVLINK_OPTIONS = ("attitude", "baud", "rate", "system", "texts")
+"""Options of MAVLink drivers: ``rate`` of the position and ``attitude`` in Hz, ``system`` id, and
+``texts=unrecorded`` if the autopilot records its texts itself, as a simulated one does.
+"""
 
 
 def _no_options() -> Mapping[str, str]:
@@ -47,13 +59,20 @@ def _no_options() -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class Address:
-    """A parsed URL. ``driver`` is empty in an address to listen at; ``port`` is ``None`` where there is none.
+    """A parsed address.
 
-    ``host`` is empty in ``udp://:14550``: bind there and answer the first who speaks.
+    Args:
+        driver: name of the driver; empty in an address to listen at.
+        transport: one of ``TRANSPORTS``.
+        host: host; empty in ``udp://:14550``, which binds the port and answers the first sender.
+        port: port; ``None`` where there is none.
+        path: device or namespace.
+        options: options by name.
+        text: the address as written.
     """
 
     driver: str
-    carrier: str
+    transport: str
     host: str = ""
     port: int | None = None
     path: str = ""
@@ -64,7 +83,7 @@ class Address:
         return self.text
 
     def number(self, option: str, default: float) -> float:
-        """The option as a number; a ``UsageError`` names the option if it is none."""
+        """Return an option as a number; ``UsageError`` names an option that is not a number."""
         given = self.options.get(option)
         if given is None:
             return default
@@ -74,13 +93,12 @@ class Address:
             raise UsageError(f"{self.text}: {option}={given!r} is not a number") from None
 
     def numbers(self, option: str, count: int) -> tuple[float, ...] | None:
-        """The option as *count* numbers between commas; ``None`` if it is not given."""
+        """Return an option as *count* comma-separated numbers, or ``None`` if it is not given."""
         given = self.options.get(option)
         if given is None:
             return None
-        parts = given.split(",")
         try:
-            numbers = tuple(float(part) for part in parts)
+            numbers = tuple(float(part) for part in given.split(","))
         except ValueError:
             numbers = ()
         if len(numbers) != count:
@@ -88,26 +106,40 @@ class Address:
         return numbers
 
     def only(self, *allowed: str) -> None:
-        """Refuse options that nobody would look at."""
+        """Raise ``UsageError`` for an option that is not among *allowed*."""
         for name in self.options:
             if name not in allowed:
                 hint = did_you_mean(name, allowed)
                 raise UsageError(f"{self.text}: no option {name!r}{hint}; there is {choices(allowed)}")
 
 
+# -- parsing
+
+
 def parse(text: str) -> Address:
-    """The address of a vehicle. Raises ``UsageError`` naming what is wrong and the valid choices."""
+    """Parse the address of a vehicle.
+
+    Raises:
+        UsageError: the address is invalid; the message names the error and the valid choices.
+    """
     url = _split(text)
     if url.scheme == "sim":
-        return _simulated(text, url)
-    driver, plus, carrier = url.scheme.partition("+")
+        name = (url.netloc + url.path).strip("/")
+        if not name:
+            raise UsageError(f"{text!r} does not say which autopilot to simulate; try sim:ardupilot")
+        return Address(name, "sim", options=_options(text, url), text=text)
+    driver, plus, transport = url.scheme.partition("+")
     if not plus or not driver:
         raise UsageError(f"{text!r} does not say which driver to use; an address is like {EXAMPLES}")
-    return _with_transport(text, url, driver, carrier)
+    return _with_transport(text, url, driver, transport)
 
 
 def parse_listen(text: str) -> Address:
-    """An address to listen at, or to send to: ``tcp://HOST:PORT``, ``udp://:PORT`` or ``udp://HOST:PORT``."""
+    """Parse an address to listen at or to send to: ``tcp://HOST:PORT``, ``udp://:PORT``, ``udp://HOST:PORT``.
+
+    Raises:
+        UsageError: the address is invalid.
+    """
     url = _split(text)
     if url.scheme not in {"tcp", "udp"}:
         raise UsageError(f"{text!r}: one listens at tcp://HOST:PORT or udp://HOST:PORT, not {url.scheme!r}")
@@ -135,109 +167,98 @@ def _options(text: str, url: SplitResult) -> Mapping[str, str]:
     return MappingProxyType(dict(pairs))
 
 
-def _simulated(text: str, url: SplitResult) -> Address:
-    name = (url.netloc + url.path).strip("/")
-    if not name:
-        raise UsageError(f"{text!r} does not say which autopilot to simulate; try sim:ardupilot")
-    return Address(name, "sim", options=_options(text, url), text=text)
-
-
-def _with_transport(text: str, url: SplitResult, driver: str, carrier: str) -> Address:
-    if carrier not in TRANSPORTS or carrier == "sim":
+def _with_transport(text: str, url: SplitResult, driver: str, transport: str) -> Address:
+    if transport not in TRANSPORTS or transport == "sim":
         valid = [name for name in TRANSPORTS if name != "sim"]
         known = f"{choices(valid)} (and sim:{driver})"
-        raise UsageError(f"{text!r}: no carrier {carrier!r}{did_you_mean(carrier, valid)}; there is {known}")
-    address = Address(driver, carrier, url.hostname or "", url.port, url.path, _options(text, url), text)
-    _complete(address)
+        hint = did_you_mean(transport, valid)
+        raise UsageError(f"{text!r}: no transport {transport!r}{hint}; there is {known}")
+    address = Address(driver, transport, url.hostname or "", url.port, url.path, _options(text, url), text)
+    if transport in {"tcp", "udp"}:
+        _check_socket(address)
+    elif address.host:
+        raise UsageError(
+            f"{text!r}: {address.host!r} stands where a host would; "
+            f"write three slashes, as in {transport}:///{address.host}{address.path}"
+        )
+    elif transport == "serial" and not address.path.strip("/"):
+        raise UsageError(f"{text!r} lacks the device, as in serial:///dev/ttyUSB0?baud=57600")
     return address
 
 
-def _complete(address: Address) -> None:
-    if address.carrier in {"tcp", "udp"}:
-        _complete_socket(address)
-    elif address.host:
-        raise UsageError(
-            f"{address.text!r}: {address.host!r} stands where a host would; "
-            f"write three slashes, as in {address.carrier}:///{address.host}{address.path}"
-        )
-    elif address.carrier == "serial" and not address.path.strip("/"):
-        raise UsageError(f"{address.text!r} lacks the device, as in serial:///dev/ttyUSB0?baud=57600")
-
-
-def _complete_socket(address: Address) -> None:
+def _check_socket(address: Address) -> None:
     if address.port is None:
-        raise UsageError(f"{address.text!r} lacks the port, as in {address.carrier}://127.0.0.1:5760")
-    if address.carrier == "tcp" and not address.host:
+        raise UsageError(f"{address.text!r} lacks the port, as in {address.transport}://127.0.0.1:5760")
+    if address.transport == "tcp" and not address.host:
         raise UsageError(f"{address.text!r} lacks the host, as in tcp://127.0.0.1:{address.port}")
     if address.path.strip("/"):
         raise UsageError(f"{address.text!r}: {address.path!r} means nothing after HOST:PORT")
 
 
-DEFAULT_BAUD = 57_600
-USUAL_BAUD = {"pprzlink": 115_200}
-"""By protocol, where another one is usual."""
-ANYWHERE = "0.0.0.0"
-"""``udp://:PORT`` means just this: whoever speaks first."""
-
-LOCAL_PORT = "from"
-"""Option of a UDP address with a host: the port that is sent from, and listened at."""
-REPLY_PORT = "uplink"
-"""Option of a UDP address without: the port at which whoever speaks listens, if it speaks from another."""
-LAST_PORT = 65_535
+# -- opening links
 
 
 def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, shared: bool = False) -> CodedLink:
-    """The link to an autopilot at *address* (tcp, udp, serial), in the words of *codec*; *shared*: to all
-    that speak there.
+    """Open the link to an autopilot; it connects by itself, and again after a break.
 
-    It connects by itself, again after a break.
+    Args:
+        kernel: clock and tasks.
+        address: address with transport tcp, udp or serial.
+        codec: codec of the frames.
+        shared: whether several autopilots send to the same UDP port.
 
-    Raises ``UsageError`` for another carrier, a baud rate that is none, or a port that is taken.
+    Raises:
+        UsageError: another transport, an invalid baud rate, or a port that is in use.
     """
-    if address.carrier == "tcp":
+    if address.transport == "tcp":
         return TcpClient(kernel, address.host, _port(address), address.text, codec)
-    if address.carrier == "udp":
+    if address.transport == "udp":
         if shared and not address.host:
             if REPLY_PORT in address.options:
                 raise UsageError(f"{address}: {REPLY_PORT} is for one vehicle behind a port, not for several")
-            return UdpServer(kernel, ANYWHERE, _port(address), address.text, codec=codec)
+            return UdpServer(kernel, ANY_HOST, _port(address), address.text, codec=codec)
         return _udp(kernel, address, codec)
-    if address.carrier == "serial":
+    if address.transport == "serial":
         baud = address.number("baud", USUAL_BAUD.get(codec.name, DEFAULT_BAUD))
         if baud <= 0 or baud != int(baud):
             raise UsageError(f"{address}: baud={baud:g} is no baud rate; usual are 57600, 115200 and 921600")
         return SerialLink(kernel, address.path, int(baud), address.text, codec)
-    raise UsageError(f"{address}: {address.carrier} is not a carrier of bytes; tcp, udp and serial are")
+    raise UsageError(f"{address}: {address.transport} carries no bytes; tcp, udp and serial do")
 
 
 def listen(
     kernel: Kernel,
     address: Address,
     *,
-    joined: Callable[[], None] | None = None,
+    on_connect: Callable[[], None] | None = None,
     codec: Codec = MAVLINK,
 ) -> CodedLink:
-    """Where an autopilot serves: tcp clients connect; udp sends to a host or answers the first speaker.
+    """Open the link at which a simulated autopilot is served.
 
-    A UDP address with a host may say with option ``from`` which port is sent from, and listened at.
+    Args:
+        kernel: clock and tasks.
+        address: tcp: clients connect; udp: sends to a host, or answers the first sender.
+        on_connect: called when a TCP client connects.
+        codec: codec of the frames.
     """
-    if address.carrier == "tcp":
+    if address.transport == "tcp":
         address.only()
-        return TcpServer(kernel, address.host, _port(address), address.text, on_connect=joined, codec=codec)
+        host, port = address.host, _port(address)
+        return TcpServer(kernel, host, port, address.text, on_connect=on_connect, codec=codec)
     address.only(LOCAL_PORT)
     return _udp(kernel, address, codec)
 
 
 def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
     if address.host:
-        ours = _port_option(address, LOCAL_PORT)
-        return UdpLink(kernel, ANYWHERE, ours, (address.host, _port(address)), address.text, codec=codec)
-    theirs = _port_option(address, REPLY_PORT) or None
-    return UdpLink(kernel, ANYWHERE, _port(address), None, address.text, codec=codec, answers_to=theirs)
+        local = _port_option(address, LOCAL_PORT)
+        return UdpLink(kernel, ANY_HOST, local, (address.host, _port(address)), address.text, codec=codec)
+    reply = _port_option(address, REPLY_PORT) or None
+    return UdpLink(kernel, ANY_HOST, _port(address), None, address.text, codec=codec, answers_to=reply)
 
 
 def _port_option(address: Address, name: str) -> int:
-    """0 if it is not given."""
+    """Return the port in an option; 0 if it is not given."""
     port = address.number(name, 0)
     if not 0 <= port <= LAST_PORT or port != int(port):
         raise UsageError(f"{address}: {name}={port:g} is no port; 1 to {LAST_PORT} are")
@@ -250,14 +271,19 @@ def _port(address: Address) -> int:
     return address.port
 
 
-MAVLINK_OPTIONS = ("attitude", "baud", "rate", "system", "texts")
-"""``rate_option`` of the position and ``attitude`` in Hz, ``system_option`` id; and ``texts=unrecorded`` where the
-autopilot records its texts itself, as a simulated one does.
-"""
+# -- options of drivers
+
+
+def check_options(driver: str, options: Mapping[str, str], *allowed: str) -> None:
+    """Raise ``UsageError`` for an option that is not among *allowed*."""
+    for name in options:
+        if name not in allowed:
+            hint = did_you_mean(name, allowed)
+            raise UsageError(f"the {driver} driver has no option {name!r}{hint}; it has {choices(allowed)}")
 
 
 def rate_option(name: str, options: Mapping[str, str], default: float, *, least: float = 0.0) -> float:
-    """Hz."""
+    """Return the option as a rate in Hz, from *least* to 100."""
     given = options.get(name)
     if given is None:
         return default
@@ -271,7 +297,7 @@ def rate_option(name: str, options: Mapping[str, str], default: float, *, least:
 
 
 def records_texts(options: Mapping[str, str]) -> bool:
-    """The autopilot's texts are to go into the trace."""
+    """Return whether the driver records the autopilot's texts (option ``texts``)."""
     given = options.get("texts", "recorded")
     if given not in {"recorded", "unrecorded"}:
         raise UsageError(f"texts={given!r}; there is recorded or unrecorded")
@@ -279,18 +305,10 @@ def records_texts(options: Mapping[str, str]) -> bool:
 
 
 def system_option(options: Mapping[str, str]) -> int | None:
-    """A system id; ``None``: take the first autopilot that speaks."""
+    """Return the system id, or ``None`` to take the first autopilot that is received."""
     given = options.get("system")
     if given is None:
         return None
     if not given.isdigit() or not 1 <= int(given) <= 255:
         raise UsageError(f"system={given!r} is no system id from 1 to 255")
     return int(given)
-
-
-def check_options(driver: str, options: Mapping[str, str], *allowed: str) -> None:
-    """Refuse options that nobody would look at."""
-    for name in options:
-        if name not in allowed:
-            hint = did_you_mean(name, allowed)
-            raise UsageError(f"the {driver} driver has no option {name!r}{hint}; it has {choices(allowed)}")

@@ -1,7 +1,8 @@
 """What a driver is: telemetry that it keeps, and for each operation the steps that its autopilot needs.
 
 A driver returns data and never waits; ``executor`` executes the steps of every driver for every vehicle.
-Time-outs, refusals, restarts, takeover and fences therefore exist once, and a driver is testable without a clock.
+Time-outs, refusals, restarts, takeover and fences therefore exist once, and a driver is testable without a
+clock.
 """
 
 from __future__ import annotations
@@ -93,8 +94,9 @@ class Step:
 class ManualControl(NamedTuple):
     """Positions of the four sticks.
 
-    Pitch (forward positive), roll (right positive) and yaw (clockwise positive) are in -1..1, throttle in 0..1,
-    where 0.5 keeps the altitude in altitude hold. For a rover roll is the steering and throttle is in -1..1.
+    Pitch (forward positive), roll (right positive) and yaw (clockwise positive) are in -1..1, throttle in
+    0..1, where 0.5 keeps the altitude in altitude hold. For a rover roll is the steering and throttle is in
+    -1..1.
     """
 
     pitch: float = 0.0

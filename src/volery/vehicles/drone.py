@@ -44,8 +44,8 @@ class Drone(Vehicle):
     def takeoff(self, height: float) -> None:
         """Wait until ready, arm, and climb.
 
-        The sequence starts again, at most three times, if it is undone before lift-off because another station
-        changes the mode or disarms.
+        The sequence starts again, at most three times, if it is undone before lift-off because another
+        station changes the mode or disarms.
 
         Args:
             height: metres above home.
@@ -97,8 +97,8 @@ class Drone(Vehicle):
             speed: speed over ground, m/s; ``None`` means the autopilot's own.
 
         Raises:
-            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is sent),
-                or were violated on the way.
+            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is
+                sent), or were violated on the way.
             Refused: it is on the ground, or the autopilot refuses.
         """
         self._require(Capability.GOTO)
@@ -249,8 +249,8 @@ class Drone(Vehicle):
     def stabilize(self) -> None:
         """Enter the mode in which manual control commands attitude and throttle; on the ground also arm.
 
-        It needs no position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control`` was
-        called within the last second.
+        It needs no position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control``
+        was called within the last second.
         """
         self._require(Capability.STABILIZE)
         self._enter_manual_mode("stabilize", "fly stabilized", self._driver.stabilize)

@@ -1,7 +1,7 @@
 """The executor of steps, one for all drivers: time-outs, refusals, restarts, takeover and link loss.
 
-A driver states what to send and how telemetry shows that it is done; everything that can go wrong meanwhile is
-handled here, once. MAVLink does not say who changed a mode. A mode that this program did not command is
+A driver states what to send and how telemetry shows that it is done; everything that can go wrong meanwhile
+is handled here, once. MAVLink does not say who changed a mode. A mode that this program did not command is
 therefore taken as the choice of a pilot, another station or a failsafe, and is never overridden in flight.
 """
 

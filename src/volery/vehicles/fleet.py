@@ -1,4 +1,4 @@
-"""A fleet: vehicles by name, and what one would ask of all of them at once. No more than that."""
+"""A fleet: vehicles by name, and operations for all of them at once."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ R = TypeVar("R")
 class Fleet(Mapping[str, Vehicle]):
     """Vehicles by name, on one clock, of any kinds and autopilots.
 
-    A group operation is asked of all vehicles at once and returns when the last has done it. One that fails
-    does not stop the others; then ``FleetError`` says which failed and how. To ask only some of them, make a
-    fleet of those: ``Fleet({name: fleet[name] for name in ("a", "b")})``.
+    A group operation starts on all vehicles at once and returns when the last one is done. A failure does not
+    stop the others; ``FleetError`` then names the vehicles that failed and their errors. For a part of the
+    vehicles, make a fleet of these: ``Fleet({name: fleet[name] for name in ("a", "b")})``.
+
+    Args:
+        vehicles: vehicles by name; at least one.
     """
 
     def __init__(self, vehicles: Mapping[str, Vehicle]) -> None:
@@ -48,41 +51,46 @@ class Fleet(Mapping[str, Vehicle]):
         return len(self._vehicles)
 
     def each(self, function: Callable[[Any], R], asked: str = "") -> dict[str, R]:
-        """``function(vehicle)`` for all at once, each in a flow of control of its own; what they return, by
-        name.
+        """Call ``function(vehicle)`` for all vehicles at once, each in its own task.
 
-        *asked* names it in messages, else the function does. Raises ``FleetError`` after the last has ended.
+        Args:
+            function: operation on one vehicle.
+            asked: the operation in words, for messages; by default the function's name.
+
+        Returns:
+            What the calls returned, by name of the vehicle.
+
+        Raises:
+            FleetError: at least one call raised an error; raised after the last call has ended.
         """
         named = getattr(function, "__name__", "each")
         asked = asked or (named if named.isidentifier() else "each")
-        return _Round(self._kernel, asked, self._vehicles, function).run()
+        return _GroupOperation(self._kernel, asked, self._vehicles, function).run()
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:
-        """Until each could arm and go by position."""
+        """Wait until each vehicle could arm and go to a position, at most *within* seconds."""
         self.each(lambda vehicle: vehicle.wait_ready(within), "be ready")
 
     def takeoff(self, height: float) -> None:
-        """All drones, to *height* metres above the home of each; rovers stay where they are."""
-        self._drones(f"take off to {height:g} m", lambda drone: drone.takeoff(height))
+        """Take off with all drones, to *height* metres above the home of each; rovers stay."""
+        asked = f"take off to {height:g} m"
+        self.each(lambda one: one.takeoff(height) if isinstance(one, Drone) else None, asked)
 
     def hold(self) -> None:
-        """Each stops and stays."""
+        """Stop all vehicles and hold their positions."""
         self.each(lambda vehicle: vehicle.hold(), "hold")
 
     def return_home(self) -> None:
-        """Each to its own home: drones land there, rovers stop."""
+        """Return each vehicle to its own home; drones land there, rovers stop."""
         self.each(lambda vehicle: vehicle.return_home(), "return home")
 
     def land(self) -> None:
-        """All drones, where they are; rovers stop."""
+        """Land all drones in place; rovers stop."""
         self.each(lambda one: one.land() if isinstance(one, Drone) else one.hold(), "land")
 
-    def _drones(self, asked: str, function: Callable[[Drone], None]) -> None:
-        self.each(lambda one: function(one) if isinstance(one, Drone) else None, asked)
 
-
-class _Round:
-    """One group operation under way."""
+class _GroupOperation:
+    """One group operation in progress."""
 
     def __init__(
         self,
@@ -100,7 +108,7 @@ class _Round:
         self._changed = Signal(kernel, f"{asked}: {', '.join(vehicles)}")
 
     def run(self) -> dict[str, Any]:
-        """Start all, wait for all."""
+        """Start all tasks and wait for all of them."""
         with self._kernel as kernel:
             caller = current_task(kernel)
             scope = caller.scope.child(self._asked)
@@ -109,18 +117,18 @@ class _Round:
             self._changed.wait_for(lambda: all(task.done for task in tasks) or self._complete())
         except BaseException:
             with self._kernel.guard:
-                self._kernel.cancel(scope, f"{self._asked}: whoever asked for it was stopped")
+                self._kernel.cancel(scope, f"{self._asked}: its caller was stopped")
             raise
         finally:
             with self._kernel.guard:
                 if self._complete() and scope in caller.scope.children:
                     caller.scope.children.remove(scope)
         if self._failed:
-            raise FleetError(self._asked, {name: self._failed[name] for name in self._in_order(self._failed)})
-        return {name: self._returned[name] for name in self._in_order(self._returned)}
+            raise FleetError(self._asked, self._in_order(self._failed))
+        return self._in_order(self._returned)
 
-    def _in_order(self, found: Mapping[str, Any]) -> list[str]:
-        return [name for name in self._vehicles if name in found]
+    def _in_order(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: found[name] for name in self._vehicles if name in found}
 
     def _complete(self) -> bool:
         return len(self._returned) + len(self._failed) == len(self._vehicles)

@@ -2,8 +2,8 @@
 
 All checks use the local frame about home: metres east and north of home, and metres above home. ``Bounds``
 computes that frame and the areas of the fence once for one home, because every command and every position
-report is checked. A goal is checked along the straight path before anything is sent; while the vehicle travels,
-``BoundsMonitor`` checks each reported position and the battery.
+report is checked. A goal is checked along the straight path before anything is sent; while the vehicle
+travels, ``BoundsMonitor`` checks each reported position and the battery.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Limits:
         farthest: greatest horizontal distance from home, m.
         highest: greatest height above home, m. The default is the height above ground to which drones may fly
             without a permit in the EU and in many other countries.
-        lowest: least height above home, m. The default leaves 2 m for the error of the estimate; state a lower
-            value if a goal lies below home.
+        lowest: least height above home, m. The default leaves 2 m for the error of the estimate; state a
+            lower value if a goal lies below home.
         battery_reserve: share of the battery, 0 to below 1, below which only landing, returning and holding
             are allowed. 0 means no reserve.
     """
@@ -146,8 +146,8 @@ class HomeFrame(NamedTuple):
     def local(self, position: Position) -> Vector:
         """Return metres east and north of home and metres above home.
 
-        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude of
-        another kind (above ground) is taken as above home: the best estimate without a terrain model.
+        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude
+        of another kind (above ground) is taken as above home: the best estimate without a terrain model.
         """
         up = self.above(position.altitude)
         height = position.altitude.metres if up is None else up

@@ -30,8 +30,8 @@ class Rover(Vehicle):
             speed: speed, m/s; ``None`` means the autopilot's own.
 
         Raises:
-            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is sent),
-                or were violated on the way.
+            OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is
+                sent), or were violated on the way.
         """
         self._require(Capability.GOTO)
         latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal

@@ -1,8 +1,8 @@
 """What drones and rovers share: state, readiness, missions, and how every operation is carried out.
 
-Every call is an interaction point. An operation blocks until telemetry shows that it is done; it has a time-out,
-and an error names the vehicle, the operation, the autopilot's own text and the remedy. One operation runs at a
-time, only while no other station has control, within the bounds, and it is recorded.
+Every call is an interaction point. An operation blocks until telemetry shows that it is done; it has a
+time-out, and an error names the vehicle, the operation, the autopilot's own text and the remedy. One
+operation runs at a time, only while no other station has control, within the bounds, and it is recorded.
 
 | what ends an operation | the caller gets | the vehicle |
 |---|---|---|
@@ -106,9 +106,10 @@ def path_timeout(path: Path, speed: float | None) -> Ns:
 class Vehicle(ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
-    Limits and fence are checked before anything is sent and at each position report while the vehicle travels.
-    ``hold``, ``return_home``, ``land`` and ``kill`` are allowed outside the bounds and abort the operation of
-    another task. A vehicle under the control of another station gets no messages; only ``kill`` is always sent.
+    Limits and fence are checked before anything is sent and at each position report while the vehicle
+    travels. ``hold``, ``return_home``, ``land`` and ``kill`` are allowed outside the bounds and abort the
+    operation of another task. A vehicle under the control of another station gets no messages; only ``kill``
+    is always sent.
 
     Args:
         kernel: clock and tasks.
@@ -368,8 +369,8 @@ class Vehicle(ABC):
     def start_mission(self, within: float = MISSION_WITHIN_S) -> None:
         """Arm, start the mission on board and return when it has ended.
 
-        A mission uploaded by this program is checked against limits and fence again. The floor of the fence is
-        not checked on the way.
+        A mission uploaded by this program is checked against limits and fence again. The floor of the fence
+        is not checked on the way.
 
         Args:
             within: longest duration of the mission, s.

@@ -122,7 +122,10 @@ def test_a_mission_may_state_its_own(fly: Any) -> None:
         ("{", "no JSON"),
         ("[]", "a GeoJSON object is expected"),
         ('{"type": "Point"}', "type 'Point'; there is Feature, FeatureCollection"),
-        ('{"type": "FeatureCollection", "features": []}', "features: a list with at least one entry is expected"),
+        (
+            '{"type": "FeatureCollection", "features": []}',
+            "features: a list with at least one entry is expected",
+        ),
         ({"type": "Polygon", "coordinates": [[]]}, "a list with at least one entry is expected"),
         ({"type": "Polygon", "coordinates": [[[1, 2], [3, 4]]]}, "has 2 corners; it takes at least 3"),
         ({"type": "Polygon", "coordinates": [[[1, "x"], [3, 4], [5, 6]]]}, "no [longitude, latitude]"),
@@ -203,7 +206,7 @@ def test_calls_that_make_no_sense(fly: Any, call: str, says: str) -> None:
     [
         ("sim:ardupilo", "no driver named 'ardupilo' (did you mean 'ardupilot'?); there is ardupilot, "),
         ("px5+udp://:14540", "no driver named 'px5'"),
-        ("px4+upd://:14540", "no carrier 'upd' (did you mean 'udp'?)"),
+        ("px4+upd://:14540", "no transport 'upd' (did you mean 'udp'?)"),
         ("dji+tcp://127.0.0.1:5000", "dji is reached over a graph"),
         ("px4+udp://", "lacks the port"),
         ("ardupilot+serial:///dev/ttyUSB0?baud=fast", "baud='fast' is not a number"),
@@ -248,7 +251,7 @@ def test_an_autopilot_of_another_make_answers(fly: Any) -> None:
             assert b"serving" in served.stdout.readline()
             status, said = fly(url=f"px4+tcp://127.0.0.1:{port}")
             assert status == FAILED
-            assert "px4: an ArduPilot speaks here, not a PX4" in said
+            assert "px4: an ArduPilot answers here, not a PX4" in said
             status, said = fly(url=f"paparazzi+tcp://127.0.0.1:{port}")
             assert status == FAILED
             assert "MAVLink arrives, not pprzlink" in said

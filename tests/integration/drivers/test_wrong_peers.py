@@ -112,5 +112,5 @@ def test_a_baud_rate_that_is_none() -> None:
 
 
 def test_a_carrier_of_no_bytes() -> None:
-    with pytest.raises(UsageError, match="graph is not a carrier of bytes"):
+    with pytest.raises(UsageError, match="graph carries no bytes"):
         open_link(WallKernel(), parse("mavros+graph:///drone_1"))

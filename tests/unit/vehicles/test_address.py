@@ -43,7 +43,7 @@ def test_options() -> None:
         ("drone", "is not an address"),
         ("tcp://127.0.0.1:5760", "does not say which driver"),
         ("ardupilot+tpc://127.0.0.1:5760", "did you mean 'tcp'"),
-        ("ardupilot+sim://", "no carrier 'sim'"),
+        ("ardupilot+sim://", "no transport 'sim'"),
         ("ardupilot+tcp://127.0.0.1", "lacks the port"),
         ("ardupilot+tcp://:5760", "lacks the host"),
         ("ardupilot+tcp://127.0.0.1:5760/x", "means nothing"),

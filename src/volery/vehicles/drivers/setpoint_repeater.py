@@ -1,7 +1,7 @@
 """Repetition of velocities and manual control.
 
-An autopilot treats missing manual control as the loss of its transmitter; a single velocity may be lost on the
-way, and some autopilots forget the last one while others follow it without end.
+An autopilot treats missing manual control as the loss of its transmitter; a single velocity may be lost on
+the way, and some autopilots forget the last one while others follow it without end.
 """
 
 from __future__ import annotations

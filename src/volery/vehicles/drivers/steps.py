@@ -156,8 +156,8 @@ def horizontal_distance(here: Position | None, there: Position) -> float:
 class Takeover:
     """Whether another station has control although the vehicle is in the offboard mode.
 
-    The mode does not show it. The other station keeps control until it has selected another mode in between, or
-    the vehicle is disarmed.
+    The mode does not show it. The other station keeps control until it has selected another mode in between,
+    or the vehicle is disarmed.
 
     Args:
         kernel: clock.

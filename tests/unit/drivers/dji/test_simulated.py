@@ -62,7 +62,7 @@ class Flown:
 
     def switch(self, pulse: int) -> None:
         """The pilot's mode switch."""
-        self.fleet.autopilots["d"].vehicle.sticks.transmitter[4] = pulse
+        self.fleet.autopilots["d"].vehicle.rc.transmitter[4] = pulse
 
     @property
     def height(self) -> float:

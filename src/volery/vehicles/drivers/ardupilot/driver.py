@@ -2,8 +2,8 @@
 
 Facts observed on ArduCopter and ArduRover 4.5: a change of mode is accepted on the ground without a position,
 arming in GUIDED is not; so the driver waits until the vehicle is ready. An accepted command is acknowledged
-before the heartbeat shows its effect. A target in GUIDED is not acknowledged and never expires; a velocity lasts
-3 s. Manual control falls back on the transmitter after 3 s.
+before the heartbeat shows its effect. A target in GUIDED is not acknowledged and never expires; a velocity
+lasts 3 s. Manual control falls back on the transmitter after 3 s.
 """
 
 from __future__ import annotations

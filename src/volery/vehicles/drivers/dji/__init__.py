@@ -1,7 +1,6 @@
-"""DJI aircraft through the ROS node of their onboard SDK: ``dji_sdk`` 3.8, or the vehicle node of
-``dji_osdk_ros`` 4.1, over any graph.
+"""DJI aircraft behind the ROS node of their onboard SDK: ``dji_sdk`` 3.8, or ``dji_osdk_ros`` 4.1, on any graph.
 
-The protocol is from public definitions and has not been flown; what is assumed: ``assumed``.
+The driver follows the public definitions and has not been flown; ``driver.ASSUMED`` lists the assumptions.
 """
 
 from __future__ import annotations
@@ -28,11 +27,15 @@ NAMES: Mapping[str, Callable[[Node, str], NodeInterface]] = {
 
 
 def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> Dji:
-    """A DJI aircraft behind its ROS node, commanded by *node*. It begins to listen at once.
+    """Open a DJI aircraft behind its ROS node; it is subscribed to from now on.
 
-    Options: ``namespace`` of its names, else ``/dji_sdk``; ``names``: ``dji_sdk`` or ``dji_osdk_ros``, by
-    default the one that the namespace ends in, else ``dji_sdk``; ``texts=unrecorded`` where the aircraft
-    records what happens itself, as a simulated one does.
+    Args:
+        kernel: clock and tasks.
+        node: the node that commands the vehicle.
+        name: name of the vehicle.
+        options: ``namespace`` of the topics (default ``/dji_sdk``); ``names``: ``dji_sdk`` or
+            ``dji_osdk_ros`` (default: the last part of the namespace, else ``dji_sdk``); ``texts=unrecorded``
+            if the aircraft records its texts itself, as a simulated one does.
     """
     check_options("dji", options, *OPTIONS)
     namespace = options.get("namespace", f"/{OLD_NAMES}").rstrip("/")
@@ -45,4 +48,4 @@ def open_driver(kernel: Kernel, node: Node, name: str, options: Mapping[str, str
 
 
 DRIVER = DriverFactory(on_graph=open_driver, namespace=f"/{{name}}/{OLD_NAMES}", graph_names=OLD_NAMES)
-"""Over a graph only: bytes to a DJI aircraft are encrypted, and its own library speaks them."""
+"""Only on a graph: the protocol of DJI aircraft is encrypted, and only DJI's own library implements it."""

@@ -1,7 +1,7 @@
-"""The way to a DJI node: what it says is taken in, set-points go out 50 times a second, requests get answers.
+"""Backend for a DJI node: it processes messages, sends set-points at 50 Hz, and calls services.
 
-It works in tasks of its own at the place of the node that commands: what that takes is charged there, it goes
-on while the component computes, and a computer that is too slow for it makes it late.
+It runs in separate tasks in the execution context of the commanding node: their execution time is charged
+there, they continue while the component computes, and a computer that is too slow delays them.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from volery.vehicles.telemetry import Answer, Telemetry
 
 SETPOINT_PERIOD: Ns = 20 * MS
 ANSWERED_WITHIN: Ns = 60 * S
-"""The vehicle node of 4.1 may answer a task only when it is done."""
+"""The vehicle node of 4.1 may answer a task only when the task is done."""
 QUIET: Ns = 200 * MS
-"""So long after the last set-point none is on its way any more: one that came later would end a task."""
-LOOK_PERIOD: Ns = S
+"""Time after the last set-point from which none is on its way; a later one would end a task."""
+CHECK_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
 KEPT = 1000
-"""Messages that wait to be taken in; older ones are dropped."""
+"""Messages that may wait to be processed; older ones are dropped."""
 
 NOT_M100 = "aircraft of OSDK 4"
 
@@ -50,11 +50,19 @@ class Ack:
 
 
 def _nothing() -> None:
-    """Nothing follows from it."""
+    """Do nothing."""
 
 
 class DjiBackend:
-    """Talks to one node. Making it subscribes and starts its tasks."""
+    """Client of one node. The constructor subscribes and starts its tasks.
+
+    Args:
+        kernel: clock, tasks and record.
+        node: the node that commands the vehicle.
+        name: name of the vehicle.
+        interface: topics and services of the DJI node.
+        record: whether texts are recorded.
+    """
 
     def __init__(
         self, kernel: Kernel, node: Node, name: str, interface: NodeInterface, *, record: bool
@@ -73,7 +81,7 @@ class DjiBackend:
         self._sent_at: Ns = -QUIET
         self._silent = False
         self._closed = False
-        self._place: ExecutionContext = replace(node.context, deadline=None, on_release=None, meter=None)
+        self._context: ExecutionContext = replace(node.context, deadline=None, on_release=None, meter=None)
         self._scope = kernel.root.child(f"{name} (DJI)")
         self._spinner = node.group()
         inbox = node.group(self._take)
@@ -81,21 +89,21 @@ class DjiBackend:
             node.subscribe(f"{interface.namespace}/{topic}", kind, handler, group=inbox)
         self._spawn(self._run, "DJI node")
         self._spawn(self._identify, "greeting")
-        self._watch = kernel.every(LOOK_PERIOD, self._notice_silence)
+        self._watch = kernel.every(CHECK_PERIOD, self._detect_silence)
 
     def _spawn(self, body: Any, what: str) -> None:
-        self._kernel.spawn(body, f"{self.telemetry.name} ({what})", self._place, self._scope)
+        self._kernel.spawn(body, f"{self.telemetry.name} ({what})", self._context, self._scope)
 
-    # -- taking in
+    # -- receiving
 
     def _take(self, work: Work) -> None:
-        """House code."""
+        """Queue a message. Framework callback."""
         self._arrived.append(work)
         if len(self._arrived) == 1:
             self._due.notify()
 
     def _run(self) -> None:
-        """The node's own loop: take in what has come, send what is due."""
+        """Process received messages and send due set-points."""
         while not self._closed and not self._node.closed:
             self._due.wait_for(self._wakes, self._time_left())
             if self._arrived:
@@ -109,7 +117,7 @@ class DjiBackend:
         return max(0, self._next - self._kernel.now()) if self.stream.wanted else None
 
     def _process(self) -> None:
-        """It is paid as one ``spinOnce``, whatever the number of messages."""
+        """Process received messages; all of them are charged as one ``spinOnce``."""
         self._spinner.spin_once(0)
         with self._kernel.guard:
             while self._arrived:
@@ -119,7 +127,7 @@ class DjiBackend:
     def _update(self) -> None:
         if self._silent and self.telemetry.silence(self._kernel.now()) < 1.0:
             self._silent = False
-            self._record_link("back", "the aircraft is heard again")
+            self._record_link("back", "the aircraft is received again")
         self.decoder.update()
         self.stream.update()
         self.telemetry.changed.notify()
@@ -142,26 +150,26 @@ class DjiBackend:
 
     @property
     def quiet(self) -> bool:
-        """No set-point is sent or on its way."""
+        """Whether no set-point is sent or on its way."""
         return not self.stream.wanted and self._kernel.now() - self._sent_at >= QUIET
 
     def wake(self) -> None:
-        """There is something else to send. House code."""
+        """Send a changed set-point at once. Framework callback."""
         self._due.notify()
 
-    def _notice_silence(self) -> None:
+    def _detect_silence(self) -> None:
         heard, now = self.telemetry.last_message_ns, self._kernel.now()
         if heard >= 0 and now - heard > SILENT_AFTER and not self._silent:
             self._silent = True
-            self._record_link("silent", "the aircraft is not heard")
+            self._record_link("silent", "the aircraft is not received")
 
     def _record_link(self, what: str, detail: str) -> None:
         self._kernel.record(LinkState(self._kernel.now(), self.telemetry.name, what, detail))
 
-    # -- who it is
+    # -- identification
 
     def _identify(self) -> None:
-        """Until it is known which aircraft it is, its numbers mean nothing."""
+        """Request the type of aircraft, on which the meaning of its numbers depends."""
         ask = self.interface.version()
         while ask is not None and not self._closed:
             if ask.client.wait(S):
@@ -183,8 +191,12 @@ class DjiBackend:
     # -- requests
 
     def request(self, key: str, ask: ServiceRequest | None, accepted: Action = _nothing) -> None:
-        """Send a request; its answer will be in the telemetry under *key*, *accepted* is called before if it
-        is. Never blocks.
+        """Call a service without blocking; the answer arrives in the telemetry.
+
+        Args:
+            key: key of the answer in ``Telemetry.answers``.
+            ask: the request; ``None`` sends nothing.
+            accepted: called before the answer is stored, if it is positive.
         """
         if ask is None or key in self._pending:
             return
@@ -212,20 +224,20 @@ class DjiBackend:
         self._update()
 
     def activate(self) -> None:
-        """Have the node activate, where it does not by itself."""
+        """Activate the SDK where the node does not by itself."""
         self.request(Ack.ACTIVATION, self.interface.activation(), self.decoder.activate)
 
     def authority(self) -> None:
-        """Obtain the authority."""
+        """Obtain the control authority."""
         self.request(Ack.AUTHORITY, self.interface.authority(True), self.decoder.granted)
 
     def motors(self, on: bool, *, force: bool = False) -> None:
-        """Start or stop them; by force in the air, too."""
+        """Start or stop the motors; *force* stops them in the air, too."""
         ask = self.interface.kill() if force else self.interface.motors(on)
         self.request(Ack.MOTORS, ask, partial(self.decoder.motors, on))
 
     def task(self, task: int, mode: DisplayMode) -> None:
-        """A task, after which it is in that mode. Set-points would end it: none is sent any more."""
+        """Start a task that enters *mode*; set-points, which would end it, are stopped."""
         self.stream.stop()
         self.decoder.commanded = mode.name
         self.request(Ack.TASK, self.interface.task(task))
@@ -233,23 +245,23 @@ class DjiBackend:
     # -- the end
 
     def problem(self) -> LinkError | None:
-        """What is wrong on the way, as far as it shows."""
+        """Return what is wrong with the link, as an error to raise."""
         if self._wrong:
             return LinkSilent(self._wrong)
         if self.telemetry.last_message_ns >= 0:
             return None
         below = self.interface.namespace
         if self.decoder.node_seen:
-            return LinkSilent(f"the node at {below} does not say which aircraft it serves")
+            return LinkSilent(f"the node at {below} does not report which aircraft it serves")
         return LinkSilent(f"no DJI node publishes {below}/flight_status")
 
     @property
     def is_m100(self) -> bool:
-        """Its numbers and its topics are fewer."""
+        """Whether it is a Matrice 100, which has fewer topics and other numbers."""
         return self.decoder.aircraft == M100
 
     def close(self) -> None:
-        """Commands no more; the node is its owner's."""
+        """Stop commanding; the node belongs to its component."""
         self.stream.stop()
         self._closed = True
         self._watch.cancel()

@@ -1,7 +1,7 @@
-"""What a DJI node's topics add_text, as ``Telemetry``. One method for each topic that is listened to.
+"""Decoder of a DJI node's topics. One method for each topic.
 
-Who has the authority is on no topic: it follows from the answers to our requests and from the pilot's mode
-switch, which takes it whenever it is moved.
+No topic reports who has the control authority: it follows from the answers to our requests and from the
+pilot's mode switch, which takes the authority whenever it is moved.
 """
 
 from __future__ import annotations
@@ -29,33 +29,46 @@ from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, 
 Handler = Callable[[Any], None]
 
 SWITCH_AXIS = 4
-"""Of ``rc``: the mode switch. Its numbers differ from aircraft to aircraft; that it moves is what counts."""
+"""Axis of the mode switch in ``rc``. Its values differ between aircraft, so only its movements count."""
 MILLI = 1000.0
 MOST_VOLTS = 100.0
-"""A voltage above it is in millivolts."""
+"""A higher voltage is in millivolts."""
 NO_FIX = -1
 UNKNOWN = -1
 WARNING = 4
 TAKEN_OVER_FOR: Ns = 5 * S
-"""So long it shows as taken by another after set-points were not obeyed."""
+"""Time for which another program counts as in control after set-points were not obeyed."""
 
 SETTLED: Ns = 200 * MS
-"""So long a mode after a way down must show before it is believed: on a bad wire the news that the motors
-stand may come later than that of the mode.
+"""Time for which a mode after a landing must be reported before it counts: on an unreliable link the report that
+the motors stand may arrive later than that of the mode.
 """
 
 WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
-"""Modes in which it hovers and takes commands, if the pilot lets it."""
+"""Modes in which it hovers and accepts commands if the pilot's switch permits."""
 LANDS = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
 DESCENDING_MODES = LANDS | {DisplayMode.NAVI_GO_HOME}
 TAKES_OFF = frozenset({DisplayMode.ENGINE_START, DisplayMode.ASSISTED_TAKEOFF, DisplayMode.AUTO_TAKEOFF})
 
 
 class DjiDecoder:
-    """Turns messages into telemetry, once ``aircraft`` is known: the M100's numbers are its own.
+    """Decodes messages into telemetry, once ``aircraft`` is known: the M100 has its own numbers.
 
-    ``commanded`` is the mode that was commanded of it last. Stages of what was commanded go by its name: a landing at
-    the end of going home is still going home, the start of the motors for a take-off is the take-off.
+    Stages of a commanded operation keep its name as their mode: the landing at the end of going home is still
+    going home, and the start of the motors for a take-off is the take-off.
+
+    Attributes:
+        aircraft: type of aircraft; empty until it is known.
+        activated: the SDK is activated.
+        authority: this program has the control authority.
+        commanded: mode commanded last.
+        node_seen: a DJI node publishes.
+        located_at: time of the last position, ns; -1 before the first.
+
+    Args:
+        kernel: clock and record.
+        telemetry: written by the decoder.
+        record: whether texts are recorded.
     """
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool) -> None:
@@ -65,7 +78,6 @@ class DjiDecoder:
         self.commanded = ""
         self.node_seen = False
         self.located_at: Ns = -1
-        """When it last said where it is."""
         self._kernel = kernel
         self._telemetry = telemetry
         self._records = record
@@ -79,11 +91,11 @@ class DjiDecoder:
         self._granted_at: float | None = None  # where the switch was when we were given the authority
         self._taken = ""
         self._taken_at: Ns = 0
-        self._motors = False  # of an M100, whose status does not tell
+        self._motors = False  # of an M100, whose status does not report them
         self._anomalies = 0
 
     def topics(self, package: str) -> Mapping[str, tuple[str, Handler]]:
-        """Type and handler of each topic."""
+        """Return type and handler of each topic."""
         return {
             "flight_status": ("std_msgs/msg/UInt8", self._flight_status),
             "display_mode": ("std_msgs/msg/UInt8", self._display_mode),
@@ -102,9 +114,7 @@ class DjiDecoder:
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True
         if message.data == M100Status.FINISHED_LANDING != self._status and self.aircraft == M100:
-            self._motors = (
-                False  # when it begins to add_text so; it goes on for a while, whatever is started then
-            )
+            self._motors = False  # only at the first report, which is repeated for a while
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
             self._telemetry.last_message_ns = self._kernel.now()
@@ -122,7 +132,7 @@ class DjiDecoder:
         self._telemetry.fix = f"gps health {message.data}"
 
     def _position(self, message: Any) -> None:
-        """Its altitude is above the sea: assumed."""
+        """Assumption: the altitude is AMSL."""
         place = (message.latitude, message.longitude, message.altitude)
         if message.status.status <= NO_FIX or not all(isfinite(value) for value in place) or not any(place):
             return
@@ -150,7 +160,7 @@ class DjiDecoder:
         self._telemetry.battery = Battery(message.percentage / 100.0, volts, amperes)
 
     def _rc(self, message: Any) -> None:
-        """Any move of the mode switch takes the authority."""
+        """Any movement of the mode switch takes the authority."""
         if len(message.axes) <= SWITCH_AXIS:
             return
         switch = self._switch = float(message.axes[SWITCH_AXIS])
@@ -162,7 +172,7 @@ class DjiDecoder:
             self._taken = ""
 
     def _anomaly(self, message: Any) -> None:
-        """What is new among the bits, as texts."""
+        """Add the bits that are newly set as texts."""
         new = message.data & ~self._anomalies
         self._anomalies = message.data
         if not new:
@@ -172,20 +182,20 @@ class DjiDecoder:
             if name.isupper() and isinstance(value, int) and value & new:
                 self.add_text(WARNING, name.replace("_", " ").lower())
 
-    # -- authority
+    # -- control authority
 
     def activate(self) -> None:
-        """It was activated."""
+        """Note that the SDK was activated."""
         self.activated = True
 
     def granted(self) -> None:
-        """We have it, for as long as the pilot's switch stays where it is."""
+        """Note that we have the authority, until the pilot moves the switch."""
         self.authority = True
         self._granted_at = self._switch
         self._taken = ""
 
     def not_obeyed(self) -> None:
-        """Set-points have no effect: somebody else must have the authority."""
+        """Note that set-points have no effect, so another program must have the authority."""
         self._lose("another program", "set-points are not obeyed: the authority is lost")
 
     def _lose(self, to: str, text: str) -> None:
@@ -194,13 +204,13 @@ class DjiDecoder:
         self.add_text(WARNING, text)
 
     def motors(self, on: bool) -> None:
-        """An M100 has accepted that its motors start or stop."""
+        """Note that an M100 has accepted to start or stop its motors."""
         self._motors = on
 
-    # -- what follows from all of them
+    # -- state derived from several topics
 
     def update(self) -> None:
-        """After the messages that came at one time."""
+        """Derive the state after all messages of one time."""
         telemetry = self._telemetry
         if telemetry.last_message_ns < 0:
             return
@@ -228,7 +238,7 @@ class DjiDecoder:
         return self._display
 
     def _update_m100(self) -> int:
-        """It has no display mode: what it does follows from its status and from what was commanded of it."""
+        """Derive the mode, which an M100 does not report, from its status and the commanded mode."""
         telemetry, status = self._telemetry, self._status
         moving = (M100Status.TAKING_OFF, M100Status.IN_AIR, M100Status.LANDING)
         telemetry.armed = self._motors or status in moving
@@ -251,7 +261,7 @@ class DjiDecoder:
         return display_name(mode) if mode != UNKNOWN else ""
 
     def _update_home(self, was_armed: bool) -> None:
-        """Home is where the motors are started; before, it is where it stands."""
+        """Home is the place where the motors were started; before that, the present place."""
         telemetry, here = self._telemetry, self._telemetry.position
         if not telemetry.armed:
             telemetry.above_home = 0.0 if here is not None else nan
@@ -263,7 +273,7 @@ class DjiDecoder:
             telemetry.home = Position(here.latitude, here.longitude, AMSL(amsl))
 
     def add_text(self, severity: int, text: str) -> None:
-        """A text of ours about the aircraft: it has none of its own."""
+        """Add a text about the aircraft, which sends none itself."""
         now = self._kernel.now()
         self._telemetry.texts.append(StatusText(now, severity, text))
         if self._records:

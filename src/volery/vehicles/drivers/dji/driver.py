@@ -1,10 +1,8 @@
-"""A DJI aircraft's sequences: what it wants to be asked, and how one sees it done.
+"""Driver of DJI aircraft: the steps of each operation.
 
-What shapes them: tasks (take-off, landing, going home) need no authority, everything else does; a take-off
-goes to a fixed height of its own, the rest is climbed by set-points; a position is a stream of remaining
-offsets; and the authority is the pilot's to take at any time.
-
-What the driver takes for granted of a DJI aircraft beyond the public definitions: one table.
+Tasks (take-off, landing, going home) need no control authority, everything else does. A take-off climbs to a
+fixed height of its own, the rest is climbed by set-points. A position is a stream of remaining offsets. The
+pilot can take the authority at any time.
 """
 
 from __future__ import annotations
@@ -49,14 +47,14 @@ from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
 LOW_THROTTLE = 0.3
-"""Below it, in the air, thrust by the control would let it fall."""
+"""Throttle below which an aircraft flown by thrust would fall."""
 
 CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN}
 _NONE: frozenset[Capability] = frozenset()
 
 
 class Dji:
-    """The driver. See ``vehicles.driver.Driver`` for what the methods mean."""
+    """Driver of a DJI aircraft. See ``vehicles.driver.Driver`` for the operations."""
 
     landing_modes = LANDING_MODES
     cycle: Action | None = None
@@ -73,8 +71,9 @@ class Dji:
 
     @property
     def offboard_mode(self) -> str:
-        """It hovers and takes commands: by position, or without one in ATTITUDE. In ``NAVI_SDK_CTRL``, which
-        no pilot can choose, it obeys a computer already: another node of ours has had it.
+        """Mode in which it hovers and accepts commands: P_GPS, or ATTITUDE without a position.
+
+        In ``NAVI_SDK_CTRL``, which no pilot can select, it already obeys another node of ours.
         """
         seen = self.telemetry
         if seen.mode == SDK:
@@ -83,31 +82,31 @@ class Dji:
 
     @property
     def capabilities(self) -> frozenset[Capability]:
-        """All but terrain; none until it has been heard."""
+        """All capabilities but terrain; none before the first message."""
         return CAPABILITIES if self.telemetry.kind else _NONE
 
     def poll(self) -> None:
-        """What arrives is taken in by itself."""
+        """Do nothing: messages are processed as they arrive."""
 
     def problem(self) -> LinkError | CapabilityError | None:
-        """What is wrong with the way to the aircraft."""
+        """Return what is wrong with the link, as an error to raise."""
         return self._backend.problem()
 
     def on_link_loss(self) -> str:
-        """Assumed: the public definitions do not say, and no parameter of the aircraft can be read."""
+        """Return the assumed reaction: neither public definitions nor parameters state it."""
         return (
             "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low or the pilot "
             "takes it; landing, going home and missions go on"
         )
 
     def close(self) -> None:
-        """Stop talking."""
+        """Stop all communication."""
         self._backend.close()
 
-    # -- on the ground, off it and back
+    # -- tasks and motors
 
     def ready(self, within: Ns) -> Sequence[Step]:
-        """Activated, a position that may be trusted, and a local reference."""
+        """Activate, wait for a healthy position, and set the local reference."""
         return self._steps.ready(within)
 
     def arm(self) -> Sequence[Step]:
@@ -115,28 +114,28 @@ class Dji:
         return self._tasks.arm()
 
     def disarm(self, force: bool) -> Sequence[Step]:
-        """Stop the motors. In the air the aircraft would fall: that takes *force*."""
+        """Stop the motors; in the air only with *force*."""
         return self._tasks.disarm(force)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """Task 4, which starts the motors and goes to its own height; then to *height* by set-points."""
+        """Start task 4, which climbs to a fixed height, then climb to *height* by set-points."""
         return self._tasks.takeoff(height, within)
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """Task 1: it climbs, goes home and lands; near home it lands at once."""
+        """Start task 1: climb, go home and land; near home it lands at once."""
         return self._tasks.return_home(within)
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Task 6, until the motors have stopped."""
+        """Start task 6; done when the motors have stopped."""
         return self._tasks.land(within)
 
-    # -- by set-points
+    # -- operations by set-points
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """Remaining offsets, streamed; the height counts from the point of take-off."""
+        """Stream remaining offsets; the height counts from the place of take-off."""
         home = self.telemetry.home
         if home is None:
-            raise Refused(self.name, f"go to {goal}", "it is not known where it took off")
+            raise Refused(self.name, f"go to {goal}", "the place of take-off is unknown")
         height = above_home(goal, home)
         self._steps.check_height(height, f"go to {goal}")
 
@@ -146,7 +145,7 @@ class Dji:
         return self._steps.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
 
     def hold(self) -> Sequence[Step]:
-        """Zero velocity until it stands; then it hovers by itself. Without a position it cannot."""
+        """Stream zero velocity until at rest; then it hovers by itself. It needs a position."""
         if self.telemetry.flying and not self.telemetry.ready:
             raise Refused(self.name, "hold", f"it has no position ({self.telemetry.fix}) and drifts; land()")
         brake = Step(
@@ -161,7 +160,7 @@ class Dji:
         return (*self._steps.leave_descent(), self._steps.authority(), brake, self._steps.hover())
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Streamed for as long as it lasts; then it stops."""
+        """Stream a velocity for *lasting*, then stop."""
         follow = immediate_step(
             "fly on", lambda: self._stream_velocity(velocity, yaw_rate, lasting), enters=SDK
         )
@@ -171,7 +170,7 @@ class Dji:
         self._steps.follow(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
 
     def heading(self, degrees: float) -> Sequence[Step]:
-        """In place."""
+        """Turn in place."""
 
         def turn() -> Point | None:
             here = self._steps.over_here(self.telemetry.above_home)
@@ -181,15 +180,15 @@ class Dji:
             f"turn to {degrees:g} degrees", turn, heading_reached(degrees), TURNED_WITHIN
         )
 
-    # -- by control
+    # -- manual flight
 
     def stabilize(self) -> Sequence[Step]:
-        """Lean angles, turn rate and thrust."""
+        """Enter manual flight by tilt, yaw rate and thrust."""
         check_throttle(self.telemetry, self._stream.held or ManualControl(), LOW_THROTTLE)
         return self._enter_manual("fly stabilized", Manual(keeps_height=False))
 
     def altitude_hold(self) -> Sequence[Step]:
-        """Lean angles, turn rate and climb rate."""
+        """Enter manual flight by tilt, yaw rate and climb rate."""
         return self._enter_manual("hold the altitude", Manual(keeps_height=True))
 
     def _enter_manual(self, ask: str, target: Manual) -> Sequence[Step]:
@@ -209,11 +208,11 @@ class Dji:
         return (self._steps.activated(), *self._steps.leave_descent(), self._steps.authority(), step)
 
     def manual(self) -> Sequence[Step]:
-        """There are no DJI rovers."""
+        """Raise ``CapabilityError``: this is for rovers."""
         raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
 
     def manual_control(self, control: ManualControl | None) -> None:
-        """They are sent while it is flown by them."""
+        """Send *control* while it is flown manually; ``None`` ends that."""
         if control is None:
             if self._stream.is_manual:
                 self._stream.stop()
@@ -225,17 +224,17 @@ class Dji:
             self._backend.wake()
 
     def stop(self) -> None:
-        """Nothing is sent any more: it brakes and hovers."""
+        """Stop sending set-points: it brakes and hovers."""
         self._stream.stop()
 
     # -- missions
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """As waypoints above the point of take-off."""
+        """Upload a mission as waypoints above the place of take-off."""
         return self._mission.upload(mission)
 
     def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Take off, start it; to its end: down, or standing at the last point."""
+        """Take off and start the mission; done when landed, or at rest at its end in the air."""
         return self._mission.start(within)
 
 
@@ -261,4 +260,4 @@ ASSUMED: Mapping[str, str] = {
     "`dji_osdk_ros`",
     "silence of the program": "makes it brake and hover; landing, going home and missions go on",
 }
-"""What, and what is taken for true."""
+"""What the driver assumes beyond the public definitions, by subject."""

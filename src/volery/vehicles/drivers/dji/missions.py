@@ -1,7 +1,4 @@
-"""Missions as DJI aircraft take them: waypoints above the point of take-off, one speed, one ending.
-
-A mission on board: given to the aircraft, begun, and followed to its end.
-"""
+"""Missions of DJI aircraft: waypoints above the place of take-off, one speed, one final action."""
 
 from __future__ import annotations
 
@@ -32,7 +29,13 @@ DAMPING_M = 0.2
 
 
 class Plan(NamedTuple):
-    """What is uploaded, and what is not part of it: the take-off. ``end`` is where it ends in the air."""
+    """A mission for the aircraft.
+
+    Args:
+        task: the uploaded message.
+        takeoff: height of a preceding take-off, m, which is not part of the message.
+        end: where it ends in the air; ``None`` if it lands.
+    """
 
     task: Any
     takeoff: float | None
@@ -40,10 +43,17 @@ class Plan(NamedTuple):
 
 
 def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Position, here: Position) -> Plan:
-    """The mission for the messages of *package*; *home* and *here* have AMSL altitudes.
+    """Return the mission as messages of *package*; a take-off becomes a waypoint above the present place.
 
-    A take-off becomes a waypoint over the place where it stands. Raises ``UsageError`` for what these
-    aircraft cannot fly: a speed that changes on the way, landing or returning but at the end.
+    Args:
+        name: name of the vehicle, for errors.
+        package: package of the messages.
+        mission: items of the mission.
+        home: home position, AMSL.
+        here: present position, AMSL.
+
+    Raises:
+        UsageError: the speed changes on the way, or it lands or returns before the end.
     """
     items = list(mission)
     takeoff = items.pop(0).height if isinstance(items[0], TakeOff) else None  # type: ignore[union-attr]
@@ -77,7 +87,7 @@ def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Posit
 
 
 def _over(item: Land, points: Sequence[Waypoint]) -> Position | None:
-    """Where it is to land, at the height at which it comes."""
+    """Return the landing place at the height of the last waypoint; ``None`` to land in place."""
     if item.position is None or not points:
         return None
     return Position(item.position.latitude, item.position.longitude, points[-1].position.altitude)
@@ -119,8 +129,10 @@ def _waypoint(package: str, point: Waypoint, home: Position) -> Any:
 
 
 def above_home(position: Position, home: Position) -> float:
-    """Metres above *home* (AMSL), which is the point of take-off. Raises ``UsageError`` for altitudes that
-    count from elsewhere.
+    """Return metres above *home* (AMSL), the place of take-off.
+
+    Raises:
+        UsageError: the altitude is neither AMSL nor above home.
     """
     if isinstance(position.altitude, AboveHome):
         return position.altitude.metres
@@ -133,7 +145,7 @@ FLYING = DisplayMode.NAVI_MISSION.name
 
 
 class MissionRunner:
-    """The mission that this program gave it last."""
+    """Steps for the mission that this program uploaded last."""
 
     def __init__(self, steps: DjiSteps, tasks: DjiTasks) -> None:
         self._steps = steps
@@ -143,7 +155,7 @@ class MissionRunner:
         self._plan: Plan | None = None
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """As waypoints above the point of take-off."""
+        """Return steps that upload a mission."""
         home, here = self._telemetry.home, self._telemetry.position
         if home is None or here is None:
             said = "it does not know where it is yet; wait_ready() first"
@@ -164,7 +176,7 @@ class MissionRunner:
         return (self._steps.activated(), step)
 
     def start(self, within: Ns) -> Sequence[Step]:
-        """Take off, start it; to its end: down, or standing at the last point."""
+        """Return steps that take off, start the mission, and wait for its end."""
         plan = self._plan
         if plan is None:
             raise Refused(self._steps.name, "start the mission", "none was uploaded by this program")
@@ -193,7 +205,7 @@ class MissionRunner:
         self._backend.request(Ack.START, self._backend.interface.mission_action(START_MISSION))
 
     def _over(self, plan: Plan, within: Ns) -> Step:
-        """Without an end in the air it is over when it is down."""
+        """Return a step that ends when disarmed, or at rest at an end in the air."""
         end = plan.end
 
         def over(seen: Telemetry) -> bool:

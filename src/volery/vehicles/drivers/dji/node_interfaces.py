@@ -1,9 +1,9 @@
-"""The two sets of names: what is asked is the same, the services and their types differ.
+"""The topics and services of the two DJI nodes: the same requests, with different names and types.
 
 ``dji_sdk`` 3.8 takes set-points on topics, in the conventions of ROS. The vehicle node of ``dji_osdk_ros``
 4.1 takes them by a service, in those of the flight controller: north and east, or forward and right;
-clockwise; degrees. It has no service to ask which aircraft it is before it flies that is of use here: an
-M100, whose numbers differ, is not supported by 4.x.
+clockwise; degrees. It needs no request for the type of aircraft: 4.x does not support the M100, whose numbers
+differ.
 """
 
 from __future__ import annotations
@@ -25,51 +25,51 @@ from volery.ros.messages.dji_constants import (
 )
 
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
-"""Tasks."""
+"""Numbers of tasks."""
 EXIT_GO_HOME, EXIT_LANDING = 12, 14
 START_MOTOR, STOP_MOTOR = 7, 8
 START_MISSION = 0
 
 SETPOINT_WITHIN = 200_000_000
-"""Nanoseconds that a set-point by a service may take."""
+"""Time-out of a set-point sent by a service, ns."""
 
 JOY = "sensor_msgs/msg/Joy"
 
 
 class ServiceRequest(NamedTuple):
-    """A request to one of the services."""
+    """A request to a service."""
 
     client: Client
     request: Any
 
 
 class NodeInterface(Protocol):
-    """What can be asked of either node. ``None``: that node needs no such request."""
+    """Requests that both nodes support. ``None`` means that the node needs no such request."""
 
     namespace: str
     package: str
     kills_without_authority: bool
 
     def version(self) -> ServiceRequest | None:
-        """Which aircraft it is: the response has ``hardware``."""
+        """Request the type of aircraft; the response has ``hardware``."""
 
     def activation(self) -> ServiceRequest | None:
-        """Activate."""
+        """Activate the SDK."""
 
     def authority(self, wanted: bool) -> ServiceRequest:
-        """Obtain or release the authority."""
+        """Obtain or release the control authority."""
 
     def motors(self, on: bool) -> ServiceRequest:
-        """Start or stop them, on the ground."""
+        """Start or stop the motors on the ground."""
 
     def kill(self) -> ServiceRequest:
-        """Stop them wherever it is."""
+        """Stop the motors anywhere."""
 
     def task(self, task: int) -> ServiceRequest:
-        """Go home, take off or land."""
+        """Start the task to go home, take off or land."""
 
     def interrupt(self, task: int) -> ServiceRequest | None:
-        """End going home or landing; ``None``: a set-point does."""
+        """End going home or landing; ``None`` means that a set-point ends it."""
 
     def reference(self) -> ServiceRequest:
         """Set the local reference."""
@@ -78,14 +78,14 @@ class NodeInterface(Protocol):
         """Upload a mission."""
 
     def mission_action(self, action: int) -> ServiceRequest:
-        """Start it."""
+        """Start or stop the mission."""
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
-        """Four numbers in the conventions of ROS. May block for as long as sending takes."""
+        """Send four numbers in the conventions of ROS. May block while they are sent."""
 
 
 class _CommonInterface:
-    """What both have below their prefix."""
+    """Services that both nodes have below their namespace."""
 
     package = ""
 
@@ -102,16 +102,16 @@ class _CommonInterface:
         return ServiceRequest(client, request(client.type, **fields))
 
     def mission(self, task: Any) -> ServiceRequest:
-        """``mission_waypoint_upload``."""
+        """Return a request to ``mission_waypoint_upload``."""
         return self._make_request(self._upload, waypoint_task=task)
 
     def mission_action(self, action: int) -> ServiceRequest:
-        """``mission_waypoint_action``."""
+        """Return a request to ``mission_waypoint_action``."""
         return self._make_request(self._action, action=action)
 
 
 class DjiSdkInterface(_CommonInterface):
-    """``dji_sdk`` 3.8."""
+    """The node of ``dji_sdk`` 3.8."""
 
     package = OLD_NAMES
     kills_without_authority = False
@@ -131,38 +131,38 @@ class DjiSdkInterface(_CommonInterface):
         self._generic = node.advertise(f"{below}{SETPOINT}generic", JOY)
 
     def version(self) -> ServiceRequest:
-        """``query_drone_version``."""
+        """Return a request to ``query_drone_version``."""
         return self._make_request(self._version)
 
     def activation(self) -> ServiceRequest:
-        """``activation``, with the key among the node's own parameters."""
+        """Return a request to ``activation``; the key is among the node's parameters."""
         return self._make_request(self._activation)
 
     def authority(self, wanted: bool) -> ServiceRequest:
-        """``sdk_control_authority``."""
+        """Return a request to ``sdk_control_authority``."""
         return self._make_request(self._authority, control_enable=int(wanted))
 
     def motors(self, on: bool) -> ServiceRequest:
-        """``drone_arm_control``."""
+        """Return a request to ``drone_arm_control``."""
         return self._make_request(self._arm, arm=int(on))
 
     def kill(self) -> ServiceRequest:
-        """``drone_arm_control``: there is no kill switch."""
+        """Return a request to ``drone_arm_control``: there is no kill switch."""
         return self.motors(False)
 
     def task(self, task: int) -> ServiceRequest:
-        """``drone_task_control``."""
+        """Return a request to ``drone_task_control``."""
         return self._make_request(self._task, task=task)
 
     def interrupt(self, task: int) -> None:
-        """There is no such task: set-points are to end it. Assumed."""
+        """Return ``None``: there is no such task; assumption: set-points end it."""
 
     def reference(self) -> ServiceRequest:
-        """``set_local_pos_ref``."""
+        """Return a request to ``set_local_pos_ref``."""
         return self._make_request(self._reference)
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
-        """On the topic of that flag, or on the generic one."""
+        """Publish on the topic of the flag, or on the generic one."""
         publisher = self._publishers.get(flag)
         axes = list(numbers) if publisher is not None else [*numbers, float(flag)]
         joy: Any = message_class(JOY)()
@@ -171,7 +171,7 @@ class DjiSdkInterface(_CommonInterface):
 
 
 class OsdkRosInterface(_CommonInterface):
-    """The vehicle node of ``dji_osdk_ros`` 4.1: most services lie beside its prefix."""
+    """The vehicle node of ``dji_osdk_ros`` 4.1; most of its services lie beside its namespace."""
 
     package = NEW_NAMES
     kills_without_authority = True
@@ -188,38 +188,40 @@ class OsdkRosInterface(_CommonInterface):
         self._flag = -1
 
     def version(self) -> None:
-        """Not asked: see above."""
+        """Return ``None``: see the module's docstring."""
 
     def activation(self) -> None:
-        """The node activates when it starts."""
+        """Return ``None``: the node activates when it starts."""
 
     def authority(self, wanted: bool) -> ServiceRequest:
-        """``obtain_release_control_authority``."""
+        """Return a request to ``obtain_release_control_authority``."""
         return self._make_request(self._authority, enable_obtain=wanted)
 
     def motors(self, on: bool) -> ServiceRequest:
-        """``flight_task_control``."""
+        """Return a request to ``flight_task_control``."""
         return self.task(START_MOTOR if on else STOP_MOTOR)
 
     def kill(self) -> ServiceRequest:
-        """``kill_switch``."""
+        """Return a request to ``kill_switch``."""
         return self._make_request(self._kill, enable=True)
 
     def task(self, task: int) -> ServiceRequest:
-        """``flight_task_control``."""
+        """Return a request to ``flight_task_control``."""
         return self._make_request(self._task, task=task)
 
     def interrupt(self, task: int) -> ServiceRequest:
-        """``flight_task_control``."""
+        """Return a request to ``flight_task_control``."""
         return self.task(EXIT_GO_HOME if task == GO_HOME else EXIT_LANDING)
 
     def reference(self) -> ServiceRequest:
-        """``set_local_pos_reference``."""
+        """Return a request to ``set_local_pos_reference``."""
         return self._make_request(self._reference)
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
-        """``joystick_action``, after ``set_joystick_mode`` where the flag is another. Raises
-        ``ServiceError``.
+        """Call ``joystick_action``, after ``set_joystick_mode`` if the flag has changed.
+
+        Raises:
+            ServiceError: a service did not answer.
         """
         if flag != self._flag:
             self._mode.call(self._mode_of(flag).request, within=SETPOINT_WITHIN)

@@ -1,6 +1,6 @@
-"""Pieces that sequences of steps are made of: readiness, authority, set-points, and their end.
+"""Steps of the DJI driver: readiness, authority, set-points, motors and tasks.
 
-Motors and tasks: what a DJI aircraft does by itself once it is told to, off the ground and back to it.
+A task (take-off, landing, going home) is what a DJI aircraft does by itself after one request.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ RESEND_PERIOD: Ns = 2 * S
 
 SDK, WAITS = DisplayMode.NAVI_SDK_CTRL.name, DisplayMode.P_GPS.name
 STARTS = (DisplayMode.ENGINE_START.name, DisplayMode.ATTITUDE.name, WAITS, SDK)
-"""Modes that the start of the motors leads through."""
+"""Modes that the aircraft enters while the motors start."""
 LANDING_MODES = frozenset(mode.name for mode in DESCENDING_MODES)
 
 
 class DjiSteps:
-    """What it takes to have one aircraft do something."""
+    """Common steps for one aircraft."""
 
     def __init__(self, name: str, backend: DjiBackend) -> None:
         self.name = name
@@ -46,14 +46,14 @@ class DjiSteps:
         self.stream = backend.stream
 
     def accepted(self, which: str) -> bool:
-        """Whether the last answer to that question was yes."""
+        """Return whether the last answer under *which* was positive."""
         answer = self.telemetry.answers.get(which)
         return answer is not None and answer.accepted
 
-    # -- before it does anything
+    # -- readiness
 
     def activated(self) -> Step:
-        """By the node's own parameters."""
+        """Return a step that activates the SDK with the node's own parameters."""
         return Step(
             ask="activate",
             send=self.backend.activate,
@@ -66,7 +66,7 @@ class DjiSteps:
         )
 
     def ready(self, within: Ns = READY_WITHIN) -> Sequence[Step]:
-        """Activated, a position that may be trusted, and a local reference."""
+        """Return steps that activate, wait for a healthy position, and set the local reference."""
         wait = Step(
             ask="be ready to go by position",
             send=send_nothing,
@@ -88,7 +88,7 @@ class DjiSteps:
         return (replace(activate, within=min(within, activate.within)), wait, refer)
 
     def authority(self) -> Step:
-        """The program's, which everything takes but tasks."""
+        """Return a step that obtains the control authority, which everything but tasks needs."""
         return Step(
             ask="give the program the authority",
             send=self.backend.authority,
@@ -101,7 +101,7 @@ class DjiSteps:
         )
 
     def leave_descent(self) -> Sequence[Step]:
-        """Out of a landing or a way home that was asked for before, where that takes a task."""
+        """Return a step that leaves a commanded landing or return, where that needs a task."""
         doing = self.decoder.commanded
         task = GO_HOME if doing == DisplayMode.NAVI_GO_HOME.name else LAND
         ask = self.backend.interface.interrupt(task) if doing in LANDING_MODES else None
@@ -123,7 +123,7 @@ class DjiSteps:
     # -- set-points
 
     def follow(self, target: Point | Moving | Manual) -> None:
-        """Stream it from now on."""
+        """Stream set-points for *target* from now on."""
         self.decoder.commanded = SDK
         self.stream.follow(target)
         self.backend.wake()
@@ -135,7 +135,14 @@ class DjiSteps:
         done: Callable[[Telemetry], bool],
         within: Ns,
     ) -> Sequence[Step]:
-        """Streamed until *done*; then it hovers by itself."""
+        """Return steps that stream set-points to a point until *done*; then the aircraft hovers by itself.
+
+        Args:
+            ask: the command in words.
+            point: returns the point; called when the step begins.
+            done: whether telemetry shows the effect.
+            within: time-out, ns.
+        """
 
         def send() -> None:
             target = point()
@@ -146,23 +153,23 @@ class DjiSteps:
         return (*self.leave_descent(), self.authority(), step, self.hover())
 
     def over_here(self, height: float) -> Point | None:
-        """Where it is, that high above home; ``None`` while it does not know."""
+        """Return the present place at *height* metres above home; ``None`` without a position."""
         here = self.telemetry.position
         return None if here is None else Point(here.latitude, here.longitude, height, yaw_of(self.telemetry))
 
     def check_height(self, height: float, asked: str) -> None:
-        """Raise ``OutOfBounds`` where no set-point goes."""
+        """Raise ``OutOfBounds`` for a height (m above home) outside the range of set-points."""
         low, high = SETPOINT_HEIGHTS
         if not low <= height <= high:
             what = f"{height:.1f} m above home; set-points of DJI aircraft go from {low:g} to {high:g} m"
             raise OutOfBounds(self.name, asked, what)
 
     def hover(self) -> Step:
-        """Without set-points."""
+        """Return a step that stops the set-points."""
         return immediate_step("hover", self.stream.stop)
 
     def quiet(self) -> Step:
-        """A set-point still on its way would end what is asked for next. Who takes it meanwhile has it."""
+        """Return a step that waits until no set-point is on its way, which would end the next task."""
         return Step(
             ask="send no more set-points",
             send=self.stream.stop,
@@ -175,15 +182,15 @@ class DjiSteps:
 
 
 UP_WITHIN: Ns = 35 * S
-"""Of the take-off itself: motors within 5 s, off the ground within 20 s, then to the fixed height."""
+"""Time-out of the take-off task: motors within 5 s, lift-off within 20 s, then the climb."""
 M100_GAINS_M = 0.8
-"""An M100 counts as off the ground once it is so much above home. The SDK's demo asks for 1 m; of a take-off
-to about 1.2 m that leaves little for the drift of a height.
+"""Height above home at which an M100 counts as off the ground. The SDK's demo uses 1 m; for a take-off to about
+1.2 m that leaves little margin for the drift of the height.
 """
 
 
 class DjiTasks:
-    """Take-off, landing and going home need no authority; the motors do."""
+    """Steps for motors and tasks. Tasks need no authority; the motors do."""
 
     def __init__(self, steps: DjiSteps) -> None:
         self._steps = steps
@@ -191,7 +198,7 @@ class DjiTasks:
         self._telemetry = steps.telemetry
 
     def arm(self) -> Sequence[Step]:
-        """Start the motors."""
+        """Return steps that start the motors."""
         step = Step(
             ask="start the motors",
             send=lambda: self._backend.motors(True),
@@ -205,7 +212,7 @@ class DjiTasks:
         return (self._steps.activated(), self._steps.authority(), step)
 
     def disarm(self, force: bool) -> Sequence[Step]:
-        """Stop the motors. In the air the aircraft would fall: that takes *force*."""
+        """Return steps that stop the motors; in the air only with *force*."""
         if self._telemetry.flying and not force:
             said = "it flies, and would fall; land() first, or force it"
             raise Refused(self._steps.name, "disarm", said)
@@ -222,7 +229,7 @@ class DjiTasks:
         return (self._steps.authority(), step) if self._telemetry.armed and not alone else (step,)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """Task 4, which starts the motors and goes to its own height; then to *height* by set-points."""
+        """Return steps for task 4, which climbs to a fixed height, and then to *height* by set-points."""
         steps = self._steps
         steps.check_height(height, f"take off to {height:g} m")
         lift = Step(
@@ -247,11 +254,11 @@ class DjiTasks:
         return seen.flying and seen.mode not in {mode.name for mode in TAKES_OFF}
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """Task 1: it climbs, goes home and lands; near home it lands at once."""
+        """Return steps for task 1: climb, go home and land; near home it lands at once."""
         return self._until_down(GO_HOME, DisplayMode.NAVI_GO_HOME, "return home and land", within)
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Task 6, until the motors have stopped."""
+        """Return steps for task 6; done when the motors have stopped."""
         return self._until_down(LAND, DisplayMode.AUTO_LANDING, "land", within)
 
     def _until_down(self, task: int, mode: DisplayMode, ask: str, within: Ns) -> Sequence[Step]:

@@ -1,7 +1,7 @@
-"""What is sent 50 times a second: the remaining offset to a point, a velocity, or control.
+"""Set-points at 50 Hz: the remaining offset to a point, a velocity, or manual control.
 
-An aircraft whose set-points are not fed brakes and hovers. So nothing is sent that would be wrong: no offset
-from a place that is not known any more.
+An aircraft without set-points brakes and hovers. So no set-point is sent that would be wrong, such as an
+offset from an old position.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ from volery.vehicles.drivers.dji.decoder import WAITS, DjiDecoder
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 STALE: Ns = 300 * MS
-"""A place that is older is not reckoned from."""
+"""No offset is computed from an older position."""
 STOP_FOR: Ns = 2 * S
-"""So long zero velocity is sent at the end of a velocity."""
+"""Time for which zero velocity is sent at the end of a velocity."""
 OBEYED_WITHIN: Ns = 3 * S
-"""Set-points that show no effect for so long are not obeyed: somebody else has the authority."""
+"""Set-points without effect for this time are not obeyed: another program has the authority."""
 
 BRAKES_M_S2 = 1.0
 UP_M_S, DOWN_M_S = 3.0, 2.0
-"""How it goes at a stated speed: deceleration, and vertical speeds at most."""
+"""Flight at a stated speed: deceleration, and greatest vertical speeds."""
 CARROT_S = 1.0
-"""Near its goal the offset is cut to what the stated speed covers in this time."""
+"""Near the goal the offset is limited to the distance covered in this time at the stated speed."""
 
 STICK_TILT, STICK_YAW_RATE = radians(25.0), pi / 2.0
 STICK_CLIMB = 2.0
-"""At full deflection: radians, radians per second, metres per second."""
+"""Tilt (rad), yaw rate (rad/s) and climb rate (m/s) at full deflection."""
 THROTTLE_DEAD = 0.05
-"""About its middle the throttle keeps the height."""
+"""Half width of the throttle's range in which the height is kept."""
 
 STILL = Velocity(0.0, 0.0, 0.0)
 
 Setpoint = tuple[int, Sequence[float]]
-"""The flag, and four numbers in the conventions of ROS."""
+"""The flag, and four numbers in the conventions of ROS (REP 103)."""
 
 
 class Point(NamedTuple):
-    """Go there: degrees, metres above the point of take-off, yaw in radians anticlockwise from east."""
+    """A point: degrees, metres above the place of take-off, yaw in rad anticlockwise from east, speed in m/s."""
 
     latitude: float
     longitude: float
@@ -60,7 +60,7 @@ class Point(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Go at this velocity until then; the turn in radians per second anticlockwise."""
+    """A velocity until a time; ``turn`` in rad/s anticlockwise."""
 
     velocity: Velocity
     turn: float
@@ -68,7 +68,7 @@ class Moving(NamedTuple):
 
 
 class Manual(NamedTuple):
-    """The control command: with ``keeps_height`` the throttle a climb rate, else the thrust."""
+    """Manual control; with ``keeps_height`` the throttle commands a climb rate, else the thrust."""
 
     keeps_height: bool
 
@@ -77,7 +77,7 @@ Target = Point | Moving | Manual
 
 
 class SetpointStream:
-    """Holds the present target. ``fresh``: it is another one, to be sent at once."""
+    """Computes set-points for the present target. ``fresh``: the target is new and must be sent at once."""
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, decoder: DjiDecoder) -> None:
         self.held: ManualControl | None = None
@@ -87,31 +87,31 @@ class SetpointStream:
         self._decoder = decoder
         self._target: Target | None = None
         self._was_armed = False
-        self._unheeded: Ns | None = None  # since when set-points have been sent without effect
+        self._not_obeyed_since: Ns | None = None  # since when set-points have been sent without effect
 
     @property
     def wanted(self) -> bool:
-        """There is something to send."""
+        """Whether there is a target."""
         return self._target is not None
 
     @property
     def is_manual(self) -> bool:
-        """The control command it."""
+        """Whether the target is manual control."""
         return isinstance(self._target, Manual)
 
     def follow(self, target: Target) -> None:
-        """From now on."""
+        """Send set-points for *target* from now on."""
         self._target, self.fresh = target, True
         self._was_armed = self._telemetry.armed
-        self._unheeded = None
+        self._not_obeyed_since = None
 
     def stop(self) -> None:
-        """Nothing is sent any more."""
+        """Stop sending set-points."""
         self._target, self.fresh = None, False
         self.held = None
 
     def update(self) -> None:
-        """After each round of telemetry: whether it makes sense to go on."""
+        """Stop after new telemetry if disarmed, without authority, or not obeyed."""
         if self._target is None:
             return
         self._was_armed = self._was_armed or self._telemetry.armed
@@ -126,20 +126,20 @@ class SetpointStream:
         waits = {mode.name for mode in WAITS}
         now = self._kernel.now()
         if not self._telemetry.flying or self._telemetry.mode not in waits or self._telemetry.failsafe:
-            self._unheeded = None
-        return self._unheeded is not None and now - self._unheeded > OBEYED_WITHIN
+            self._not_obeyed_since = None
+        return self._not_obeyed_since is not None and now - self._not_obeyed_since > OBEYED_WITHIN
 
     def setpoint(self) -> Setpoint | None:
-        """What is to be sent now; ``None`` for nothing."""
+        """Return the set-point to send now, or ``None``."""
         self.fresh = False
-        made = self._made()
+        made = self._compute()
         if made is None:
-            self._unheeded = None
-        elif self._unheeded is None and self._telemetry.mode != DisplayMode.NAVI_SDK_CTRL.name:
-            self._unheeded = self._kernel.now()
+            self._not_obeyed_since = None
+        elif self._not_obeyed_since is None and self._telemetry.mode != DisplayMode.NAVI_SDK_CTRL.name:
+            self._not_obeyed_since = self._kernel.now()
         return made
 
-    def _made(self) -> Setpoint | None:
+    def _compute(self) -> Setpoint | None:
         target = self._target
         if isinstance(target, Point):
             return self._towards(target)
@@ -163,7 +163,7 @@ class SetpointStream:
         return POSITION_YAW, (east * share, north * share, target.height, target.yaw)
 
     def _at_speed(self, target: Point, offset: tuple[float, float], speed: float) -> Setpoint:
-        """Straight there: the climb is spread over the way."""
+        """Fly straight; the climb is spread over the path."""
         away = hypot(*offset)
         climb = target.height - self._telemetry.above_home
         up = min(UP_M_S, max(-DOWN_M_S, climb / max(1.0, away / speed)))
@@ -189,7 +189,7 @@ class SetpointStream:
 
 
 def _climb(throttle: float) -> float:
-    """Metres per second up."""
+    """Return the climb rate, m/s."""
     off = throttle - 0.5
     if abs(off) <= THROTTLE_DEAD:
         return 0.0
@@ -198,6 +198,6 @@ def _climb(throttle: float) -> float:
 
 
 def yaw_of(telemetry: Telemetry) -> float:
-    """The present heading as a yaw of ROS; east where it is unknown."""
+    """Return the present heading as a yaw of ROS; east if it is unknown."""
     heading = telemetry.attitude.heading
     return heading_to_yaw(radians(heading)) if isfinite(heading) else 0.0

@@ -84,8 +84,8 @@ class Firmware(NamedTuple):
 class StreamRequests:
     """Requests messages, and requests those again that do not arrive. Check it once a second.
 
-    ArduPilot streams only heartbeats and texts without a request. It acknowledges requests in the first moments
-    after its start, and forgets them.
+    ArduPilot streams only heartbeats and texts without a request. It acknowledges requests in the first
+    moments after its start, and forgets them.
 
     Args:
         periods: requested period of each message, ns.

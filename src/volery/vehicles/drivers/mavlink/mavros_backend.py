@@ -1,11 +1,11 @@
 """Backend over MAVROS: an autopilot behind topics and services of a graph, as a commanding node uses them.
 
-The node's own loop, at 10 Hz, is run by the task that waits: process what has arrived (one ``spinOnce``), then
-sleep. All execution time is therefore charged to the component whose node this is. Nothing runs in the
+The node's own loop, at 10 Hz, is run by the task that waits: process what has arrived (one ``spinOnce``),
+then sleep. All execution time is therefore charged to the component whose node this is. Nothing runs in the
 background: a set-point is repeated by that loop, or by the caller.
 
-MAVROS does not pass on everything: neither the kind of vehicle (``Drone`` or ``Rover`` states it) nor the result
-of the arming checks. Here a vehicle is ready once it has a local position, a fix and a home.
+MAVROS does not pass on everything: neither the kind of vehicle (``Drone`` or ``Rover`` states it) nor the
+result of the arming checks. Here a vehicle is ready once it has a local position, a fix and a home.
 """
 
 from __future__ import annotations

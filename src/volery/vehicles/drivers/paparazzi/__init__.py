@@ -1,6 +1,7 @@
 """Paparazzi rotorcraft: one driver, over pprzlink or over pprzros topics.
 
-It follows the public definitions of the protocol and has not been flown; ``modes.ASSUMED`` lists the assumptions.
+It follows the public definitions of the protocol and has not been flown; ``modes.ASSUMED`` lists the
+assumptions.
 """
 
 from __future__ import annotations

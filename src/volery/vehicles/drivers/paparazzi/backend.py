@@ -1,7 +1,7 @@
 """What can be sent to a Paparazzi rotorcraft on a pprzlink, and the check of its setting numbers.
 
-pprzlink has no acknowledgements. A setting is answered by its value; the effect of everything else shows in the
-telemetry or not at all.
+pprzlink has no acknowledgements. A setting is answered by its value; the effect of everything else shows in
+the telemetry or not at all.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ COME_DOWN = entry_value("EMERGENCY_CMD", "cmd", "LAND")
 class Setpoint(NamedTuple):
     """A set-point in GUIDED.
 
-    North, east and down in metres about the local origin and a heading in radians; with the flags ``BY_VELOCITY``
-    metres per second and radians per second, clockwise.
+    North, east and down in metres about the local origin and a heading in radians; with the flags
+    ``BY_VELOCITY`` metres per second and radians per second, clockwise.
     """
 
     north: float

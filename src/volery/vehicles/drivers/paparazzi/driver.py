@@ -1,12 +1,12 @@
 """Driver of Paparazzi rotorcraft: the steps of each operation.
 
-Facts from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors start and stop by
-a setting or by a block of the flight plan. Blocks take off and land; in between the aircraft follows set-points in
-GUIDED, which last until the next one. Telemetry is 0.25 s (position) to 2 s (block) late, but a change of mode is
-reported at once.
+Facts from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors start and
+stop by a setting or by a block of the flight plan. Blocks take off and land; in between the aircraft follows
+set-points in GUIDED, which last until the next one. Telemetry is 0.25 s (position) to 2 s (block) late, but a
+change of mode is reported at once.
 
-On a lost link nothing happens in GUIDED: neither the ground station nor a transmitter nor, by the sources, a fence
-is monitored. In NAV the plan's own rules hold. Manual modes become FAILSAFE when manual control ends.
+On a lost link nothing happens in GUIDED: neither the ground station nor a transmitter nor, by the sources, a
+fence is monitored. In NAV the plan's own rules hold. Manual modes become FAILSAFE when manual control ends.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The pprzros bridge as a link: its publications are received, its subscriptions are sent to.
 
 A separate task in the execution context of the commanding node processes received messages and publishes. Its
-execution time is therefore charged there, and set-points and manual control continue while the component computes;
-a velocity that is never ended would last for ever. A computer that is too slow delays them.
+execution time is therefore charged there, and set-points and manual control continue while the component
+computes; a velocity that is never ended would last for ever. A computer that is too slow delays them.
 """
 
 from __future__ import annotations

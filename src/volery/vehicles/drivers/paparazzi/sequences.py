@@ -1,8 +1,8 @@
 """Steps of the Paparazzi driver: modes, motors, positions in the local frame, take-off and landing.
 
-Take-off and landing use blocks of the flight plan in NAV, or GUIDED where NAV would turn back: in NAV an aircraft
-returns by itself if it is further from home than its plan allows. Blocks are therefore flown only well inside
-that distance.
+Take-off and landing use blocks of the flight plan in NAV, or GUIDED where NAV would turn back: in NAV an
+aircraft returns by itself if it is further from home than its plan allows. Blocks are therefore flown only
+well inside that distance.
 """
 
 from __future__ import annotations

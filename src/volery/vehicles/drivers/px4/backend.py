@@ -1,8 +1,8 @@
 """What can be sent to a PX4, over MAVLink and over MAVROS.
 
-Over MAVROS the stream of OFFBOARD is repeated by the node's loop while a call waits, and by the caller after the
-call: a velocity that is not set again within a second ends in PX4's failsafe. The same holds for manual control.
-PX4's events do not pass MAVROS.
+Over MAVROS the stream of OFFBOARD is repeated by the node's loop while a call waits, and by the caller after
+the call: a velocity that is not set again within a second ends in PX4's failsafe. The same holds for manual
+control. PX4's events do not pass MAVROS.
 """
 
 from __future__ import annotations

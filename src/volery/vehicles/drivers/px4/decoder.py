@@ -1,9 +1,9 @@
 """Decoder of PX4: mode names, estimator status, and events.
 
 PX4 reports arming checks and state changes as numbered events. The number consists of the component (1, the
-autopilot) in the high byte and the 24 low bits of the FNV-1a hash of the event's name. The meanings stand only in
-the firmware's sources; here are the recorded events of PX4 1.14 and the arming checks that users meet. Others are
-shown as their number.
+autopilot) in the high byte and the 24 low bits of the FNV-1a hash of the event's name. The meanings stand
+only in the firmware's sources; here are the recorded events of PX4 1.14 and the arming checks that users
+meet. Others are shown as their number.
 """
 
 from __future__ import annotations
@@ -176,8 +176,8 @@ def _forbids(event: Event, mode: str) -> bool:
 class PX4Decoder(TelemetryDecoder):
     """Decodes PX4's mode names, ESTIMATOR_STATUS, and events.
 
-    PX4 sends nearly all events also as a text, which ends with a tabulator, while it receives a ground station.
-    So an event becomes a text here only if it has none, or is an unknown warning.
+    PX4 sends nearly all events also as a text, which ends with a tabulator, while it receives a ground
+    station. So an event becomes a text here only if it has none, or is an unknown warning.
     """
 
     autopilot = "PX4"

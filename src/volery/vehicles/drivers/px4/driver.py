@@ -1,20 +1,20 @@
 """Driver of PX4: the steps of each operation.
 
-Facts observed on PX4 1.14: a heartbeat arrives once a second, so a mode is acknowledged in milliseconds and seen
-up to a second later. On the ground every mode is accepted, even one that is not entered, so only the heartbeat
-counts. Arming checks are those of the present mode.
+Facts observed on PX4 1.14: a heartbeat arrives once a second, so a mode is acknowledged in milliseconds and
+seen up to a second later. On the ground every mode is accepted, even one that is not entered, so only the
+heartbeat counts. Arming checks are those of the present mode.
 
-To go to a position the driver sends DO_REPOSITION, which is flown in AUTO.LOITER: one command, after which PX4
-needs no commander, like ArduPilot's target in GUIDED. Only velocities and turns need OFFBOARD and its stream (see
-``OffboardStream``).
+To go to a position the driver sends DO_REPOSITION, which is flown in AUTO.LOITER: one command, after which
+PX4 needs no commander, like ArduPilot's target in GUIDED. Only velocities and turns need OFFBOARD and its
+stream (see ``OffboardStream``).
 
-NAV_TAKEOFF takes an altitude AMSL and ends up to a metre below it: a take-off to 10 m ended at 8.97 m. The driver
-then sends the drone by DO_REPOSITION to the stated height above the place of take-off.
+NAV_TAKEOFF takes an altitude AMSL and ends up to a metre below it: a take-off to 10 m ended at 8.97 m. The
+driver then sends the drone by DO_REPOSITION to the stated height above the place of take-off.
 
-A pilot hands over by AUTO.LOITER, PX4's Hold. A pilot who ends an OFFBOARD flight by Hold has control until another
-mode has been selected in between, because Hold is then the pilot's. The same holds for a station that sends the
-drone elsewhere by DO_REPOSITION, which is also how ground stations pause a vehicle. Commanding AUTO.LOITER while it
-flies in it changes nothing: it continues to its target.
+A pilot hands over by AUTO.LOITER, PX4's Hold. A pilot who ends an OFFBOARD flight by Hold has control until
+another mode has been selected in between, because Hold is then the pilot's. The same holds for a station that
+sends the drone elsewhere by DO_REPOSITION, which is also how ground stations pause a vehicle. Commanding
+AUTO.LOITER while it flies in it changes nothing: it continues to its target.
 """
 
 from __future__ import annotations
@@ -381,8 +381,8 @@ class PX4(MavlinkDriver):
 def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:
     """Return the mission as PX4's items, without one for home; items without a place use the mission frame.
 
-    As recorded, PX4 1.14 refuses commands without a place in a global frame, and flies to latitude and longitude
-    0 for an item that states none.
+    As recorded, PX4 1.14 refuses commands without a place in a global frame, and flies to latitude and
+    longitude 0 for an item that states none.
 
     Args:
         mission: items of the mission.

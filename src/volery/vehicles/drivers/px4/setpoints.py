@@ -151,10 +151,10 @@ class OffboardStream:
 class ManualControlStream:
     """Stream of manual control, which PX4 needs more than twice a second (COM_RC_LOSS_T).
 
-    Once PX4 has received manual control, a failsafe acts in every mode if it ends: half a second after the last
-    sample it holds, then it returns home, even in AUTO.LOITER. So the stream goes on, centred, after manual
-    flight. Manual control that moves in an autonomous mode makes PX4 change to POSCTL; so in such modes only
-    centred samples are sent, and the stream is centred before such a mode is commanded.
+    Once PX4 has received manual control, a failsafe acts in every mode if it ends: half a second after the
+    last sample it holds, then it returns home, even in AUTO.LOITER. So the stream goes on, centred, after
+    manual flight. Manual control that moves in an autonomous mode makes PX4 change to POSCTL; so in such
+    modes only centred samples are sent, and the stream is centred before such a mode is commanded.
     """
 
     def __init__(self, kernel: Kernel, backend: PX4Backend) -> None:
