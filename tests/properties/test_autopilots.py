@@ -107,8 +107,8 @@ LISTENED = sorted(_vehicle()[1].endpoint.handled_messages)
 @given(st.lists(frames(), max_size=20), st.booleans())
 def test_no_message_upsets_an_autopilot(sent: list[Frame], flying: bool) -> None:
     kernel, autopilot, link = _vehicle()
-    heard: list[Frame] = []
-    link.receive(heard.append)
+    received: list[Frame] = []
+    link.receive(received.append)
     kernel.run(S)
     link.send(Frame("REQUEST_DATA_STREAM", STREAM_ALL, STATION, STATION_COMPONENT))
     if flying:
@@ -120,8 +120,8 @@ def test_no_message_upsets_an_autopilot(sent: list[Frame], flying: bool) -> None
     for frame in sent:
         link.send(frame)
         kernel.run(kernel.now() + 50 * MS)
-    heard.clear()
+    received.clear()
     kernel.run(kernel.now() + 4 * S)
-    assert any(frame.name == "HEARTBEAT" for frame in heard)
+    assert any(frame.name == "HEARTBEAT" for frame in received)
     state = autopilot.state()
     assert isfinite(state.x + state.y + state.z)

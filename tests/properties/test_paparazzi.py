@@ -57,8 +57,8 @@ def test_no_message_upsets_it(sent: list[Frame], where: str) -> None:
     autopilot = Autopilot(kernel, flight, FIRMWARE, system=AIRCRAFT, warm=True)
     link, theirs = in_process_pair(kernel, MS, "ground", PPRZLINK)
     autopilot.connect(theirs)
-    heard: list[Frame] = []
-    link.receive(heard.append)
+    received: list[Frame] = []
+    link.receive(received.append)
     kernel.run(S)
 
     def send(name: str, **fields: float) -> None:
@@ -73,9 +73,9 @@ def test_no_message_upsets_it(sent: list[Frame], where: str) -> None:
     for frame in sent:
         link.send(frame)
         kernel.run(kernel.now() + 100 * MS)
-    heard.clear()
+    received.clear()
     kernel.run(kernel.now() + 3 * S)
-    assert {"ROTORCRAFT_FP", "ROTORCRAFT_STATUS", "ROTORCRAFT_NAV_STATUS"} <= {one.name for one in heard}
+    assert {"ROTORCRAFT_FP", "ROTORCRAFT_STATUS", "ROTORCRAFT_NAV_STATUS"} <= {one.name for one in received}
     state = autopilot.state()
     assert isfinite(state.x + state.y + state.z)
     assert autopilot.vehicle.armed is False or autopilot.vehicle.mode.name != "KILL"

@@ -51,7 +51,7 @@ class Station:
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=3, frame=self.home)
         self.autopilot = Autopilot(self.kernel, self.flight, self.firmware, warm=warm, **options)
         self.vehicle = self.autopilot.vehicle
-        self.heard: list[Heard] = []
+        self.received: list[Heard] = []
         self.latest: dict[str, dict[str, Any]] = {}
         self.link = self.another_link(use)
         self.link.receive(self._hear)
@@ -63,7 +63,7 @@ class Station:
         return ours
 
     def _hear(self, frame: Frame) -> None:
-        self.heard.append(Heard(self.now, frame.name, frame.fields))
+        self.received.append(Heard(self.now, frame.name, frame.fields))
         self.latest[frame.name] = frame.fields
 
     @property
@@ -108,16 +108,16 @@ class Station:
         return self._answered("COMMAND_INT", number, {**values, **fields})
 
     def _answered(self, name: str, number: int, fields: dict[str, Any]) -> int | None:
-        count = len(self.heard)
+        count = len(self.received)
         self.send(name, **{**TARGET, "command": number, **fields})
         self.run(0.05)
-        answers = [one.fields for one in self.heard[count:] if one.name == "COMMAND_ACK"]
+        answers = [one.fields for one in self.received[count:] if one.name == "COMMAND_ACK"]
         return next((int(answer["result"]) for answer in answers if answer["command"] == number), None)
 
     # -- what was heard
 
     def of(self, name: str) -> list[Heard]:
-        return [one for one in self.heard if one.name == name]
+        return [one for one in self.received if one.name == name]
 
     def texts(self) -> list[str]:
         return [one.fields["text"] for one in self.of("STATUSTEXT")]

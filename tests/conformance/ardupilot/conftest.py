@@ -47,7 +47,7 @@ class Bench(Station):
 
     def names(self) -> list[str]:
         """The messages that came, each once, in order."""
-        return list(dict.fromkeys(one.name for one in self.heard))
+        return list(dict.fromkeys(one.name for one in self.received))
 
     def airborne(self, height: float = 10.0) -> None:
         """In GUIDED at that height."""

@@ -66,20 +66,20 @@ def test_set_mode_is_acknowledged_as_command_11(bench: Any) -> None:
 def test_an_answer_comes_within_milliseconds_before_what_it_changes(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
-    rig.heard.clear()
+    rig.received.clear()
     sent = rig.now
     rig.command(176, 1, 4)
-    assert [one.name for one in rig.heard[:2]] == ["COMMAND_ACK", "HEARTBEAT"]
-    assert rig.heard[0].at - sent < 0.01
+    assert [one.name for one in rig.received[:2]] == ["COMMAND_ACK", "HEARTBEAT"]
+    assert rig.received[0].at - sent < 0.01
 
 
 def test_words_of_a_refusal_come_after_the_answer(bench: Any) -> None:
     rig = bench(warm=False)
     rig.run(25.0)
     rig.mode(4)
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.command(400, 1) == FAILED
-    assert [one.name for one in rig.heard if one.name != "HEARTBEAT"] == ["COMMAND_ACK", "STATUSTEXT"]
+    assert [one.name for one in rig.received if one.name != "HEARTBEAT"] == ["COMMAND_ACK", "STATUSTEXT"]
     assert rig.texts() == ["Arm: Need Position Estimate"]
 
 

@@ -24,7 +24,7 @@ def airborne_without_a_station(rig: Any) -> None:
     rig.command(22, 0, 0, 0, 0, 0, 0, 10)
     rig.run(15.0)
     handle.cancel()
-    rig.heard.clear()
+    rig.received.clear()
 
 
 def test_losing_the_station_returns_after_the_recorded_time(bench: Any, facts: Any) -> None:

@@ -208,7 +208,7 @@ def test_attitude_targets_lean_and_climb_and_expire(bench: Any) -> None:
     assert abs(rig.vehicle.estimate.velocity[2]) < 0.2
 
 
-def test_reposition_goes_there_and_enters_guided_if_told(bench: Any) -> None:
+def test_reposition_enters_guided_with_its_flag(bench: Any) -> None:
     rig = bench()
     rig.airborne()
     latitude, longitude, _ = rig.vehicle.estimate.geodetic

@@ -32,7 +32,7 @@ HOME = item(WAYPOINT, 0.001, 0.0, 584.0)
 
 def upload(rig: Any, items: list[dict[str, Any]]) -> int:
     """Answer each request with its item; the type of the final acknowledgement."""
-    rig.heard.clear()
+    rig.received.clear()
     rig.send("MISSION_COUNT", target_system=1, target_component=1, count=len(items))
     answered = -1
     for _ in range(200):
@@ -67,7 +67,7 @@ def test_the_recorded_mission_is_asked_for_and_read_back_alike(bench: Any, facts
     rig.run(0.1)
     assert "Flight plan received" in rig.texts()
     assert [one.fields["param_value"] for one in rig.of("PARAM_VALUE")] == [1, 2, 3, 4, 5, 6]
-    rig.heard.clear()
+    rig.received.clear()
     rig.send("MISSION_REQUEST_LIST", target_system=1, target_component=1)
     rig.run(0.05)
     assert rig.latest["MISSION_COUNT"]["count"] == 6
@@ -87,7 +87,7 @@ def test_items_are_asked_for_in_the_old_form(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
     upload(rig, [HOME, item(TAKEOFF), item(WAYPOINT, 20.0)])
-    assert {one.name for one in rig.heard if "REQUEST" in one.name} == {"MISSION_REQUEST"}
+    assert {one.name for one in rig.received if "REQUEST" in one.name} == {"MISSION_REQUEST"}
 
 
 def test_the_old_form_of_items_is_understood_and_answered_in_degrees(bench: Any) -> None:
@@ -161,7 +161,7 @@ def test_clearing_and_other_kinds_of_plan(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
     upload(rig, [HOME, item(TAKEOFF)])
-    rig.heard.clear()
+    rig.received.clear()
     rig.send("MISSION_CLEAR_ALL", target_system=1, target_component=1)
     rig.run(0.05)
     assert rig.names() == ["MISSION_ACK", "PARAM_VALUE"]
@@ -188,13 +188,13 @@ def test_the_recorded_mission_is_flown_as_recorded(bench: Any, facts: Any) -> No
         param_type=9,
     )
     rig.stream(10)
-    rig.heard.clear()
+    rig.received.clear()
     start(rig)
     begun = rig.now
     took = rig.run_until(lambda: not rig.vehicle.armed, within=200.0)
     assert took == pytest.approx(recorded["seconds"], rel=0.2)
     rig.run(0.5)
-    events = [one for one in rig.heard if one.name in ("STATUSTEXT", "MISSION_ITEM_REACHED")]
+    events = [one for one in rig.received if one.name in ("STATUSTEXT", "MISSION_ITEM_REACHED")]
     events = [(one.at - begun, one.name, one.fields.get("text", one.fields.get("seq"))) for one in events]
     events = [one for one in events if one[1] != "STATUSTEXT" or "ission" in one[2]]
     assert [one[1:] for one in events] == [tuple(one[1:]) for one in recorded["events"]]

@@ -71,7 +71,7 @@ def test_reading_by_index_answers_with_the_index(bench: Any) -> None:
 def test_an_unknown_parameter_is_not_answered(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
-    rig.heard.clear()
+    rig.received.clear()
     rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_id="NO_SUCH", param_index=-1)
     rig.send("PARAM_REQUEST_READ", target_system=1, target_component=1, param_index=5000)
     rig.send(
@@ -105,7 +105,7 @@ def test_a_value_is_kept_in_the_parameters_own_type(given: float, kept: float, b
 def test_numbers_that_are_none_are_not_taken(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
-    rig.heard.clear()
+    rig.received.clear()
     rig.send(
         "PARAM_SET",
         target_system=1,

@@ -166,7 +166,7 @@ def test_a_mission_is_driven(bench: Any) -> None:
 def test_rates_that_were_asked_for_are_stored(bench: Any) -> None:
     rig = bench("rover")
     rig.run(0.3)
-    rig.heard.clear()
+    rig.received.clear()
     rig.stream(4)
     rig.run(0.05)
     stored = {one.fields["param_id"]: one.fields["param_value"] for one in rig.of("PARAM_VALUE")}

@@ -43,7 +43,7 @@ def test_all_streams_are_the_recorded_ones_at_the_rate_asked(
         type_mask=3576,
         **flying_to,
     )
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(10.0)
     expected = set(facts["rates"][recorded]) - NOT_SENT - REGULAR
     assert expected <= set(rig.names())
@@ -87,12 +87,12 @@ def test_an_interval_overrules_the_stream_for_one_message(bench: Any) -> None:
     rig.stream(4)
     assert rig.command(511, 30, 50_000) == 0
     rig.run(1.0)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(5.0)
     assert len(rig.of("ATTITUDE")) == pytest.approx(100, abs=2)
     assert len(rig.of("VFR_HUD")) == pytest.approx(20, abs=1)
     assert rig.command(511, 30, -1) == 0
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(2.0)
     assert not rig.of("ATTITUDE")
     rig.command(510, 74)
@@ -119,7 +119,7 @@ def test_streams_stop_when_asked(bench: Any) -> None:
     rig.run(1.0)
     rig.stream(0)
     rig.run(0.1)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(3.0)
     assert set(rig.names()) <= {"HEARTBEAT", "TIMESYNC"}
 
@@ -136,7 +136,7 @@ def test_streams_stop_when_asked(bench: Any) -> None:
 def test_one_message_on_request(number: int, result: int, message: str | None, bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.command(512, number) == result
     assert message is None or rig.names() == ["COMMAND_ACK", message]
 
@@ -170,7 +170,7 @@ def test_a_closed_link_leaves_the_vehicle_flying(bench: Any) -> None:
     rig.run(10.0)
     assert rig.height == pytest.approx(5.0, abs=0.5)
     rig.autopilot.connect(link)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(2.0)
     assert rig.of("HEARTBEAT")
 

@@ -13,7 +13,7 @@ import pytest
 
 import volery.simulation.autopilots
 from volery.simulation.autopilots.autopilot_parameters import REAL32
-from volery.simulation.autopilots.px4 import FIRMWARE, events
+from volery.simulation.autopilots.px4 import FIRMWARE, event_interface
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NOT_SENT = {
@@ -53,7 +53,7 @@ def test_commands_on_the_ground(command: tuple[float, ...], result: int, bench: 
 
 
 @pytest.mark.parametrize("wrong", [{"target_system": 7}, {"target_component": 42}, {"target_system": 0}])
-def test_a_wrong_target_is_told_so(wrong: dict[str, int], bench: Any) -> None:
+def test_a_wrong_target_is_refused(wrong: dict[str, int], bench: Any) -> None:
     rig = bench()
     rig.ready()
     assert rig.command(400, 1, **wrong) == FAILED
@@ -135,7 +135,7 @@ def test_words_wait_for_a_ground_station(bench: Any) -> None:
     assert rig.command(400, 1) == ACCEPTED
     rig.run(1.0)
     assert rig.texts() == []
-    assert events.ARMED.id in rig.events()
+    assert event_interface.ARMED.id in rig.events()
     rig.beat()
     rig.run(1.1)
     assert rig.texts() == ["Armed by external command\t"]
@@ -265,7 +265,7 @@ def test_lost_sticks_hold_then_return_and_only_movement_brings_the_pilot_back(be
     rig.sticks(x=1000)
     rig.run(0.5)
     assert rig.vehicle.mode.name == "POSCTL"
-    assert events.PILOT_TOOK_OVER.id in rig.events(last)
+    assert event_interface.PILOT_TOOK_OVER.id in rig.events(last)
 
 
 def test_in_hold_moving_the_sticks_takes_over_but_not_in_offboard(bench: Any) -> None:

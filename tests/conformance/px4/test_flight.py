@@ -134,7 +134,7 @@ def test_offboard_is_accepted_at_the_first_setpoint_and_not_before(bench: Any) -
         ({"type_mask": 4095}, "SET_POSITION_TARGET_LOCAL_NED invalid\t"),
     ],
 )
-def test_what_is_not_understood_is_told_each_time_and_does_not_count(
+def test_invalid_setpoints_are_reported_each_time_and_do_not_count(
     fields: dict[str, int], words: str, bench: Any
 ) -> None:
     rig = bench()

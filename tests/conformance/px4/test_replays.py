@@ -25,7 +25,7 @@ OURS: dict[str, Any] = {}
 
 
 def flown(name: str, facts: dict[str, Any], bench: Any) -> Any:
-    """The simulated autopilot after it was told what the real one was told."""
+    """The simulated autopilot after it received what the real one received."""
     if name not in OURS:
         OURS[name] = _fly(name, facts["replays"][name], bench)
     return OURS[name]
@@ -106,7 +106,7 @@ def test_the_recorded_landed_states_are_passed(name: str, facts: dict[str, Any],
 
 
 @pytest.mark.parametrize("name", USES)
-def test_the_recorded_kinds_of_events_are_told(name: str, facts: dict[str, Any], bench: Any) -> None:
+def test_the_recorded_kinds_of_events_are_sent(name: str, facts: dict[str, Any], bench: Any) -> None:
     """Nothing that was recorded is missing, and nothing is told that was never recorded."""
     known = {event[1] for rows in facts["boot"].values() for event in rows["events"]}
     known |= {event[0] for rows in facts["events"].values() for event in rows}
@@ -115,11 +115,11 @@ def test_the_recorded_kinds_of_events_are_told(name: str, facts: dict[str, Any],
     assert theirs - ours <= {LOGGER, *OF_THE_RETURN}
 
 
-def test_a_mission_is_asked_for_and_told_as_recorded(facts: dict[str, Any], bench: Any) -> None:
+def test_a_mission_is_requested_and_reported_as_recorded(facts: dict[str, Any], bench: Any) -> None:
     rig, recorded = flown("auto-gcs", facts, bench), facts["replays"]["auto-gcs"]
     ours = [
         [one.name, one.fields["seq"]]
-        for one in rig.heard
+        for one in rig.received
         if one.name in ("MISSION_REQUEST", "MISSION_REQUEST_INT")
     ]
     assert ours == recorded["requests"]

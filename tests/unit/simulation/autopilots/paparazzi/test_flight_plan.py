@@ -195,7 +195,7 @@ def test_a_block_that_is_none_changes_nothing(craft: Any) -> None:
     assert craft.block_name == "Holding point"
 
 
-def test_a_moved_waypoint_is_flown_to_and_told(craft: Any) -> None:
+def test_a_moved_waypoint_is_flown_to_and_reported(craft: Any) -> None:
     craft.in_the_air()
     place = 20.0, -15.0, -9.0
     latitude, longitude, amsl = craft.flight.from_ned(place)
@@ -203,9 +203,9 @@ def test_a_moved_waypoint_is_flown_to_and_told(craft: Any) -> None:
         "MOVE_WP", wp_id=3, lat=round(latitude * 1e7), lon=round(longitude * 1e7), alt=round(amsl * 1e3)
     )
     craft.run(0.1)
-    told = craft.last("WP_MOVED_ENU")
-    assert told["wp_id"] == 3
-    assert [told[axis] / 256.0 for axis in ("east", "north", "up")] == pytest.approx(
+    reported = craft.last("WP_MOVED_ENU")
+    assert reported["wp_id"] == 3
+    assert [reported[axis] / 256.0 for axis in ("east", "north", "up")] == pytest.approx(
         [-15.0, 20.0, 9.0], abs=0.02
     )
     craft.run(15.0)

@@ -17,7 +17,7 @@ Make = Callable[..., Any]
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
 
 
-def test_it_publishes_at_the_rates_of_its_packages_what_somebody_hears(apron: Make) -> None:
+def test_it_publishes_topics_with_subscribers_at_the_rates_of_their_groups(apron: Make) -> None:
     yard = apron()
 
     def body() -> None:

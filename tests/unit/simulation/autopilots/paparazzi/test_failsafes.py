@@ -1,4 +1,4 @@
-"""What it does by itself: too far, too high, nobody speaks, no satellites, no sticks, no battery."""
+"""Failsafes: distance, height, data link, satellites, radio control, battery."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.simulation.world.environment_models import Wind
 Make = Callable[..., Any]
 
 
-def test_nobody_speaking_means_nothing(craft: Any) -> None:
+def test_a_silent_ground_has_no_effect(craft: Any) -> None:
     craft.guided()
     place = craft.position
     craft.run(300.0)
@@ -45,7 +45,7 @@ def test_going_back_to_nav_while_still_too_far_is_of_no_use(make: Make) -> None:
     assert craft.mode == "GUIDED"
 
 
-def test_very_far_it_comes_down_where_it_is(make: Make) -> None:
+def test_very_far_from_home_it_enters_failsafe(make: Make) -> None:
     craft = make(parameters={"MAX_DIST_FROM_HOME": 10.0, "FAILSAFE_MODE_DISTANCE": 15.0})
     craft.guided()
     craft.guide(0x00, 0.0, 20.0, -10.0)
@@ -73,7 +73,7 @@ def test_a_silent_ground_sends_it_home_only_if_that_is_set(make: Make) -> None:
     assert craft.mode == "HOME"
 
 
-def test_without_satellites_nav_comes_down(craft: Any) -> None:
+def test_without_satellites_nav_becomes_failsafe(craft: Any) -> None:
     craft.in_the_air()
     craft.flight.block_gps()
     craft.run(1.5)
@@ -93,7 +93,7 @@ def test_without_satellites_guided_flies_on(craft: Any) -> None:
     assert craft.armed
 
 
-def test_without_satellites_home_comes_down(craft: Any) -> None:
+def test_without_satellites_home_becomes_failsafe(craft: Any) -> None:
     craft.guided()
     craft.set("mode", 2)
     craft.flight.block_gps()

@@ -30,7 +30,7 @@ PERIODS = {
 @pytest.mark.parametrize("name", PERIODS)
 def test_the_default_periods(craft: Any, name: str) -> None:
     craft.run(3.0)
-    craft.heard.clear()
+    craft.received.clear()
     craft.run(51.0)
     assert craft.count(name) == pytest.approx(51.0 / PERIODS[name], abs=1.0)
 
@@ -93,26 +93,26 @@ def test_the_battery(make: Make) -> None:
 
 def test_settings_are_read_and_written_by_number(craft: Any) -> None:
     auto2 = stock_aircraft().setting("auto2").number
-    craft.heard.clear()
+    craft.received.clear()
     craft.send("GET_SETTING", index=auto2)
     craft.run(0.05)
     assert craft.last("DL_VALUE") == {"index": auto2, "value": 13.0}
     craft.set("auto2", 19.0)
     assert craft.last("DL_VALUE") == {"index": auto2, "value": 19.0}
     assert craft.mode == "NAV"  # it says what the switch means, and there is no switch
-    craft.heard.clear()
+    craft.received.clear()
     craft.send("SETTING", index=200, value=1.0)
     craft.send("GET_SETTING", index=200)
     craft.send("SETTING", index=auto2, value=float("nan"))
     craft.run(0.05)
-    assert [frame.fields["value"] for frame in craft.heard if frame.name == "DL_VALUE"] == [19.0]
+    assert [frame.fields["value"] for frame in craft.received if frame.name == "DL_VALUE"] == [19.0]
 
 
-def test_settings_and_waypoints_are_told_in_turn(craft: Any) -> None:
+def test_settings_and_waypoints_are_sent_in_turn(craft: Any) -> None:
     craft.run(15.0)
-    told = {frame.fields["index"] for frame in craft.heard if frame.name == "DL_VALUE"}
-    assert told == {one.number for one in stock_aircraft().settings}
-    places = {frame.fields["wp_id"] for frame in craft.heard if frame.name == "WP_MOVED_ENU"}
+    reported = {frame.fields["index"] for frame in craft.received if frame.name == "DL_VALUE"}
+    assert reported == {one.number for one in stock_aircraft().settings}
+    places = {frame.fields["wp_id"] for frame in craft.received if frame.name == "WP_MOVED_ENU"}
     assert places == set(range(10))
 
 
@@ -122,7 +122,7 @@ def test_a_ping_is_answered(craft: Any) -> None:
     assert craft.count("PONG") == 1
 
 
-def test_it_says_how_long_it_has_not_heard_the_ground(craft: Any) -> None:
+def test_the_datalink_report_counts_the_silence_of_the_ground(craft: Any) -> None:
     craft.send("PING")
     craft.run(5.2)
     report = craft.last("DATALINK_REPORT")
@@ -135,8 +135,8 @@ def test_every_message_fits_its_definition_and_carries_its_number(make: Make) ->
     craft = make(through_bytes=True)
     craft.guided()
     craft.run(10.0)
-    assert {frame.system for frame in craft.heard} == {7}
-    assert set(PERIODS) <= {frame.name for frame in craft.heard}
+    assert {frame.system for frame in craft.received} == {7}
+    assert set(PERIODS) <= {frame.name for frame in craft.received}
     assert (
         craft.link.statistics.corrupt == craft.link.statistics.unknown == craft.link.statistics.garbage == 0
     )
@@ -144,14 +144,14 @@ def test_every_message_fits_its_definition_and_carries_its_number(make: Make) ->
 
 
 def test_values_and_bytes_fly_the_same(make: Make) -> None:
-    heard = []
+    received = []
     for through_bytes in (False, True):
         craft = make(through_bytes=through_bytes)
         craft.guided()
         craft.guide(0x00, 10.0, 5.0, -12.0, 0.3)
         craft.run(10.0)
-        heard.append([PPRZLINK.encode(frame, 0) for frame in craft.heard])
-    assert heard[0] == heard[1]
+        received.append([PPRZLINK.encode(frame, 0) for frame in craft.received])
+    assert received[0] == received[1]
 
 
 def test_a_flight_repeats_byte_for_byte(make: Make) -> None:
@@ -161,7 +161,7 @@ def test_a_flight_repeats_byte_for_byte(make: Make) -> None:
         craft.in_the_air()
         craft.block("route")
         craft.run(20.0)
-        flown.append(b"".join(PPRZLINK.encode(frame, 0) for frame in craft.heard))
+        flown.append(b"".join(PPRZLINK.encode(frame, 0) for frame in craft.received))
     assert flown[0] == flown[1]
 
 

@@ -151,8 +151,8 @@ def test_sticks_fly_without_satellites(make: Make) -> None:
 def test_channels_say_the_same_as_sticks(craft: Any) -> None:
     craft.send("RC_UP", channels=(64, -64, 32, 100, -127))
     craft.run(0.6)
-    told = craft.last("ROTORCRAFT_RADIO_CONTROL")
-    assert [told[name] for name in ("roll", "pitch", "yaw", "throttle", "mode")] == [
+    reported = craft.last("ROTORCRAFT_RADIO_CONTROL")
+    assert [reported[name] for name in ("roll", "pitch", "yaw", "throttle", "mode")] == [
         4800,
         -4800,
         2400,
@@ -172,6 +172,6 @@ def test_a_joystick_is_sticks_with_the_switch_at_auto2(craft: Any) -> None:
     craft.set("auto2", 6)
     craft.send("JOYSTICK_RAW", roll=9600, pitch=-32768, yaw=0, throttle=-5)
     craft.run(0.6)
-    told = craft.last("ROTORCRAFT_RADIO_CONTROL")
-    assert [told[name] for name in ("roll", "pitch", "yaw", "throttle")] == [9600, -9600, 0, 0]
+    reported = craft.last("ROTORCRAFT_RADIO_CONTROL")
+    assert [reported[name] for name in ("roll", "pitch", "yaw", "throttle")] == [9600, -9600, 0, 0]
     assert craft.mode == "ATTITUDE_RC_CLIMB"

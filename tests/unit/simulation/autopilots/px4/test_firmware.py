@@ -18,7 +18,7 @@ from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.px4 import FIRMWARE
-from volery.simulation.autopilots.px4.events import ArmingChecks, arming_report
+from volery.simulation.autopilots.px4.event_interface import ArmingChecks, arming_report
 from volery.simulation.autopilots.px4.flight_modes import apply_expo, interpolated
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
 from volery.simulation.autopilots.px4.offboard import OffboardTarget, SetpointStream, attitude_target
@@ -122,14 +122,14 @@ def test_texts_wait_for_a_station_keep_their_distance_and_the_newest_four() -> N
 
 
 def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
-    """Everything that is heard on one link during a short flight or drive."""
+    """All messages that one link receives during a short flight or drive."""
     kernel = VirtualKernel()
     spec = Multirotor() if kind == "multirotor" else Rover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
     autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
-    heard: list[tuple[Any, ...]] = []
-    ours.receive(lambda frame: heard.append((kernel.now(), frame.name, repr(frame.fields))))
+    received: list[tuple[Any, ...]] = []
+    ours.receive(lambda frame: received.append((kernel.now(), frame.name, repr(frame.fields))))
     autopilot.connect(theirs)
 
     def setpoint() -> None:
@@ -146,7 +146,7 @@ def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
     kernel.call_at(2 * S, lambda: command(400, 1))
     kernel.run(8 * S)
     assert autopilot.vehicle.armed
-    return heard
+    return received
 
 
 @pytest.mark.parametrize("kind", ["multirotor", "rover"])

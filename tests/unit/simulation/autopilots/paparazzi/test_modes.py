@@ -57,7 +57,7 @@ def test_others_are_refused_in_silence(craft: Any, number: int) -> None:
     assert craft.last("DL_VALUE") == {"index": 3, "value": 13.0}
 
 
-def test_a_changed_mode_is_told_at_once(craft: Any) -> None:
+def test_a_changed_mode_is_reported_at_once(craft: Any) -> None:
     craft.run(1.0)
     before = craft.count("ROTORCRAFT_STATUS")
     craft.set("mode", 19)

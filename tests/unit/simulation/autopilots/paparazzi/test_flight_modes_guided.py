@@ -31,7 +31,7 @@ def test_a_point_is_reached_and_kept(craft: Any) -> None:
     craft.run(20.0)
     assert craft.position == pytest.approx((20.0, -10.0, -15.0), abs=0.3)
     assert heading(craft) == pytest.approx(1.0, abs=0.05)
-    craft.run(120.0)  # and nobody says anything
+    craft.run(120.0)  # without further messages
     assert craft.mode == "GUIDED"
     assert craft.position == pytest.approx((20.0, -10.0, -15.0), abs=0.3)
 
@@ -67,7 +67,7 @@ def test_elsewhere_it_is_ignored_in_silence(craft: Any, mode: int) -> None:
     craft.set("mode", mode)
     craft.run(5.0)
     place = craft.position
-    craft.heard.clear()
+    craft.received.clear()
     craft.guide(0x00, 30.0, 30.0, -20.0)
     craft.run(8.0)
     assert dist(craft.position, place) < 0.5

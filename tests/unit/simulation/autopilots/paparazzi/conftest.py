@@ -26,7 +26,7 @@ AIRCRAFT = 7
 
 
 class Craft:
-    """One rotorcraft with accurate sensors, booted unless ``warm=False``, and what the ground heard."""
+    """One rotorcraft with accurate sensors, booted unless ``warm=False``, and the messages that the ground received."""
 
     def __init__(
         self,
@@ -52,8 +52,8 @@ class Craft:
             self.link: Any = ours
         else:
             self.link, theirs = in_process_pair(self.kernel, MS, "ground", codec)
-        self.heard: list[Frame] = []
-        self.link.receive(self.heard.append)
+        self.received: list[Frame] = []
+        self.link.receive(self.received.append)
         self.autopilot.connect(theirs)
         if warm:
             self.run(3.0)
@@ -98,11 +98,11 @@ class Craft:
 
     def last(self, name: str) -> dict[str, Any]:
         """The fields of the last message of that name."""
-        return next(frame.fields for frame in reversed(self.heard) if frame.name == name)
+        return next(frame.fields for frame in reversed(self.received) if frame.name == name)
 
     def count(self, name: str) -> int:
-        """How many of them were heard."""
-        return sum(frame.name == name for frame in self.heard)
+        """Number of received messages of that name."""
+        return sum(frame.name == name for frame in self.received)
 
     # -- looking
 

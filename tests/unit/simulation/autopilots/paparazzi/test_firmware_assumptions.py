@@ -7,7 +7,7 @@ from pathlib import Path
 from volery.simulation.autopilots.paparazzi.firmware import ASSUMED
 from volery.simulation.autopilots.paparazzi.parameters import FIGURES
 
-PAGE = Path(__file__).parents[3] / "docs" / "paparazzi.md"
+PAGE = Path(__file__).parents[5] / "docs" / "paparazzi.md"
 
 
 def table_after(heading: str, head: str) -> list[str]:
