@@ -1,12 +1,8 @@
-"""Changes to a model: what scenarios, allocations and options ``set``.
+"""Assembly of one tree from a model's parts: world file, model file, scenario, allocation, options.
 
-A path is keys and list positions joined by dots. It must lead somewhere: the entry that is set may be new,
-what leads there must exist or be a part of every model (``environment.wind``). Setting nothing takes an entry
-away.
-
-One tree out of a model's parts: the file, its world file, a scenario, an allocation, options.
-
-In this order, later ones win: world file, model file, scenario, allocation, options.
+In this order, later parts win. Scenarios, allocations and options ``set`` paths: keys and list positions
+joined by dots. The entry that is set may be new; what leads to it must exist or be a part of every model
+(``environment.wind``). Setting nothing removes an entry.
 """
 
 from __future__ import annotations
@@ -23,25 +19,29 @@ from volery.model.text import Node, Path, Problems, no_such, parse, parse_value,
 
 @dataclass(frozen=True)
 class Change:
-    """Put *value* at *path*. ``said_at`` is the path in the model that says so, empty for an option."""
+    """A change: put *value* at *path*. ``stated_at`` is the path in the model that states it, if any."""
 
     path: Path
     value: Node
-    said_at: Path = ()
+    stated_at: Path = ()
 
     @property
     def where(self) -> Location:
-        """The line or the option that says so."""
+        """The line or the option that states the change."""
         return self.value.where
 
 
 def split_path(path: str) -> Path:
-    """The path that a text such as ``platform.processors.onboard`` means."""
+    """Return the path of a text such as ``platform.processors.onboard``."""
     return tuple(path.split("."))
 
 
 def change_from_option(text: str) -> Change:
-    """What ``--set path=value`` means; the value is YAML."""
+    """Return the change of an option ``--set path=value``; the value is YAML.
+
+    Raises:
+        UsageError: *text* has no path or no value.
+    """
     path, equals, value = text.partition("=")
     if not equals or not path.strip() or "" in path.strip().split("."):
         raise UsageError(
@@ -51,21 +51,21 @@ def change_from_option(text: str) -> Change:
     return Change(split_path(path.strip()), parse_value(value, Location(f"--set {text}", 0)))
 
 
-def changes_from_mapping(node: Node | None, said_at: Path) -> list[Change]:
-    """What a ``set:`` mapping means, in its order."""
+def changes_from_mapping(node: Node | None, stated_at: Path) -> list[Change]:
+    """Return the changes of a ``set:`` mapping, in its order."""
     if node is None:
         return []
-    return [Change(split_path(key), value, (*said_at, key)) for key, value in node.items.items()]
+    return [Change(split_path(key), value, (*stated_at, key)) for key, value in node.items.items()]
 
 
 def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> None:
-    """Change *root* in place; a path that leads nowhere is a problem."""
+    """Change *root* in place; report paths that do not exist."""
     for change in changes:
         complaint = _apply(root, change)
         if change.path[0] == "run":  # a scenario's own `duration` and `until` are copied there
-            problems.copied(change.path, change.said_at or None)
+            problems.copied(change.path, change.stated_at or None)
         if complaint:
-            problems.add(change.said_at or change.path, complaint, change.where)
+            problems.add(change.stated_at or change.path, complaint, change.where)
 
 
 def _apply(root: Node, change: Change) -> str:
@@ -84,7 +84,7 @@ def _apply(root: Node, change: Change) -> str:
 
 
 def _lengthen(node: Node, path: Path) -> None:
-    """A single value becomes the mapping that is meant: ``battery: 5 Ah`` has a ``capacity``."""
+    """Expand a value in its short form to the mapping: ``battery: 5 Ah`` has a ``capacity``."""
     if node.value is None:
         node.value = {}
     key = short_key(path)
@@ -93,7 +93,7 @@ def _lengthen(node: Node, path: Path) -> None:
 
 
 def _cannot_make(node: Node, path: Path) -> str:
-    """Why a mapping cannot be made at *path* on the way; empty if it can."""
+    """Return why a mapping cannot be made at *path*; empty if it can."""
     known = keys_at(path[:-1]) or []
     if path[-1] in known:
         return ""
@@ -145,7 +145,7 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Selection:
-    """What is asked for: a scenario, an allocation (``None``: the model's choice), and options in order."""
+    """The selected scenario and allocation (None: the model's default), and options in order."""
 
     scenario: str | None = None
     allocation: str | None = None
@@ -153,7 +153,11 @@ class Selection:
 
 
 def read_text(path: FilePath, name: str, where: Location | None = None, at: Path = ()) -> str:
-    """The text of a file; a ``ModelError`` names it. *where* and *at* are of what asks for it."""
+    """Return the text of a file that is named at *at* in the model, which stands at *where*.
+
+    Raises:
+        ModelError: the file cannot be read.
+    """
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -172,19 +176,19 @@ def _near(path: FilePath) -> str:
     return f"; in that folder there is {', '.join(models[:5])}" if models else ""
 
 
-def assemble(file: FilePath, wanted: Selection) -> tuple[Assembly, Problems]:
-    """Read *file* and what it names, and apply what is *wanted*. Problems of the paths are in the result."""
+def assemble(file: FilePath, selection: Selection) -> tuple[Assembly, Problems]:
+    """Read *file* and the files that it names, and apply the selection. Return the tree and its problems."""
     text = read_text(file, str(file))
     root = parse(text, str(file))
     if not isinstance(root.value, dict):
         raise ModelError("a model is a mapping that starts with `volery: 1`", "", root.where)
     made = Assembly(root, (Source(file.name, text),))
     problems = Problems(root.locate)
-    early, late = _parted(wanted.options)
+    early, late = _parted(selection.options)
     apply_changes(root, early, problems)
     all_changes = [
-        *_choose_scenario(made, wanted, problems),
-        *_choose_allocation(made, wanted, problems),
+        *_choose_scenario(made, selection, problems),
+        *_choose_allocation(made, selection, problems),
         *late,
     ]
     _merge_world(made, file.parent, all_changes, problems)
@@ -193,16 +197,16 @@ def assemble(file: FilePath, wanted: Selection) -> tuple[Assembly, Problems]:
 
 
 def _parted(options: Sequence[Change]) -> tuple[list[Change], list[Change]]:
-    """Options that change what a scenario or an allocation says come before these are looked at."""
+    """Return the options that change scenarios and allocations, which are applied first, and the rest."""
     early = [change for change in options if change.path[0] in ("scenarios", "allocations")]
     return early, [change for change in options if change not in early]
 
 
-def _choose_scenario(made: Assembly, wanted: Selection, problems: Problems) -> list[Change]:
-    if wanted.scenario is None:
+def _choose_scenario(made: Assembly, selection: Selection, problems: Problems) -> list[Change]:
+    if selection.scenario is None:
         return []
     found: list[Change] = []
-    for name in _chain(made.root, "scenarios", wanted.scenario, problems):
+    for name in _chain(made.root, "scenarios", selection.scenario, problems):
         at = ("scenarios", name)
         node = made.root.at(at)
         found += changes_from_mapping(made.root.at((*at, "set")), (*at, "set"))
@@ -210,13 +214,13 @@ def _choose_scenario(made: Assembly, wanted: Selection, problems: Problems) -> l
             below = node.child(key) if node else None
             if below is not None:
                 found.append(Change(("run", key), below, (*at, key)))
-    made.scenario = wanted.scenario
+    made.scenario = selection.scenario
     return found
 
 
-def _choose_allocation(made: Assembly, wanted: Selection, problems: Problems) -> list[Change]:
+def _choose_allocation(made: Assembly, selection: Selection, problems: Problems) -> list[Change]:
     name = (
-        wanted.allocation
+        selection.allocation
         or _scenarios_allocation(made, problems)
         or next(iter(_names(made.root, "allocations")), "")
     )
@@ -250,7 +254,7 @@ def _names(root: Node, section: str) -> list[str]:
 
 
 def _chain(root: Node, section: str, name: str, problems: Problems) -> list[str]:
-    """*name* and what it extends, the first ancestor first."""
+    """Return *name* and what it extends, the first ancestor first."""
     names = _names(root, section)
     if name not in names:
         raise UsageError(no_such(name, section[:-1], names))
@@ -299,7 +303,7 @@ def _listed(known: list[str]) -> str:
 
 
 def _under(own: Node | None, world: Node) -> Node:
-    """The world's part with the model's own entries on top."""
+    """Return the world's part with the model's own entries on top."""
     if own is None:
         return world
     if isinstance(own.value, dict) and isinstance(world.value, dict):

@@ -1,6 +1,4 @@
-"""A system as text: what runs on what, what is connected to what. One line per thing, made to be read and
-compared.
-"""
+"""A system as text: allocation and connections, one line for each thing."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from volery.model.system import Network, Processor, System
 
 
 def diagram(system: System) -> str:
-    """Each computer with what runs on it, the environment's components, the networks and the vehicles."""
+    """Return each computer with its instances, the environment's components, networks and vehicles."""
     return "\n".join(_lines(system)) + "\n"
 
 

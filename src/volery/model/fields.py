@@ -283,7 +283,10 @@ class Reference(Syntax):
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         other = f", or `{self.none}`" if self.none else ""
-        return {"type": "string", "x-quantity": f"the name of {'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}{other}"}
+        return {
+            "type": "string",
+            "x-quantity": f"the name of {'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}{other}",
+        }
 
 
 # -- collections

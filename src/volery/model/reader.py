@@ -12,7 +12,7 @@ from pathlib import Path as FilePath
 
 from volery.base.errors import ModelError, choices
 from volery.model.assembly import NOT_PLACES, Assembly, Selection, assemble, change_from_option
-from volery.model.components import Component, Figure
+from volery.model.components import Figure
 from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
 from volery.model.fields import TEXT, ListOf, read_child
@@ -26,7 +26,11 @@ FIDELITIES = ("times", "code", "firmware", "hardware")
 
 
 def check_ready(system: System, fidelity: str, vocabulary: Vocabulary) -> None:
-    """Raise ``ModelError`` for whatever *system* lacks to run at *fidelity* (``times`` or ``code``)."""
+    """Check that *system* can run at *fidelity* (``times`` or ``code``).
+
+    Raises:
+        ModelError: what is missing; all of it at once (``CollectedModelError``).
+    """
     found = list(gaps(system, fidelity, vocabulary))
     if len(found) == 1:
         raise found[0]
@@ -35,8 +39,9 @@ def check_ready(system: System, fidelity: str, vocabulary: Vocabulary) -> None:
 
 
 def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:
-    """What is missing, component by component, in the order of the model."""
-    for component in _used(system):
+    """Yield what is missing, component by component, in the order of the model."""
+    used = {instance.component.name: instance.component for instance in system.instances}
+    for component in used.values():
         if fidelity == "code" and not component.path:
             what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
             yield ModelError(what, f"components.{component.name}", component.where)
@@ -46,11 +51,6 @@ def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[Mode
     if fidelity == "times":
         for instance in system.instances:
             yield from _missing_figures(system, instance)
-
-
-def _used(system: System) -> list[Component]:
-    """The components that have instances."""
-    return list({instance.component.name: instance.component for instance in system.instances}.values())
 
 
 def _missing_figures(system: System, instance: Instance) -> Iterator[ModelError]:
@@ -121,7 +121,10 @@ def load(
 def check(path: str | FilePath, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
     """Read the model with each of its allocations and each of its scenarios; return it as it stands.
 
-    It has the warnings of all of them. Raises what ``load`` raises, for all of them together.
+    The result has the warnings of all of them.
+
+    Raises:
+        ModelError: the problems of all of them.
     """
     options = tuple(overrides)
     system = load(path, vocabulary, overrides=options)

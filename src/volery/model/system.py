@@ -202,10 +202,10 @@ class BoundText:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A requirement: a bound on an observed quantity. ``relation`` is ``max`` or ``min``; both include the
-    bound.
+    """A requirement: a bound on an observed quantity.
 
-    ``observe`` is ``<subject>.<quantity>``; ``bound`` is in ``unit``, the unit of the observable.
+    ``relation`` is ``max`` or ``min``; both include the bound. ``observe`` is ``<subject>.<quantity>``;
+    ``bound`` is in ``unit``, the unit of the observable.
     """
 
     name: str

@@ -1,9 +1,8 @@
-"""Collecting what is wrong with a model, so that all of it is told at once.
+"""The text of a model: YAML as a tree with source lines, and the problems found in it.
 
-YAML text to a tree that remembers where everything stands.
-
-A ``Node`` is a scalar, a mapping or a list; what is merged into a tree later (a world file, a scenario, an
-option) brings its own places along. YAML 1.2, so ``on`` and ``yes`` are text. Keys are text, and stand once.
+A ``Node`` is a scalar, a mapping or a list. Nodes that are merged into a tree later (a world file, a
+scenario, an option) keep their own locations. YAML 1.2, so ``on`` and ``yes`` are text. Keys are text, and
+unique. Problems are collected, so that all of them are reported at once.
 """
 
 from __future__ import annotations
@@ -28,16 +27,16 @@ Path = tuple[str | int, ...]
 """A path in the model: keys and list positions from the top."""
 
 Locate = Callable[[Path], Location | None]
-"""Where something of a path stands; its nearest ancestor if it stands nowhere itself."""
+"""Returns the location of a path, or of its nearest ancestor in the tree."""
 
 
 def written(path: Path) -> str:
-    """The path as messages and ``--set`` write it: ``platform.processors.onboard``."""
+    """Return *path* as messages and ``--set`` write it: ``platform.processors.onboard``."""
     return ".".join(str(step) for step in path)
 
 
 class CollectedModelError(ModelError):
-    """Several things are wrong with a model. ``errors`` has them one by one, in the order of the file."""
+    """Several problems of a model. ``errors`` has them one by one, in the order of the file."""
 
     def __init__(self, errors: Iterable[ModelError]) -> None:
         self.errors = tuple(errors)
@@ -45,12 +44,12 @@ class CollectedModelError(ModelError):
         super().__init__(f"{len(self.errors)} things are wrong with this model:\n{listed}")
 
     def __reduce__(self) -> tuple[type[CollectedModelError], tuple[tuple[ModelError, ...]]]:
-        """So that it can be sent from process to process."""
+        """Return how to pickle it, to send it from process to process."""
         return type(self), (self.errors,)
 
 
 class Problems:
-    """What was found so far."""
+    """The problems of a model that were found so far."""
 
     def __init__(self, locate: Locate) -> None:
         self._locate = locate
@@ -62,7 +61,7 @@ class Problems:
         return bool(self._found)
 
     def add(self, path: Path, what: str, where: Location | None = None) -> None:
-        """Note that *what* is wrong at *path* (or *where*, if known better); once if it comes twice."""
+        """Report that *what* is wrong at *path*, which stands at *where*; the same problem counts once."""
         where = where or self._locate(path)
         for copy, origin in self._origins.items():
             if path[: len(copy)] == copy:
@@ -81,24 +80,24 @@ class Problems:
             self._origins[path] = origin
 
     def unknown(self, path: Path, name: object, noun: str, valid: Iterable[str]) -> None:
-        """Note a *name* that nothing goes by; *valid* are the names there are."""
+        """Report an unknown *name* at *path*; *valid* are the known names."""
         self.add(path, no_such(name, noun, valid))
 
     def warn(self, path: Path, what: str) -> None:
-        """Note that *what* is doubtful at *path*; the model stands nevertheless."""
+        """Report that *what* is doubtful at *path*; the model is valid nevertheless."""
         self._warnings[f"{written(path)}: {what}"] = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What was found to be doubtful, once each."""
+        """The warnings, once each."""
         return tuple(self._warnings)
 
     def where(self, path: Path) -> Location | None:
-        """Where *path* stands."""
+        """Return the location of *path*."""
         return self._locate(path)
 
     def raise_if_any(self) -> None:
-        """Raise what was found: a ``ModelError``, or one ``CollectedModelError`` for several."""
+        """Raise the problems, if any: a ``ModelError``, or one ``CollectedModelError`` for several."""
         if len(self._found) == 1:
             raise self._found[0]
         if self._found:
@@ -106,7 +105,7 @@ class Problems:
 
 
 def no_such(name: object, noun: str, valid: Iterable[str]) -> str:
-    """``no processor named 'x' (did you mean 'y'?); there is y or z``."""
+    """Return ``no processor named 'x' (did you mean 'y'?); there is y or z``."""
     names = list(valid)
     return f"no {noun} named {name!r}{did_you_mean(str(name), names)}; there is {choices(names)}"
 
@@ -116,14 +115,14 @@ def _order(error: ModelError) -> tuple[str, int]:
 
 
 MOST_NODES = 100_000
-"""More than any model needs: a file of nested aliases would otherwise fill the memory."""
+"""More than any model needs. Without a limit, a file of nested aliases would fill the memory."""
 
 Scalar = str | int | float | bool | None
 
 
 @dataclass
 class Node:
-    """A piece of a model and where it stands: for the value of a mapping, the line of its key.
+    """A value of a model with its location: for an entry of a mapping, the line of its key.
 
     ``quoted`` is true for a text in quotation marks: it is meant as text even if it looks like a quantity.
     """
@@ -138,20 +137,20 @@ class Node:
         return self.value if isinstance(self.value, dict) else {}
 
     def child(self, step: str | int) -> Node | None:
-        """The entry or the list item, ``None`` where there is none."""
+        """Return the entry or the list item *step*, None if there is none."""
         if isinstance(self.value, list) and str(step).isdigit() and int(step) < len(self.value):
             return self.value[int(step)]
         return self.items.get(str(step))
 
     def at(self, path: Path) -> Node | None:
-        """The piece at *path*, ``None`` if there is none."""
+        """Return the node at *path*, None if there is none."""
         node: Node | None = self
         for step in path:
             node = node.child(step) if node else None
         return node
 
     def locate(self, path: Path) -> Location | None:
-        """Where *path* stands, or the deepest part of it that there is."""
+        """Return the location of *path*, or of its deepest part that exists."""
         node: Node = self
         for step in path:
             below = node.child(step)
@@ -161,7 +160,7 @@ class Node:
         return node.where
 
     def plain(self) -> Any:
-        """The same as plain values. A text in quotation marks stays a ``Quoted``."""
+        """Return the tree as plain values; a text in quotation marks as a ``Quoted``."""
         if isinstance(self.value, dict):
             return {key: node.plain() for key, node in self.value.items()}
         if isinstance(self.value, list):
@@ -169,7 +168,7 @@ class Node:
         return Quoted(self.value) if self.quoted else self.value
 
     def copy(self) -> Node:
-        """A tree of its own."""
+        """Return a deep copy."""
         if isinstance(self.value, dict):
             return Node({key: node.copy() for key, node in self.value.items()}, self.where)
         if isinstance(self.value, list):
@@ -177,7 +176,7 @@ class Node:
         return Node(self.value, self.where, self.quoted)
 
     def moved(self, where: Location) -> Node:
-        """The same, as if all of it stood at *where*."""
+        """Return a copy in which every node stands at *where*."""
         if isinstance(self.value, dict):
             return Node({key: node.moved(where) for key, node in self.value.items()}, where)
         if isinstance(self.value, list):
@@ -186,13 +185,17 @@ class Node:
 
 
 class Quoted(str):
-    """A text that stood in quotation marks."""
+    """A text that was written in quotation marks."""
 
     __slots__ = ()
 
 
 def parse(text: str, name: str) -> Node:
-    """The tree of a YAML text. *name* is what messages call the file."""
+    """Return the tree of a YAML text. *name* is the name of the file in messages.
+
+    Raises:
+        ModelError: it is not the YAML of a model.
+    """
     yaml = YAML(typ="safe", pure=True)
     try:
         with warnings.catch_warnings(action="ignore", category=ReusedAnchorWarning):
@@ -211,7 +214,7 @@ def parse(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, where: Location) -> Node:
-    """The tree of an option's value, all of it standing at *where*."""
+    """Return the tree of an option's value, every node of which stands at *where*."""
     if not text.strip():
         return Node(None, where)
     try:
@@ -230,7 +233,7 @@ class _Reading:
     open: list[int] = field(default_factory=list)
 
     def node(self, raw: Any, path: Path) -> Node:
-        """The tree below *raw*."""
+        """Return the tree below *raw*."""
         where = Location(self.name, raw.start_mark.line + 1)
         self.count += 1
         if self.count > MOST_NODES:

@@ -1,7 +1,7 @@
-"""What a run comes to: one fold over its events, the same while it runs and from a trace read back.
+"""The accounts of a run: one fold over its events, the same during the run and from a trace read back.
 
-Memory does not grow with time, only with what the run is made of and with what the application follows
-(parcels, vehicle operations, failures). It prices nothing: the energy law of processors is handed in.
+Memory does not grow with time, only with the number of parts of the run and of what the application tracks
+(parcels, vehicle operations, failures). Nothing is priced here: the energy law of processors is an argument.
 """
 
 from __future__ import annotations
@@ -58,15 +58,15 @@ PARCEL = "parcel"
 """Kind of the milestones of a parcel."""
 ORDERED, DELIVERED, FAILED = "ordered", "delivered", "failed"
 """States of a parcel that observables are defined by. An application may have others in between."""
-"""The kind of milestone that tells of parcels."""
-HOUSE = "volery"
-"""The source of words that come from the house itself: its warnings become warnings of the record."""
+"""The kind of milestones of parcels."""
+FRAMEWORK = "volery"
+"""The source of texts of the framework: its warnings become warnings of the record."""
 WARNING = 4
 """Syslog's severity of a warning."""
 
 
 class Circumstances(NamedTuple):
-    """What stands in ``run.json`` alone, since it differs from one execution of a run to the next."""
+    """What differs from one execution of a run to the next, and so is stored in ``run.json`` alone."""
 
     wall_s: float | None = None
     versions: Mapping[str, str] = {}
@@ -76,9 +76,13 @@ UNKNOWN_CIRCUMSTANCES = Circumstances()
 
 
 class Accounts:
-    """A tap of the stream that keeps the accounts of a run. Ask for its ``record`` at any time.
+    """A listener of the event stream that keeps the accounts of a run; see ``record``.
 
     ``last`` is the time of the latest event.
+
+    Args:
+        setup: The set-up of the run.
+        energy: Energy law of processors.
     """
 
     def __init__(self, setup: RunSetup, energy: EnergyLaw = linear_energy) -> None:
@@ -113,11 +117,11 @@ class Accounts:
         }
 
     def __call__(self, event: Event) -> None:
-        """Take one event into account."""
+        """Add an event."""
         self.listener(type(event))(event)
 
     def listener(self, kind: type[Any]) -> Record:
-        """What takes events of *kind* into account; of those not accounted for, only the time counts."""
+        """Return what adds events of *kind*; of kinds without an account, only the time counts."""
         fold: Callable[[Any], Ns] = self._folds.get(kind, itemgetter(0))
 
         def take(event: Any) -> None:
@@ -144,8 +148,8 @@ class Accounts:
         return event.end
 
     def _preemption(self, event: Preemption) -> Ns:
-        who = event.processor, event.preempted, event.by
-        self._preemptions[who] = self._preemptions.get(who, 0) + 1
+        key = event.processor, event.preempted, event.by
+        self._preemptions[key] = self._preemptions.get(key, 0) + 1
         return event.at
 
     def _message(self, event: Message) -> Ns:
@@ -194,7 +198,7 @@ class Accounts:
         return event.at
 
     def _text(self, event: Text) -> Ns:
-        if event.source == HOUSE and event.severity <= WARNING:
+        if event.source == FRAMEWORK and event.severity <= WARNING:
             self._warnings[event.text] = None
         return event.at
 
@@ -205,7 +209,7 @@ class Accounts:
         ended: Ns | None = None,
         circumstances: Circumstances = UNKNOWN_CIRCUMSTANCES,
     ) -> RunRecord:
-        """The contents of ``run.json`` for a run that ended at *ended*; without it, at its last event."""
+        """Return the contents of ``run.json`` for a run that ended at *ended*; default: its last event."""
         setup = self.setup
         elapsed = to_seconds(self.last if ended is None else ended)
         wall = circumstances.wall_s
@@ -234,7 +238,7 @@ class Accounts:
         )
 
     def _component_records(self) -> dict[str, ComponentRecord]:
-        """Without the house's own flows of control, which were neither set up nor allocated."""
+        """Return the records of components, without the framework's own tasks, which are not set up."""
         bounds = self._response_bounds()
         return {
             name: ledger.record(self._above_idle(ledger.processor), bounds.get(name))
@@ -250,7 +254,7 @@ class Accounts:
         }
 
     def _preemption_records(self) -> list[PreemptionRecord]:
-        """The most frequent first."""
+        """Return the records of preemptions, the most frequent first."""
         often = sorted(self._preemptions.items(), key=lambda one: (-one[1], one[0]))
         return [
             PreemptionRecord(processor=processor, preempted=preempted, by=by, count=count)
@@ -307,8 +311,8 @@ class Accounts:
         return all(verdict.met for verdict in self._verdicts.values())
 
     def _not_counted(self) -> list[str]:
-        """What the accounts themselves can see is missing."""
-        homeless = [name for name in self._declared if not self._components[name].processor]
+        """Return what is missing in the accounts."""
+        unallocated = [name for name in self._declared if not self._components[name].processor]
         uncounted = [
             name for name, ledger in self._components.items() if ledger.processor and ledger.uncounted()
         ]
@@ -319,7 +323,7 @@ class Accounts:
         ]
         missing = (
             ("their own code, of which nothing but ROS calls was counted", uncounted),
-            ("all computing, since they are allocated to no processor", homeless),
+            ("all computing, since they are allocated to no processor", unallocated),
             ("energy, for want of power figures", powerless),
         )
         return [f"{', '.join(names)}: {what}" for what, names in missing if names]

@@ -1,17 +1,13 @@
-"""How durations are spread, in bounded memory and exactly the same on every machine.
+"""Ledgers: what one component, one vehicle or one chain of topics did in a run, each closing to a record.
 
-Integer nanoseconds fall into buckets that keep the ten leading bits, the idea of HdrHistogram
-(https://hdrhistogram.org): mean, count and maximum are exact, a quantile is at most 0.2 % too high and never
-too low.
+Durations are kept as distributions in bounded memory, exactly the same on every machine: integer nanoseconds
+fall into buckets that keep the ten leading bits, the idea of HdrHistogram (https://hdrhistogram.org). Mean,
+count and maximum are exact, a quantile is at most 0.2 % too high and never too low.
 
-The ledgers of a run's accounts: one per component, one per vehicle, each closing to a record.
-
-How old what arrives at the end of a chain of topics is.
-
-A chain is a row of topics: a node hears the first and says the second, and so on. The latency of a message on
-the last topic is counted from when the message on the first topic was sent that it may have been made from:
-at each node on the way, the latest one that had arrived there when it spoke. (Feiertag et al., *A
-Compositional Framework for End-to-End Path Delay Calculation*, CRTS 2008, call it the data age.)
+The latency of a chain of topics is the age of its data: the time of a message on the last topic since the
+message on the first topic was sent that it may have been made from; at each node in between, the latest one
+that had arrived there when it published. (Feiertag et al., *A Compositional Framework for End-to-End Path
+Delay Calculation*, CRTS 2008.)
 """
 
 from __future__ import annotations
@@ -47,7 +43,7 @@ class Distribution:
         self._buckets: dict[int, int] = {}
 
     def add(self, duration: Ns) -> None:
-        """One more observation."""
+        """Add a duration; a negative one counts as 0."""
         value = max(0, duration)
         self.count += 1
         self.total += value
@@ -57,11 +53,11 @@ class Distribution:
         self._buckets[bucket] = self._buckets.get(bucket, 0) + 1
 
     def mean(self) -> float | None:
-        """Nanoseconds; ``None`` if nothing was observed."""
+        """Return the mean in nanoseconds, None if nothing was added."""
         return self.total / self.count if self.count else None
 
     def quantile(self, share: float) -> Ns | None:
-        """The smallest duration that *share* (0..1) of all do not exceed; ``None`` if there are none."""
+        """Return the smallest duration that *share* (0..1) of all do not exceed; None if there are none."""
         if not self.count:
             return None
         wanted = share * self.count
@@ -83,15 +79,14 @@ STILL_M_S = 0.3
 AIRBORNE_M = 0.3
 
 EnergyLaw = Callable[[ProcessorSetup, float, float], float | None]
-"""Joules that a processor takes for so many busy core-seconds within so many seconds, ``None`` without
-figures.
+"""Energy of a processor in joules from its busy core-seconds and the elapsed seconds, None without figures.
 
-With zero elapsed seconds it must give what the busy core-seconds take above idle.
+With zero elapsed seconds it must return the energy above idle.
 """
 
 
 def linear_energy(processor: ProcessorSetup, busy_core_s: float, elapsed_s: float) -> float | None:
-    """Idle power all the time, plus the step from idle to busy in proportion to the busy cores.
+    """Return the idle energy plus the step from idle to busy power in proportion to the busy cores.
 
     E = idle_w * elapsed + (busy_w - idle_w) * busy / cores: the linear model of Fan, Weber and Barroso,
     *Power Provisioning for a Warehouse-sized Computer*, ISCA 2007, section 3.
@@ -104,7 +99,7 @@ def linear_energy(processor: ProcessorSetup, busy_core_s: float, elapsed_s: floa
 
 @dataclass
 class ComponentLedger:
-    """What one component was charged, executed and answered."""
+    """Execution times, calls and activations of one component."""
 
     setup: ComponentSetup
     processor: str
@@ -119,7 +114,7 @@ class ComponentLedger:
     calls: Distribution = field(default_factory=Distribution)
 
     def charge(self, event: Charge) -> None:
-        """Computing was owed."""
+        """Add execution time that was charged."""
         owed = event.caller + event.background
         if event.kind.startswith(ROS_PREFIX):
             self.ros += owed
@@ -132,27 +127,27 @@ class ComponentLedger:
             self.priced += owed
 
     def activation(self, event: Activation) -> None:
-        """An activation ended."""
+        """Add an activation that ended."""
         self.activations.add(event.finished - event.released)
         if event.deadline != NONE and event.finished > event.deadline:
             self.misses += 1
 
     def call(self, event: Call) -> None:
-        """It served a call."""
+        """Add a call that the component served."""
         self.calls.add(event.end - event.start)
 
     def unpriced_s(self) -> float:
-        """Executed seconds whose energy the law of the processor must give."""
+        """Return the executed seconds whose energy the model does not state."""
         return to_seconds(max(0, self.executed - self.priced))
 
     def uncounted(self) -> bool:
-        """It worked, but no computing of its own was ever charged."""
+        """Return whether the component was active without any execution time of its own."""
         return not self.charges and bool(self.activations.count or self.calls.count)
 
     def record(
         self, energy: Callable[[float], float | None], response_bound: Ns | None = None
     ) -> ComponentRecord:
-        """Its row; *energy* gives joules above idle for busy core-seconds of its processor."""
+        """Return the record; *energy* gives joules above idle for busy core-seconds of the processor."""
         unpriced = self.unpriced_s()
         by_law = energy(unpriced)
         return ComponentRecord(
@@ -185,7 +180,7 @@ class ComponentLedger:
 
 @dataclass
 class VehicleLedger:
-    """Where one vehicle went and what it took."""
+    """Path, times, energy and operations of one vehicle."""
 
     setup: VehicleSetup
     last: VehicleState | None = None
@@ -198,7 +193,7 @@ class VehicleLedger:
     operations: list[Operation] = field(default_factory=list)
 
     def state(self, event: VehicleState) -> None:
-        """It was seen; states come in the order of time."""
+        """Add a state; states must be in the order of time."""
         if self.last is not None:
             self._between(self.last, event)
         z = event.where()[2]
@@ -222,7 +217,7 @@ class VehicleLedger:
             self.joules += watts * to_seconds(elapsed)
 
     def record(self) -> VehicleRecord:
-        """Its row."""
+        """Return the record."""
         done = [one for one in self.operations if one.outcome == "ok"]
         last = self.last
         return VehicleRecord(
@@ -269,34 +264,34 @@ def _operation(event: Operation) -> OperationRecord:
 
 
 def known(value: float) -> float | None:
-    """The value, or ``None`` where an event says NaN."""
+    """Return *value*, or None if it is NaN."""
     return None if isnan(value) else value
 
 
 def largest(values: list[float]) -> float | None:
-    """The value farthest from zero, its sign dropped; ``None`` if all are NaN or there are none."""
+    """Return the greatest absolute value; None if all are NaN or there are none."""
     sizes = [abs(value) for value in values if not isnan(value)]
     return max(sizes, default=None)
 
 
 _REMEMBERED = 256
-"""Messages that a node may have heard since it sent the one that arrives now."""
+"""Messages that a node may have received since it sent the one that arrives now."""
 
-Heard = deque[tuple[Ns, Ns]]
+Received = deque[tuple[Ns, Ns]]
 
 
 class ChainLedger:
-    """Give it all messages of a run."""
+    """Latencies of one chain of topics, from all messages of a run."""
 
     def __init__(self, setup: ChainSetup) -> None:
         self.setup = setup
         self.latencies = Distribution()
-        self._heard: list[dict[str, Heard]] = [
+        self._received: list[dict[str, Received]] = [
             {} for _ in setup.topics
         ]  # by topic and node: when, since when
 
     def message(self, event: Message) -> None:
-        """A message arrived, or was lost."""
+        """Add a message that arrived or was lost."""
         if event.received == NONE:
             return
         for place, topic in enumerate(self.setup.topics):
@@ -306,21 +301,21 @@ class ChainLedger:
                     self._arrived(place, event, since)
 
     def _since(self, place: int, event: Message) -> Ns | None:
-        """When the chain began that led to *event*; ``None`` if it was made from nothing."""
+        """Return when the chain began that led to *event*, None if no message preceded it."""
         if place == 0:
             return event.sent
-        heard = self._heard[place - 1].get(_bare(event.publisher), ())
-        return next((since for at, since in reversed(heard) if at <= event.sent), None)
+        received = self._received[place - 1].get(_bare(event.publisher), ())
+        return next((since for at, since in reversed(received) if at <= event.sent), None)
 
     def _arrived(self, place: int, event: Message, since: Ns) -> None:
         if place == len(self.setup.topics) - 1:
             self.latencies.add(event.received - since)
         else:
-            heard = self._heard[place].setdefault(_bare(event.subscriber), deque(maxlen=_REMEMBERED))
-            heard.append((event.received, since))
+            received = self._received[place].setdefault(_bare(event.subscriber), deque(maxlen=_REMEMBERED))
+            received.append((event.received, since))
 
     def record(self) -> ChainRecord:
-        """Its row."""
+        """Return the record."""
         spread = self.latencies
         mean, p95 = spread.mean(), spread.quantile(0.95)
         if mean is None or p95 is None:

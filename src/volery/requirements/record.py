@@ -1,7 +1,7 @@
-"""``run.json``: what one run came to, as documented in ``docs/run-folder.md``.
+"""``run.json``: the results of one run, as documented in ``docs/run-folder.md``.
 
-Seconds, metres, joules, megahertz. A value that nobody observed is ``null``, never zero. Wall time and
-versions stand here and nowhere else in a run folder.
+Seconds, metres, joules, megahertz. A value that was not observed is ``null``, never zero. Wall time and
+versions are stored here and nowhere else in a run folder.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class ResponseRecord(_Part):
 
 
 class LatencyRecord(_Part):
-    """How long it took, in seconds."""
+    """Latencies in seconds."""
 
     count: int = 0
     mean: float | None = None
@@ -52,14 +52,14 @@ class LatencyRecord(_Part):
 
 
 class ChainRecord(_Part):
-    """A chain of topics, and how old what arrived at its end was."""
+    """A chain of topics, and the age of the data at its end."""
 
     topics: list[str]
     latency_s: LatencyRecord
 
 
 class PreemptionRecord(_Part):
-    """How often a task had to make way for another one on a processor."""
+    """How often a task was preempted by another one on a processor."""
 
     processor: str
     preempted: str
@@ -68,9 +68,9 @@ class PreemptionRecord(_Part):
 
 
 class ComponentRecord(_Part):
-    """What a component cost. ``cpu_s`` was executed on its processor; ``ros_cpu_s`` is the part owed to ROS
-    calls.
+    """The computing of a component.
 
+    ``cpu_s`` was executed on its processor; ``ros_cpu_s`` is the part of ROS calls.
     ``energy_j`` is what the model states for its operations, else by the energy law of its processor above
     idle. ``response_bound_s`` is the bound of its response time by analysis, where there is one.
     """
@@ -105,14 +105,14 @@ class ProcessorRecord(_Part):
 
 
 class OffsetRecord(_Part):
-    """How far from what was asked, in metres."""
+    """Distance from the commanded point, in metres."""
 
     horizontal: float | None
     vertical: float | None
 
 
 class OperationRecord(_Part):
-    """One vehicle operation and how far off it ended."""
+    """One vehicle operation, and its error at the end."""
 
     operation: str
     asked: str
@@ -125,7 +125,7 @@ class OperationRecord(_Part):
 
 
 class VehicleRecord(_Part):
-    """What a vehicle did; the errors are the largest of all operations that succeeded.
+    """The motion of a vehicle; the errors are the largest of all operations that succeeded.
 
     ``airborne_s`` is the time armed and more than 0.3 m above where it last stood disarmed. ``landed`` is
     true if it stands still, disarmed, at the end.
@@ -154,14 +154,14 @@ class StepRecord(_Part):
 
 
 class ParcelRecord(_Part):
-    """A parcel: its state at the end and how it came there. It is in exactly one state at any time."""
+    """A parcel: its state at the end and its history. It is in exactly one state at any time."""
 
     state: str
     history: list[StepRecord]
 
 
 class RequirementRecord(_Part):
-    """A bound, what was observed (``null``: nothing) and whether it was met."""
+    """A bound, the observed value (``null``: none) and whether it was met."""
 
     observable: str
     relation: str
@@ -172,7 +172,7 @@ class RequirementRecord(_Part):
 
 
 class FailureRecord(_Part):
-    """What failed when."""
+    """A failure."""
 
     at_s: float
     who: str
@@ -217,12 +217,16 @@ class RunRecord(_Part):
 
     @property
     def is_real(self) -> bool:
-        """Whether it was flown out there, in real time."""
+        """True for a flight of real vehicles, in real time."""
         return self.fidelity == "hardware"
 
 
 def write_record(record: RunRecord, folder: Path) -> Path:
-    """Write ``run.json`` into *folder*; ``UsageError`` if that cannot be done."""
+    """Write ``run.json`` into *folder*.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
     path = folder / RUN_FILE
     try:
         path.write_text(record.model_dump_json(by_alias=True, indent=2) + "\n", encoding="utf-8")
@@ -232,7 +236,11 @@ def write_record(record: RunRecord, folder: Path) -> Path:
 
 
 def read_record(folder: Path) -> RunRecord:
-    """The ``run.json`` of *folder*; ``UsageError`` if there is none or it is of another version."""
+    """Read the ``run.json`` of *folder*.
+
+    Raises:
+        UsageError: there is none, or it is of another version.
+    """
     path = folder / RUN_FILE
     try:
         return RunRecord.model_validate_json(path.read_bytes())

@@ -1,28 +1,23 @@
-"""Bounds of response times by analysis, to stand beside the longest ones that were simulated.
+"""Bounds of response times by analysis, for comparison with the longest simulated ones.
 
-A simulation shows what happened; analysis bounds what could, had releases fallen as unluckily as they may.
-For tasks under preemptive fixed priorities, over the windows in which a task is busy (Lehoczky, *Fixed
-Priority Scheduling of Periodic Task Sets with Arbitrary Deadlines*, RTSS 1990): the q-th activation in such a
-window ends after no more than the least w with w = C(q) + interference within w, and was released no sooner
-than the least span of q releases, D(q).
+A simulation shows what happened; analysis bounds what could have happened with the worst releases. For tasks
+under preemptive fixed priorities, over the windows in which a task is busy (Lehoczky, *Fixed Priority
+Scheduling of Periodic Task Sets with Arbitrary Deadlines*, RTSS 1990): the q-th activation in such a window
+ends after no more than the least w with w = C(q) + interference within w, and was released no sooner than the
+least span of q releases, D(q).
 
-* one core: the interference is the sum of what the more urgent execute whose releases fall into w (Joseph and
-  Pandya, *Finding Response Times in a Real-Time System*, The Computer Journal 29(5), 1986);
-* m cores that tasks move between: (sum over the more urgent of min(W, w - C(q))) / m, W being the most that
-  one of them executes in w, with what it brings along from before (after Bertogna and Cirinei, *Response-Time
-  Analysis for Globally Scheduled Symmetric Multiprocessor Platforms*, RTSS 2007).
+* one core: the interference is the sum of the execution times of more urgent tasks whose releases fall into w
+  (Joseph and Pandya, *Finding Response Times in a Real-Time System*, The Computer Journal 29(5), 1986);
+* m cores with migration: (sum over the more urgent of min(W, w - C(q))) / m, W being the most that one
+  executes in w, including its carried-in work (after Bertogna and Cirinei, *Response-Time Analysis for
+  Globally Scheduled Symmetric Multiprocessor Platforms*, RTSS 2007).
 
-C(q) is the most that q activations in a row executed, D(q) the shortest time that q releases took (curves of
-events, as in Richter and Ernst, *Event Model Interfaces for Heterogeneous System Analysis*, DATE 2002), so a
-bound is as good as what the run went through. Tasks of equal priority count as more urgent. What is executed
-outside activations counts as more urgent, too, by the most that was seen in any ``WINDOW``. Waiting for
-messages, networks and locks is not in it.
-
-What tasks demand of their processors, folded from a run: the figures of the analysis of response times.
-
-Of each component that has activations: the most that k of them in a row executed and the shortest time that k
-releases took, for k up to ``IN_A_ROW``. All flows of control of a component count as one. A period that the
-model promises is taken for the distance of releases unless they were seen to come faster.
+C(q) is the most that q activations in a row executed, D(q) the shortest time that q releases took (event
+curves, as in Richter and Ernst, *Event Model Interfaces for Heterogeneous System Analysis*, DATE 2002), for q
+up to ``IN_A_ROW``; so a bound covers what the run went through. A period that the model promises is taken for
+the distance of releases unless they were faster. All flows of control of a component count as one. Tasks of
+equal priority count as more urgent, and so does execution outside activations, by its greatest amount in any
+``WINDOW``. Waiting for messages, networks and locks is not included.
 """
 
 from __future__ import annotations
@@ -40,22 +35,23 @@ WINDOW: Ns = 10 * MS
 
 
 STEP: Ns = 10 * US
-"""A bound on several cores is found to so much: it is looked for in steps, from below."""
+"""Resolution of a bound on several cores: the search goes in steps, from below."""
 
 MOST_STEPS = 4000
-"""After so many it is given up: the cores are as good as full."""
+"""The search ends without a bound after so many steps: the cores are nearly full."""
 
 MOST_ACTIVATIONS = 64
-"""In a window in which a task is busy; it is given up after so many."""
+"""The search ends without a bound after so many activations in one busy window."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """A task: ``costs`` are the most that 1, 2, ... activations in a row execute, ``spans`` the least times
-    that 2, 3, ... releases take, the last of them above 0. Longer rows are put together from these.
+    """The demand of a task.
 
-    ``least_priority`` is that of the least urgent place it computes at: a task that calls a less urgent
-    component waits as one of its priority.
+    ``costs`` are the most that 1, 2, ... activations in a row execute, ``spans`` the least times that 2, 3,
+    ... releases take, the last of them above 0. Longer rows are put together from these. ``least_priority``
+    is that of the least urgent component it computes in: a task that calls a less urgent component waits with
+    that priority.
     """
 
     name: str
@@ -66,21 +62,21 @@ class Demand:
 
     @classmethod
     def periodic(cls, name: str, priority: int, cost: Ns, period: Ns) -> Demand:
-        """One whose activations all execute *cost*, released no sooner after each other than *period*."""
+        """Return the demand of activations that execute *cost* each, released at least *period* apart."""
         return cls(name, priority, (cost,), (period,), priority)
 
     def cost(self, activations: int) -> Ns:
-        """The most that so many in a row execute."""
+        """Return the most that *activations* in a row execute."""
         rows, rest = divmod(activations, len(self.costs))
         return rows * self.costs[-1] + (self.costs[rest - 1] if rest else 0)
 
     def span(self, releases: int) -> Ns:
-        """The least time from a release to the one that comes so many later."""
+        """Return the least time that *releases* releases take."""
         rows, rest = divmod(releases, len(self.spans))
         return rows * self.spans[-1] + (self.spans[rest - 1] if rest else 0)
 
     def released_within(self, window: Ns) -> int:
-        """The most releases in any half-open *window*."""
+        """Return the most releases in any half-open *window*."""
         if window <= 0:
             return 0
         rows, rest = divmod(window - 1, self.spans[-1])
@@ -89,12 +85,12 @@ class Demand:
 
 @dataclass(frozen=True)
 class Load:
-    """Computing that is no activation: the most in any window of ``WINDOW``, all cores together."""
+    """Execution outside activations: the most in any window of ``WINDOW``, all cores together."""
 
     most: Ns
 
     def within(self, span: Ns) -> Ns:
-        """The most in any *span*, which may touch one window more at either end."""
+        """Return the most in any *span*, which may touch one window more at either end."""
         return (span // WINDOW + 2) * self.most
 
 
@@ -104,7 +100,7 @@ def response_bounds(
     cores: int,
     executed: Mapping[str, Load] | None = None,
 ) -> dict[str, Ns | None]:
-    """The bound of each task on a processor, ``None`` where none was found.
+    """Return the bound of each task on a processor, None where none was found.
 
     *executed* is, by task, what it was seen to execute: it stands in for a task on several cores that has no
     bound (yet) itself. Without it, all of its time is taken.
@@ -163,15 +159,15 @@ def _bound(task: Demand, others: _OneCore | _Cores) -> Ns | None:
 
 FIXED_PRIORITY = "fixed-priority"
 IN_A_ROW = 16
-"""So many activations in a row are remembered."""
+"""Activations in a row that are compared."""
 LEAST_RELEASES = 10
-"""Fewer say nothing about how fast releases come; a period that is promised does."""
+"""With fewer releases, their spans are unknown unless the model promises a period."""
 BACKGROUND = " (background)"
-"""The end of the name of what is executed beside a component's own flows of control."""
+"""Ends the name of what is executed beside a component's own flows of control."""
 
 
 class _Releases:
-    """How fast a component's activations were released, and how long they took."""
+    """Spans of releases and longest response time of a component's activations."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -201,7 +197,7 @@ class _Releases:
                 spans[back - 1] = span
 
     def curve(self, period: Ns) -> tuple[Ns, ...]:
-        """The least times that 2, 3, ... releases take; empty if nothing can be said."""
+        """Return the least times that 2, 3, ... releases take; empty if they are unknown."""
         promised = [period * (one + 1) for one in range(len(self.spans) or 1)] if period > 0 else []
         if not promised:
             spans = tuple(self.spans) if self.count >= LEAST_RELEASES else ()
@@ -211,7 +207,7 @@ class _Releases:
 
 
 class _Work:
-    """What a component's flows of control executed on one processor."""
+    """Execution times of a component's flows of control on one processor."""
 
     def __init__(self) -> None:
         self.since: Ns = 0  # executed since the last activation ended
@@ -232,7 +228,7 @@ class _Work:
 
 
 class Demands:
-    """Give it all slices and activations, then ask for ``bounds``."""
+    """Demands of all components, from the slices and activations of a run; see ``bounds``."""
 
     def __init__(self) -> None:
         self._work: dict[str, dict[str, _Work]] = {}  # by whose flows of control they are, and processor
@@ -241,7 +237,7 @@ class Demands:
         self._most: dict[tuple[str, str], Ns] = {}
 
     def slice(self, event: Slice) -> None:
-        """A task executed on a processor."""
+        """Add a slice of a task."""
         owner = _owner(event.task)
         where = self._work.setdefault(owner, {})
         work = where.get(event.processor)
@@ -262,7 +258,7 @@ class Demands:
             start = until
 
     def activation(self, event: Activation) -> None:
-        """An activation ended: what was executed since the one before belongs to it."""
+        """Add an activation that ended: what was executed since the one before belongs to it."""
         self._releases.setdefault(event.component, _Releases()).add(event)
         for work in self._work.get(event.component, {}).values():
             work.ended()
@@ -270,7 +266,7 @@ class Demands:
     def bounds(
         self, processor: ProcessorSetup, components: dict[str, ComponentSetup]
     ) -> dict[str, Ns | None]:
-        """Of the active components on *processor*; none under another scheduler than fixed priorities.
+        """Return the bounds of the active components on *processor*; none unless it has fixed priorities.
 
         ``None`` also for one that was seen to take longer: it waits for something that the analysis does not
         know. As the more urgent of others it counts by what it was seen to execute.
@@ -301,7 +297,7 @@ class Demands:
         return bound < self._releases[name].longest
 
     def _demand(self, name: str, work: _Work, components: dict[str, ComponentSetup]) -> Demand | None:
-        """``None`` for what has no activations, too few of them, or computes on other processors as well."""
+        """Return the demand of a task, None for too few activations or several processors."""
         setup, releases = components.get(name), self._releases.get(name)
         if setup is None or releases is None or len(self._work[name]) > 1 or not any(work.costs):
             return None
@@ -314,5 +310,5 @@ class Demands:
 
 
 def _owner(task: str) -> str:
-    """The component whose flow of control it is: ``drone/mavros`` of ``drone/mavros (set-points)``."""
+    """Return the component of *task*: ``drone/mavros`` for ``drone/mavros (set-points)``."""
     return task if task.endswith(BACKGROUND) else task.partition(" (")[0]

@@ -1,4 +1,5 @@
 """The event stream of a run: one schema, its writers and its reader.
 
-Knows nobody: every room that has something to tell imports this one. It must not know what an event is for.
+Every package that records events imports this one; it imports only `base`. What an event is used for is
+decided by those who read the stream.
 """

@@ -24,12 +24,22 @@ D = TypeVar("D")
 
 
 def to_json(description: DataclassInstance) -> bytes:
-    """The description as UTF-8 JSON, the same bytes for the same description."""
+    """Return *description* as UTF-8 JSON: the same bytes for the same description."""
     return json.dumps(asdict(description), ensure_ascii=False, separators=(",", ":")).encode()
 
 
 def from_json(data: bytes, adapter: TypeAdapter[D], schema: str, what: str) -> D:
-    """What ``to_json`` wrote. Raises ``UsageError``, which calls it *what*, if it is not of that schema."""
+    """Return what ``to_json`` wrote.
+
+    Args:
+        data: UTF-8 JSON.
+        adapter: Validates the description.
+        schema: The schema that the description must name.
+        what: What messages call the description.
+
+    Raises:
+        UsageError: *data* is not a description of that schema.
+    """
     try:
         raw: Any = json.loads(data)
         version = raw.get("schema") if isinstance(raw, dict) else None
@@ -47,13 +57,12 @@ SETUP_ATTACHMENT = "run-setup.json"
 MODEL_ATTACHMENT = "model.yaml"
 """The attachment that holds the text of the system model."""
 WORLD_ATTACHMENT = "world.json"
-"""The attachment that holds the map: see ``volery.trace.attachments``."""
+"""The attachment that holds a ``Scenery``."""
 
 
 @dataclass(frozen=True)
 class ComponentSetup:
-    """A component instance and where it was allocated. ``processor`` is empty where its computing takes no
-    time.
+    """A component instance and its allocation. ``processor`` is empty where computing takes no time.
 
     ``period`` and ``deadline`` (relative to the release) are ``NONE`` where the model promises none.
     """
@@ -72,7 +81,7 @@ class ComponentSetup:
 class ProcessorSetup:
     """A processor. ``idle_w`` and ``busy_w`` are watts of the whole of it, idle and with all cores busy.
 
-    They are ``None`` where nobody stated them: then its energy is not counted. ``power_error`` is their
+    They are None where they are not stated: then its energy is not counted. ``power_error`` is their
     relative band (0.2: within 20 per cent), ``None`` where it is unknown.
     """
 
@@ -97,7 +106,7 @@ class VehicleSetup:
 
 @dataclass(frozen=True)
 class ChainSetup:
-    """A row of topics whose end-to-end latency is observed."""
+    """A chain of topics whose end-to-end latency is observed."""
 
     name: str
     topics: tuple[str, ...]
@@ -116,11 +125,11 @@ class RequirementSetup:
 
 @dataclass(frozen=True)
 class LawSetup:
-    """A law of cost or physics that priced this run: its ``source``, provenance and what is to be warned of.
+    """A law of cost or physics that priced this run: its source, provenance and warning.
 
-    ``provenance`` is ``estimated``, ``measured``, ``calculated`` or ``required``; ``validity`` says in words
-    where the law holds; ``warning`` is empty unless the run used it outside that, or on a component it was
-    not measured for.
+    ``provenance`` is ``estimated``, ``measured``, ``calculated`` or ``required``; ``validity`` is a
+    text that states where the law holds; ``warning`` is empty unless the run used the law outside that range,
+    or on a component that it was not measured for.
     """
 
     name: str
@@ -132,7 +141,7 @@ class LawSetup:
 
 @dataclass(frozen=True)
 class RunSetup:
-    """The circumstances of a run that belong to the run itself, not to the machine it ran on."""
+    """The set-up of a run, without anything that depends on the machine that executes it."""
 
     system: str = ""
     fidelity: str = ""
@@ -154,12 +163,16 @@ _SETUP = TypeAdapter(RunSetup)
 
 
 def setup_to_json(setup: RunSetup) -> bytes:
-    """The setup as UTF-8 JSON, the same bytes for the same setup."""
+    """Return the set-up as UTF-8 JSON: the same bytes for the same set-up."""
     return to_json(setup)
 
 
 def setup_from_json(data: bytes) -> RunSetup:
-    """The setup that ``setup_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
+    """Return the set-up that ``setup_to_json`` wrote.
+
+    Raises:
+        UsageError: *data* is anything else.
+    """
     return from_json(data, _SETUP, SETUP_SCHEMA, SETUP_ATTACHMENT)
 
 
@@ -172,7 +185,7 @@ SCENERY_SCHEMA = "volery-scenery/1"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where x = y = z = 0 lies: WGS-84 degrees and metres AMSL."""
+    """Origin of the coordinates: WGS-84 degrees and metres AMSL."""
 
     latitude: float
     longitude: float
@@ -191,7 +204,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Area:
-    """A named polygon that closes itself: ``no-fly``, ``building``, ``water``, ``park`` or your own kind."""
+    """A named polygon, closed from its last point to the first.
+
+    ``kind`` is ``no-fly``, ``building``, ``water``, ``park`` or another name.
+    """
 
     name: str
     outline: Line
@@ -200,7 +216,10 @@ class Area:
 
 @dataclass(frozen=True)
 class Scenery:
-    """All there is to draw. ``roads`` are for rovers, ``corridors`` are the air lanes of drones."""
+    """The map of a run, for reports. Points are (x, y) metres east and north of the origin.
+
+    It is not the world of the physics. ``roads`` are for rovers, ``corridors`` are the air lanes of drones.
+    """
 
     origin: Origin
     places: tuple[Place, ...] = ()
@@ -214,10 +233,14 @@ _SCENERY = TypeAdapter(Scenery)
 
 
 def scenery_to_json(scenery: Scenery) -> bytes:
-    """The scenery as UTF-8 JSON, the same bytes for the same scenery."""
+    """Return the scenery as UTF-8 JSON: the same bytes for the same scenery."""
     return to_json(scenery)
 
 
 def scenery_from_json(data: bytes) -> Scenery:
-    """The scenery that ``scenery_to_json`` wrote. Raises ``UsageError`` if it is anything else."""
+    """Return the scenery that ``scenery_to_json`` wrote.
+
+    Raises:
+        UsageError: *data* is anything else.
+    """
     return from_json(data, _SCENERY, SCENERY_SCHEMA, "map")

@@ -1,9 +1,8 @@
-"""Events as ROS 2 messages: their definitions (``ros2msg`` text) and their CDR bytes, both generated from the
-events.
+"""Events as ROS 2 messages: definitions (``ros2msg`` text) and CDR bytes, both generated from the events.
 
-A message of ours has its numbers first, widest first, and its words last, so that all numbers are packed by
-one precompiled ``struct`` and every string starts where CDR wants it (strings are 4-aligned; each is padded
-to 4). The words of an event repeat over and over, so their bytes are remembered.
+A message has its numbers first, widest first, and its strings last, so that one precompiled ``struct`` packs
+all numbers and every string is aligned as CDR requires (strings are 4-aligned; each is padded to 4). The
+strings of events repeat, so their bytes are cached.
 
 Encoding: OMG DDS-XTypes 1.3, plain CDR version 1, little endian (encapsulation identifier 00 01).
 """
@@ -23,30 +22,30 @@ LITTLE_ENDIAN_CDR = 0x0100  # the bytes 00 01 00 00, read as a little-endian uin
 _ROS_TYPE = {"Ns": "int64", "float": "float64", "int": "int32", "bool": "bool"}
 _STRUCT_CODE = {"Ns": "q", "float": "d", "int": "i", "bool": "?"}
 _WIDTH = {"Ns": 8, "float": 8, "int": 4, "bool": 1}
-_REMEMBERED = 4096  # combinations of words per type of event; with more, they hardly repeat
+_REMEMBERED = 4096  # combinations of strings per type of event; with more, they hardly repeat
 
 OWN_EVENTS: tuple[type[Any], ...] = tuple(kind for kind in get_args(Event) if kind is not Published)
-"""The events that become messages of ``volery_msgs``; ``Published`` is a message already."""
+"""The events that are written as messages of ``volery_msgs``; a ``Published`` event is a message already."""
 
 
 _make: Callable[[type[Any], tuple[Any, ...]], Any] = (
     tuple.__new__
-)  # as a named tuple makes itself, at less cost
+)  # as the constructor of a named tuple, but faster
 
 
 def type_name(kind: type[Any]) -> str:
-    """``volery_msgs/msg/Slice``."""
+    """Return the message type of an event: ``volery_msgs/msg/Slice``."""
     return f"{PACKAGE}/msg/{kind.__name__}"
 
 
 def _annotation(kind: type[Any], name: str) -> str:
-    """The annotation as it is written: ``Ns`` and ``int`` are the same type, but not the same field."""
+    """Return an annotation as it is written: ``Ns`` and ``int`` are the same type, encoded differently."""
     written = kind.__annotations__[name]
     return str(getattr(written, "__forward_arg__", written))
 
 
 def _getter(indexes: tuple[int, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    """Like ``itemgetter``, but a tuple for a single index too."""
+    """Return an ``itemgetter`` that returns a tuple for a single index, too."""
     if len(indexes) == 1:
         index = indexes[0]
         return lambda event: (event[index],)
@@ -54,11 +53,11 @@ def _getter(indexes: tuple[int, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 class Codec:
-    """How events of one kind become CDR bytes and back.
+    """Encoder and decoder of events of one kind.
 
     ``codes`` are the ``struct`` codes of the encapsulation header and the numbers, ``fixed`` their size in
-    bytes; the words follow as ``tail``, of which ``tails`` are those that are remembered. ``numbers`` and
-    ``words`` take them out of an event.
+    bytes; the strings follow as ``tail``, of which ``tails`` is the cache. ``numbers`` and ``words`` get the
+    numbers and the strings of an event.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -68,7 +67,9 @@ class Codec:
         words = [index for index, annotation in enumerate(annotations) if annotation == "str"]
         order = numbers + words
         if len(order) != len(annotations):
-            raise TypeError(f"{kind.__name__} has a field that is neither a number nor words: {annotations}")
+            raise TypeError(
+                f"{kind.__name__} has a field that is neither a number nor a string: {annotations}"
+            )
         width = sum(_WIDTH[annotations[index]] for index in numbers)
         self.kind = kind
         self.codes = "I" + "".join(_STRUCT_CODE[annotations[index]] for index in numbers) + "x" * (-width % 4)
@@ -81,10 +82,10 @@ class Codec:
         self._unpack = struct.Struct(f"<{self.codes}").unpack_from
         self._in_order = _getter(tuple(order.index(index) for index in range(len(order))))
         self.tails: dict[tuple[str, ...], bytes] = {}
-        self._said: dict[bytes, tuple[str, ...]] = {}
+        self._strings: dict[bytes, tuple[str, ...]] = {}
 
     def tail(self, words: tuple[str, ...]) -> bytes:
-        """The CDR bytes of *words*."""
+        """Return the CDR bytes of the strings *words*."""
         known = self.tails.get(words)
         if known is None:
             if len(self.tails) >= _REMEMBERED:
@@ -93,22 +94,26 @@ class Codec:
         return known
 
     def encode(self, event: Any) -> bytes:
-        """The CDR bytes of *event*."""
+        """Return the CDR bytes of *event*."""
         head = struct.pack(f"<{self.codes}", LITTLE_ENDIAN_CDR, *self.numbers(event))
         return head + self.tail(self.words(event))
 
     def decode(self, data: bytes) -> Any:
-        """The event in *data*; ``ValueError`` or ``struct.error`` if there is none."""
+        """Return the event in *data*.
+
+        Raises:
+            ValueError, struct.error: there is none.
+        """
         header, *numbers = self._unpack(data)
         if header != LITTLE_ENDIAN_CDR:
             raise ValueError(f"not little-endian CDR: {data[:4].hex()}")
         tail = data[self.fixed :]
-        said = self._said.get(tail)
-        if said is None:
-            if len(self._said) >= _REMEMBERED:
-                self._said.clear()
-            said = self._said[tail] = _decode_words(tail)
-        return _make(self.kind, self._in_order((*numbers, *said)))
+        strings = self._strings.get(tail)
+        if strings is None:
+            if len(self._strings) >= _REMEMBERED:
+                self._strings.clear()
+            strings = self._strings[tail] = _decode_words(tail)
+        return _make(self.kind, self._in_order((*numbers, *strings)))
 
 
 def _encode_words(words: tuple[str, ...]) -> bytes:

@@ -16,7 +16,7 @@ NONE: Ns = -1
 
 
 class Slice(NamedTuple):
-    """A task ran on a core of a processor from ``start`` to ``end`` without a break."""
+    """A task ran on a core of a processor from ``start`` to ``end`` without interruption."""
 
     start: Ns
     end: Ns
@@ -27,7 +27,7 @@ class Slice(NamedTuple):
 
 
 class Preemption(NamedTuple):
-    """A task had to leave its core because a more urgent one came. Both are named as in ``Slice.task``."""
+    """A task was preempted by a more urgent one. Both are named as in ``Slice.task``."""
 
     at: Ns
     processor: str
@@ -37,11 +37,11 @@ class Preemption(NamedTuple):
 
 
 class Charge(NamedTuple):
-    """Computing was added to what a component owes its processor.
+    """Execution time was added to a component's pending execution time on its processor.
 
-    ``kind`` is ``code``, ``stated``, ``operation:<name>``, ``activation`` or ``ros:<call>``; ``caller`` is
-    what the calling task pays before it goes on, ``background`` what its process pays beside it, both target
-    time at the processor's frequency; ``energy`` in joules is given only where the model states it for the
+    ``kind`` is ``code``, ``stated``, ``operation:<name>``, ``activation`` or ``ros:<call>``. ``caller`` is
+    executed by the calling task before it continues, ``background`` by other threads of its process; both are
+    times at the processor's frequency. ``energy`` in joules is given only where the model states it for the
     operation, else 0.0.
     """
 
@@ -99,11 +99,11 @@ class Published(NamedTuple):
 
 
 class VehicleState(NamedTuple):
-    """A vehicle as it is (truth, ENU metres about the world's origin) and as its autopilot believes.
+    """A vehicle's true state (ENU metres about the world's origin) and its autopilot's estimate.
 
     Attitude is a quaternion (w, x, y, z), FLU body in ENU; velocity in m/s ENU; ``battery`` 0..1; estimates
-    are NaN while the autopilot has none. Of a real vehicle nobody knows the truth: its position is NaN, its
-    attitude and velocity are as the autopilot believes.
+    are NaN while the autopilot has none. The true state of a real vehicle is unknown: its position is NaN,
+    its attitude and velocity are the estimates.
     """
 
     at: Ns
@@ -128,14 +128,14 @@ class VehicleState(NamedTuple):
     mode: str
 
     def where(self) -> tuple[float, float, float]:
-        """The true position, else what the autopilot believes; NaN if neither is known."""
+        """Return the true position, else the estimated one; NaN if neither is known."""
         if self.x == self.x:  # false for NaN alone
             return self.x, self.y, self.z
         return self.estimated_x, self.estimated_y, self.estimated_z
 
 
 class Operation(NamedTuple):
-    """A vehicle operation (take-off, goto, ...) from its call to its end, with how far off it ended.
+    """A vehicle operation (take-off, goto, ...) from its call to its end, with its error at the end.
 
     Errors in metres, horizontal and vertical, by the autopilot's own estimate and by truth; NaN where there
     is none.
@@ -155,7 +155,7 @@ class Operation(NamedTuple):
 
 
 class Milestone(NamedTuple):
-    """Something that the application follows, such as a parcel, entered a state."""
+    """Something that the application tracks, such as a parcel, entered a state."""
 
     at: Ns
     component: str
@@ -166,7 +166,7 @@ class Milestone(NamedTuple):
 
 
 class Text(NamedTuple):
-    """Words: a component's log line or an autopilot's status text.
+    """A component's log line or an autopilot's status text.
 
     ``severity`` is that of syslog: 0 emergency .. 7 debug.
     """
@@ -197,7 +197,7 @@ class Failure(NamedTuple):
 class Verdict(NamedTuple):
     """A requirement at the end of a run.
 
-    ``observed`` is NaN when nothing was there to observe (and ``met`` False).
+    ``observed`` is NaN when nothing was observed (then ``met`` is False).
     """
 
     at: Ns
@@ -226,44 +226,44 @@ Event = (
     | Verdict
 )
 Record = Callable[[Any], None]
-"""What a room that has something to tell is given: call it with an ``Event``."""
+"""Records an ``Event``: what a package that records events is given."""
 
 
 def ignore(event: Event) -> None:
-    """A record that keeps nothing."""
+    """Discard *event*."""
 
 
 @runtime_checkable
 class SelectiveListener(Protocol):
-    """A tap that does not listen to every kind of event, or has a shorter way in for some."""
+    """A listener that takes only some kinds of events, or takes some by a faster function."""
 
     def listener(self, kind: type[Any]) -> Record | None:
-        """What is to be called with events of *kind*; ``None`` if they do not matter here."""
+        """Return what takes events of *kind*, None if they do not matter here."""
 
 
 class Stream:
-    """Hands every event to every tap. Itself a ``Record``.
+    """Distributes every event to its listeners. Itself a ``Record``.
 
-    A run tells thousands of events a second, so the way of each kind of event to its listeners is found once.
+    A run records thousands of events a second, so the listeners of each kind of event are looked up once.
     """
 
     def __init__(self) -> None:
         self._taps: list[Record] = []
-        self._ways = _Ways(self._taps)
+        self._routes = _Routes(self._taps)
 
     def tap(self, listener: Record) -> None:
-        """From now on *listener* is told every event; if it is ``SelectiveListener``, those that it asks for."""
+        """Add a listener of every event; a ``SelectiveListener`` receives the kinds that it selects."""
         self._taps.append(listener)
-        self._ways.clear()
+        self._routes.clear()
 
     def __call__(self, event: Event) -> None:
-        """Tell everybody."""
-        for listener in self._ways[type(event)]:
+        """Pass *event* to its listeners."""
+        for listener in self._routes[type(event)]:
             listener(event)
 
 
-class _Ways(dict[type[Any], tuple[Record, ...]]):
-    """Kind of event -> who is told, found when the first of its kind is told."""
+class _Routes(dict[type[Any], tuple[Record, ...]]):
+    """Listeners by kind of event, looked up when the first event of a kind is recorded."""
 
     def __init__(self, taps: list[Record]) -> None:
         super().__init__()
@@ -271,5 +271,5 @@ class _Ways(dict[type[Any], tuple[Record, ...]]):
 
     def __missing__(self, kind: type[Any]) -> tuple[Record, ...]:
         found = [tap.listener(kind) if isinstance(tap, SelectiveListener) else tap for tap in self._taps]
-        ways = self[kind] = tuple(listener for listener in found if listener is not None)
-        return ways
+        routes = self[kind] = tuple(listener for listener in found if listener is not None)
+        return routes

@@ -1,4 +1,4 @@
-"""A file that is written until it is done or the disk is full, and never ends in half a record."""
+"""A file of whole records, which stays readable when the disk fills up or the process is killed."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from volery.base.errors import UsageError
 
 
 class Output:
-    """A file that takes whole records only. What it has taken survives the death of this process.
+    """A file of whole records. A record that was written survives the end of this process.
 
-    Raises ``UsageError`` if it cannot be made. Should it become unwritable later (a full disk), it is cut
-    back to its last whole record, takes nothing more and says so in ``problem``; a run need not end for it.
+    If the file becomes unwritable later (a full disk), it is truncated to its last whole record, ``problem``
+    states the reason, and further records are dropped; the run goes on.
+
+    Raises:
+        UsageError: the file cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
@@ -26,11 +29,11 @@ class Output:
 
     @property
     def closed(self) -> bool:
-        """True once it takes nothing more because it was closed."""
+        """True after ``close``."""
         return self._file.closed
 
     def write(self, record: bytes) -> bool:
-        """Hand *record* to the operating system; False if it was not taken."""
+        """Write *record* to the operating system; return whether it was written."""
         if self.problem or self._file.closed:
             return False
         rest = memoryview(record)
@@ -46,10 +49,10 @@ class Output:
     def _give_up(self, error: OSError) -> None:
         why = error.strerror or error
         self.problem = f"cannot write {self.path} any more: {why}; it ends after {self.size} bytes"
-        with suppress(OSError):  # readers of both formats cope with a file that is cut anywhere
+        with suppress(OSError):  # both formats can be read from a file that is cut anywhere
             self._file.truncate(self.size)
 
     def close(self) -> None:
-        """Let go of the file. A second call does nothing."""
+        """Close the file. A second call does nothing."""
         with suppress(OSError):  # what could not be written was reported when it happened
             self._file.close()

@@ -1,7 +1,7 @@
-"""The one reader of a trace, whole or cut anywhere.
+"""The reader of a trace, complete or cut anywhere.
 
-A trace whose writer was killed has no summary and may end within a chunk. The reader therefore never needs
-the summary: it walks through the records from the start, takes every whole one and says what is missing.
+A trace whose writer was killed has no summary and may end within a chunk. The reader therefore never uses the
+summary: it goes through the records from the start, takes every whole one and reports what is missing.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ _CHUNK_OVERHEAD = _CHUNK_HEAD.size + 8
 
 @dataclass(frozen=True)
 class Trace:
-    """A run, read back: its events in the order in which they were told.
+    """A run, read back: its events in the order in which they were recorded.
 
-    ``complete`` is False if the writer never finished; ``lost`` then says in words what is missing.
+    ``complete`` is False if the writer never finished; ``lost`` then states what is missing.
     """
 
     setup: RunSetup
@@ -50,7 +50,11 @@ class Trace:
 
 
 def read(path: Path) -> Trace:
-    """The trace in a file. Raises ``UsageError`` if there is none, or not enough of it to know its set-up."""
+    """Read the trace in a file.
+
+    Raises:
+        UsageError: it is no trace, or cut before its set-up.
+    """
     with Reading(path) as reading:
         events = tuple(reading.events())
     return Trace(reading.setup, events, reading.attachments, reading.metadata, reading.complete, reading.lost)
@@ -59,16 +63,17 @@ def read(path: Path) -> Trace:
 class _Record(NamedTuple):
     opcode: int
     content: bytes
-    missing: int  # how many bytes of it are not there
+    missing: int  # bytes that are cut off
 
 
 class Reading:
-    """Reads a trace as far as one asks: iterate over ``events()`` once, then look at ``complete`` and
-    ``lost``.
+    """An open trace: iterate over ``events()`` once, then see ``complete`` and ``lost``.
 
-    The set-up and the attachments made at the start are known from the beginning, later ones when
-    ``events()`` has passed them. A context, since it holds the file open. Raises ``UsageError`` as ``read``
-    does.
+    The set-up and the attachments made at the start are available at once, later ones when ``events()`` has
+    passed them. A context manager, since it holds the file open.
+
+    Raises:
+        UsageError: it is no trace, or cut before its set-up.
     """
 
     def __init__(self, path: Path) -> None:
@@ -100,7 +105,7 @@ class Reading:
         self._file.close()
 
     def events(self, only: Collection[type[Any]] | None = None) -> Iterator[Event]:
-        """All events, or those of the kinds in *only*, in the order in which they were told."""
+        """Yield all events, or those of the kinds in *only*, in the order in which they were recorded."""
         if only is not None:
             self._wanted = only.__contains__
         record = self._pending
@@ -131,7 +136,7 @@ class Reading:
             found = self.metadata["volery"]["schema"]
             raise UsageError(f"{self.path} has schema {found!r}; this version reads {TRACE_SCHEMA!r}")
         if SETUP_ATTACHMENT not in self.attachments:
-            what = "does not say how the run was set up: cut too early, or not a trace of volery"
+            what = "does not contain the set-up of its run: cut too early, or not a trace of volery"
             raise UsageError(f"{self.path} {what}")
         return setup_from_json(self.attachments[SETUP_ATTACHMENT].data)
 
@@ -147,7 +152,7 @@ class Reading:
                 return
 
     def _next(self) -> _Record | None:
-        """The next record, after what it says about the file itself has been noted."""
+        """Return the next record, after storing attachments and metadata."""
         record = next(self._records, None)
         if record is None or record.missing:
             return record
@@ -200,7 +205,7 @@ class Reading:
             at += length
 
     def _decoder(self, channel: records.Channel) -> _Decoder | None:
-        """What makes events of the messages of *channel*; ``None`` if nobody wants them."""
+        """Return what makes events of the messages of *channel*, None if they are not wanted."""
         schema, topic = self._schemas[channel.schema_id], channel.topic
         codec = self._codecs.get(schema)
         if not self._wanted(Published if codec is None else codec.kind):

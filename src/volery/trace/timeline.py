@@ -1,11 +1,11 @@
-"""Writes ``timeline.json``: who ran on which core when, for https://ui.perfetto.dev and chrome://tracing.
+"""Writer of ``timeline.json``: which task ran on which core when, for https://ui.perfetto.dev and chrome://tracing.
 
 The trace-event format (*Trace Event Format*, Google, 2016) as its JSON array, which by its definition may
 lack the closing bracket: a file whose writer was killed opens as far as it goes. A process of the timeline is
-a processor of the run and a thread one of its cores; who preempted whom is marked there. Tracks of their own
-have activations and messages that took time on their way (both with the names that ros2_tracing has for their
-begin and end), calls, vehicle operations and what the application follows. The format's time is microseconds;
-three decimals keep the nanoseconds.
+a processor of the run and a thread one of its cores; preemptions are marked there. Activations, messages that
+took time (both with the names of ros2_tracing for their begin and end), calls, vehicle operations and what
+the application follows have tracks of their own. The format's time is microseconds; three decimals keep the
+nanoseconds.
 """
 
 from __future__ import annotations
@@ -45,10 +45,12 @@ _RUN = "the run"
 
 
 class TimelineWriter:
-    """A tap of the stream that writes ``timeline.json``. Call it with events, then ``close`` it.
+    """A listener of the event stream that writes ``timeline.json``. Call it with events, then ``close`` it.
 
-    Raises ``UsageError`` if the file cannot be made; what happens when the disk fills up is said at
-    ``Output``.
+    For a full disk, see ``Output``.
+
+    Raises:
+        UsageError: the file cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,11 +81,11 @@ class TimelineWriter:
 
     @property
     def problem(self) -> str:
-        """Why the timeline is not whole; empty if it is."""
+        """Why the timeline is incomplete; empty if it is complete."""
         return self._output.problem
 
     def listener(self, kind: type[Any]) -> Record | None:
-        """What writes events of *kind*, if the timeline shows them."""
+        """Return what writes events of *kind*, None if the timeline does not show them."""
         return self._writers.get(kind)
 
     def __call__(self, event: Event) -> None:
@@ -93,7 +95,7 @@ class TimelineWriter:
             writer(event)
 
     def close(self) -> None:
-        """Let what is still under way end with the run, and close the file. A second call does nothing."""
+        """End what is still in progress, and close the file. A second call does nothing."""
         if self._output.closed:
             return
         for running in self._running.values():
@@ -105,7 +107,7 @@ class TimelineWriter:
         self._output.close()
 
     def _slice(self, event: Slice) -> None:
-        """Slices of one task that follow each other without a gap become one."""
+        """Write slices of one task that follow each other without a gap as one."""
         core = event[2:4]
         running = self._running.get(core)
         if running is None:
@@ -128,7 +130,7 @@ class TimelineWriter:
         self._complete(name, start, event.end, where)
 
     def _preemption(self, event: Preemption) -> None:
-        """On the track of the core, at the seam between the two."""
+        """Write a mark on the track of the core, between the two tasks."""
         where = self._cores.get(event[1:3]) or self._thread(
             event.processor, str(event.core), f"core {event.core}"
         )
@@ -140,7 +142,7 @@ class TimelineWriter:
         self._span(_ACTIVATIONS, _quote(event.component), event.released, event.finished, details)
 
     def _message(self, event: Message) -> None:
-        """One that was lost, or that was there at once, took no time on its way."""
+        """Write a message that took time; lost and immediate ones do not show."""
         if event.received > event.sent:
             ends = f'"from": {_quote(event.publisher)}, "to": {_quote(event.subscriber)}'
             details = f'{{{ends}, "bytes": {event.size}, {_MESSAGE}}}'
@@ -178,13 +180,13 @@ class TimelineWriter:
         self._instant(event.at, f"{event.requirement} {'met' if event.met else 'NOT met'}", event.observable)
 
     def _complete(self, name: str, start: Ns, end: Ns, where: str) -> None:
-        """A span of a track whose spans do not overlap; *name* is JSON already."""
+        """Write a span of a track whose spans do not overlap; *name* is JSON already."""
         self._last = max(self._last, end)
         times = f'"ts":{_microseconds(start)},"dur":{_microseconds(end - start)}'
         self._line(f'{{"name":{name},"ph":"X",{times},{where}}}')
 
     def _span(self, process: str, name: str, start: Ns, end: Ns, details: str) -> None:
-        """Something that may overlap with its like: an asynchronous pair; *name* and *details* are JSON."""
+        """Write a span that may overlap with others: an asynchronous pair; *name* and *details* are JSON."""
         self._last = max(self._last, end)
         self._spans += 1
         common = f'"cat":{_quote(process)},"id":{self._spans},{self._thread(process, "", process)}'
@@ -200,7 +202,7 @@ class TimelineWriter:
         self._line(f'{{"name":{_quote(name)},"ph":"i","s":"g","ts":{time},{where},"args":{arguments}}}')
 
     def _thread(self, process: str, thread: str, name: str) -> str:
-        """The ``pid`` and ``tid`` of a track, which is introduced when it first occurs."""
+        """Return the ``pid`` and ``tid`` of a track, which is named when it first occurs."""
         known = self._threads.get((process, thread))
         if known is not None:
             return known

@@ -184,17 +184,17 @@ def test_everything_published_can_be_observed(published):
 
 
 def test_latency_goes_back_to_what_a_node_had_heard_when_it_spoke():
-    def heard(topic, sent, received, publisher="camera", subscriber="/finder"):
+    def received(topic, sent, received, publisher="camera", subscriber="/finder"):
         return Message(sent * MS, received * MS, topic, publisher, subscriber, 1)
 
     events = [
-        heard("/a", 0, 5),
-        heard("/a", 10, 15),
+        received("/a", 0, 5),
+        received("/a", 10, 15),
         Message(20 * MS, NONE, "/a", "camera", "/finder", 1),
-        heard("/a", 30, 42),
-        heard("/b", 40, 50, "finder", "/pilot"),  # the third picture came after it was said
-        heard("/b", 44, 46, "finder", "/pilot"),
-        heard("/b", 60, 61, "stranger", "/pilot"),  # made from nothing
+        received("/a", 30, 42),
+        received("/b", 40, 50, "finder", "/pilot"),  # the third picture came after it was said
+        received("/b", 44, 46, "finder", "/pilot"),
+        received("/b", 60, 61, "stranger", "/pilot"),  # made from nothing
     ]
     assert observed("chain.latency", events) == pytest.approx(0.040)
     assert observed("chain.latency_mean", events) == pytest.approx(0.028)

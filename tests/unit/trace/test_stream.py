@@ -1,4 +1,4 @@
-"""The stream tells every event to whoever wants its kind, in the order of tapping."""
+"""The stream passes every event to the listeners of its kind, in the order in which they were added."""
 
 from typing import Any
 
@@ -10,23 +10,23 @@ FAILURE = Failure(2, "a", "b")
 
 class TextsOnly:
     def __init__(self) -> None:
-        self.heard: list[Event] = []
+        self.received: list[Event] = []
 
     def __call__(self, event: Event) -> None:
-        raise AssertionError("who is choosy is told by the way it chose")
+        raise AssertionError("a selective listener receives events by its own function")
 
     def listener(self, kind: type[Any]) -> Record | None:
-        return self.heard.append if kind is Text else None
+        return self.received.append if kind is Text else None
 
 
 def test_everybody_is_told_in_turn() -> None:
-    heard: list[tuple[str, Event]] = []
+    received: list[tuple[str, Event]] = []
     stream = Stream()
-    stream.tap(lambda event: heard.append(("first", event)))
-    stream.tap(lambda event: heard.append(("second", event)))
+    stream.tap(lambda event: received.append(("first", event)))
+    stream.tap(lambda event: received.append(("second", event)))
     stream(WORDS)
     stream(FAILURE)
-    assert heard == [("first", WORDS), ("second", WORDS), ("first", FAILURE), ("second", FAILURE)]
+    assert received == [("first", WORDS), ("second", WORDS), ("first", FAILURE), ("second", FAILURE)]
 
 
 def test_the_choosy_hear_what_they_chose() -> None:
@@ -35,13 +35,13 @@ def test_the_choosy_hear_what_they_chose() -> None:
     stream.tap(tap)
     stream(WORDS)
     stream(FAILURE)
-    assert tap.heard == [WORDS]
+    assert tap.received == [WORDS]
 
 
 def test_a_tap_that_comes_late_hears_from_then_on() -> None:
-    heard: list[Event] = []
+    received: list[Event] = []
     stream = Stream()
     stream(WORDS)
-    stream.tap(heard.append)
+    stream.tap(received.append)
     stream(WORDS)
-    assert heard == [WORDS]
+    assert received == [WORDS]

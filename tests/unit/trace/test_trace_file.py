@@ -155,7 +155,7 @@ def test_events_of_a_channel_that_was_introduced_in_a_damaged_part_are_missing(t
     [
         (b"", "not a trace"),
         (b"hello, I am a text", "not a trace"),
-        (b"\x89MCAP0\r\n", "how the run was set up"),
+        (b"\x89MCAP0\r\n", "does not contain the set-up of its run"),
     ],
 )
 def test_what_is_no_trace_is_refused(tmp_path: Path, content: bytes, says: str) -> None:
