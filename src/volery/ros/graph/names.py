@@ -1,8 +1,8 @@
-"""ROS names: what is valid, and how a name becomes absolute.
+"""ROS names: their syntax and their absolute forms.
 
 The rules are those that ROS 1 and ROS 2 share: tokens of letters, digits and underscores that do not begin
-with a digit, joined by single slashes; ``/a`` is absolute, ``a`` relative to the namespace, ``~a`` private
-to the node. See http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and_service_names.html.
+with a digit, joined by single slashes; ``/a`` is absolute, ``a`` relative to the namespace, ``~a`` private to
+the node. See http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and_service_names.html.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _RULE = f"{_PART}, parts joined by single slashes"
 
 
 def check(name: str, what: str = "name") -> None:
-    """``UsageError`` if *name* is no valid ROS name."""
+    """Raise ``UsageError`` if `name` is no valid ROS name."""
     if not _NAME.match(name) or "__" in name:
         raise UsageError(
             f"{name!r} is no valid ROS {what}: {_RULE}; '/' before makes it absolute, '~' private"
@@ -29,7 +29,7 @@ def check(name: str, what: str = "name") -> None:
 
 
 def node_name(name: str, namespace: str) -> str:
-    """The full name of a node; ``UsageError`` if its name or its namespace is not valid."""
+    """Return the full name of a node; ``UsageError`` if its name or its namespace is not valid."""
     if not _NODE.match(name) or "__" in name:
         raise UsageError(f"{name!r} is no valid ROS node name: {_PART}, without slashes")
     if not _NAMESPACE.fullmatch(namespace):
@@ -38,12 +38,12 @@ def node_name(name: str, namespace: str) -> str:
 
 
 def join(namespace: str, name: str) -> str:
-    """*name* below *namespace*."""
+    """Return `name` below `namespace`."""
     return f"{namespace.rstrip('/')}/{name}"
 
 
 def absolute(name: str, namespace: str, node: str) -> str:
-    """The absolute form of *name*, used in the *namespace* of the node whose full name is *node*."""
+    """Return the absolute form of `name` as used by the node of full name `node` in `namespace`."""
     check(name)
     if name.startswith("/"):
         return name
@@ -53,5 +53,5 @@ def absolute(name: str, namespace: str, node: str) -> str:
 
 
 def remapping(remaps: Mapping[str, str], namespace: str, node: str) -> dict[str, str]:
-    """Remappings with both sides absolute."""
+    """Return remappings with both sides absolute."""
     return {absolute(old, namespace, node): absolute(new, namespace, node) for old, new in remaps.items()}

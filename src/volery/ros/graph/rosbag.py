@@ -1,7 +1,4 @@
-"""Recording a graph: every topic, as it appears, or those that are named.
-
-Playing a recording into a graph, at its own speed or another.
-"""
+"""Recorder of a graph's topics, and playback of a recording into a graph."""
 
 from __future__ import annotations
 
@@ -16,16 +13,23 @@ from volery.ros.messages import Message, new
 from volery.ros.messages.bag_writer import BagWriter
 from volery.ros.messages.bags import Bag
 
-_LOOK: Ns = 500 * MS
-"""How often new topics are looked for."""
-_KEPT: QoS = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
+_DISCOVERY_PERIOD: Ns = 500 * MS
+_QUEUED: QoS = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
 
 
 class Recorder:
-    """Writes what is said on a graph. ``run`` it in a task; ``stop`` it from anywhere.
+    """Records the messages of a graph. Call ``run`` in a task, ``stop`` from anywhere.
 
-    *topics*: only these; ``None``: all, each from when it is first seen. ``counts`` says how many messages
-    were recorded, ``problems`` why a topic cannot be, both by topic. *told* is told each message's topic.
+    Args:
+        graph: Graph whose topics are discovered.
+        node: Node that subscribes to them.
+        writer: Recording to add the messages to.
+        topics: Names of the topics to record; None for all, each from its discovery on.
+        on_message: Called with the topic of each recorded message.
+
+    Attributes:
+        counts: Number of recorded messages by topic.
+        problems: Reasons why a topic cannot be recorded, by topic.
     """
 
     def __init__(
@@ -35,42 +39,42 @@ class Recorder:
         writer: BagWriter,
         *,
         topics: Collection[str] | None = None,
-        told: Callable[[str], None] = lambda topic: None,
+        on_message: Callable[[str], None] = lambda topic: None,
     ) -> None:
         self._graph, self._node, self._writer = graph, node, writer
         self._topics = None if topics is None else frozenset(node.resolve(topic) for topic in topics)
-        self._told = told
+        self._on_message = on_message
         self._seen: set[str] = set()
         self._stopped = False
         self.counts: dict[str, int] = {}
         self.problems: dict[str, str] = {}
 
     def run(self) -> None:
-        """Record until it is stopped."""
+        """Record until ``stop``."""
         looked: Ns | None = None
         while not self._stopped and not self._node.closed:
             now = self._node.now()
-            if looked is None or now - looked >= _LOOK:
+            if looked is None or now - looked >= _DISCOVERY_PERIOD:
                 looked = now
-                self._look()
-            self._node.spin_once(_LOOK)
+                self._discover()
+            self._node.spin_once(_DISCOVERY_PERIOD)
 
     def stop(self) -> None:
-        """Record no more; ``run`` returns within half a second."""
+        """Stop recording; ``run`` returns within half a second."""
         self._stopped = True
 
-    def _look(self) -> None:
+    def _discover(self) -> None:
         for topic in self._graph.topics():
             wanted = topic.publishers and (self._topics is None or topic.name in self._topics)
             if not wanted or topic.name in self._seen:
                 continue
             self._seen.add(topic.name)
             try:
-                self._node.subscribe(topic.name, topic.type, partial(self._hear, topic.name), _KEPT)
+                self._node.subscribe(topic.name, topic.type, partial(self._write, topic.name), _QUEUED)
             except UsageError as error:
                 self.problems[topic.name] = str(error)
 
-    def _hear(self, topic: str, message: Message) -> None:
+    def _write(self, topic: str, message: Message) -> None:
         if topic in self.problems:
             return
         try:
@@ -79,28 +83,27 @@ class Recorder:
             self.problems[topic] = str(error)
             return
         self.counts[topic] = self.counts.get(topic, 0) + 1
-        self._told(topic)
+        self._on_message(topic)
 
 
 _DEPTH = 100
 _CLOCK_PERIOD: Ns = 10 * MS
 _LATCHED = frozenset({"/tf_static", "/robot_description", "/map"})
-"""Topics that late subscribers get, too, by ROS's own conventions."""
-
-
-def nothing(played: int, at: Ns) -> None:
-    """Tell nobody how far it is."""
+"""Topics that are latched by ROS's conventions."""
 
 
 @dataclass(frozen=True)
 class PlayOptions:
-    """How a recording is played.
+    """How to play a recording.
 
-    ``rate``: recorded seconds per second. ``topics``: only these; ``None``: all that can be read, but for
-    what a run says of itself (``/volery/...``). ``after``: begin so many recorded seconds from the start.
-    ``clock``: publish the recorded time on ``/clock``. ``delay``: wait so many seconds between advertising
-    and the first message, and after the last one, since connecting takes time on a real graph. ``told`` is
-    told, for each message, how many have been played and its recorded time.
+    Attributes:
+        rate: Recorded seconds per second, above 0.
+        topics: Names of the topics to play; None for all that can be decoded, without those of a run's trace.
+        after: Recorded time to skip at the start, s.
+        clock: Publish the recorded time on ``/clock``.
+        delay: Time between advertising and the first message, and after the last one, s; connecting takes
+            time on a real graph.
+        on_message: Called for each message with the number of played messages and its recorded time, ns.
     """
 
     rate: float = 1.0
@@ -108,7 +111,7 @@ class PlayOptions:
     after: float = 0.0
     clock: bool = False
     delay: float = 0.0
-    told: Callable[[int, Ns], None] = nothing
+    on_message: Callable[[int, Ns], None] = lambda played, at: None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate < float("inf"):
@@ -118,9 +121,10 @@ class PlayOptions:
 
 
 def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
-    """Publish what was recorded, in time; blocks until the end. Returns how many messages were published.
+    """Publish a recording in time and block until its end; return the number of published messages.
 
-    Raises ``UsageError`` for a topic that was not recorded or cannot be read.
+    Raises:
+        UsageError: a requested topic was not recorded or cannot be decoded.
     """
     publishers = _advertise(node, bag, how)
     clock = node.advertise(CLOCK, "rosgraph_msgs/msg/Clock", QoS(1)) if how.clock else None
@@ -139,7 +143,7 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
         _wait(node, started, recorded.at - begin, how.rate)
         publishers[recorded.topic].publish(recorded.message)
         played += 1
-        how.told(played, recorded.at)
+        how.on_message(played, recorded.at)
     node.sleep(from_seconds(how.delay))
     return played
 

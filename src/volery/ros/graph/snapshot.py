@@ -1,4 +1,4 @@
-"""Who is on a graph, what is said there, and how often."""
+"""Snapshot of a graph: nodes, topics with their rates, services."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, to_seconds
 from volery.ros.graph.interface import AS_OFFERED, QoS, RosGraph, ServiceState
 
-_LISTENING = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
+_MEASURING = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
 _PORTION: Ns = 100 * MS
 
 
 class TopicSnapshot(NamedTuple):
-    """A topic: who publishes and who subscribes, and messages per second (``None``: not measured)."""
+    """A topic with its publishers and subscribers, and messages per second (None if not measured)."""
 
     name: str
     type: str
@@ -25,14 +25,14 @@ class TopicSnapshot(NamedTuple):
 
 
 class GraphSnapshot(NamedTuple):
-    """A graph at one moment. Everything is sorted by name."""
+    """A graph at one instant, sorted by name."""
 
     nodes: tuple[str, ...]
     topics: tuple[TopicSnapshot, ...]
     services: tuple[ServiceState, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the snapshot as values for JSON."""
         return {
             "nodes": list(self.nodes),
             "topics": [topic._asdict() for topic in self.topics],
@@ -41,9 +41,12 @@ class GraphSnapshot(NamedTuple):
 
 
 def snapshot(graph: RosGraph, within: Ns = 0) -> GraphSnapshot:
-    """What is there now; with *within*, each topic is listened to for so long and its rate counted.
+    """Return a snapshot of a graph; the node that measures is not in it.
 
-    Blocks for that long. The node that listens is not in the picture.
+    Args:
+        graph: The graph.
+        within: Time for which each topic's messages are counted, ns; the call blocks for that time. 0 for no
+            rates.
     """
     topics, nodes, services = graph.topics(), graph.node_names(), graph.services()
     rates = _rates(graph, within) if within > 0 else {}
@@ -52,25 +55,25 @@ def snapshot(graph: RosGraph, within: Ns = 0) -> GraphSnapshot:
 
 
 def _rates(graph: RosGraph, within: Ns) -> dict[str, float]:
-    """Messages per second of each topic that could be listened to."""
+    """Return messages per second of each topic of a known type."""
     counts: Counter[str] = Counter()
-    heard: list[str] = []
+    measured: list[str] = []
     node = graph.node("volery_graph", anonymous=True)
     try:
         for topic in graph.topics():
             if topic.publishers:
                 try:
-                    node.subscribe(topic.name, topic.type, partial(_count, counts, topic.name), _LISTENING)
+                    node.subscribe(topic.name, topic.type, partial(_count, counts, topic.name), _MEASURING)
                 except UsageError:
-                    continue  # a type that is not known here: it has no rate
-                heard.append(topic.name)
+                    continue  # of an unknown type: it has no rate
+                measured.append(topic.name)
         began = node.now()
         while node.now() - began < within:
             node.spin_once(_PORTION)
         lasted = to_seconds(node.now() - began)
     finally:
         node.close()
-    return {name: counts[name] / lasted for name in heard}
+    return {name: counts[name] / lasted for name in measured}
 
 
 def _count(counts: Counter[str], topic: str, _message: object) -> None:

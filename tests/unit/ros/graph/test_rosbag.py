@@ -56,7 +56,7 @@ def test_only_some_topics_from_a_moment_on(rig: Rig, bag: Bag) -> None:
     heard: list[Any] = []
     told: list[Any] = []
     listen(rig, "/words", "std_msgs/String", heard)
-    how = PlayOptions(topics=["/words"], after=1.0, told=lambda played, at: told.append(played))
+    how = PlayOptions(topics=["/words"], after=1.0, on_message=lambda played, at: told.append(played))
 
     def player() -> None:
         play(rig.graph.node("player"), bag, how)

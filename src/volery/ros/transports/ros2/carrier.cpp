@@ -1,8 +1,8 @@
-// Messages of any type as their bytes, for rclpy on Fast DDS: type support that reads nothing of what it carries.
+// Messages of any type as their bytes, for rclpy on Fast DDS: type support that does not read them.
 //
 // What rclpy calls a ROS message is here a buffer with the CDR bytes behind the encapsulation header; its Python
 // side is an object with these bytes as `data`, or plain `bytes` when it arrives. The structures are those of
-// rosidl_typesupport_fastrtps_cpp and rosidl_runtime_c (Jazzy, Kilted). Built and loaded by carrier.py.
+// rosidl_typesupport_fastrtps_cpp and rosidl_runtime_c (Jazzy, Kilted). Built and loaded by rclpy_types.py.
 
 #include <cstdint>
 #include <cstring>
@@ -18,7 +18,7 @@
 #include "rosidl_typesupport_fastrtps_cpp/service_type_support.h"
 #include "rosidl_typesupport_introspection_c/message_introspection.h"
 
-// Of Python's C interface, what is needed: its headers need not be installed.
+// The parts of the Python C API that are used; its headers need not be installed.
 typedef struct _object PyObject;
 extern "C" {
 PyObject * PyObject_GetAttrString(PyObject *, const char *);
@@ -35,7 +35,7 @@ using eprosima::fastcdr::Cdr;
 const char * const IDENTIFIER = "rosidl_typesupport_fastrtps_c";
 const char * const INTROSPECTION = "rosidl_typesupport_introspection_c";
 
-// -- what Fast DDS asks of a message
+// -- callbacks of Fast DDS
 
 bool serialize(const void * message, Cdr & cdr)
 {
@@ -53,7 +53,7 @@ bool deserialize(Cdr & cdr, void * message)
       cdr.deserialize(next);
     }
   } catch (const eprosima::fastcdr::exception::Exception &) {
-    return true;  // the end: how much there is, is not told
+    return true;  // the end; the number of bytes is not given
   }
 }
 
@@ -68,7 +68,7 @@ size_t max_serialized_size(char & bounds)
   return 0;
 }
 
-// -- what rclpy asks of a message
+// -- callbacks of rclpy
 
 void * create() {return new Bytes;}
 
@@ -96,7 +96,7 @@ PyObject * to_python(void * message)
   return PyBytes_FromStringAndSize(bytes.data(), static_cast<intptr_t>(bytes.size()));
 }
 
-// -- a type. `support` is first: who is handed it, is handed the type
+// -- a type. `support` is first, so that a pointer to it is a pointer to the type
 
 template<typename Support, typename Callbacks>
 struct Type
@@ -137,7 +137,7 @@ struct Type
 
 using Message = Type<rosidl_message_type_support_t, message_type_support_callbacks_t>;
 
-// Fast DDS 2 (Jazzy) insists on describing each type to others; it gets a description without members, which it
+// Fast DDS 2 (Jazzy) requires a description of each type; it gets one without members, which it
 // does not compare. Fast DDS 3 (Kilted) compares, and goes by the name where there is no description.
 #if __has_include("fastrtps/config.h")
 const bool IS_DESCRIBED = true;
@@ -168,7 +168,7 @@ struct Described : Message
 using Service = Type<rosidl_service_type_support_t, service_type_support_callbacks_t>;
 }  // namespace
 
-// Types live as long as the process: nobody says when rclpy needs them no longer.
+// Types live as long as the process: rclpy does not report when it no longer needs them.
 extern "C" {
 // "mavros_msgs::msg", "State", RIHS01 as 32 bytes
 const void * carrier_message(const char * space, const char * name, const uint8_t * hash)
