@@ -1,9 +1,9 @@
-"""The bridge: one vehicle on the graph, under MAVROS's names, roscopter's or pprzros's.
+"""A vehicle as a ROS node under the names of MAVROS, roscopter or pprzros.
 
-Knows the graph, messages and links (frames as values); translates between them as those do, and
-no more: it waits for nothing to be done and repeats no command. Where an autopilot does not speak MAVLink,
-the interpreter stands between it and the names that do. It must not know worlds, simulated autopilots or any
-one driver.
+The package knows the graph, messages and links. It translates between ROS messages and frames as those
+programs do, and does no more: it does not wait for the effect of a command and repeats no command.
+``mavlink_adapter`` presents an autopilot that does not use MAVLink as one that does. The package must not
+know worlds, simulated autopilots or any one driver.
 """
 
 from volery.bridge.mavlink_adapter import MavlinkAdapter

@@ -1,7 +1,7 @@
-"""Services that command the autopilot: modes, arming, take-off, landing, any MAVLink command, stream rates.
+"""MAVROS's command services: modes, arming, take-off, landing, any MAVLink command, stream rates.
 
-A command is sent once and answered with the autopilot's acknowledgement, or with ``success`` false after
-five seconds without one. As in MAVROS, ``set_mode`` and ``cmd/command_int`` do not wait for it.
+A command is sent once. The response contains the autopilot's acknowledgement, or ``success`` false after
+``ACK_TIMEOUT`` without one. As in MAVROS, ``set_mode`` and ``cmd/command_int`` do not wait for it.
 """
 
 from __future__ import annotations
@@ -17,21 +17,22 @@ from volery.bridge.node_interface import InterfaceContext, Service
 from volery.kernel.waiting import Lock
 from volery.ros.messages import service
 
-ACK_WITHIN: Ns = 5 * S
+ACK_TIMEOUT: Ns = 5 * S
 ACCEPTED, FAILED, IN_PROGRESS = 0, 4, 5
 CUSTOM_MODE_ENABLED = 1
 LAND, TAKEOFF, SET_HOME, ARM_DISARM, SET_MESSAGE_INTERVAL = 21, 22, 179, 400, 511
+_INT_FIELDS = ("frame", "command", "current", "autocontinue", "param1", "param2", "param3", "param4", *"xyz")
 
 
 class CommandServices:
-    """The handlers. One command at a time is under way, others wait their turn."""
+    """Handlers of the command services. One command is in progress at a time, others wait."""
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._wire, self._warn = around.wire, around.warn
-        self._one_at_a_time = Lock(around.wire.kernel, f"{around.node.name} (command)")
+    def __init__(self, context: InterfaceContext) -> None:
+        self._link, self._warn = context.link, context.warn
+        self._one_at_a_time = Lock(context.link.kernel, f"{context.node.name} (command)")
 
     def services(self) -> Mapping[str, Service]:
-        """Handlers by the service's name, with its type."""
+        """Return types and handlers by service name."""
         return {
             "set_mode": ("mavros_msgs/srv/SetMode", self.set_mode),
             "cmd/arming": ("mavros_msgs/srv/CommandBool", self.arming),
@@ -44,104 +45,92 @@ class CommandServices:
             "set_message_interval": ("mavros_msgs/srv/MessageInterval", self.set_message_interval),
         }
 
-    def ask(self, command: int, *parameters: float, confirmation: int = 0) -> tuple[bool, int]:
-        """Send a COMMAND_LONG; whether it was accepted, and the result (FAILED without an answer)."""
+    def send_command(self, command: int, *parameters: float, confirmation: int = 0) -> tuple[bool, int]:
+        """Send a COMMAND_LONG and wait for its acknowledgement.
+
+        Args:
+            command: MAV_CMD.
+            *parameters: Its parameters; missing ones are 0.
+            confirmation: Number of earlier transmissions.
+
+        Returns:
+            Whether the command was accepted, and the MAV_RESULT (FAILED without an acknowledgement).
+        """
         padded = [*parameters, *[0.0] * (7 - len(parameters))]
         fields: dict[str, Any] = {"command": command, "confirmation": confirmation}
         fields.update({f"param{number}": value for number, value in enumerate(padded, start=1)})
-        with self._one_at_a_time, self._wire.listen("COMMAND_ACK") as ear:
-            self._wire.send_to("COMMAND_LONG", fields)
+        with self._one_at_a_time, self._link.subscribe("COMMAND_ACK") as acknowledgements:
+            self._link.send_to_autopilot("COMMAND_LONG", fields)
             while True:
-                answer = ear.next(ACK_WITHIN)
+                answer = acknowledgements.next(ACK_TIMEOUT)
                 if answer is None:
-                    self._warn(f"command {command}: no acknowledgement within {ACK_WITHIN // S} s")
+                    self._warn(f"command {command}: no acknowledgement within {ACK_TIMEOUT // S} s")
                     return False, FAILED
                 result = answer.fields["result"]
                 if answer.fields["command"] == command and result != IN_PROGRESS:
                     return result == ACCEPTED, result
 
     def set_mode(self, request: Any) -> Any:
-        """``set_mode``: sent, not waited for; look at ``state``."""
+        """Handle ``set_mode``. The command is not acknowledged; ``state`` shows its effect."""
         response = service("mavros_msgs/srv/SetMode").response
         base, custom = request.base_mode, 0
         if request.custom_mode:
-            number = mode_number(self._wire.firmware, request.custom_mode)
+            number = mode_number(self._link.autopilot, request.custom_mode)
             if number is None:
-                names = mode_names(self._wire.firmware)
+                names = mode_names(self._link.autopilot)
                 hint = did_you_mean(request.custom_mode.upper(), names)
                 self._warn(f"set_mode: no mode {request.custom_mode!r}{hint}; there is {choices(names)}")
                 return response(False)
             base, custom = CUSTOM_MODE_ENABLED, number
-        system = self._wire.target[0]
-        self._wire.send("SET_MODE", {"target_system": system, "base_mode": base, "custom_mode": custom})
+        system = self._link.target[0]
+        self._link.send("SET_MODE", {"target_system": system, "base_mode": base, "custom_mode": custom})
         return response(True)
 
     def arming(self, request: Any) -> Any:
-        """``cmd/arming``."""
-        answer = self.ask(ARM_DISARM, 1.0 if request.value else 0.0)
+        """Handle ``cmd/arming``."""
+        answer = self.send_command(ARM_DISARM, 1.0 if request.value else 0.0)
         return service("mavros_msgs/srv/CommandBool").response(*answer)
 
     def _take_off_or_land(self, command: int, request: Any) -> Any:
-        answer = self.ask(
-            command,
-            request.min_pitch,
-            0.0,
-            0.0,
-            request.yaw,
-            request.latitude,
-            request.longitude,
-            request.altitude,
-        )
+        place = (request.latitude, request.longitude, request.altitude)
+        answer = self.send_command(command, request.min_pitch, 0.0, 0.0, request.yaw, *place)
         return service("mavros_msgs/srv/CommandTOL").response(*answer)
 
     def takeoff(self, request: Any) -> Any:
-        """``cmd/takeoff``: the altitude is what it means to the autopilot (PX4: AMSL, else above home)."""
+        """Handle ``cmd/takeoff``. The altitude is passed on: AMSL for PX4, else above home."""
         return self._take_off_or_land(TAKEOFF, request)
 
     def land(self, request: Any) -> Any:
-        """``cmd/land``."""
+        """Handle ``cmd/land``."""
         return self._take_off_or_land(LAND, request)
 
     def command(self, request: Any) -> Any:
-        """``cmd/command``: any MAVLink command."""
+        """Handle ``cmd/command``: any MAVLink command."""
         parameters = [getattr(request, f"param{number}") for number in range(1, 8)]
-        answer = self.ask(request.command, *parameters, confirmation=request.confirmation)
+        answer = self.send_command(request.command, *parameters, confirmation=request.confirmation)
         return service("mavros_msgs/srv/CommandLong").response(*answer)
 
     def command_int(self, request: Any) -> Any:
-        """``cmd/command_int``: sent, not waited for."""
-        names = (
-            "frame",
-            "command",
-            "current",
-            "autocontinue",
-            "param1",
-            "param2",
-            "param3",
-            "param4",
-            "x",
-            "y",
-            "z",
-        )
-        self._wire.send_to("COMMAND_INT", {name: getattr(request, name) for name in names})
+        """Handle ``cmd/command_int``. The response does not wait for the acknowledgement."""
+        self._link.send_to_autopilot("COMMAND_INT", {name: getattr(request, name) for name in _INT_FIELDS})
         return service("mavros_msgs/srv/CommandInt").response(True)
 
     def set_home(self, request: Any) -> Any:
-        """``cmd/set_home``: AMSL altitude."""
+        """Handle ``cmd/set_home``; the altitude is AMSL."""
         current = 1.0 if request.current_gps else 0.0
         place = (request.latitude, request.longitude, request.altitude)
-        answer = self.ask(SET_HOME, current, 0.0, 0.0, request.yaw, *place)
+        answer = self.send_command(SET_HOME, current, 0.0, 0.0, request.yaw, *place)
         return service("mavros_msgs/srv/CommandHome").response(*answer)
 
     def set_stream_rate(self, request: Any) -> Any:
-        """``set_stream_rate``: not acknowledged by MAVLink either."""
+        """Handle ``set_stream_rate``, which MAVLink does not acknowledge."""
         rate = request.message_rate if request.on_off else 0
-        request_stream(self._wire, request.stream_id, rate)
+        request_stream(self._link, request.stream_id, rate)
         return service("mavros_msgs/srv/StreamRate").response()
 
     def set_message_interval(self, request: Any) -> Any:
-        """``set_message_interval``: hertz; 0 the autopilot's own rate, below 0 none."""
+        """Handle ``set_message_interval``: a rate in Hz, 0 for the autopilot's default, below 0 for none."""
         rate = request.message_rate
         interval = -1.0 if rate < 0 else (0.0 if rate == 0 else 1e6 / rate)
-        accepted, _ = self.ask(SET_MESSAGE_INTERVAL, float(request.message_id), interval)
+        accepted, _ = self.send_command(SET_MESSAGE_INTERVAL, float(request.message_id), interval)
         return service("mavros_msgs/srv/MessageInterval").response(accepted)

@@ -1,8 +1,8 @@
 """MAVROS's names.
 
-Differences from MAVROS: publishers are reliable, as in ROS 1; it speaks as a ground station's system id,
-which is the only one from which ArduPilot takes sticks; it asks for the streams it publishes, as roscopter
-does; topics that few need are published while somebody subscribes to them.
+Differences from MAVROS: publishers are reliable, as in ROS 1; the node sends with the system id of a ground
+station, which is the only one from which ArduPilot accepts manual control; the node requests the streams that
+it publishes, as roscopter does; topics that few nodes need are published only while they have a subscription.
 """
 
 from __future__ import annotations
@@ -45,26 +45,25 @@ TOPICS = (
 )
 
 
-def offer(around: InterfaceContext) -> NodeInterface:
-    """All that is served."""
-    said, asked = StatusPublisher(around), CommandServices(around)
-    stored, kept = MissionServices(around), ParameterServices(around)
-    placed, health = PosePublisher(around), DiagnosticsPublisher(around)
-    moving = (ImuPublisher(around), TargetPublisher(around), TransformPublisher(around))
+def mavros_interface(context: InterfaceContext) -> NodeInterface:
+    """Return the interface of a node under MAVROS's names."""
+    status, commands = StatusPublisher(context), CommandServices(context)
+    missions, parameters = MissionServices(context), ParameterServices(context)
+    poses, diagnostics = PosePublisher(context), DiagnosticsPublisher(context)
+    others = (ImuPublisher(context), TargetPublisher(context), TransformPublisher(context))
+    parts = (status, poses, *others, missions, parameters, diagnostics)
 
     def disconnected(stamp: Ns) -> None:
-        said.disconnected(stamp)
-        health.disconnected(stamp)
+        status.disconnected(stamp)
+        diagnostics.disconnected(stamp)
 
     return NodeInterface(
         topics=TOPICS,
-        translators=merge_translators(
-            *(part.translators() for part in (said, placed, *moving, stored, kept, health))
-        ),
-        subscriptions=subscriptions(around.geoid),
-        services={**asked.services(), **stored.services(), **kept.services()},
+        translators=merge_translators(*(part.translators() for part in parts)),
+        subscriptions=subscriptions(context.geoid),
+        services={**commands.services(), **missions.services(), **parameters.services()},
         disconnected=disconnected,
     )
 
 
-MAVROS = NamingScheme("mavros", offer, STREAMS, home=True)
+MAVROS = NamingScheme("mavros", mavros_interface, STREAMS, home=True)

@@ -1,8 +1,8 @@
-"""Names and numbers of flight modes, by MAVLink's autopilot and type of vehicle.
+"""Names and numbers of flight modes by MAVLink's autopilot and vehicle type.
 
-Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``, PX4's ``px4_custom_mode.h``; for those that do
-not speak MAVLink the definitions of what they speak. A mode that is not listed goes by ``CMODE(number)``, as
-in MAVROS.
+Source: ArduPilot's ``ArduCopter/mode.h`` and ``Rover/mode.h``, PX4's ``px4_custom_mode.h``; for autopilots
+without MAVLink the definitions of their own protocols. A mode that is not listed is called ``CMODE(number)``,
+as in MAVROS.
 """
 
 from __future__ import annotations
@@ -31,48 +31,48 @@ _PX4_MODES = (
     (5, 0, "ACRO"), (6, 0, "OFFBOARD"), (7, 0, "STABILIZED"), (8, 0, "RATTITUDE"),
 )  # fmt: skip
 PX4 = {sub << 24 | main << 16: name for main, sub, name in _PX4_MODES}
-"""The same for all types of vehicle."""
+"""The modes of PX4 are the same for all vehicle types."""
 PAPARAZZI = dict(enumerate(message_type("ROTORCRAFT_STATUS").words("ap_mode")))
 DJI = {mode.value: mode.name for mode in DisplayMode}
 
 GENERIC_ID, ARDUPILOT_ID, PAPARAZZI_ID, PX4_ID = 0, 3, 9, 12
 """MAV_AUTOPILOT."""
 DJI_ID = 255
-"""MAVLink has no number for it, and does not use this one. It is said inside this process only."""
+"""MAVLink defines no id for DJI and does not use this one. The id is used within this process only."""
 AUTOPILOT_NAMES = {ARDUPILOT_ID: "ArduPilot", PX4_ID: "PX4", PAPARAZZI_ID: "Paparazzi", DJI_ID: "DJI"}
 
 _ROVER_TYPES = frozenset({10, 11})
 """MAV_TYPE: ground rover, surface boat."""
-_SAME_FOR_ALL = {PX4_ID: PX4, PAPARAZZI_ID: PAPARAZZI, DJI_ID: DJI}
+_SAME_FOR_ALL_TYPES = {PX4_ID: PX4, PAPARAZZI_ID: PAPARAZZI, DJI_ID: DJI}
 _NUMBERED = re.compile(r"(?:CMODE\(|MODE_)?(\d+)\)?\Z")
 
 
 class AutopilotType(NamedTuple):
-    """Whose modes they are: MAV_AUTOPILOT and MAV_TYPE, as heartbeats state them."""
+    """MAV_AUTOPILOT and MAV_TYPE of a heartbeat, which determine the mode names."""
 
     autopilot: int = ARDUPILOT_ID
     kind: int = 0
 
 
-def _table(firmware: AutopilotType) -> dict[int, str]:
-    of_copters_or_rovers = ROVER if firmware.kind in _ROVER_TYPES else COPTER
-    return _SAME_FOR_ALL.get(firmware.autopilot, of_copters_or_rovers)
+def _mode_table(autopilot: AutopilotType) -> dict[int, str]:
+    by_type = ROVER if autopilot.kind in _ROVER_TYPES else COPTER
+    return _SAME_FOR_ALL_TYPES.get(autopilot.autopilot, by_type)
 
 
-def mode_name(firmware: AutopilotType, number: int) -> str:
-    """The name of a mode of that *firmware*."""
-    return _table(firmware).get(number, f"CMODE({number})")
+def mode_name(autopilot: AutopilotType, number: int) -> str:
+    """Return the name of mode *number*."""
+    return _mode_table(autopilot).get(number, f"CMODE({number})")
 
 
-def mode_number(firmware: AutopilotType, name: str) -> int | None:
-    """The number of a mode, ``None`` if there is no such name."""
-    for number, known in _table(firmware).items():
+def mode_number(autopilot: AutopilotType, name: str) -> int | None:
+    """Return the number of the mode called *name*, or None."""
+    for number, known in _mode_table(autopilot).items():
         if known == name.upper():
             return number
     numbered = _NUMBERED.match(name)
     return int(numbered.group(1)) if numbered else None
 
 
-def mode_names(firmware: AutopilotType) -> list[str]:
-    """All names of modes of that *firmware*."""
-    return list(_table(firmware).values())
+def mode_names(autopilot: AutopilotType) -> list[str]:
+    """Return the names of all modes of an autopilot."""
+    return list(_mode_table(autopilot).values())

@@ -1,6 +1,4 @@
-"""What a vehicle node offers to the graph under one set of names: topics, services, and who translates
-them.
-"""
+"""The ROS interface of a vehicle node under one naming scheme: topics, services and their translators."""
 
 from __future__ import annotations
 
@@ -16,26 +14,26 @@ from volery.ros.graph import DEFAULT, TRANSIENT_LOCAL, Handler, Node, QoS
 from volery.ros.messages import message_class
 
 BODY = "base_link"
-"""The frame of the vehicle's body: forward, left, up."""
+"""The body frame of the vehicle: forward, left, up."""
 LATCHED_STATE = QoS(10, durability=TRANSIENT_LOCAL)
 
 Fields = dict[str, Any]
-"""Of a frame."""
+"""Fields of a MAVLink message by name."""
 Publish = Callable[[str, Any], None]
 """``publish(topic, message)``."""
 Translator = Callable[[Fields, Ns], None]
-"""``translate(fields, stamp)`` publishes what a frame says; the stamp is ROS time of its arrival."""
+"""``translate(fields, stamp)`` publishes the content of a frame; the stamp is ROS time of its arrival."""
 OutgoingMessage = tuple[str, Fields]
-"""A frame's name and fields, without addresses."""
+"""Name and fields of a MAVLink message, without addresses."""
 Service = tuple[str, Handler]
-"""The type of a service and its handler."""
+"""Type of a service and its handler."""
 
 _header = message_class("std_msgs/msg/Header")
 _time = message_class("builtin_interfaces/msg/Time")
 
 
 class Topic(NamedTuple):
-    """A topic that the vehicle node publishes; *on_demand*: while somebody subscribes to it."""
+    """A published topic. With *on_demand* it is published only while it has a subscription."""
 
     name: str
     type: str
@@ -44,7 +42,7 @@ class Topic(NamedTuple):
 
 
 class Subscription(NamedTuple):
-    """A topic that the vehicle node subscribes to, and what its messages become."""
+    """A subscribed topic and the function that translates its messages to MAVLink."""
 
     name: str
     type: str
@@ -53,7 +51,10 @@ class Subscription(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class NodeInterface:
-    """All of it. ``disconnected`` publishes that the autopilot has fallen silent."""
+    """All topics, translators, subscriptions and services of a vehicle node.
+
+    ``disconnected`` publishes that the autopilot has stopped sending.
+    """
 
     topics: Sequence[Topic]
     translators: Mapping[str, Sequence[Translator]]
@@ -64,14 +65,21 @@ class NodeInterface:
 
 @dataclass(frozen=True)
 class InterfaceContext:
-    """What an offering is made with.
+    """What the parts of an interface work with.
 
-    ``wanted(topic)``: it is worth while to publish; ``warn`` records what went wrong; *control*:
-    roscopter may be told to send sticks; *origin*: what ``map`` is about, where that is agreed.
+    Args:
+        node: The node of the graph.
+        link: Link to the autopilot.
+        publish: Publishes a message on a topic.
+        wanted: Returns whether a topic should be published.
+        warn: Records a warning.
+        geoid: Converts between ellipsoidal and AMSL altitudes.
+        control: Whether roscopter's ``send_rc`` is offered.
+        origin: Origin of the frame ``map``; None is the autopilot's own origin.
     """
 
     node: Node
-    wire: AutopilotLink
+    link: AutopilotLink
     publish: Publish
     wanted: Callable[[str], bool]
     warn: Callable[[str], None]
@@ -82,23 +90,28 @@ class InterfaceContext:
 
 @dataclass(frozen=True)
 class NamingScheme:
-    """One set of names: that of the node, what it ``offer``s, and the ``streams`` that this takes (hertz by
-    MAV_DATA_STREAM); *home*: the home position and the landed state as well.
+    """The names under which a vehicle is served.
+
+    Args:
+        node: Name of the node.
+        make_interface: Returns the interface of a node.
+        streams: Rates in Hz of the telemetry streams that the interface needs, by MAV_DATA_STREAM.
+        home: Whether the interface needs the home position and the landed state.
     """
 
     node: str
-    offer: Callable[[InterfaceContext], NodeInterface]
+    make_interface: Callable[[InterfaceContext], NodeInterface]
     streams: Mapping[int, int]
     home: bool
 
 
 def stamped(at: Ns, frame_id: str = "") -> Any:
-    """A header."""
+    """Return a ``std_msgs/msg/Header`` with ROS time *at* in ns."""
     return _header(_time(*divmod(at, S)), frame_id)
 
 
 def merge_translators(*parts: Mapping[str, Translator]) -> dict[str, list[Translator]]:
-    """Translators by the name of the frame; several parts may want the same one."""
+    """Return all translators by message name; several parts may translate the same message."""
     found: dict[str, list[Translator]] = {}
     for part in parts:
         for name, translate in part.items():

@@ -1,9 +1,8 @@
-"""Services that read and set the autopilot's parameters, and ``param/param_value``, which says each that
-is heard.
+"""MAVROS's parameter services, and ``param/param_value``, which publishes each received parameter.
 
-``param/pull`` reads all of them and sets them as ROS parameters below ``param`` in the node's namespace;
-``param/push`` sends those that were changed there since. Where the graph takes no such parameters,
-``param/pull`` still publishes them.
+``param/pull`` reads all parameters and sets them as ROS parameters below ``param`` in the node's namespace;
+``param/push`` sends those that were changed there. Where the graph does not accept such ROS parameters,
+``param/pull`` still publishes the values.
 """
 
 from __future__ import annotations
@@ -19,31 +18,31 @@ from volery.links.link import Frame
 from volery.links.mavlink_conventions import from_bytewise, to_bytewise
 from volery.ros.messages import new, service
 
-ANSWER_WITHIN: Ns = 1000 * MS
-TRIES = 3
+ANSWER_TIMEOUT: Ns = 1000 * MS
+ATTEMPTS = 3
 REAL32, REAL64 = 9, 10
 PARAMETERS = "param"
-"""Where ROS parameters are."""
+"""Name below which the ROS parameters are set."""
 VALUE = "mavros_msgs/msg/Param"
 
 PARAMETER_TOPICS = (Topic("param/param_value", VALUE, on_demand=True),)
 
 
 class ParameterServices:
-    """Handlers and a translator. An unknown parameter is not answered by ArduPilot.
+    """Handlers of the parameter services and the translator of PARAM_VALUE.
 
-    ``success`` is false after three seconds.
+    ArduPilot does not answer a request for an unknown parameter: ``success`` is false after three seconds.
     """
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._around = around
-        self._wire = around.wire
+    def __init__(self, context: InterfaceContext) -> None:
+        self._context = context
+        self._link = context.link
         self._types: dict[str, int] = {}
         self._values: dict[str, float] = {}
         self._complete = False
 
     def services(self) -> Mapping[str, Service]:
-        """Handlers by the service's name, with its type."""
+        """Return types and handlers by service name."""
         return {
             "param/get": ("mavros_msgs/srv/ParamGet", self.get),
             "param/set": ("mavros_msgs/srv/ParamSet", self.put),
@@ -52,123 +51,123 @@ class ParameterServices:
         }
 
     def translators(self) -> Mapping[str, Translator]:
-        """By the name of the frame."""
-        return {"PARAM_VALUE": self._heard}
+        """Return the translators by message name."""
+        return {"PARAM_VALUE": self._publish_value}
 
-    # -- values, as this firmware writes them
+    # -- values in the encoding of the firmware
 
     @property
     def _bytewise(self) -> bool:
-        return self._wire.firmware.autopilot == PX4_ID
+        return self._link.autopilot.autopilot == PX4_ID
 
-    def _value(self, said: Fields) -> float:
-        value: float = said["param_value"]
-        return from_bytewise(said["param_type"], value) if self._bytewise else value
+    def _value(self, fields: Fields) -> float:
+        value: float = fields["param_value"]
+        return from_bytewise(fields["param_type"], value) if self._bytewise else value
 
-    def _written(self, kind: int, value: float) -> Fields:
+    def _encoded(self, kind: int, value: float) -> Fields:
         return {"param_value": to_bytewise(kind, value) if self._bytewise else value, "param_type": kind}
 
-    def _message(self, said: Fields) -> Any:
-        value = self._value(said)
-        given = {"real": value} if said["param_type"] in (REAL32, REAL64) else {"integer": round(value)}
+    def _message(self, fields: Fields) -> Any:
+        value = self._value(fields)
+        given = {"real": value} if fields["param_type"] in (REAL32, REAL64) else {"integer": round(value)}
         return new("mavros_msgs/msg/ParamValue", **given)
 
-    def _note(self, said: Fields) -> None:
-        name = said["param_id"]
-        self._types[name], self._values[name] = said["param_type"], self._value(said)
+    def _store(self, fields: Fields) -> None:
+        name = fields["param_id"]
+        self._types[name], self._values[name] = fields["param_type"], self._value(fields)
 
-    def _heard(self, said: Fields, at: Ns) -> None:
-        self._note(said)
-        if self._around.wanted("param/param_value"):
-            message = new(VALUE, header=stamped(at), param_id=said["param_id"], value=self._message(said))
-            message.param_index, message.param_count = said["param_index"], said["param_count"]
-            self._around.publish("param/param_value", message)
+    def _publish_value(self, fields: Fields, at: Ns) -> None:
+        self._store(fields)
+        if self._context.wanted("param/param_value"):
+            message = new(VALUE, header=stamped(at), param_id=fields["param_id"], value=self._message(fields))
+            message.param_index, message.param_count = fields["param_index"], fields["param_count"]
+            self._context.publish("param/param_value", message)
 
-    # -- one
+    # -- single parameters
 
-    def _ask(self, name: str, message: str, fields: Fields) -> Frame | None:
-        with self._wire.listen("PARAM_VALUE") as ear:
-            for _ in range(TRIES):
-                self._wire.send_to(message, {"param_id": name, **fields})
-                answer = ear.next(ANSWER_WITHIN)
+    def _request(self, name: str, message: str, fields: Fields) -> Frame | None:
+        with self._link.subscribe("PARAM_VALUE") as answers:
+            for _ in range(ATTEMPTS):
+                self._link.send_to_autopilot(message, {"param_id": name, **fields})
+                answer = answers.next(ANSWER_TIMEOUT)
                 while answer is not None and answer.fields["param_id"] != name:
-                    answer = ear.next(ANSWER_WITHIN)
+                    answer = answers.next(ANSWER_TIMEOUT)
                 if answer is not None:
                     return answer
         return None
 
     def _set(self, name: str, kind: int, value: float) -> Frame | None:
-        return self._ask(name, "PARAM_SET", self._written(kind, value))
+        return self._request(name, "PARAM_SET", self._encoded(kind, value))
 
     def _response(self, service_type: str, answer: Frame | None) -> Any:
         response = service(service_type).response
         return response() if answer is None else response(True, self._message(answer.fields))
 
     def get(self, request: Any) -> Any:
-        """``param/get``."""
-        answer = self._ask(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
+        """Handle ``param/get``."""
+        answer = self._request(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
         return self._response("mavros_msgs/srv/ParamGet", answer)
 
     def put(self, request: Any) -> Any:
-        """``param/set``: an integer that is not 0 counts, else the real."""
-        known = self._ask(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
+        """Handle ``param/set``: the integer is used unless it is 0, else the real."""
+        known = self._request(request.param_id, "PARAM_REQUEST_READ", {"param_index": -1})
         if known is not None:
             value = float(request.value.integer or request.value.real)
             known = self._set(request.param_id, known.fields["param_type"], value)
         return self._response("mavros_msgs/srv/ParamSet", known)
 
-    # -- all
+    # -- all parameters
 
     def pull(self, request: Any) -> Any:
-        """``param/pull``: read all, unless they are known and *force_pull* does not ask for it."""
+        """Handle ``param/pull``: read all parameters, unless they are known and *force_pull* is false."""
         wanted = request.force_pull or not self._complete
         self._complete = not wanted or self._read_all()
         try:
-            self._around.node.set_parameter(PARAMETERS, {name: self._of_ros(name) for name in self._values})
+            self._context.node.set_parameter(PARAMETERS, {name: self._as_ros(name) for name in self._values})
         except VoleryError as error:
-            self._around.warn(f"param/pull: not set as ROS parameters: {error}")
+            self._context.warn(f"param/pull: not set as ROS parameters: {error}")
         return service("mavros_msgs/srv/ParamPull").response(self._complete, len(self._values))
 
-    def _of_ros(self, name: str) -> float | int:
+    def _as_ros(self, name: str) -> float | int:
         value = self._values[name]
         return value if self._types[name] in (REAL32, REAL64) else round(value)
 
     def _read_all(self) -> bool:
-        """Ask for the list, then for each that was lost on the way, until there is silence."""
+        """Request the list, then each parameter that was lost, and return whether all were received."""
         found: set[int] = set()
         count = 0
-        with self._wire.listen("PARAM_VALUE") as ear:
-            for _ in range(TRIES):
-                self._wire.send_to("PARAM_REQUEST_LIST", {})
-                while (answer := ear.next(ANSWER_WITHIN)) is not None:
+        with self._link.subscribe("PARAM_VALUE") as answers:
+            for _ in range(ATTEMPTS):
+                self._link.send_to_autopilot("PARAM_REQUEST_LIST", {})
+                while (answer := answers.next(ANSWER_TIMEOUT)) is not None:
                     count = self._keep(answer.fields, found)
                     if len(found) == count:
                         return True
                 if found:
                     break
-            for _ in range(TRIES):
+            for _ in range(ATTEMPTS):
                 while (index := _first_missing(found, count)) is not None:
-                    self._wire.send_to("PARAM_REQUEST_READ", {"param_id": "", "param_index": index})
-                    answer = ear.next(ANSWER_WITHIN)
+                    self._link.send_to_autopilot("PARAM_REQUEST_READ", {"param_id": "", "param_index": index})
+                    answer = answers.next(ANSWER_TIMEOUT)
                     if answer is None or answer.fields["param_index"] != index:
                         break
                     self._keep(answer.fields, found)
         return bool(found) and len(found) == count
 
-    def _keep(self, said: Fields, found: set[int]) -> int:
-        """Note a value; how many there are."""
-        count: int = said["param_count"]
-        if said["param_index"] < count:
-            found.add(said["param_index"])
-        self._note(said)
+    def _keep(self, fields: Fields, found: set[int]) -> int:
+        """Store a value and return the number of parameters."""
+        count: int = fields["param_count"]
+        if fields["param_index"] < count:
+            found.add(fields["param_index"])
+        self._store(fields)
         return count
 
     def push(self, request: Any) -> Any:
-        """``param/push``: send what the ROS parameters say otherwise."""
+        """Handle ``param/push``: send the ROS parameters that differ from the known values."""
         response = service("mavros_msgs/srv/ParamPush").response
-        stated = self._around.node.get_parameter(PARAMETERS, {})
+        given = self._context.node.get_parameter(PARAMETERS, {})
         sent = 0
-        for name, value in sorted(stated.items()):
+        for name, value in sorted(given.items()):
             if name in self._values and float(value) != self._values[name]:
                 if self._set(name, self._types[name], float(value)) is None:
                     return response(False, sent)

@@ -1,9 +1,9 @@
-"""roscopter's names: what it publishes and takes, under the same names, in the same types and units.
+"""roscopter's names: its topics and services with the same names, types and units.
 
-Differences from roscopter: it waits for frames instead of asking a thousand times a second; ``rc`` also
-comes of RC_CHANNELS and ``raw_imu`` of SCALED_IMU and HIGHRES_IMU, where the autopilot sends those
-instead; an arming that is refused is told as a warning, and on ``state``: the service's type has no place
-for it.
+Differences from roscopter: the node waits for frames instead of polling a thousand times a second; ``rc`` is
+also published from RC_CHANNELS, and ``raw_imu`` from SCALED_IMU and HIGHRES_IMU, where the autopilot sends
+those instead; a refused arming is reported as a warning and on ``state``, because the type of the service has
+no field for it.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ _ANGLES = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
 _MEASURED = tuple(f"{axis}{kind}" for kind in ("acc", "gyro", "mag") for axis in "xyz")
 
 
-class Roscopter:
-    """Translators and handlers."""
+class RoscopterInterface:
+    """Translators and handlers under roscopter's names."""
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._wire, self._publish, self._warn = around.wire, around.publish, around.warn
-        self._commands = CommandServices(around)
+    def __init__(self, context: InterfaceContext) -> None:
+        self._link, self._publish, self._warn = context.link, context.publish, context.warn
+        self._commands = CommandServices(context)
 
     def translators(self) -> Mapping[str, Translator]:
-        """By the name of the frame."""
+        """Return the translators by message name."""
         return {
             "GPS_RAW_INT": self._gps,
             "RC_CHANNELS": self._rc,
@@ -74,52 +74,56 @@ class Roscopter:
             **{name: partial(self._raw_imu, name) for name in IMU_SOURCES},
         }
 
-    def _gps(self, said: Fields, at: Ns) -> None:
-        """AMSL, as the receiver says it."""
-        place = {"latitude": said["lat"] / 1e7, "longitude": said["lon"] / 1e7, "altitude": said["alt"] / 1e3}
+    def _gps(self, fields: Fields, at: Ns) -> None:
+        """Publish the fix with the AMSL altitude of the receiver."""
+        place = {
+            "latitude": fields["lat"] / 1e7,
+            "longitude": fields["lon"] / 1e7,
+            "altitude": fields["alt"] / 1e3,
+        }
         message = new("sensor_msgs/msg/NavSatFix", header=stamped(at), **place)
-        message.status.status = FIX if said["fix_type"] >= FIX_3D else NO_FIX
+        message.status.status = FIX if fields["fix_type"] >= FIX_3D else NO_FIX
         message.status.service = GPS
         self._publish("gps", message)
 
-    def _rc(self, said: Fields, at: Ns) -> None:
-        channels = [said[f"chan{number}_raw"] for number in range(1, CHANNELS + 1)]
+    def _rc(self, fields: Fields, at: Ns) -> None:
+        channels = [fields[f"chan{number}_raw"] for number in range(1, CHANNELS + 1)]
         self._publish("rc", new(RC, channel=channels))
 
-    def _rc_raw(self, said: Fields, at: Ns) -> None:
-        if self._wire.last("RC_CHANNELS") is None:
-            self._rc(said, at)
+    def _rc_raw(self, fields: Fields, at: Ns) -> None:
+        if self._link.last("RC_CHANNELS") is None:
+            self._rc(fields, at)
 
-    def _state(self, said: Fields, at: Ns) -> None:
-        base = said["base_mode"]
-        mode = mode_name(AutopilotType(said["autopilot"], said["type"]), said["custom_mode"])
+    def _state(self, fields: Fields, at: Ns) -> None:
+        base = fields["base_mode"]
+        mode = mode_name(AutopilotType(fields["autopilot"], fields["type"]), fields["custom_mode"])
         armed, guided = bool(base & SAFETY_ARMED), bool(base & GUIDED_ENABLED)
         self._publish("state", new("roscopter/msg/State", armed=armed, guided=guided, mode=mode))
 
-    def _vfr_hud(self, said: Fields, at: Ns) -> None:
+    def _vfr_hud(self, fields: Fields, at: Ns) -> None:
         names = ("airspeed", "groundspeed", "heading", "throttle", "alt", "climb")
-        self._publish("vfr_hud", new("roscopter/msg/VFR_HUD", **{name: said[name] for name in names}))
+        self._publish("vfr_hud", new("roscopter/msg/VFR_HUD", **{name: fields[name] for name in names}))
 
-    def _attitude(self, said: Fields, at: Ns) -> None:
-        self._publish("attitude", new("roscopter/msg/Attitude", **{name: said[name] for name in _ANGLES}))
+    def _attitude(self, fields: Fields, at: Ns) -> None:
+        self._publish("attitude", new("roscopter/msg/Attitude", **{name: fields[name] for name in _ANGLES}))
 
-    def _raw_imu(self, name: str, said: Fields, at: Ns) -> None:
-        """Thousandths of g, of rad/s and of gauss, whichever of the three is sent."""
-        if imu_source(self._wire) != name:
+    def _raw_imu(self, name: str, fields: Fields, at: Ns) -> None:
+        """Publish the measurement in thousandths of g, of rad/s and of gauss."""
+        if imu_source(self._link) != name:
             return
-        measured = {one: said[one] for one in _MEASURED}
+        measured = {one: fields[one] for one in _MEASURED}
         if name == "HIGHRES_IMU":
             measured = _in_thousandths(measured)
-        time = said["time_boot_ms"] * 1000 if name == "SCALED_IMU" else said["time_usec"]
+        time = fields["time_boot_ms"] * 1000 if name == "SCALED_IMU" else fields["time_usec"]
         message = new("roscopter/msg/Mavlink_RAW_IMU", header=stamped(at), time_usec=time, **measured)
         self._publish("raw_imu", message)
 
     def services(self) -> Mapping[str, Service]:
-        """Handlers by the service's name, with its type."""
+        """Return types and handlers by service name."""
         return {"arm": (EMPTY, partial(self._arm, 1.0)), "disarm": (EMPTY, partial(self._arm, 0.0))}
 
     def _arm(self, arm: float, request: Any) -> Any:
-        accepted, result = self._commands.ask(ARM_DISARM, arm)
+        accepted, result = self._commands.send_command(ARM_DISARM, arm)
         if not accepted:
             what = "arm" if arm else "disarm"
             self._warn(f"{what}: the autopilot says {entry_name('MAV_RESULT', result)}")
@@ -127,7 +131,7 @@ class Roscopter:
 
 
 def _in_thousandths(measured: Mapping[str, float]) -> dict[str, int]:
-    """HIGHRES_IMU's m/s^2, rad/s and gauss as those of RAW_IMU."""
+    """Convert the m/s^2, rad/s and gauss of HIGHRES_IMU to the units of RAW_IMU."""
     return {name: round(value * _PER_UNIT[name[1:]]) for name, value in measured.items()}
 
 
@@ -135,25 +139,25 @@ _PER_UNIT = {"acc": MILLI / 9.80665, "gyro": MILLI, "mag": MILLI}
 
 
 def send_rc(message: Any, now: Ns) -> OutgoingMessage:
-    """``send_rc``: microseconds; 0 gives a channel back to the operator's remote control."""
+    """Translate ``send_rc``: microseconds; 0 returns a channel to the operator's remote control."""
     channels = {f"chan{number}_raw": int(value) for number, value in enumerate(message.channel, start=1)}
     return "RC_CHANNELS_OVERRIDE", channels
 
 
-def _nothing(stamp: Ns) -> None:
-    """Nobody is told that the autopilot has fallen silent: ``state`` has no word for it."""
+def _ignore_disconnection(stamp: Ns) -> None:
+    """Publish nothing, because ``state`` cannot express that the autopilot has stopped sending."""
 
 
-def offer(around: InterfaceContext) -> NodeInterface:
-    """All that is served; ``send_rc`` with *control* only."""
-    made = Roscopter(around)
+def roscopter_interface(context: InterfaceContext) -> NodeInterface:
+    """Return the interface of a node under roscopter's names; it contains ``send_rc`` only with *control*."""
+    made = RoscopterInterface(context)
     return NodeInterface(
         topics=TOPICS,
         translators=merge_translators(made.translators()),
-        subscriptions=(Subscription("send_rc", RC, send_rc),) if around.control else (),
+        subscriptions=(Subscription("send_rc", RC, send_rc),) if context.control else (),
         services=made.services(),
-        disconnected=_nothing,
+        disconnected=_ignore_disconnection,
     )
 
 
-ROSCOPTER = NamingScheme("roscopter", offer, {ALL: 10}, home=False)
+ROSCOPTER = NamingScheme("roscopter", roscopter_interface, {ALL: 10}, home=False)

@@ -1,11 +1,9 @@
-"""Set-points: ROS messages as the frames that command the autopilot. ENU and FLU to NED and FRD.
+"""Set-points in both directions: topics that command the autopilot, and publishers of its targets.
 
-In the body frames (8, 9) vectors are forward, left, up on the ROS side; elsewhere east, north, up. Yaw is
-anticlockwise from east there and clockwise from north here. Altitudes of ``setpoint_raw/global`` go through
-as they are, in the frame that the message names (AMSL, above home or above terrain); that of
+In the body frames (8, 9) vectors are forward, left, up on the ROS side; otherwise east, north, up. Yaw is
+anticlockwise from east in ROS and clockwise from north in MAVLink. Altitudes of ``setpoint_raw/global`` are
+passed on in the frame that the message names (AMSL, above home or above terrain); that of
 ``setpoint_position/global`` is above the ellipsoid.
-
-Where the autopilot says it is going, as ROS messages: the other way round from ``setpoints``.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ VELOCITY_AND_YAW_RATE = 1 | 2 | 4 | 64 | 128 | 256 | 1024
 
 
 def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
-    """All of them; *geoid* turns ellipsoidal altitudes into the autopilot's."""
+    """Return all set-point subscriptions; *geoid* converts ellipsoidal altitudes to AMSL."""
 
     def position_global(message: Any, now: Ns) -> OutgoingMessage:
         return _position_global(message, now, geoid)
@@ -64,7 +62,7 @@ def _motion(velocity: frames.Vector, acceleration: frames.Vector) -> dict[str, f
 
 
 def raw_local(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_raw/local``."""
+    """Translate ``setpoint_raw/local``."""
     body = message.coordinate_frame in BODY_FRAMES
     turn = frames.flu_to_frd if body else frames.enu_to_ned
     x, y, z = turn(_vector(message.position))
@@ -83,7 +81,7 @@ def raw_local(message: Any, now: Ns) -> OutgoingMessage:
 
 
 def raw_global(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_raw/global``."""
+    """Translate ``setpoint_raw/global``."""
     velocity = frames.enu_to_ned(_vector(message.velocity))
     acceleration = frames.enu_to_ned(_vector(message.acceleration_or_force))
     return "SET_POSITION_TARGET_GLOBAL_INT", {
@@ -100,7 +98,7 @@ def raw_global(message: Any, now: Ns) -> OutgoingMessage:
 
 
 def raw_attitude(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_raw/attitude``: how a FLU body lies in ENU, its rates in FLU; thrust 0..1."""
+    """Translate ``setpoint_raw/attitude``: attitude of the FLU body in ENU, rates in FLU, thrust 0..1."""
     orientation = message.orientation
     enu = (orientation.w, orientation.x, orientation.y, orientation.z)
     roll_rate, pitch_rate, yaw_rate = frames.flu_to_frd(_vector(message.body_rate))
@@ -121,7 +119,7 @@ def _heading(orientation: Any) -> float:
 
 
 def position_local(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_position/local``."""
+    """Translate ``setpoint_position/local``."""
     x, y, z = frames.enu_to_ned(_vector(message.pose.position))
     return "SET_POSITION_TARGET_LOCAL_NED", {
         "time_boot_ms": now // MS,
@@ -148,12 +146,12 @@ def _position_global(message: Any, now: Ns, geoid: Geoid) -> OutgoingMessage:
 
 
 def velocity(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_velocity/cmd_vel``: ENU metres per second, yaw rate anticlockwise."""
+    """Translate ``setpoint_velocity/cmd_vel``: ENU in m/s, yaw rate anticlockwise in rad/s."""
     return velocity_unstamped(message.twist, now)
 
 
 def velocity_unstamped(message: Any, now: Ns) -> OutgoingMessage:
-    """``setpoint_velocity/cmd_vel_unstamped``: the same without a header."""
+    """Translate ``setpoint_velocity/cmd_vel_unstamped``: the same without a header."""
     vx, vy, vz = frames.enu_to_ned(_vector(message.linear))
     return "SET_POSITION_TARGET_LOCAL_NED", {
         "time_boot_ms": now // MS,
@@ -167,13 +165,13 @@ def velocity_unstamped(message: Any, now: Ns) -> OutgoingMessage:
 
 
 def rc_override(message: Any, now: Ns) -> OutgoingMessage:
-    """``rc/override``: microseconds, 0 releases a channel, 65535 leaves it as it is."""
+    """Translate ``rc/override``: microseconds; 0 releases a channel, 65535 leaves it unchanged."""
     channels = {f"chan{number}_raw": int(value) for number, value in enumerate(message.channels, start=1)}
     return "RC_CHANNELS_OVERRIDE", channels
 
 
 def manual_control(message: Any, now: Ns) -> OutgoingMessage:
-    """``manual_control/send``: x forward, y right, z throttle, r yaw clockwise, -1000..1000 (z 0..1000)."""
+    """Translate ``manual_control/send``: x forward, y right, z throttle, r yaw clockwise, -1000..1000."""
     return "MANUAL_CONTROL", {
         "x": round(message.x),
         "y": round(message.y),
@@ -184,7 +182,7 @@ def manual_control(message: Any, now: Ns) -> OutgoingMessage:
 
 
 def status_text(message: Any, now: Ns) -> OutgoingMessage:
-    """``statustext/send``: for ground stations behind the autopilot."""
+    """Translate ``statustext/send``, which is for ground stations behind the autopilot."""
     return "STATUSTEXT", {"severity": message.severity, "text": message.text}
 
 
@@ -202,42 +200,44 @@ TARGET_TOPICS = (
 
 
 class TargetPublisher:
-    """Translates frames."""
+    """Publishes the targets that the autopilot reports."""
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._publish, self._wanted = around.publish, around.wanted
+    def __init__(self, context: InterfaceContext) -> None:
+        self._publish, self._wanted = context.publish, context.wanted
 
     def translators(self) -> Mapping[str, Translator]:
-        """By the name of the frame."""
+        """Return the translators by message name."""
         return {
             "POSITION_TARGET_LOCAL_NED": self._local,
             "POSITION_TARGET_GLOBAL_INT": self._global,
             "ATTITUDE_TARGET": self._attitude,
         }
 
-    def _local(self, said: Fields, at: Ns) -> None:
-        """ENU."""
+    def _local(self, fields: Fields, at: Ns) -> None:
+        """Publish the local target in ENU."""
         if self._wanted("setpoint_raw/target_local"):
-            position = _point(*frames.ned_to_enu((said["x"], said["y"], said["z"])))
-            message = new(_LOCAL, header=stamped(at), position=position, **_moving(said))
+            position = _point(*frames.ned_to_enu((fields["x"], fields["y"], fields["z"])))
+            message = new(_LOCAL, header=stamped(at), position=position, **_motion_fields(fields))
             self._publish("setpoint_raw/target_local", message)
 
-    def _global(self, said: Fields, at: Ns) -> None:
-        """The altitude in the frame that the message names."""
+    def _global(self, fields: Fields, at: Ns) -> None:
+        """Publish the global target; the altitude is in the frame that the message names."""
         if self._wanted("setpoint_raw/target_global"):
             place = {
-                "latitude": said["lat_int"] / 1e7,
-                "longitude": said["lon_int"] / 1e7,
-                "altitude": said["alt"],
+                "latitude": fields["lat_int"] / 1e7,
+                "longitude": fields["lon_int"] / 1e7,
+                "altitude": fields["alt"],
             }
-            message = new(_GLOBAL, header=stamped(at), **place, **_moving(said))
+            message = new(_GLOBAL, header=stamped(at), **place, **_motion_fields(fields))
             self._publish("setpoint_raw/target_global", message)
 
-    def _attitude(self, said: Fields, at: Ns) -> None:
+    def _attitude(self, fields: Fields, at: Ns) -> None:
         if self._wanted("setpoint_raw/target_attitude"):
-            w, x, y, z = frames.attitude_ned_to_enu(tuple(said["q"]))
-            rates = (said["body_roll_rate"], said["body_pitch_rate"], said["body_yaw_rate"])
-            message = new(_ATTITUDE, header=stamped(at), type_mask=said["type_mask"], thrust=said["thrust"])
+            w, x, y, z = frames.attitude_ned_to_enu(tuple(fields["q"]))
+            rates = (fields["body_roll_rate"], fields["body_pitch_rate"], fields["body_yaw_rate"])
+            message = new(
+                _ATTITUDE, header=stamped(at), type_mask=fields["type_mask"], thrust=fields["thrust"]
+            )
             message.orientation, message.body_rate = (
                 _quaternion(x, y, z, w),
                 _ros_vector(*frames.frd_to_flu(rates)),
@@ -245,13 +245,15 @@ class TargetPublisher:
             self._publish("setpoint_raw/target_attitude", message)
 
 
-def _moving(said: Fields) -> Fields:
-    """What local and global targets have in common."""
+def _motion_fields(fields: Fields) -> Fields:
+    """Return the fields that local and global targets have in common."""
     return {
-        "coordinate_frame": said["coordinate_frame"],
-        "type_mask": said["type_mask"],
-        "velocity": _ros_vector(*frames.ned_to_enu((said["vx"], said["vy"], said["vz"]))),
-        "acceleration_or_force": _ros_vector(*frames.ned_to_enu((said["afx"], said["afy"], said["afz"]))),
-        "yaw": frames.heading_to_yaw(said["yaw"]),
-        "yaw_rate": -said["yaw_rate"],
+        "coordinate_frame": fields["coordinate_frame"],
+        "type_mask": fields["type_mask"],
+        "velocity": _ros_vector(*frames.ned_to_enu((fields["vx"], fields["vy"], fields["vz"]))),
+        "acceleration_or_force": _ros_vector(
+            *frames.ned_to_enu((fields["afx"], fields["afy"], fields["afz"]))
+        ),
+        "yaw": frames.heading_to_yaw(fields["yaw"]),
+        "yaw_rate": -fields["yaw_rate"],
     }

@@ -1,12 +1,8 @@
-"""What the autopilot says of itself, as ROS messages: state, battery, texts, sticks, what a head-up
-display shows.
+"""Publishers of the state, battery, texts, RC channels and instruments, and of ``/diagnostics``.
 
-``vfr_hud`` is AMSL.
-
-How the vehicle is, for ``/diagnostics``: once a heartbeat, while somebody listens.
-
-MAVROS's statuses, each behind the name of the vehicle node: ``FCU connection``, ``Heartbeat``, ``System``,
-``Battery``, ``GPS``. Levels are those of ``diagnostic_msgs/DiagnosticStatus``.
+Altitude in ``vfr_hud`` is AMSL. Diagnostics are published once per heartbeat while ``/diagnostics`` has a
+subscription. As in MAVROS, the status names follow the name of the vehicle node: ``FCU connection``,
+``Heartbeat``, ``System``, ``Battery``, ``GPS``. Levels are those of ``diagnostic_msgs/DiagnosticStatus``.
 """
 
 from __future__ import annotations
@@ -47,7 +43,7 @@ _SYS_STATUS = {
     "errors_count3": "errors_count3",
     "errors_count4": "errors_count4",
 }
-"""Fields of the message and of the frame."""
+"""Fields of the ROS message and of the MAVLink message."""
 
 STATUS_TOPICS = (
     Topic("state", "mavros_msgs/msg/State", LATCHED_STATE),
@@ -62,15 +58,15 @@ STATUS_TOPICS = (
 
 
 class StatusPublisher:
-    """Translates frames."""
+    """Publishes state, battery, texts, RC channels and instruments."""
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._publish, self._wanted = around.publish, around.wanted
-        self._texts = StatusTextAssembler(self._say)
+    def __init__(self, context: InterfaceContext) -> None:
+        self._publish, self._wanted = context.publish, context.wanted
+        self._texts = StatusTextAssembler(self._publish_text)
         self._text_at: Ns = 0
 
     def translators(self) -> Mapping[str, Translator]:
-        """By the name of the frame."""
+        """Return the translators by message name."""
         return {
             "HEARTBEAT": self._heartbeat,
             "EXTENDED_SYS_STATE": self._extended_state,
@@ -82,11 +78,11 @@ class StatusPublisher:
         }
 
     def disconnected(self, stamp: Ns) -> None:
-        """Publish that the autopilot has fallen silent."""
+        """Publish that the autopilot has stopped sending."""
         self._publish("state", new("mavros_msgs/msg/State", header=stamped(stamp)))
 
-    def _heartbeat(self, said: Fields, at: Ns) -> None:
-        base = said["base_mode"]
+    def _heartbeat(self, fields: Fields, at: Ns) -> None:
+        base = fields["base_mode"]
         self._publish(
             "state",
             new(
@@ -96,30 +92,30 @@ class StatusPublisher:
                 armed=bool(base & 128),
                 guided=bool(base & 8),
                 manual_input=bool(base & 64),
-                mode=mode_name(AutopilotType(said["autopilot"], said["type"]), said["custom_mode"]),
-                system_status=said["system_status"],
+                mode=mode_name(AutopilotType(fields["autopilot"], fields["type"]), fields["custom_mode"]),
+                system_status=fields["system_status"],
             ),
         )
 
-    def _extended_state(self, said: Fields, at: Ns) -> None:
+    def _extended_state(self, fields: Fields, at: Ns) -> None:
         message = new(
             "mavros_msgs/msg/ExtendedState",
             header=stamped(at),
-            vtol_state=said["vtol_state"],
-            landed_state=said["landed_state"],
+            vtol_state=fields["vtol_state"],
+            landed_state=fields["landed_state"],
         )
         self._publish("extended_state", message)
 
-    def _sys_status(self, said: Fields, at: Ns) -> None:
+    def _sys_status(self, fields: Fields, at: Ns) -> None:
         if self._wanted("sys_status"):
-            fields = {ours: said[theirs] for ours, theirs in _SYS_STATUS.items()}
-            self._publish("sys_status", new("mavros_msgs/msg/SysStatus", header=stamped(at), **fields))
-        self._battery(said, at)
+            values = {ours: fields[theirs] for ours, theirs in _SYS_STATUS.items()}
+            self._publish("sys_status", new("mavros_msgs/msg/SysStatus", header=stamped(at), **values))
+        self._battery(fields, at)
 
-    def _battery(self, said: Fields, at: Ns) -> None:
-        """Current is negative while it discharges (sensor_msgs/BatteryState)."""
-        millivolts, centiamperes = said["voltage_battery"], said["current_battery"]
-        percent = said["battery_remaining"]
+    def _battery(self, fields: Fields, at: Ns) -> None:
+        """Publish the battery; the current is negative while discharging (sensor_msgs/BatteryState)."""
+        millivolts, centiamperes = fields["voltage_battery"], fields["current_battery"]
+        percent = fields["battery_remaining"]
         self._publish(
             "battery",
             new(
@@ -137,40 +133,40 @@ class StatusPublisher:
             ),
         )
 
-    def _text(self, said: Fields, at: Ns) -> None:
-        """A long one, which comes in pieces, is published whole."""
+    def _text(self, fields: Fields, at: Ns) -> None:
+        """Publish a text, joining the chunks of a long one."""
         self._text_at = at
-        self._texts.add(said)
+        self._texts.add(fields)
 
-    def _say(self, severity: int, text: str) -> None:
+    def _publish_text(self, severity: int, text: str) -> None:
         header = stamped(self._text_at)
         message = new("mavros_msgs/msg/StatusText", header=header, severity=severity, text=text)
         self._publish("statustext/recv", message)
 
-    def _vfr_hud(self, said: Fields, at: Ns) -> None:
+    def _vfr_hud(self, fields: Fields, at: Ns) -> None:
         self._publish(
             "vfr_hud",
             new(
                 "mavros_msgs/msg/VfrHud",
                 header=stamped(at),
-                airspeed=said["airspeed"],
-                groundspeed=said["groundspeed"],
-                heading=said["heading"],
-                throttle=said["throttle"] / 100.0,
-                altitude=said["alt"],
-                climb=said["climb"],
+                airspeed=fields["airspeed"],
+                groundspeed=fields["groundspeed"],
+                heading=fields["heading"],
+                throttle=fields["throttle"] / 100.0,
+                altitude=fields["alt"],
+                climb=fields["climb"],
             ),
         )
 
-    def _rc_in(self, said: Fields, at: Ns) -> None:
-        channels = [said[f"chan{number}_raw"] for number in range(1, said["chancount"] + 1)]
-        message = new("mavros_msgs/msg/RCIn", header=stamped(at), rssi=said["rssi"], channels=channels)
+    def _rc_in(self, fields: Fields, at: Ns) -> None:
+        channels = [fields[f"chan{number}_raw"] for number in range(1, fields["chancount"] + 1)]
+        message = new("mavros_msgs/msg/RCIn", header=stamped(at), rssi=fields["rssi"], channels=channels)
         self._publish("rc/in", message)
 
-    def _rc_out(self, said: Fields, at: Ns) -> None:
-        """Ports 1 to 16; the second eight are missing in MAVLink 1."""
+    def _rc_out(self, fields: Fields, at: Ns) -> None:
+        """Publish the outputs 1 to 16; MAVLink 1 has only eight."""
         if self._wanted("rc/out"):
-            channels = [said.get(f"servo{number}_raw", 0) for number in range(1, _SERVOS + 1)]
+            channels = [fields.get(f"servo{number}_raw", 0) for number in range(1, _SERVOS + 1)]
             self._publish("rc/out", new("mavros_msgs/msg/RCOut", header=stamped(at), channels=channels))
 
 
@@ -178,10 +174,10 @@ DIAGNOSTICS = "/diagnostics"
 _ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 OK, WARN, ERROR, STALE = range(4)
 LOW = 20
-"""Percent of the battery below which one is warned."""
+"""Percentage of the battery below which the level is WARN."""
 _SAFETY_ARMED = 128
 _NO_FIX, _FIX_3D = 1, 3
-_UNKNOWN_U16_diagnostics, _UNKNOWN_U8 = 65535, 255
+_UNKNOWN_U8 = 255
 
 _pair = message_class("diagnostic_msgs/msg/KeyValue")
 
@@ -189,53 +185,53 @@ DIAGNOSTIC_TOPICS = (Topic(DIAGNOSTICS, _ARRAY, on_demand=True),)
 
 
 class Finding(NamedTuple):
-    """One status: how grave, in words, and what it is made of."""
+    """One status: level, message and values."""
 
     level: int
-    words: str
+    message: str
     values: Mapping[str, object] = {}
 
 
 class DiagnosticsPublisher:
-    """Looks at the latest frames of each kind, which the wire keeps."""
+    """Publishes diagnostics of the latest frames that the link keeps."""
 
-    def __init__(self, around: InterfaceContext) -> None:
-        self._wire, self._node = around.wire, around.node
-        self._publish, self._wanted = around.publish, around.wanted
+    def __init__(self, context: InterfaceContext) -> None:
+        self._link, self._node = context.link, context.node
+        self._publish, self._wanted = context.publish, context.wanted
 
     def translators(self) -> Mapping[str, Translator]:
-        """By the name of the frame."""
+        """Return the translators by message name."""
         return {"HEARTBEAT": self._heartbeat}
 
     def disconnected(self, stamp: Ns) -> None:
-        """Publish that the autopilot has fallen silent."""
-        self._tell(stamp, {"FCU connection": Finding(ERROR, "not connected")})
+        """Publish that the autopilot has stopped sending."""
+        self._publish_findings(stamp, {"FCU connection": Finding(ERROR, "not connected")})
 
-    def _heartbeat(self, said: Fields, at: Ns) -> None:
-        looks: dict[str, tuple[str, Callable[[Fields], Finding]]] = {
+    def _heartbeat(self, fields: Fields, at: Ns) -> None:
+        checks: dict[str, tuple[str, Callable[[Fields], Finding]]] = {
             "System": ("SYS_STATUS", _system),
             "Battery": ("SYS_STATUS", _battery),
             "GPS": ("GPS_RAW_INT", _gps),
         }
-        found = {"FCU connection": Finding(OK, "connected"), "Heartbeat": self._beat(said)}
-        for name, (frame, look) in looks.items():
-            last = self._wire.last(frame)
-            found[name] = Finding(STALE, f"no {frame} yet") if last is None else look(last)
-        self._tell(at, found)
+        found = {"FCU connection": Finding(OK, "connected"), "Heartbeat": self._heartbeat_finding(fields)}
+        for name, (frame, check) in checks.items():
+            last = self._link.last(frame)
+            found[name] = Finding(STALE, f"no {frame} yet") if last is None else check(last)
+        self._publish_findings(at, found)
 
-    def _beat(self, said: Fields) -> Finding:
-        status = entry_name("MAV_STATE", said["system_status"])
+    def _heartbeat_finding(self, fields: Fields) -> Finding:
+        status = entry_name("MAV_STATE", fields["system_status"])
         values = {
-            "Vehicle type": entry_name("MAV_TYPE", said["type"]),
-            "Autopilot type": entry_name("MAV_AUTOPILOT", said["autopilot"]),
-            "Mode": mode_name(self._wire.firmware, said["custom_mode"]),
-            "Armed": bool(said["base_mode"] & _SAFETY_ARMED),
+            "Vehicle type": entry_name("MAV_TYPE", fields["type"]),
+            "Autopilot type": entry_name("MAV_AUTOPILOT", fields["autopilot"]),
+            "Mode": mode_name(self._link.autopilot, fields["custom_mode"]),
+            "Armed": bool(fields["base_mode"] & _SAFETY_ARMED),
             "System status": status,
         }
-        grave = status in ("CRITICAL", "EMERGENCY")
-        return Finding(ERROR if grave else OK, status.lower() if grave else "Normal", values)
+        critical = status in ("CRITICAL", "EMERGENCY")
+        return Finding(ERROR if critical else OK, status.lower() if critical else "Normal", values)
 
-    def _tell(self, at: Ns, found: Mapping[str, Finding]) -> None:
+    def _publish_findings(self, at: Ns, found: Mapping[str, Finding]) -> None:
         if not self._wanted(DIAGNOSTICS):
             return
         name = self._node.name.lstrip("/")
@@ -249,31 +245,33 @@ def _status(name: str, hardware: str, found: Finding) -> Any:
         "diagnostic_msgs/msg/DiagnosticStatus",
         level=found.level,
         name=name,
-        message=found.words,
+        message=found.message,
         hardware_id=hardware,
         values=values,
     )
 
 
-def _system(said: Fields) -> Finding:
-    """Sensors that are switched on and not well, and the load of the autopilot's processor."""
-    enabled, well = said["onboard_control_sensors_enabled"], said["onboard_control_sensors_health"]
-    ill = enabled & ~well
+def _system(fields: Fields) -> Finding:
+    """Return the enabled sensors that are unhealthy, and the load of the autopilot's processor."""
+    enabled, healthy = fields["onboard_control_sensors_enabled"], fields["onboard_control_sensors_health"]
+    unhealthy = enabled & ~healthy
     values = {
-        "Sensor present": f"0x{said['onboard_control_sensors_present']:08X}",
+        "Sensor present": f"0x{fields['onboard_control_sensors_present']:08X}",
         "Sensor enabled": f"0x{enabled:08X}",
-        "Sensor health": f"0x{well:08X}",
-        "CPU Load (%)": f"{said['load'] / 10.0:.1f}",
+        "Sensor health": f"0x{healthy:08X}",
+        "CPU Load (%)": f"{fields['load'] / 10.0:.1f}",
     }
     return (
-        Finding(ERROR, f"sensors are not well: 0x{ill:08X}", values) if ill else Finding(OK, "Normal", values)
+        Finding(ERROR, f"sensors are not well: 0x{unhealthy:08X}", values)
+        if unhealthy
+        else Finding(OK, "Normal", values)
     )
 
 
-def _battery(said: Fields) -> Finding:
-    millivolts, centiamperes = said["voltage_battery"], said["current_battery"]
-    percent = said["battery_remaining"]
-    if millivolts == _UNKNOWN_U16_diagnostics:
+def _battery(fields: Fields) -> Finding:
+    millivolts, centiamperes = fields["voltage_battery"], fields["current_battery"]
+    percent = fields["battery_remaining"]
+    if millivolts == _UNKNOWN_U16:
         return Finding(STALE, "No data")
     values = {
         "Voltage": f"{millivolts / 1000.0:.2f}",
@@ -284,12 +282,12 @@ def _battery(said: Fields) -> Finding:
     return Finding(WARN, f"below {LOW} %", values) if low else Finding(OK, "Normal", values)
 
 
-def _gps(said: Fields) -> Finding:
-    kind, seen, spread = said["fix_type"], said["satellites_visible"], said["eph"]
+def _gps(fields: Fields) -> Finding:
+    kind, seen, spread = fields["fix_type"], fields["satellites_visible"], fields["eph"]
     values = {
         "Satellites visible": "unknown" if seen == _UNKNOWN_U8 else f"{seen}",
         "Fix type": f"{kind}",
-        "EPH (m)": "unknown" if spread == _UNKNOWN_U16_diagnostics else f"{spread / 100.0:.2f}",
+        "EPH (m)": "unknown" if spread == _UNKNOWN_U16 else f"{spread / 100.0:.2f}",
     }
     if kind <= _NO_FIX:
         return Finding(WARN, "No satellites" if seen == 0 else "No fix", values)

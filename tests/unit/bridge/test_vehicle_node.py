@@ -195,7 +195,7 @@ def test_other_stations_on_the_link_are_not_the_vehicle(aviary: Any) -> None:
     aviary.heartbeat()
     aviary._theirs.send(Frame("HEARTBEAT", station, 254, 190))
     aviary.run(200 * MS)
-    assert aviary.node.wire.target == (1, 1)
+    assert aviary.node.link.target == (1, 1)
     assert len(heard) == 1
 
 

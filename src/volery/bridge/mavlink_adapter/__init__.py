@@ -1,7 +1,7 @@
-"""The interpreter: a vehicle whose autopilot does not speak MAVLink, as one that does.
+"""A link that presents a vehicle without MAVLink as one that uses MAVLink.
 
-It is a link. What the driver hears is said there in MAVLink's messages, and what is asked for there is done
-by the driver's operations. So names that are made for MAVLink serve every drone that a driver flies.
+The telemetry of the vehicle's driver is encoded as MAVLink messages, and MAVLink commands are executed by the
+operations of a ``Drone``. So naming schemes made for MAVLink serve every drone that has a driver.
 """
 
 from volery.bridge.mavlink_adapter.adapter import MavlinkAdapter

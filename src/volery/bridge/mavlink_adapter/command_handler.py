@@ -1,8 +1,8 @@
-"""What the vehicle does for whoever commands it: one command or one set-point at a time.
+"""Execution of commands and set-points by a drone: one command or one set-point at a time.
 
-A command takes the place of the one that is under way, and of set-points; set-points do not interrupt a
-command. A command has been accepted when it is done, or when nothing has gone wrong with it for a while: what
-goes wrong later is told in words, as everything that goes wrong is.
+A command replaces the command in progress and the set-points; set-points do not interrupt a command. A
+command is accepted when it has finished, or when it has run without an error for ``ACCEPTED_AFTER``; later
+errors are reported as texts, as all errors are.
 """
 
 from __future__ import annotations
@@ -26,30 +26,34 @@ ACCEPTED, BUSY, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = (
     for name in ("ACCEPTED", "TEMPORARILY_REJECTED", "DENIED", "UNSUPPORTED", "FAILED", "IN_PROGRESS")
 )
 CANCELLED = 6
-"""MAV_RESULT; pymavlink has no name for the last."""
+"""MAV_RESULT_CANCELLED, for which pymavlink has no name."""
 
 NO_LIMITS = Limits(farthest=100_000.0, highest=10_000.0, lowest=-10_000.0)
-"""No limits but the autopilot's own."""
+"""Limits beyond those of any autopilot."""
 ACCEPTED_AFTER: Ns = 3 * S
 TICK: Ns = S
 RETRY_AFTER: Ns = S
-"""After a set-point that could not be flown the next one is looked at so much later."""
+"""After a set-point that could not be flown, set-points are ignored for this time."""
 MANUAL_CONTROL_TIMEOUT: Ns = 3 * S
-"""Sticks that nobody moves for so long are let go, as autopilots do it."""
+"""Manual control that is not renewed for this time is released, as autopilots do."""
 
 Answer = Callable[[int], None]
-"""Told a MAV_RESULT."""
-Say = Callable[[str], None]
+"""Receives the MAV_RESULT of a command."""
+Report = Callable[[str], None]
 
 
-class Operation(NamedTuple):
-    """A command, ready to be carried out. ``asked`` says what, in words.
+class DroneOperation(NamedTuple):
+    """A command, ready to be executed.
 
-    ``body`` blocks. ``answered_when_done``: it has not been accepted before. ``waits``: it does not take the
-    place of another command, but is turned down meanwhile. ``by_hand``: from then on sticks fly it.
+    Args:
+        description: Infinitive phrase for messages, such as ``take off to 5 m``.
+        body: Executes the command; it may block.
+        answered_when_done: The command is accepted only when it has finished.
+        waits: The command is rejected while another one is in progress, instead of replacing it.
+        by_hand: The command starts a mode in which manual control flies the vehicle.
     """
 
-    asked: str
+    description: str
     body: Action
     answered_when_done: bool = False
     waits: bool = False
@@ -57,17 +61,17 @@ class Operation(NamedTuple):
 
 
 class Target(Protocol):
-    """A set-point. ``stays``: it holds until the next one, so that the same one once more says nothing."""
+    """A set-point. ``persistent``: it is valid until the next one, so repeating it has no effect."""
 
-    stays: ClassVar[bool]
+    persistent: ClassVar[bool]
 
     def fly(self, drone: Drone) -> None:
-        """Raises what the drone's operations raise."""
+        """Fly to the set-point; raise the errors of the drone's operations."""
 
 
 @dataclass
 class _RunningOperation:
-    order: Operation
+    operation: DroneOperation
     answer: Answer
     began: Ns
     handle: Handle | None = None
@@ -75,177 +79,179 @@ class _RunningOperation:
 
 
 def result_of(error: VoleryError) -> int:
-    """The MAV_RESULT of a command that ended so."""
+    """Return the MAV_RESULT of a command that ended with *error*."""
     if isinstance(error, CapabilityError):
         return UNSUPPORTED
     return FAILED if isinstance(error, NotArrived | LinkError) else DENIED
 
 
 class CommandHandler:
-    """Flies *driver*'s vehicle, in tasks at *place*. *say* tells in words what went wrong."""
+    """Flies the vehicle of *driver* in tasks that execute in *context*; *report* receives error texts.
 
-    def __init__(self, kernel: Kernel, driver: Driver, place: ExecutionContext, say: Say) -> None:
+    All public methods are called as framework callbacks.
+    """
+
+    def __init__(self, kernel: Kernel, driver: Driver, context: ExecutionContext, report: Report) -> None:
         self.drone = Drone(kernel, driver.name, driver, limits=NO_LIMITS)
-        self._kernel, self._driver, self._place, self._say = kernel, driver, place, say
+        self._kernel, self._driver, self._context, self._report = kernel, driver, context, report
         self._scope = self._new_scope()
-        self._command: _RunningOperation | None = None
-        self._aim: Target | None = None  # the set-point that holds
+        self._running: _RunningOperation | None = None
+        self._target: Target | None = None  # the valid set-point
         self._next: Target | None = None
-        self._flies = False  # a task flies set-points
+        self._flies_targets = False  # the task of set-points runs
         self._not_before: Ns = 0
-        self._complaint = ""
+        self._last_report = ""
         self._by_hand = False
-        self._sticks_at: Ns | None = None
-        self._tick = kernel.every(TICK // 5, self._look_at_sticks)
+        self._manual_control_at: Ns | None = None
+        self._tick = kernel.every(TICK // 5, self._check_manual_control)
 
     def _new_scope(self) -> Scope:
         return self._kernel.root.child(f"commands of {self._driver.name}")
 
     def close(self) -> None:
-        """Do nothing any more. The vehicle goes on with what it does."""
+        """Stop all operations. The vehicle continues what it does."""
         self._interrupt(f"{self._driver.name} is left alone")
         self._tick.cancel()
         self.drone.close()
 
-    # -- commands; house code
+    # -- commands
 
-    def command(self, order: Operation, answer: Answer) -> None:
-        """Carry it out and answer with its result."""
-        if order.waits and self._command is not None:
-            self._say(f"{self._driver.name}: {order.asked}: not while it is to {self._command.order.asked}")
+    def execute(self, operation: DroneOperation, answer: Answer) -> None:
+        """Execute a command and answer with its result."""
+        if operation.waits and self._running is not None:
+            current = self._running.operation.description
+            self._report(f"{self._driver.name}: {operation.description}: not while it is to {current}")
             answer(BUSY)
             return
-        self._interrupt(f"{order.asked} took its place")
-        self._by_hand = order.by_hand
-        under_way = self._command = _RunningOperation(order, answer, self._kernel.now())
-        under_way.handle = self._kernel.every(TICK, partial(self._accept, under_way))
-        self._spawn(partial(self._carry_out, under_way), order.asked)
+        self._interrupt(f"{operation.description} took its place")
+        self._by_hand = operation.by_hand
+        running = self._running = _RunningOperation(operation, answer, self._kernel.now())
+        running.handle = self._kernel.every(TICK, partial(self._acknowledge_progress, running))
+        self._spawn(partial(self._run, running), operation.description)
 
-    def _spawn(self, body: Action, asked: str) -> None:
-        name = f"{self._driver.name} ({asked})"
-        self._kernel.spawn(body, name, self._place, self._scope)
+    def _spawn(self, body: Action, description: str) -> None:
+        name = f"{self._driver.name} ({description})"
+        self._kernel.spawn(body, name, self._context, self._scope)
 
-    def _accept(self, under_way: _RunningOperation) -> None:
-        since = self._kernel.now() - under_way.began
-        if under_way.order.answered_when_done:
+    def _acknowledge_progress(self, running: _RunningOperation) -> None:
+        since = self._kernel.now() - running.began
+        if running.operation.answered_when_done:
             if since > 0:
-                under_way.answer(IN_PROGRESS)
+                running.answer(IN_PROGRESS)
         elif since >= ACCEPTED_AFTER:
-            self._answer(under_way, ACCEPTED)
+            self._answer(running, ACCEPTED)
 
-    def _answer(self, under_way: _RunningOperation, result: int) -> None:
-        if under_way.handle is not None:
-            under_way.handle.cancel()
-        if not under_way.answered:
-            under_way.answered = True
-            under_way.answer(result)
+    def _answer(self, running: _RunningOperation, result: int) -> None:
+        if running.handle is not None:
+            running.handle.cancel()
+        if not running.answered:
+            running.answered = True
+            running.answer(result)
 
-    def _carry_out(self, under_way: _RunningOperation) -> None:
-        """The task of a command."""
-        result, wrong = ACCEPTED, ""
+    def _run(self, running: _RunningOperation) -> None:
+        """Execute a command in its task."""
+        result, problem = ACCEPTED, ""
         try:
-            under_way.order.body()
+            running.operation.body()
         except VoleryError as error:
-            result, wrong = result_of(error), str(error)
+            result, problem = result_of(error), str(error)
         with self._kernel.guard:
-            if self._command is under_way:
-                self._command = None
-                if wrong:
-                    self._say(wrong)
-                self._answer(under_way, result)
+            if self._running is running:
+                self._running = None
+                if problem:
+                    self._report(problem)
+                self._answer(running, result)
 
     def _interrupt(self, why: str) -> None:
-        """End what is under way."""
-        if self._command is None and not self._flies:
-            self._aim = None
+        """Abort the command and the set-points in progress."""
+        if self._running is None and not self._flies_targets:
+            self._target = None
             return
         self._kernel.cancel(self._scope, why)
         self._scope = self._new_scope()
-        self._aim = self._next = None
-        self._flies = False
-        interrupted, self._command = self._command, None
+        self._target = self._next = None
+        self._flies_targets = False
+        interrupted, self._running = self._running, None
         if interrupted is not None:
             self._answer(interrupted, CANCELLED)
 
-    # -- set-points; house code
+    # -- set-points
 
-    def aim(self, aim: Target) -> None:
-        """Fly there, or so, from now on. Not while a command is under way."""
-        if self._command is not None:
-            asked = self._command.order.asked
-            self.complain(f"{self._driver.name}: set-points are not followed while it is to {asked}")
+    def set_target(self, target: Target) -> None:
+        """Fly to a set-point from now on, unless a command is in progress."""
+        if self._running is not None:
+            current = self._running.operation.description
+            self.report(f"{self._driver.name}: set-points are not followed while it is to {current}")
             return
         if self._kernel.now() < self._not_before:
             return
-        if aim.stays and aim == self._aim:
+        if target.persistent and target == self._target:
             return
-        if self._flies and self._aim is not None and self._aim.stays:
+        if self._flies_targets and self._target is not None and self._target.persistent:
             self._interrupt("another set-point took its place")
-        self._aim = self._next = aim
+        self._target = self._next = target
         self._by_hand = False
-        if not self._flies:
-            self._flies = True
-            self._spawn(partial(self._fly, self._scope), "set-points")
+        if not self._flies_targets:
+            self._flies_targets = True
+            self._spawn(partial(self._fly_targets, self._scope), "set-points")
 
-    def _fly(self, scope: Scope) -> None:
-        """The task of set-points, for as long as there are any."""
+    def _fly_targets(self, scope: Scope) -> None:
+        """Fly set-points in their task until there are no more."""
         while True:
             with self._kernel.guard:
                 if scope is not self._scope:
                     return
-                aim, self._next = self._next, None
-                if aim is None:
-                    self._flies = False
+                target, self._next = self._next, None
+                if target is None:
+                    self._flies_targets = False
                     return
-            wrong = ""
+            problem = ""
             try:
-                aim.fly(self.drone)
+                target.fly(self.drone)
             except VoleryError as error:
-                wrong = str(error)
+                problem = str(error)
             with self._kernel.guard:
                 if scope is self._scope:
-                    self._flown(wrong)
+                    if problem:
+                        self._target = self._next = None
+                        self._not_before = self._kernel.now() + RETRY_AFTER
+                    self.report(problem)
 
-    def _flown(self, wrong: str) -> None:
-        if wrong:
-            self._aim = self._next = None
-            self._not_before = self._kernel.now() + RETRY_AFTER
-        self.complain(wrong)
+    def report(self, problem: str) -> None:
+        """Report a problem with set-points or manual control once; ``""`` means that there is none now."""
+        if problem and problem != self._last_report:
+            self._report(problem)
+        self._last_report = problem
 
-    def complain(self, wrong: str) -> None:
-        """Tell once what is wrong with set-points and sticks; empty: nothing is any more."""
-        if wrong and wrong != self._complaint:
-            self._say(wrong)
-        self._complaint = wrong
+    # -- manual control
 
-    # -- sticks; house code
-
-    def sticks(self, sticks: ManualControl | None) -> None:
-        """Hold them so; ``None`` lets go of them. They take effect in modes that are flown by hand."""
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Apply manual control, or release it with None. It takes effect in modes that are flown by hand."""
         if self._driver.telemetry.kind != Drone.kind:
-            return  # it would have to be waited for
-        if sticks is None:
-            self._let_go()
+            return  # the kind of vehicle is not known yet, and this method must not wait
+        if control is None:
+            self._release_manual_control()
             return
-        self._sticks_at = self._kernel.now()
+        self._manual_control_at = self._kernel.now()
         try:
-            self.drone.manual_control(*sticks)
+            self.drone.manual_control(*control)
         except VoleryError as error:
-            self.complain(str(error))
+            self.report(str(error))
         else:
-            self.complain("")
+            self.report("")
 
-    def _look_at_sticks(self) -> None:
-        if self._sticks_at is None or self._kernel.now() - self._sticks_at < MANUAL_CONTROL_TIMEOUT:
+    def _check_manual_control(self) -> None:
+        since = self._manual_control_at
+        if since is None or self._kernel.now() - since < MANUAL_CONTROL_TIMEOUT:
             return
         if not self._by_hand:
-            self._let_go()
+            self._release_manual_control()
             return
-        self._sticks_at = None  # what holds it lets go of them
-        self._say(f"{self._driver.name}: no sticks for {MANUAL_CONTROL_TIMEOUT // S} s: it is told to hold")
-        self.command(Operation("hold", self.drone.hold), lambda result: None)
+        self._manual_control_at = None  # the hold operation releases manual control
+        self._report(f"{self._driver.name}: no sticks for {MANUAL_CONTROL_TIMEOUT // S} s: it holds now")
+        self.execute(DroneOperation("hold", self.drone.hold), lambda result: None)
 
-    def _let_go(self) -> None:
-        if self._sticks_at is not None:
-            self._sticks_at = None
+    def _release_manual_control(self) -> None:
+        if self._manual_control_at is not None:
+            self._manual_control_at = None
             self._driver.manual_control(None)

@@ -1,7 +1,7 @@
-"""Missions: MAVLink's mission protocol, its items as those of a drone.
+"""MAVLink's mission protocol for a drone: upload, and download of what was uploaded.
 
-There is no item for home: the first one is the first to be flown. What is on board can be told as far as it
-was uploaded here.
+There is no item for home: the first item is the first to be flown. Only a mission that was uploaded through
+the adapter can be downloaded.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from volery.bridge.mavlink_adapter.command_handler import (
     IN_PROGRESS,
     UNSUPPORTED,
     CommandHandler,
-    Operation,
-    Say,
+    DroneOperation,
+    Report,
     result_of,
 )
 from volery.bridge.mavlink_adapter.drone_commands import global_position
@@ -33,13 +33,13 @@ Send = Callable[[str, Fields], None]
 
 ERROR = constant("MAV_MISSION_ERROR")
 INVALID_SEQUENCE = constant("MAV_MISSION_INVALID_SEQUENCE")
-ENDINGS: Mapping[int, int] = {
+MISSION_RESULTS: Mapping[int, int] = {
     ACCEPTED: constant("MAV_MISSION_ACCEPTED"),
     UNSUPPORTED: constant("MAV_MISSION_UNSUPPORTED"),
     DENIED: constant("MAV_MISSION_DENIED"),
     CANCELLED: constant("MAV_MISSION_OPERATION_CANCELLED"),
 }
-"""MAV_MISSION_RESULT by MAV_RESULT; any other is an error."""
+"""MAV_MISSION_RESULT by MAV_RESULT; any other result is an error."""
 
 
 @dataclass
@@ -49,45 +49,45 @@ class _Upload:
 
 
 class MissionTransfer:
-    """Takes missions for the drone of *conduct*."""
+    """Handlers of the mission protocol for the drone of *commands*."""
 
-    def __init__(self, conduct: CommandHandler, send: Send, say: Say) -> None:
-        self._conduct, self._send, self._say = conduct, send, say
+    def __init__(self, commands: CommandHandler, send: Send, report: Report) -> None:
+        self._commands, self._send, self._report = commands, send, report
         self._upload: _Upload | None = None
         self._on_board: list[Fields] | None = None
 
     def handlers(self) -> Mapping[str, Callable[[Fields], None]]:
-        """By the name of the frame."""
+        """Return the handlers by message name."""
         return {
-            "MISSION_COUNT": self._count,
-            "MISSION_ITEM_INT": self._item,
-            "MISSION_REQUEST_LIST": self._list,
-            "MISSION_REQUEST_INT": self._request,
+            "MISSION_COUNT": self._handle_count,
+            "MISSION_ITEM_INT": self._handle_item,
+            "MISSION_REQUEST_LIST": self._handle_request_list,
+            "MISSION_REQUEST_INT": self._handle_request,
             "MISSION_CLEAR_ALL": lambda fields: self._refuse("take its mission away"),
             "MISSION_SET_CURRENT": lambda fields: self._refuse("go on with another item of its mission"),
         }
 
-    def _refuse(self, asked: str) -> None:
-        self._end(CapabilityError(f"{self._conduct.drone.name}: nothing here can {asked}"))
+    def _refuse(self, request: str) -> None:
+        self._fail(CapabilityError(f"{self._commands.drone.name}: nothing here can {request}"))
 
-    def _end(self, error: VoleryError) -> None:
-        self._say(str(error))
+    def _fail(self, error: VoleryError) -> None:
+        self._report(str(error))
         self._answer(result_of(error))
 
     def _answer(self, result: int) -> None:
         if result != IN_PROGRESS:
-            self._send("MISSION_ACK", {"type": ENDINGS.get(result, ERROR)})
+            self._send("MISSION_ACK", {"type": MISSION_RESULTS.get(result, ERROR)})
 
     # -- upload
 
-    def _count(self, fields: Fields) -> None:
+    def _handle_count(self, fields: Fields) -> None:
         if not fields["count"]:
             self._refuse("take its mission away")
             return
         self._upload = _Upload(fields["count"])
         self._send("MISSION_REQUEST_INT", {"seq": 0})
 
-    def _item(self, fields: Fields) -> None:
+    def _handle_item(self, fields: Fields) -> None:
         upload = self._upload
         if upload is None or fields["seq"] != len(upload.items):
             self._send("MISSION_ACK", {"type": INVALID_SEQUENCE})
@@ -98,58 +98,55 @@ class MissionTransfer:
             return
         self._upload = None
         try:
-            mission = [self._flown(item) for item in upload.items]
+            mission = [self._mission_item(item) for item in upload.items]
         except VoleryError as error:
-            self._end(error)
+            self._fail(error)
             return
-        body = partial(self._take, mission, upload.items)
-        asked = f"take a mission of {upload.count} items"
-        self._conduct.command(Operation(asked, body, answered_when_done=True, waits=True), self._answer)
+        body = partial(self._upload_mission, mission, upload.items)
+        description = f"take a mission of {upload.count} items"
+        operation = DroneOperation(description, body, answered_when_done=True, waits=True)
+        self._commands.execute(operation, self._answer)
 
-    def _take(self, mission: Sequence[MissionItem], items: list[Fields]) -> None:
-        self._conduct.drone.upload_mission(mission)
+    def _upload_mission(self, mission: Sequence[MissionItem], items: list[Fields]) -> None:
+        self._commands.drone.upload_mission(mission)
         self._on_board = items
 
-    def _flown(self, item: Fields) -> MissionItem:
+    def _mission_item(self, item: Fields) -> MissionItem:
         make = _ITEMS.get(item["command"])
         if make is None:
-            wrong = entry_name("MAV_CMD", item["command"])
+            name = entry_name("MAV_CMD", item["command"])
             known = choices(entry_name("MAV_CMD", number) for number in _ITEMS)
-            raise CapabilityError(f"mission item {item['seq']}: no {wrong} here; there is {known}")
+            raise CapabilityError(f"mission item {item['seq']}: no {name} here; there is {known}")
         made = make(item)
-        if isinstance(made, TakeOff) and isinstance(_place(item).altitude, AMSL):
-            return TakeOff(made.height - self._conduct.drone.home.altitude.metres)
+        if isinstance(made, TakeOff) and isinstance(_position(item).altitude, AMSL):
+            return TakeOff(made.height - self._commands.drone.home.altitude.metres)
         return made
 
     # -- download
 
-    def _list(self, fields: Fields) -> None:
+    def _handle_request_list(self, fields: Fields) -> None:
         if self._on_board is None:
             self._refuse("read the mission on board; there is only what was uploaded here")
         else:
             self._send("MISSION_COUNT", {"count": len(self._on_board)})
 
-    def _request(self, fields: Fields) -> None:
+    def _handle_request(self, fields: Fields) -> None:
         items, number = self._on_board or (), fields["seq"]
         if number < len(items):
             self._send("MISSION_ITEM_INT", items[number])
         else:
-            self._end(UsageError(f"{self._conduct.drone.name}: no item {number} of {len(items)}"))
+            self._fail(UsageError(f"{self._commands.drone.name}: no item {number} of {len(items)}"))
 
 
-def _place(item: Fields) -> Any:
+def _position(item: Fields) -> Any:
     return global_position(item["frame"], item["x"], item["y"], item["z"])
-
-
-def _landing(item: Fields) -> Land:
-    """Without a place: here."""
-    return Land(_place(item) if item["x"] or item["y"] else None)
 
 
 _ITEMS: Mapping[int, Callable[[Fields], MissionItem]] = {
     constant("MAV_CMD_NAV_TAKEOFF"): lambda item: TakeOff(item["z"]),
-    constant("MAV_CMD_NAV_WAYPOINT"): lambda item: Waypoint(_place(item), item["param1"], item["param4"]),
+    constant("MAV_CMD_NAV_WAYPOINT"): lambda item: Waypoint(_position(item), item["param1"], item["param4"]),
     constant("MAV_CMD_DO_CHANGE_SPEED"): lambda item: ChangeSpeed(item["param2"]),
-    constant("MAV_CMD_NAV_LAND"): _landing,
+    # Without coordinates the landing place is the current position.
+    constant("MAV_CMD_NAV_LAND"): lambda item: Land(_position(item) if item["x"] or item["y"] else None),
     constant("MAV_CMD_NAV_RETURN_TO_LAUNCH"): lambda item: ReturnHome(),
 }

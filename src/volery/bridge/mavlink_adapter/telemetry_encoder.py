@@ -1,7 +1,8 @@
-"""What is said of a vehicle: its telemetry as the fields of MAVLink's messages.
+"""Encoding of a vehicle's telemetry as MAVLink messages.
 
-What is not known is not said, or said to be unknown in MAVLink's own way: -1, the largest integer, NaN. Three
-fields have no such value and are zero: throttle, load and sensors. Local positions are about home.
+A message with unknown content is not encoded; an unknown field has MAVLink's value for unknown: -1, the
+largest integer, or NaN. Three fields have no such value and are zero: throttle, load and sensors. Local
+positions are about home.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from volery.vehicles.driver import Driver
 Fields = dict[str, Any]
 
 AUTOPILOTS: Mapping[str, int] = {"Paparazzi": PAPARAZZI_ID, "DJI": DJI_ID}
-"""MAV_AUTOPILOT by the first of the driver's words."""
+"""MAV_AUTOPILOT by the first word of the driver's autopilot name."""
 KINDS: Mapping[str, int] = {"drone": constant("MAV_TYPE_QUADROTOR")}
-"""MAV_TYPE by the driver's word. How many rotors a drone has is not known: it stands for a multirotor."""
+"""MAV_TYPE by the kind of vehicle. The number of rotors is unknown: a quadrotor stands for any multirotor."""
 
 FIXES: Mapping[str, int] = {
     "no_fix": 1,
@@ -34,7 +35,7 @@ FIXES: Mapping[str, int] = {
     "rtk": 5,
     **{f"gps health {health}": 3 if health >= HEALTHY_GPS else 1 for health in range(6)},
 }
-"""GPS_FIX_TYPE by the autopilot's word."""
+"""GPS_FIX_TYPE by the name that the autopilot gives to a fix."""
 
 CUSTOM_MODE_ENABLED, GUIDED_ENABLED, SAFETY_ARMED = 1, 8, 128
 STANDBY, ACTIVE, CRITICAL = 3, 4, 5
@@ -44,98 +45,103 @@ UNKNOWN_U8, UNKNOWN_U16 = 255, 65_535
 _MOST_MS = 1 << 32
 
 
-class Message(NamedTuple):
-    """``made_of`` is what it is made of: ``None`` while that is not known, and another object when it was
-    heard anew.
+class EncodedMessage(NamedTuple):
+    """How one message is encoded.
+
+    Args:
+        source: Returns what the message is made of: None while it is unknown, another object after an update.
+        fields: Returns the fields of the message.
     """
 
-    made_of: Callable[[], object]
+    source: Callable[[], object]
     fields: Callable[[], Fields]
 
 
 class TelemetryEncoder:
-    """Says what *driver* has heard."""
+    """Encodes the telemetry of *driver*."""
 
     def __init__(self, kernel: Kernel, driver: Driver) -> None:
         self._kernel, self._driver = kernel, driver
         self._seen = driver.telemetry
-        self._said: dict[str, object] = {}
-        self.messages: Mapping[str, Message] = self._all()
+        self._encoded: dict[str, object] = {}  # source of the last encoding
+        self.messages: Mapping[str, EncodedMessage] = self._make_messages()
 
-    def _all(self) -> Mapping[str, Message]:
+    def _make_messages(self) -> Mapping[str, EncodedMessage]:
         seen = self._seen
         return {
-            "HEARTBEAT": Message(lambda: self._heard(self.mode is not None), self._heartbeat),
-            "SYS_STATUS": Message(
-                lambda: self._heard(not all(isnan(one) for one in seen.battery)), self._sys_status
+            "HEARTBEAT": EncodedMessage(lambda: self._received(self.mode is not None), self._heartbeat),
+            "SYS_STATUS": EncodedMessage(
+                lambda: self._received(not all(isnan(one) for one in seen.battery)), self._sys_status
             ),
-            "EXTENDED_SYS_STATE": Message(self._heard, self._extended_sys_state),
-            "GPS_RAW_INT": Message(lambda: self._heard(seen.position is not None), self._gps_raw_int),
-            "GLOBAL_POSITION_INT": Message(self._placed, self._global_position_int),
-            "LOCAL_POSITION_NED": Message(
-                lambda: None if seen.home is None else self._placed(), self._local_position_ned
+            "EXTENDED_SYS_STATE": EncodedMessage(self._received, self._extended_sys_state),
+            "GPS_RAW_INT": EncodedMessage(
+                lambda: self._received(seen.position is not None), self._gps_raw_int
             ),
-            "ATTITUDE": Message(
+            "GLOBAL_POSITION_INT": EncodedMessage(self._known_position, self._global_position_int),
+            "LOCAL_POSITION_NED": EncodedMessage(
+                lambda: None if seen.home is None else self._known_position(), self._local_position_ned
+            ),
+            "ATTITUDE": EncodedMessage(
                 lambda: None if any(map(isnan, seen.attitude)) else seen.attitude, self._attitude
             ),
-            "VFR_HUD": Message(
-                lambda: None if isnan(seen.attitude.heading) else self._placed(), self._vfr_hud
+            "VFR_HUD": EncodedMessage(
+                lambda: None if isnan(seen.attitude.heading) else self._known_position(), self._vfr_hud
             ),
-            "HOME_POSITION": Message(lambda: seen.home, self._home_position),
-            "GPS_GLOBAL_ORIGIN": Message(lambda: seen.home, self._gps_global_origin),
-            "MISSION_CURRENT": Message(
+            "HOME_POSITION": EncodedMessage(lambda: seen.home, self._home_position),
+            "GPS_GLOBAL_ORIGIN": EncodedMessage(lambda: seen.home, self._gps_global_origin),
+            "MISSION_CURRENT": EncodedMessage(
                 lambda: None if seen.mission_item < 0 else seen.mission_item,
                 lambda: {"seq": seen.mission_item},
             ),
-            "MISSION_ITEM_REACHED": Message(
+            "MISSION_ITEM_REACHED": EncodedMessage(
                 lambda: None if seen.mission_reached < 0 else seen.mission_reached,
                 lambda: {"seq": seen.mission_reached},
             ),
         }
 
-    def anew(self, name: str) -> Fields | None:
-        """The fields of a message; ``None`` if nothing is known, or nothing was heard since it was said."""
+    def encode_new(self, name: str) -> Fields | None:
+        """Return the fields of a message, None if they are unknown or unchanged since the last time."""
         message = self.messages[name]
-        made_of = message.made_of()
-        if made_of is None or made_of is self._said.get(name):
+        source = message.source()
+        if source is None or source is self._encoded.get(name):
             return None
-        self._said[name] = made_of
+        self._encoded[name] = source
         return message.fields()
 
-    def again(self, name: str) -> Fields | None:
-        """The same, for whoever asks: also what was said before."""
-        self._said.pop(name, None)
-        return self.anew(name)
+    def encode(self, name: str) -> Fields | None:
+        """Return the fields of a message, or None if they are unknown."""
+        self._encoded.pop(name, None)
+        return self.encode_new(name)
 
-    # -- what they are made of
+    # -- sources
 
-    def _heard(self, known: bool = True) -> object:
+    def _received(self, known: bool = True) -> object:
         return self._seen.last_message_ns if known and self._seen.last_message_ns >= 0 else None
 
-    def _placed(self) -> Position | None:
+    def _known_position(self) -> Position | None:
         seen = self._seen
         unknown = isnan(seen.above_home) or any(map(isnan, seen.velocity))
         return None if unknown else seen.position
 
     @property
-    def firmware(self) -> AutopilotType:
-        """Whose modes they are."""
+    def autopilot(self) -> AutopilotType:
+        """Autopilot and type of the vehicle, which determine the mode names."""
         seen = self._seen
         maker = seen.autopilot.partition(" ")[0]
         return AutopilotType(AUTOPILOTS.get(maker, GENERIC_ID), KINDS.get(seen.kind, 0))
 
     @property
     def mode(self) -> int | None:
-        """The number of its mode. What the driver says behind the name, as by whom it is, has none."""
-        return mode_number(self.firmware, self._seen.mode.partition(" ")[0])
+        """Number of the current mode, or None. Only the first word of the driver's mode is the name."""
+        return mode_number(self.autopilot, self._seen.mode.partition(" ")[0])
 
     def _boot_ms(self) -> int:
         return self._kernel.now() // MS % _MOST_MS
 
-    # -- the fields
+    # -- fields
 
     def _heartbeat(self) -> Fields:
-        seen, firmware = self._seen, self.firmware
+        seen, firmware = self._seen, self.autopilot
         guided = GUIDED_ENABLED if seen.mode == self._driver.offboard_mode else 0
         return {
             "type": firmware.kind,
@@ -162,7 +168,7 @@ class TelemetryEncoder:
         return {
             "time_usec": self._kernel.now() // US,
             "fix_type": FIXES.get(seen.fix, 0),
-            **_on_globe(seen.position, "lat", "lon", "alt"),
+            **_coordinates(seen.position, "lat", "lon", "alt"),
             "eph": UNKNOWN_U16,
             "epv": UNKNOWN_U16,
             "vel": UNKNOWN_U16,
@@ -176,7 +182,7 @@ class TelemetryEncoder:
         heading = seen.attitude.heading
         return {
             "time_boot_ms": self._boot_ms(),
-            **_on_globe(seen.position, "lat", "lon", "alt"),
+            **_coordinates(seen.position, "lat", "lon", "alt"),
             "relative_alt": round(seen.above_home * 1e3),
             "vx": north,
             "vy": east,
@@ -221,19 +227,19 @@ class TelemetryEncoder:
 
     def _home_position(self) -> Fields:
         unknown = {f"approach_{axis}": nan for axis in "xyz"}
-        place = _on_globe(self._seen.home, "latitude", "longitude", "altitude")
+        place = _coordinates(self._seen.home, "latitude", "longitude", "altitude")
         return {**place, "x": 0.0, "y": 0.0, "z": 0.0, "q": (nan,) * 4, **unknown}
 
     def _gps_global_origin(self) -> Fields:
-        return _on_globe(self._seen.home, "latitude", "longitude", "altitude")
+        return _coordinates(self._seen.home, "latitude", "longitude", "altitude")
 
 
 def local_frame(home: Position) -> LocalFrame:
-    """The frame of local positions."""
+    """Return the frame of local positions about *home*."""
     return LocalFrame(home.latitude, home.longitude, home.altitude.metres)
 
 
-def _on_globe(position: Position | None, latitude: str, longitude: str, altitude: str) -> Fields:
+def _coordinates(position: Position | None, latitude: str, longitude: str, altitude: str) -> Fields:
     assert position is not None
     return {
         latitude: round(position.latitude * 1e7),

@@ -130,7 +130,7 @@ def test_what_cannot_be_is_refused_with_a_reason(ready: Any) -> None:
     refused = {"paparazzi": "NAV", "dji": "AUTO_TAKEOFF"}[kind]
     assert ready.call("set_mode", "mavros_msgs/SetMode", custom_mode=refused).mode_sent
     ready.run(0.3)
-    assert f"no mode {refused} to be asked for; there is" in ready.texts[-1]
+    assert f"mode {refused} cannot be requested; there is" in ready.texts[-1]
     for _ in range(20):
         ready.publish("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/Twist", linear={"x": 1.0})
         ready.run(0.1)
@@ -307,7 +307,7 @@ def test_a_pilot_who_takes_it_is_shown_and_not_fought(flown: Any) -> None:
     made.hear("state", "mavros_msgs/State")
     made.run(5.0)
     made.take_off(4.0)
-    made.fleet.autopilots["d"].vehicle.sticks.transmitter[4] = 1500  # the mode switch
+    made.fleet.autopilots["d"].vehicle.rc.transmitter[4] = 1500  # the mode switch
     made.run(2.0)
     assert (made.last("state").mode, made.last("state").guided) == ("ATTITUDE", False)
     assert made.command("cmd/land", "CommandTOL") == (False, 2)

@@ -37,14 +37,19 @@ class Bird:
         self.kernel = VirtualKernel()
         self.telemetry = Telemetry(self.kernel, "bird")
         self.offboard_mode = "GUIDED"
-        self.telling = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
+        self.encoder = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
 
     def hear(self, at: int = 5 * S, **facts: Any) -> None:
-        for name, value in {"heard": at, "kind": "drone", "autopilot": "Paparazzi", **facts}.items():
+        for name, value in {
+            "last_message_ns": at,
+            "kind": "drone",
+            "autopilot": "Paparazzi",
+            **facts,
+        }.items():
             setattr(self.telemetry, name, value)
 
     def says(self, name: str) -> Any:
-        fields = self.telling.anew(name)
+        fields = self.encoder.encode_new(name)
         return None if fields is None else quantised(Frame(name, fields, 1, 1)).fields
 
 
@@ -63,12 +68,12 @@ def seen(bird: Bird) -> Telemetry:
 
 
 def test_of_an_unknown_vehicle_nothing_is_said(bird: Bird) -> None:
-    assert [name for name in bird.telling.messages if bird.says(name) is not None] == []
+    assert [name for name in bird.encoder.messages if bird.says(name) is not None] == []
 
 
 def test_what_is_not_known_is_not_said_or_said_to_be_unknown(bird: Bird) -> None:
     bird.hear(mode="NAV")
-    said = {name for name in bird.telling.messages if bird.says(name) is not None}
+    said = {name for name in bird.encoder.messages if bird.says(name) is not None}
     assert said == {"HEARTBEAT", "EXTENDED_SYS_STATE"}
     bird.hear(battery=Battery(nan, 12.25, nan), position=HOME)
     status = bird.says("SYS_STATUS")
@@ -90,7 +95,7 @@ def test_only_what_was_heard_anew_is_said_again(bird: Bird, seen: Telemetry) -> 
     for name in ("HEARTBEAT", "GLOBAL_POSITION_INT", "ATTITUDE", "HOME_POSITION"):
         assert bird.says(name) is not None
         assert bird.says(name) is None
-        assert bird.telling.again(name) is not None  # whoever asks is told
+        assert bird.encoder.encode(name) is not None  # whoever asks is told
     bird.hear(at=6 * S)
     assert bird.says("HEARTBEAT") is not None
     assert bird.says("GLOBAL_POSITION_INT") is None  # of that nothing was heard
@@ -218,12 +223,12 @@ def channels(*pulses: int) -> dict[str, int]:
 
 def test_channels_as_sticks() -> None:
     held = RcChannels()
-    assert held.take(channels(1600, 1250, 1000, 1400)) == ManualControl(
+    assert held.update(channels(1600, 1250, 1000, 1400)) == ManualControl(
         0.5, 0.2, 0.0, -0.2
     )  # low pitch: forward
-    assert held.take(channels(0, 65_535, 65_535, 65_535)) == ManualControl(0.5, 0.0, 0.0, -0.2)
-    assert held.take(channels(65_535, 2_400, 0, 0)) == ManualControl(-1.0, 0.0, 0.5, 0.0)
-    assert held.take(channels(0, 0, 0, 0)) is None
+    assert held.update(channels(0, 65_535, 65_535, 65_535)) == ManualControl(0.5, 0.0, 0.0, -0.2)
+    assert held.update(channels(65_535, 2_400, 0, 0)) == ManualControl(-1.0, 0.0, 0.5, 0.0)
+    assert held.update(channels(0, 0, 0, 0)) is None
 
 
 def test_axes_as_sticks() -> None:

@@ -12,8 +12,7 @@ from volery.ros.client_libraries.rclpy.errors import InvalidHandle
 from volery.ros.client_libraries.rclpy.executors import CallbackGroup, CallbackQueue, Executor, Future
 from volery.ros.client_libraries.rclpy.qos import graph_qos
 from volery.ros.graph import Node as GraphNode
-from volery.ros.graph import ServiceError
-from volery.ros.graph.interface import Work
+from volery.ros.graph import ServiceError, Work
 from volery.ros.messages import Message
 
 

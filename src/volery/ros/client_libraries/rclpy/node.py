@@ -32,8 +32,7 @@ from volery.ros.client_libraries.rclpy.parameters import (
     serve_parameters,
 )
 from volery.ros.client_libraries.rclpy.time import Clock, ClockType, Rate
-from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS
-from volery.ros.graph.interface import Work
+from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS, Work
 
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
 _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service", "use_global_arguments")

@@ -171,7 +171,7 @@ class Buffer:
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return the transform from a source frame at one time to a target frame at another via a fixed frame."""
+        """Return the transform from a frame at one time to a frame at another time via a fixed frame."""
         source = self.lookup_transform(fixed_frame, source_frame, source_time, timeout)
         target = self.lookup_transform(target_frame, fixed_frame, target_time, timeout)
         combined = from_transform(source.transform).then(from_transform(target.transform))
