@@ -44,7 +44,7 @@ ANY_HOST = "0.0.0.0"
 LOCAL_PORT = "from"
 """Option of a UDP address with a host: the local port to send from and listen at."""
 REPLY_PORT = "uplink"
-"""Option of a UDP address without a host: the sender's port for replies, if it differs from its source port."""
+"""Option of a UDP address without a host: port for replies, if it differs from the sender's."""
 LAST_PORT = 65_535
 
 MAVLINK_OPTIONS = ("attitude", "baud", "rate", "system", "texts")

@@ -128,7 +128,7 @@ class Driver(Protocol):
 
     @property
     def cycle(self) -> Action | None:
-        """One round of the node's own loop, for drivers on a graph; ``None`` if messages arrive by themselves.
+        """One round of the node's loop, for drivers on a graph; ``None`` if messages arrive by themselves.
 
         A round processes received messages and sleeps for the period of the loop. A task that waits runs the
         rounds itself, so that their execution time is charged to it.

@@ -318,7 +318,7 @@ class Drone(Vehicle):
         return Position(latitude, longitude, AboveHome(max(height, self.limits.lowest)))
 
     def _landing_timeout(self, climb: float) -> Ns:
-        """ArduPilot lands at 0.5 m/s; from an unknown height, allow for the highest."""
+        """Return the time-out of a landing at 0.5 m/s, as of ArduPilot; an unknown height is the highest."""
         height = self._driver.telemetry.above_home
         height = max(height, 0.0) if isfinite(height) else self.limits.highest
         return travel_timeout(0.0, 2.0 * (height + climb))

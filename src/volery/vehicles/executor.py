@@ -33,7 +33,7 @@ LINK_TIMEOUT: Ns = 5 * S
 """Time without a message after which the link counts as lost: five missed heartbeats."""
 
 Check = Callable[[str, Ns], VehicleError | None]
-"""``check(operation, now)`` runs at each telemetry message and returns the error that ends the step, or None."""
+"""``check(operation, now)`` runs at each telemetry message and returns an error to end the step."""
 
 
 def _no_check(_operation: str, _now: Ns) -> None:
@@ -137,7 +137,7 @@ class StepExecutor:
         self._driver.stop()
 
     def check_ours(self, asked: str) -> None:
-        """Raise ``Overridden`` or ``Failsafe`` if the vehicle flies in a mode not commanded by this program."""
+        """Raise ``Overridden`` or ``Failsafe`` if it flies in a mode not commanded by this program."""
         telemetry = self._driver.telemetry
         if not telemetry.flying or self.is_ours():
             return
@@ -260,7 +260,7 @@ class _StepRun:
             self._step.send()
 
     def _over(self) -> bool:
-        """Return whether the step is done, refused, taken over by another, aborted or stopped by the check."""
+        """Return whether the step is done, refused, taken over, aborted or stopped by the check."""
         if self._claim != self._executor._claim or self._step.done(self._telemetry):
             return True
         # the refusal of a repeated command proves nothing: the first may have been obeyed, its answer lost

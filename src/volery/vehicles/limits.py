@@ -32,7 +32,7 @@ TOLERANCE_M = 3.0
 multirotor when it stops.
 """
 LOW_BATTERY_FOR: Ns = 3 * S
-"""The battery must be below the reserve for this time, because the voltage sags while the motors draw current."""
+"""The battery must be below the reserve for this time: the voltage sags while the motors draw current."""
 FLOOR = "floor"
 """Key of the floor's violation. Operations that end on the ground ignore it."""
 
@@ -88,7 +88,7 @@ class Zone:
 
 @dataclass(frozen=True)
 class Fence:
-    """A geofence: stay inside ``polygon`` (if given), between floor and ceiling, and outside every no-fly zone.
+    """A geofence: the vehicle stays inside the polygon, between floor and ceiling, and outside all zones.
 
     Args:
         polygon: corners as (latitude, longitude) in degrees; empty means no horizontal boundary.
@@ -201,7 +201,7 @@ class Bounds:
     # -- home
 
     def _find_home_violation(self) -> str:
-        """The floor is not checked: it is crossed on the way up and down."""
+        """Return why no flight can start at home; the floor is crossed on the way and not checked."""
         if self._polygon is not None and not self._polygon.covers(Point(0.0, 0.0)):
             return f"home ({self.home}) is outside the fence's polygon{self._hint_if_swapped()}"
         if self._high <= 0.0:
@@ -311,7 +311,7 @@ def height_violation(height: float, limits: Limits, home: Position | None = None
 
 
 def _zone_area(zone: Zone, frame: HomeFrame) -> _ZoneArea:
-    """A small zone gets a smaller tolerance, or nothing would be left of it."""
+    """Return the areas of a zone; a small zone gets a smaller tolerance, or nothing would be left."""
     area = frame.area(zone.corners)
     inner = area.buffer(-min(TOLERANCE_M, sqrt(float(area.area)) / 4.0))
     prepare(inner)

@@ -8,7 +8,7 @@ operation runs at a time, only while no other station has control, within the bo
 |---|---|---|
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
-| a pilot or another station changes its mode or target | ``Overridden``, ``Failsafe`` | gets no more messages |
+| a pilot or another station changes mode or target | ``Overridden``, ``Failsafe`` | gets no more messages |
 | another task of this program holds, returns, lands or kills | ``Overridden`` | does that |
 | the link times out | ``LinkLost`` | does what its parameters state: ``on_link_loss`` |
 
@@ -153,7 +153,7 @@ class Vehicle(ABC):
 
     @property
     def position(self) -> Position:
-        """Position (AMSL) as estimated by the autopilot. Raises ``VehicleError`` before the first estimate."""
+        """Position (AMSL) estimated by the autopilot. Raises ``VehicleError`` before the first estimate."""
         return self._known("its position", self._poll().position)
 
     @property
@@ -485,8 +485,8 @@ class Vehicle(ABC):
             lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
         ):
             raise CapabilityError(
-                f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve of "
-                f"{reserve:.0%} cannot be kept; set its battery monitor up, or state no reserve"
+                f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
+                f"of {reserve:.0%} cannot be kept; set its battery monitor up, or state no reserve"
             )
         if telemetry.battery.remaining < reserve:
             raise low_battery(self.name, asked, telemetry.battery.remaining, reserve)

@@ -1,1 +1,1 @@
-"""Drivers: one package for each autopilot. They depend neither on the simulated world nor on simulated autopilots."""
+"""Drivers: one package for each autopilot. They do not depend on the simulation."""

@@ -83,8 +83,8 @@ def check_throttle(telemetry: Telemetry, held: ManualControl | None, least: floa
     throttle = held.throttle if held is not None else 0.0
     if telemetry.flying and throttle < least:
         raise UsageError(
-            f"{telemetry.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle and it "
-            f"would fall; manual_control() with a throttle about 0.5 first"
+            f"{telemetry.name}: the throttle is at {throttle:g}: flown stabilized the motors would idle and "
+            f"it would fall; manual_control() with a throttle about 0.5 first"
         )
 
 

@@ -184,9 +184,7 @@ def test_a_degraded_link_loses_or_doubles_frames(run, argument, factor):
 def test_a_vehicle_without_a_link_is_refused():
     bird = Vehicle("bird", "multirotor", "dji", PAD)
     cut = LinkCut(vehicle="bird", **FAULT)
-    with pytest.raises(
-        ModelError, match=r"trouble\.vehicle: a simulated dji has no link"
-    ):
+    with pytest.raises(ModelError, match=r"trouble\.vehicle: a simulated dji has no link"):
         with_faulty_links(Environment(vehicles=(bird,), faults=(cut,)))
 
 

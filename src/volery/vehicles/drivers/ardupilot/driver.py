@@ -74,7 +74,7 @@ class ArduPilot(MavlinkDriver):
         return (*self._armed_in_guided(), climb)
 
     def _armed_in_guided(self) -> Sequence[Step]:
-        """A pilot who changes the mode meanwhile has control: arming in another mode is not intended."""
+        """Return steps that arm in GUIDED; a pilot who changes the mode meanwhile has control."""
         arm = (replace(step, mode=GUIDED) for step in self.arm())
         return (*self.ready(READY_WITHIN), *self._guided(), *arm)
 
@@ -170,7 +170,7 @@ class ArduPilot(MavlinkDriver):
         return mission_items(mission)
 
     def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
-        """Item 0 is home; a waypoint with a heading is two items, of which the waypoint is the last."""
+        """Return the last item; item 0 is home, and a waypoint with a heading is two items."""
         return len(mission_items(mission)) - 1 if isinstance(mission[-1], Waypoint) else None
 
     def start_mission(self, within: Ns) -> Sequence[Step]:

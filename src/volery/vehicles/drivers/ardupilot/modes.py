@@ -63,5 +63,5 @@ NUMBERS: Mapping[str, Mapping[str, int]] = {
 
 
 def mode_name(kind: str, number: int) -> str:
-    """Return the name of a mode; a name with its number if the firmware is newer than this table."""
+    """Return the name of a mode, or its number for a mode that is not in this table."""
     return MODES.get(kind, {}).get(number, f"MODE {number}")

@@ -1,4 +1,4 @@
-"""DJI aircraft behind the ROS node of their onboard SDK: ``dji_sdk`` 3.8, or ``dji_osdk_ros`` 4.1, on any graph.
+"""DJI aircraft behind the ROS node of their onboard SDK: ``dji_sdk`` 3.8 or ``dji_osdk_ros`` 4.1.
 
 The driver follows the public definitions and has not been flown; ``driver.ASSUMED`` lists the assumptions.
 """

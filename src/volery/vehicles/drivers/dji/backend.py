@@ -158,8 +158,8 @@ class DjiBackend:
         self._due.notify()
 
     def _detect_silence(self) -> None:
-        heard, now = self.telemetry.last_message_ns, self._kernel.now()
-        if heard >= 0 and now - heard > SILENT_AFTER and not self._silent:
+        last, now = self.telemetry.last_message_ns, self._kernel.now()
+        if last >= 0 and now - last > SILENT_AFTER and not self._silent:
             self._silent = True
             self._record_link("silent", "the aircraft is not received")
 

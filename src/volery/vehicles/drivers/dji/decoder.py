@@ -40,8 +40,9 @@ TAKEN_OVER_FOR: Ns = 5 * S
 """Time for which another program counts as in control after set-points were not obeyed."""
 
 SETTLED: Ns = 200 * MS
-"""Time for which a mode after a landing must be reported before it counts: on an unreliable link the report that
-the motors stand may arrive later than that of the mode.
+"""Time for which a mode after a landing must be reported before it counts.
+
+On an unreliable link the report that the motors stand may arrive later than that of the mode.
 """
 
 WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
@@ -132,7 +133,7 @@ class DjiDecoder:
         self._telemetry.fix = f"gps health {message.data}"
 
     def _position(self, message: Any) -> None:
-        """Assumption: the altitude is AMSL."""
+        """Decode the position; assumption: the altitude is AMSL."""
         place = (message.latitude, message.longitude, message.altitude)
         if message.status.status <= NO_FIX or not all(isfinite(value) for value in place) or not any(place):
             return
@@ -160,7 +161,7 @@ class DjiDecoder:
         self._telemetry.battery = Battery(message.percentage / 100.0, volts, amperes)
 
     def _rc(self, message: Any) -> None:
-        """Any movement of the mode switch takes the authority."""
+        """Detect a takeover: any movement of the mode switch takes the authority."""
         if len(message.axes) <= SWITCH_AXIS:
             return
         switch = self._switch = float(message.axes[SWITCH_AXIS])
@@ -261,7 +262,7 @@ class DjiDecoder:
         return display_name(mode) if mode != UNKNOWN else ""
 
     def _update_home(self, was_armed: bool) -> None:
-        """Home is the place where the motors were started; before that, the present place."""
+        """Update home: the place where the motors were started; before that, the present place."""
         telemetry, here = self._telemetry, self._telemetry.position
         if not telemetry.armed:
             telemetry.above_home = 0.0 if here is not None else nan

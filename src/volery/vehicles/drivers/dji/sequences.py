@@ -184,8 +184,9 @@ class DjiSteps:
 UP_WITHIN: Ns = 35 * S
 """Time-out of the take-off task: motors within 5 s, lift-off within 20 s, then the climb."""
 M100_GAINS_M = 0.8
-"""Height above home at which an M100 counts as off the ground. The SDK's demo uses 1 m; for a take-off to about
-1.2 m that leaves little margin for the drift of the height.
+"""Height above home at which an M100 counts as off the ground.
+
+The SDK's demo uses 1 m; for a take-off to about 1.2 m that leaves little margin for the drift of the height.
 """
 
 

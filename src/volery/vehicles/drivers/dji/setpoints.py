@@ -50,7 +50,7 @@ Setpoint = tuple[int, Sequence[float]]
 
 
 class Point(NamedTuple):
-    """A point: degrees, metres above the place of take-off, yaw in rad anticlockwise from east, speed in m/s."""
+    """A point: degrees, metres above home, yaw in rad anticlockwise from east, speed in m/s."""
 
     latitude: float
     longitude: float

@@ -34,9 +34,7 @@ MISSED = 3
 """Number of periods without a message after which the stream counts as missing."""
 PARAMETER_REQUEST_PERIOD: Ns = 2 * S
 TRIES = 5
-"""A request without an answer after this many tries has none: firmware does not answer for a parameter that it
-does not have.
-"""
+"""Tries after which a request is given up: firmware does not answer for a parameter that it lacks."""
 UPLOAD_STALLED: Ns = 5 * S
 MISSION_TYPE = 0
 
@@ -338,7 +336,7 @@ class MavlinkClient:
         return True
 
     def _handle_parameter(self, fields: Mapping[str, Any]) -> bool:
-        """Another station may list all parameters at the same time."""
+        """Store a requested parameter; another station may list all parameters at the same time."""
         name: str = fields["param_id"]
         value = parameter_value(fields, self.firmware.bytewise)
         if name not in self._requested_parameters() or not isfinite(value):
@@ -348,7 +346,7 @@ class MavlinkClient:
         return True
 
     def _handle_version(self, number: int) -> bool:
-        """The number has one byte each for major, minor, patch and kind of release; 0 means not stated."""
+        """Check the version: one byte each for major, minor, patch and kind of release; 0 if not stated."""
         self._requests.note_answered(VERSION)
         major, minor, patch = number >> 24, number >> 16 & 0xFF, number >> 8 & 0xFF
         oldest = self.firmware.oldest
@@ -439,7 +437,7 @@ class MavlinkClient:
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
     def upload(self, items: Sequence[Item]) -> None:
-        """Upload a mission; a repeated call begins again only if the autopilot has stopped requesting items."""
+        """Upload a mission; a repeated call starts again only if the autopilot requests no more items."""
         if self._upload is None or not self._upload.alive(self._kernel.now()):
             self._upload = MissionUpload(items, self._send_to)
             self._upload.begin()
@@ -455,7 +453,7 @@ class MavlinkClient:
 
 
 def parameter_value(fields: Mapping[str, Any], bytewise: bool) -> float:
-    """Return the value in a PARAM_VALUE; *bytewise*: whole numbers lie in the bytes of the float, as in PX4."""
+    """Return the value in a PARAM_VALUE; *bytewise*: integers lie in the bytes of the float, as in PX4."""
     value: float = fields["param_value"]
     return from_bytewise(fields["param_type"], value) if bytewise else value
 
@@ -468,5 +466,5 @@ def link_error(link: Link, wrong: str) -> LinkError:
 
 
 def _for_us(fields: Mapping[str, Any]) -> bool:
-    """Older firmware sends acknowledgements without an address."""
+    """Return whether a message is addressed to us; older firmware states no address."""
     return fields.get("target_system", 0) in {0, GCS_SYSTEM}

@@ -107,7 +107,7 @@ class TelemetryDecoder(ABC):
         """Return the firmware's name of a ``custom_mode``."""
 
     def _update_ready(self) -> None:
-        """Ready means: it could arm now, and the estimator has a position."""
+        """Update ``ready``: it could arm now, and the estimator has a position."""
         self._telemetry.ready = self._telemetry.armable and self._estimates_position
 
     def _heartbeat(self, fields: Fields) -> None:
@@ -133,7 +133,7 @@ class TelemetryDecoder(ABC):
             self._telemetry.flying = self._landed_state != ON_GROUND
 
     def _global_position(self, fields: Fields) -> None:
-        """Before there is an estimate, ArduPilot sends zeros and PX4 nothing."""
+        """Decode the position; before there is an estimate, ArduPilot sends zeros and PX4 nothing."""
         latitude, longitude = fields["lat"], fields["lon"]
         if latitude == 0 and longitude == 0:
             return

@@ -207,7 +207,7 @@ class MavlinkDriver:
         return (step,)
 
     def _finish_mission(self, mode: str, leads_to: tuple[str, ...], within: Ns) -> Step:
-        """Return a step that ends when disarmed, at the last item, or when the mission is reported as ended."""
+        """Return a step that ends when disarmed, at the last item, or when the mission is reported over."""
 
         def over(seen: Telemetry) -> bool:
             last = self._last_item

@@ -164,7 +164,7 @@ class MavrosDecoder:
         telemetry.ready = telemetry.armable = self._has_fix and self._has_local_position and located
 
     def _battery(self, message: Any) -> None:
-        """In ROS the current of a discharge is negative."""
+        """Decode the battery; in ROS the current of a discharge is negative."""
         amperes = -message.current if message.current == message.current else nan
         self._telemetry.battery = Battery(message.percentage, message.voltage, amperes)
 

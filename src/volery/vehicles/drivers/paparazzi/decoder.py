@@ -111,7 +111,7 @@ class PaparazziDecoder:
         }
 
     def handle_message(self, name: str, fields: Fields) -> bool:
-        """Decode a message; return whether it was used. Nothing counts before the kind of vehicle is known."""
+        """Decode a message; return whether it was used. The link counts once the kind of vehicle is known."""
         telemetry = self._telemetry
         if name in KINDS and not telemetry.kind:
             telemetry.kind, telemetry.autopilot = KINDS[name], "Paparazzi"
@@ -137,7 +137,7 @@ class PaparazziDecoder:
             self._kernel.record(Text(now, self._telemetry.name, severity, text))
 
     def update_ready(self) -> None:
-        """Ready means: position, aligned attitude, and checked settings."""
+        """Update ``ready``: it has a position, an aligned attitude, and checked settings."""
         telemetry = self._telemetry
         telemetry.armable = bool(self._arming) and self._arming not in PREVENTS_ARMING
         located = self._origin_is_set and telemetry.position is not None
@@ -173,7 +173,7 @@ class PaparazziDecoder:
         self._arming = status
 
     def _reference(self, fields: Fields) -> None:
-        """All zeros mean that no origin has been set; a point off the globe was garbled on the way."""
+        """Store the origin; zeros mean that none is set, a point off the globe was garbled on the way."""
         latitude, longitude = fields["lat0"], fields["lon0"]
         if not (latitude or longitude) or abs(latitude) > 90 * 10**7 or abs(longitude) > 180 * 10**7:
             return
@@ -216,11 +216,11 @@ class PaparazziDecoder:
         self._telemetry.satellites = fields["numsv"]
 
     def _energy(self, fields: Fields) -> None:
-        """Paparazzi reports what was drawn, not what remains."""
+        """Decode the battery; Paparazzi reports what was drawn, not what remains."""
         self._telemetry.battery = Battery(nan, fields["voltage"], fields["current"])
 
     def _navigation(self, fields: Fields) -> None:
-        """An INS_REF received before the origin was set is not valid."""
+        """Store the block; an INS_REF received before the origin was set is not valid."""
         self.block = self._kernel.now(), fields["cur_block"]
         if self.block[1] in self._preparing:
             self._origin_is_set = False

@@ -93,9 +93,9 @@ class Paparazzi:
         farthest = self._backend.aircraft.farthest
         far = f", further than {farthest:g} m from home it turns back" if farthest else ""
         return (  # recorded in traces: do not reword
-            "in GUIDED it misses nobody: it goes to its last set-point and stays there, and a velocity goes on "
-            f"without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by sticks it comes "
-            "down (FAILSAFE)"
+            "in GUIDED it misses nobody: it goes to its last set-point and stays there, and a velocity "
+            f"goes on without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by "
+            "sticks it comes down (FAILSAFE)"
         )
 
     def problem(self) -> LinkError | CapabilityError | None:
@@ -174,7 +174,7 @@ class Paparazzi:
         return (*self._steps.guided(), turn)
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """Fly over home in GUIDED at the present height, then land: mode HOME flies there but does not land."""
+        """Fly over home in GUIDED at the present height, then land; mode HOME does not land."""
         if not self.telemetry.armed:
             return ()
         home = self.telemetry.home

@@ -44,12 +44,12 @@ HOME_WAYPOINT = "HOME"
 
 ASSUMED: Mapping[str, str] = {
     "GET_SETTING": "is answered with DL_VALUE: the numbers of 'mode' and 'kill_throttle' are checked so",
-    "SETTING of 'mode'": "KILL, FAILSAFE and HOME always; NAV and GUIDED while no transmitter is heard",
+    "SETTING of 'mode'": "KILL, FAILSAFE and HOME always; NAV and GUIDED while no transmitter is received",
     "SETTING of 'auto2'": "what the third position of the mode switch means, at once where it is in it",
     "SETTING of 'kill_throttle'": "0 starts the motors in every mode but KILL, 1 stops them, in the air, too",
     "RC_4CH": "counts as a transmitter; mode 2 is the third position of its switch; pitch is nose up +",
     "GUIDED_SETPOINT_NED": "about the origin that INS_REF tells; stands until the next one",
-    "ROTORCRAFT_FP": "in GUIDED its carrot is the set-point, of whoever sent it",
+    "ROTORCRAFT_FP": "in GUIDED its carrot is the set-point, of any sender",
     "block 'Start Engine'": "starts the motors, in NAV",
     "block 'Takeoff'": "climbs straight up to some 2 m",
     "block 'land here'": "takes the touch-down point from where it is, descends, and stops the motors",

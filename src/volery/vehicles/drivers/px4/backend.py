@@ -54,7 +54,7 @@ _NO_SPEED = -1.0
 
 
 class Setpoint(NamedTuple):
-    """A set-point of OFFBOARD: a velocity, and a heading in degrees or, where NaN, a yaw rate in degrees/s."""
+    """A set-point of OFFBOARD: velocity, and heading in degrees or, where NaN, yaw rate in degrees/s."""
 
     velocity: Velocity
     yaw_rate: float = 0.0

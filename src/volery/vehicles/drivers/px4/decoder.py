@@ -165,7 +165,7 @@ class ArmingChecks:
 
 
 def _forbids(event: Event, mode: str) -> bool:
-    """Missing manual control is a warning for all modes, and forbids the modes that need it."""
+    """Return whether an event forbids arming in *mode*; missing manual control forbids manual modes."""
     if event.id == NO_MANUAL_CONTROL:
         return mode in MANUAL_MODES
     if event.modes == ALL_MODES:
@@ -194,7 +194,7 @@ class PX4Decoder(TelemetryDecoder):
         return mode_name(number)
 
     def _update_ready(self) -> None:
-        """PX4 converts altitudes above home by its own home: without a home it is not ready."""
+        """Update ``ready``; PX4 converts altitudes above home by its own home, so it needs one."""
         telemetry = self._telemetry
         located = telemetry.position is not None and telemetry.home is not None
         estimates = self._estimates_position or not self._estimator_reports

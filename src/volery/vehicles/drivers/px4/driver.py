@@ -148,7 +148,7 @@ class PX4(MavlinkDriver):
         )
 
     def _armed_in_hold(self) -> Sequence[Step]:
-        """A pilot who changes the mode meanwhile has control: arming in another mode is not intended."""
+        """Return steps that arm in Hold; a pilot who changes the mode meanwhile has control."""
         arm = (replace(step, mode=HOLD) for step in self.arm())
         return (*self._end_manual_control(), self._change_mode(HOLD), *self.ready(READY_WITHIN), *arm)
 
@@ -278,7 +278,7 @@ class PX4(MavlinkDriver):
         return (*self._end_manual_control(), self._change_mode(modes.RTL), reach)
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Enter AUTO.LAND; done when disarmed. Without a position it drifts with the wind while it descends."""
+        """Enter AUTO.LAND; done when disarmed. Without a position it drifts with the wind."""
         return self._until_disarmed(modes.LAND, "land", within)
 
     # -- manual flight
@@ -335,7 +335,7 @@ class PX4(MavlinkDriver):
         return mission_items(mission, self._here("upload a mission"))
 
     def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
-        """PX4 1.14 does not report the end of a mission: it ends when its last place is reached."""
+        """Return the last place: PX4 1.14 does not report the end of a mission."""
         if isinstance(mission[-1], Land | ReturnHome):
             return None
         places = [number for number, one in enumerate(mission) if isinstance(one, TakeOff | Waypoint)]

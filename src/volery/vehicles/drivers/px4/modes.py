@@ -51,5 +51,5 @@ _NAMES = {mode.number: name for name, mode in MODES.items()}
 
 
 def mode_name(number: int) -> str:
-    """Return the name of a ``custom_mode``; a name with its number if the firmware is newer than this table."""
+    """Return the name of a ``custom_mode``, or its number for a mode that is not in this table."""
     return _NAMES.get(number) or f"MODE {number:#010x}"

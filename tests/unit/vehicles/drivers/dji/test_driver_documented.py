@@ -11,7 +11,7 @@ from volery.simulation.autopilots.dji import firmware as simulated
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters
 from volery.vehicles.drivers.dji import driver as driver
 
-PAGE = Path(__file__).parents[4] / "docs" / "dji.md"
+PAGE = Path(__file__).parents[5] / "docs" / "dji.md"
 
 
 def table(heading: str, head: str) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from volery.vehicles.drivers.paparazzi.modes import ASSUMED
 
-PAGE = Path(__file__).parents[4] / "docs" / "paparazzi.md"
+PAGE = Path(__file__).parents[5] / "docs" / "paparazzi.md"
 
 
 def test_every_assumption_is_in_the_table() -> None:
