@@ -16,7 +16,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.environment import Environment, Place, Prism, Ways, Workload
 from volery.trace.events import Milestone, Text
 
-COMPONENTS = Path(__file__).parents[3] / "examples" / "delivery" / "components"
+COMPONENTS = Path(__file__).parents[4] / "examples" / "delivery" / "components"
 FRAME = LocalFrame(43.46, -3.81, 20.0)
 
 
