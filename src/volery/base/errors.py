@@ -1,12 +1,12 @@
-"""One tree of errors, split by who is at fault.
+"""The exceptions of volery, in one tree that separates what is at fault.
 
 | class | at fault | examples |
 |---|---|---|
 | ``ModelError`` | your model file | a typo in a key, a cycle of required ports |
 | ``UsageError`` | your call or option | an unknown URL scheme, coordinates off the globe |
 | ``ComponentError`` | the code of a component | it raised, or it froze virtual time |
-| ``CapabilityError`` | nobody: this vehicle cannot | mission upload where the autopilot has none |
-| ``LinkError`` | the wire | silent, lost, garbled |
+| ``CapabilityError`` | the request: this vehicle cannot do it | mission upload where the autopilot has none |
+| ``LinkError`` | the link | silent, lost, garbled |
 | ``VehicleError`` | the aircraft | refused, overridden, in failsafe, did not arrive |
 | ``FleetError`` | several of a fleet | each vehicle's own error, by its name |
 | ``EstimateError`` | a law of cost or physics | out of range, no figure for this processor |
@@ -23,10 +23,10 @@ from typing import NamedTuple, Self
 
 
 class VoleryError(Exception):
-    """Anything this project raises on purpose."""
+    """Base class of all errors that volery raises on purpose."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """How it gets to another process: as it is, whatever its constructor takes."""
+        """Pickle the error as it is, whatever its constructor takes."""
         return _again, (type(self), self.args, self.__dict__)
 
 
@@ -37,7 +37,7 @@ def _again(kind: type[VoleryError], args: tuple[object, ...], state: Mapping[str
 
 
 class Location(NamedTuple):
-    """Where in a file something stands. Lines count from 1; 0 is no line (an option, a missing file)."""
+    """Place in a file. Lines count from 1; 0 is no line (an option, a missing file)."""
 
     file: str
     line: int
@@ -47,7 +47,7 @@ class Location(NamedTuple):
 
 
 class ModelError(VoleryError):
-    """The model is wrong. Says file, line, path in the model, what is wrong and the valid choices."""
+    """The model is wrong. The message names file, line, path in the model, fault and valid choices."""
 
     def __init__(self, what: str, path: str = "", where: Location | None = None) -> None:
         self.what, self.path, self.where = what, path, where
@@ -55,11 +55,11 @@ class ModelError(VoleryError):
 
 
 class UsageError(VoleryError):
-    """A call, an option or an address that makes no sense."""
+    """A call, an option or an address is wrong."""
 
 
 class ComponentError(VoleryError):
-    """A component's own code raised or misbehaved. The cause, if any, is chained."""
+    """The code of a component raised an exception or misbehaved. The cause, if any, is chained."""
 
     def __init__(self, component: str, what: str) -> None:
         self.component, self.what = component, what
@@ -67,27 +67,27 @@ class ComponentError(VoleryError):
 
 
 class CapabilityError(VoleryError):
-    """This vehicle or autopilot cannot do what was asked; known before anything moved."""
+    """The vehicle or its autopilot cannot do this; detected before anything moves."""
 
 
 class LinkError(VoleryError):
-    """The wire to a vehicle is silent, lost or carries something else."""
+    """The link to a vehicle is silent, lost or carries another protocol."""
 
 
 class LinkSilent(LinkError):
-    """Nobody answers at this address."""
+    """Nothing answers at the address."""
 
 
 class LinkLost(LinkError):
-    """The autopilot spoke before and has fallen silent."""
+    """Messages of the autopilot have stopped arriving."""
 
 
 class LinkGarbled(LinkError):
-    """Bytes arrive, but they are not the protocol that was expected."""
+    """Bytes arrive, but not in the expected protocol."""
 
 
 class VehicleError(VoleryError):
-    """The aircraft did not do it. Names the vehicle, what was asked and the autopilot's own words."""
+    """The vehicle did not do it. The message has the vehicle, the request and the autopilot's own text."""
 
     def __init__(self, vehicle: str, asked: str, what: str) -> None:
         self.vehicle, self.asked, self.what = vehicle, asked, what
@@ -95,41 +95,42 @@ class VehicleError(VoleryError):
 
 
 class Refused(VehicleError):
-    """The autopilot said no."""
+    """The autopilot refused the command."""
 
 
 class Overridden(VehicleError):
-    """Somebody else, a pilot or another station, commands the vehicle now. Never fought."""
+    """A pilot or another station commands the vehicle now. volery never overrides it."""
 
 
 class Failsafe(Overridden):
-    """The autopilot itself took over."""
+    """A failsafe of the autopilot has taken over."""
 
 
 class NotArrived(VehicleError):
-    """It was not seen to be done within its time-out."""
+    """Telemetry did not show the operation as done within its time-out."""
 
 
 class OutOfBounds(VehicleError):
-    """Outside what the fence or the stated limits allow: a goal or a path, refused before anything moved; or
-    the vehicle itself, which has strayed while it travelled.
+    """A goal or a path is outside the fence or the limits, or the vehicle has left them on its way.
+
+    A goal or a path is refused before anything moves.
     """
 
 
 class LowBattery(VehicleError):
-    """The battery is below the stated reserve: nothing but the way down or home is begun any more."""
+    """The battery is below its reserve: only landing and returning home may be started."""
 
 
 class FleetError(ExceptionGroup[Exception], VoleryError):
-    """What went wrong with some vehicles of a fleet, by their names; the others did what was asked.
+    """Errors of some vehicles of a fleet, by name; the other vehicles have succeeded.
 
-    It is a group of exceptions, too: ``except* Refused`` picks from it.
+    It is also an exception group, so ``except* Refused`` selects from it.
     """
 
     failed: Mapping[str, Exception]
 
     def __new__(cls, asked: str, failed: Mapping[str, Exception]) -> Self:
-        """*failed* has at least one error."""
+        """Create the group; *failed* has at least one error."""
         made = super().__new__(cls, asked, list(failed.values()))
         made.failed = dict(failed)
         return made
@@ -141,13 +142,13 @@ class FleetError(ExceptionGroup[Exception], VoleryError):
         return type(self), (self.message, self.failed)
 
     def derive(self, errors: Sequence[Exception]) -> ExceptionGroup[Exception]:  # type: ignore[override]  # typeshed states a group of any exceptions
-        """The part of it that ``except*`` did not take."""
+        """Return the group of the errors that ``except*`` did not select."""
         left = {name: error for name, error in self.failed.items() if error in errors}
         return FleetError(self.message, left)
 
     def __str__(self) -> str:
-        told = (f"{name}: {_said(name, error)}" for name, error in self.failed.items())
-        return f"{self.message}: {len(self.failed)} failed: " + "; ".join(told)
+        parts = (f"{name}: {_said(name, error)}" for name, error in self.failed.items())
+        return f"{self.message}: {len(self.failed)} failed: " + "; ".join(parts)
 
 
 def _said(name: str, error: Exception) -> str:
@@ -156,15 +157,15 @@ def _said(name: str, error: Exception) -> str:
 
 
 class EstimateError(VoleryError):
-    """A law has no figure for this, or was asked outside its range of validity."""
+    """A law has no figure for this case, or is used outside its range of validity."""
 
 
 class Deadlock(VoleryError):
-    """Nothing is left to happen while tasks still wait. Names who waits for what."""
+    """Tasks wait and no event is pending. The message names the tasks and what each waits for."""
 
 
 def choices(names: Iterable[str]) -> str:
-    """``a, b or c``: how a message lists what would have been valid."""
+    """Return ``a, b or c``, for a message that lists valid choices."""
     listed = sorted(names)
     if not listed:
         return "nothing"
@@ -174,6 +175,6 @@ def choices(names: Iterable[str]) -> str:
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
-    """`` (did you mean 'x'?)`` if one of *names* is close to *wrong*, else an empty string."""
+    """Return `` (did you mean 'x'?)`` if one of *names* is close to *wrong*, else an empty string."""
     close = get_close_matches(wrong, list(names), n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""

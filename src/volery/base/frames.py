@@ -1,4 +1,4 @@
-"""The one place where frames are converted.
+"""Conversion of frames, attitudes and geodetic coordinates. No other module converts them.
 
 Names: ``enu`` = east, north, up metres about an origin; ``ned`` = north, east, down about the same origin;
 ``flu``/``frd`` = body axes forward, left, up / forward, right, down (REP-103 on the ROS side, MAVLink on the
@@ -27,7 +27,7 @@ _HALF = sqrt(0.5)
 
 
 def enu_to_ned(v: Vector) -> Vector:
-    """East, north, up to north, east, down. Its own inverse."""
+    """Convert a vector from east, north, up to north, east, down. Its own inverse."""
     return v[1], v[0], -v[2]
 
 
@@ -35,7 +35,7 @@ ned_to_enu = enu_to_ned
 
 
 def flu_to_frd(v: Vector) -> Vector:
-    """Forward, left, up to forward, right, down. Its own inverse."""
+    """Convert a vector from forward, left, up to forward, right, down. Its own inverse."""
     return v[0], -v[1], -v[2]
 
 
@@ -43,13 +43,16 @@ frd_to_flu = flu_to_frd
 
 
 def wrap(angle: float) -> float:
-    """The same angle in (-pi, pi], radians."""
+    """Return the same angle in (-pi, pi], radians."""
     wrapped = remainder(angle, 2.0 * pi)
     return pi if wrapped == -pi else wrapped
 
 
 def heading_to_yaw(heading: float) -> float:
-    """NED heading (clockwise from north) to ENU yaw (anticlockwise from east), radians. Its own inverse."""
+    """Convert a NED heading (clockwise from north) to ENU yaw (anticlockwise from east), radians.
+
+    Its own inverse.
+    """
     return wrap(pi / 2.0 - heading)
 
 
@@ -57,7 +60,7 @@ yaw_to_heading = heading_to_yaw
 
 
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
-    """The Hamilton product p q: rotate by q first, then by p."""
+    """Return the Hamilton product p q: the rotation by q, then by p."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     return (
@@ -69,14 +72,19 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def world_to_body(attitude: Quaternion, v: Vector) -> Vector:
-    """A vector of the world in the axes of a body that lies so in that world."""
+    """Rotate a world-frame vector into body axes.
+
+    Args:
+        attitude: Unit quaternion that rotates body into world.
+        v: Vector in the axes of that world.
+    """
     w, x, y, z = attitude
     _, bx, by, bz = multiply(multiply((w, -x, -y, -z), (0.0, *v)), attitude)
     return bx, by, bz
 
 
 def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
-    """A FRD-in-NED attitude as the FLU-in-ENU attitude of the same body. Its own inverse."""
+    """Convert the attitude of a FRD body in NED to that of the FLU body in ENU. Its own inverse."""
     world: Quaternion = (0.0, _HALF, _HALF, 0.0)
     body: Quaternion = (0.0, 1.0, 0.0, 0.0)
     return multiply(multiply(world, q), body)
@@ -86,7 +94,7 @@ attitude_enu_to_ned = attitude_ned_to_enu
 
 
 def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Intrinsic yaw-pitch-roll (z, y', x'') radians to a quaternion."""
+    """Convert intrinsic yaw, pitch, roll (z, y', x'') in radians to a quaternion."""
     cr, sr = cos(roll / 2), sin(roll / 2)
     cp, sp = cos(pitch / 2), sin(pitch / 2)
     cy, sy = cos(yaw / 2), sin(yaw / 2)
@@ -99,7 +107,7 @@ def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def quaternion_to_euler(q: Quaternion) -> Vector:
-    """Roll, pitch, yaw in radians. Straight up and straight down roll is zero and yaw takes the rest."""
+    """Convert a quaternion to roll, pitch, yaw in radians. At a pitch of +-pi/2 the roll is zero."""
     w, x, y, z = q
     sine = 2.0 * (w * y - z * x)
     if abs(sine) > 1.0 - 1e-12:
@@ -114,7 +122,7 @@ def quaternion_to_euler(q: Quaternion) -> Vector:
 
 
 def geodetic_to_ecef(latitude: float, longitude: float, height: float) -> Vector:
-    """WGS-84 degrees and metres to earth-centred, earth-fixed metres."""
+    """Convert WGS-84 degrees and metres to earth-centred, earth-fixed metres."""
     sin_lat, cos_lat = sin(radians(latitude)), cos(radians(latitude))
     normal = EQUATOR_M / sqrt(1.0 - _E2 * sin_lat * sin_lat)
     across = (normal + height) * cos_lat
@@ -126,7 +134,7 @@ def geodetic_to_ecef(latitude: float, longitude: float, height: float) -> Vector
 
 
 def ecef_to_geodetic(ecef: Vector) -> Vector:
-    """Earth-centred metres to WGS-84 latitude, longitude (degrees) and height (metres).
+    """Convert earth-centred metres to WGS-84 latitude, longitude (degrees) and height (metres).
 
     Bowring's method, iterated on the reduced latitude: to 1e-9 degrees and 1e-6 m, from 10 km below to 50 km
     above the ellipsoid.
@@ -149,9 +157,12 @@ def ecef_to_geodetic(ecef: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """A tangent plane at an origin: converts between WGS-84 degrees/AMSL and local metres.
+    """Tangent plane at an origin: converts between WGS-84 degrees with AMSL and local metres.
 
-    ``amsl`` is the origin's altitude in metres above mean sea level.
+    Attributes:
+        latitude: Of the origin, degrees north.
+        longitude: Of the origin, degrees east.
+        amsl: Altitude of the origin, metres above mean sea level.
     """
 
     latitude: float
@@ -172,7 +183,7 @@ class LocalFrame:
         )
 
     def to_enu(self, latitude: float, longitude: float, amsl: float) -> Vector:
-        """Degrees and metres AMSL to east, north, up metres about the origin."""
+        """Convert degrees and metres AMSL to east, north, up metres from the origin."""
         x, y, z = geodetic_to_ecef(latitude, longitude, amsl)
         dx, dy, dz = x - self._origin[0], y - self._origin[1], z - self._origin[2]
         east, north, up = self._axes
@@ -183,7 +194,7 @@ class LocalFrame:
         )
 
     def from_enu(self, enu: Vector) -> Vector:
-        """East, north, up metres to latitude, longitude (degrees) and metres AMSL."""
+        """Convert east, north, up metres to latitude, longitude (degrees) and metres AMSL."""
         east, north, up = self._axes
         return ecef_to_geodetic(
             (
@@ -194,9 +205,9 @@ class LocalFrame:
         )
 
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
-        """Degrees and metres AMSL to north, east, down metres about the origin."""
+        """Convert degrees and metres AMSL to north, east, down metres from the origin."""
         return enu_to_ned(self.to_enu(latitude, longitude, amsl))
 
     def from_ned(self, ned: Vector) -> Vector:
-        """North, east, down metres to latitude, longitude (degrees) and metres AMSL."""
+        """Convert north, east, down metres to latitude, longitude (degrees) and metres AMSL."""
         return self.from_enu(ned_to_enu(ned))

@@ -1,14 +1,12 @@
-"""EGM96: how far mean sea level is above the WGS-84 ellipsoid, from a grid of a quarter of a degree.
+"""Between metres above mean sea level (the geoid) and metres above the WGS-84 ellipsoid.
 
-Source: Lemoine et al., The Development of the Joint NASA GSFC and NIMA Geopotential Model EGM96,
-NASA/TP-1998-206861; public domain. ``egm96.xz`` is made by ``scripts/egm96_grid.py`` from the 5' grid:
-whole decimetres, bicubic in between. Against that grid it errs by at most 0.19 m, by 0.06 m at 99 % of
-all places and by 0.025 m root mean square; EGM96 itself errs by 0.5 to 1 m.
+Law: ellipsoidal = AMSL + N, where N is the height of the geoid above the ellipsoid at that place. Receivers
+and autopilots report AMSL, MAVROS reports ellipsoidal; both sides must use the same N, by default EGM96's.
 
-Between metres above mean sea level (the geoid) and metres above the WGS-84 ellipsoid.
-
-Law: ellipsoidal = AMSL + N, where N is how far the geoid is above the ellipsoid at that place. Receivers and
-autopilots say AMSL, MAVROS says ellipsoidal; both sides must mean the same N, and by default it is EGM96's.
+EGM96 is read from a grid of a quarter of a degree. Source: Lemoine et al., The Development of the Joint NASA
+GSFC and NIMA Geopotential Model EGM96, NASA/TP-1998-206861; public domain. ``scripts/egm96_grid.py`` makes
+``egm96.xz`` from the 5' grid: whole decimetres, bicubic in between. Against that grid it errs by at most
+0.19 m, by 0.06 m at 99 % of all places and by 0.025 m root mean square; EGM96 itself errs by 0.5 to 1 m.
 """
 
 from __future__ import annotations
@@ -27,33 +25,33 @@ from volery.base.errors import UsageError
 
 PER_DEGREE = 4
 ROWS, COLUMNS = 180 * PER_DEGREE + 1, 360 * PER_DEGREE
-"""From the south pole to the north pole, and eastwards from 180 degrees west."""
+"""Rows from the south pole to the north pole, columns eastwards from 180 degrees west."""
 DECIMETRE = 0.1
 GRID_FILE = "egm96.xz"
 
 
 def pack(decimetres: npt.NDArray[np.int16]) -> bytes:
-    """A grid as the file has it: differences of differences, low bytes before high bytes, compressed."""
+    """Compress a grid for the file: second differences, low bytes before high bytes."""
     steps = np.diff(np.diff(decimetres, axis=1, prepend=np.int16(0)), axis=0, prepend=np.int16(0))
     octets = np.frombuffer(steps.astype("<i2").tobytes(), np.uint8).reshape(-1, 2)
     return lzma.compress(octets.T.tobytes(), preset=9)
 
 
 def unpack(data: bytes) -> npt.NDArray[np.int16]:
-    """The other way round."""
+    """Return the grid in the compressed bytes of the file."""
     octets = np.frombuffer(lzma.decompress(data), np.uint8).reshape(2, -1)
     steps = np.ascontiguousarray(octets.T).view("<i2").reshape(ROWS, COLUMNS)
     return np.cumsum(np.cumsum(steps, axis=0, dtype=np.int16), axis=1, dtype=np.int16)
 
 
 class Egm96Grid:
-    """Heights of the geoid, at places between the grid's too."""
+    """Heights of the geoid, interpolated between the points of the grid."""
 
     def __init__(self, decimetres: npt.NDArray[np.int16]) -> None:
         self._decimetres = decimetres
 
     def height(self, latitude: float, longitude: float) -> float:
-        """Metres above the ellipsoid, by Catmull and Rom's cubics; 0 for a place that is none."""
+        """Return metres above the ellipsoid by Catmull-Rom cubics; 0 for coordinates off the globe."""
         if not (isfinite(longitude) and abs(latitude) <= 90.0):
             return 0.0
         up, along = (latitude + 90.0) * PER_DEGREE, (longitude + 180.0) * PER_DEGREE
@@ -68,7 +66,7 @@ class Egm96Grid:
 
 
 def _weights(f: float) -> tuple[float, float, float, float]:
-    """Of four neighbours, for a place at *f* (0..1) between the middle two."""
+    """Return the weights of four neighbours for a point at *f* (0..1) between the middle two."""
     return (
         -0.5 * f * (1.0 - f) ** 2,
         1.0 - 2.5 * f * f + 1.5 * f**3,
@@ -78,37 +76,42 @@ def _weights(f: float) -> tuple[float, float, float, float]:
 
 
 def read_grid() -> Egm96Grid:
-    """The grid of the package."""
+    """Return the grid of the package."""
     return Egm96Grid(unpack(files("volery.base").joinpath(GRID_FILE).read_bytes()))
 
 
 LOWEST_SEPARATION, HIGHEST_SEPARATION = -107.0, 86.0
-"""The separations there are on Earth, metres (EGM96)."""
+"""Range of separations on Earth, metres (EGM96)."""
 
 EGM96_NAME = "egm96"
 
 
 class Geoid(ABC):
-    """Mean sea level, everywhere."""
+    """Model of mean sea level."""
 
     @abstractmethod
     def separation(self, latitude: float, longitude: float) -> float:
-        """Metres of the geoid above the ellipsoid there; degrees. 0 where there is no such place."""
+        """Return the height of the geoid above the ellipsoid in metres.
+
+        Args:
+            latitude: Degrees north.
+            longitude: Degrees east.
+        """
 
     def to_ellipsoidal(self, latitude: float, longitude: float, amsl: float) -> float:
-        """Metres AMSL as metres above the ellipsoid."""
+        """Convert metres AMSL to metres above the ellipsoid."""
         return amsl + self.separation(latitude, longitude)
 
     def to_amsl(self, latitude: float, longitude: float, ellipsoidal: float) -> float:
-        """Metres above the ellipsoid as metres AMSL."""
+        """Convert metres above the ellipsoid to metres AMSL."""
         return ellipsoidal - self.separation(latitude, longitude)
 
 
 @dataclass(frozen=True, slots=True)
 class LevelGeoid(Geoid):
-    """The same N everywhere, ``metres``: where one knows it better, or wants none.
+    """The same separation everywhere, ``metres``; for a place where it is known better than by EGM96.
 
-    N varies by up to 0.1 m a kilometre, so within 10 km of where it was taken it is right within 1 m.
+    N varies by up to 0.1 m per kilometre, so within 10 km the error is at most 1 m.
     """
 
     metres: float = 0.0
@@ -126,7 +129,7 @@ class LevelGeoid(Geoid):
 
 
 class Egm96(Geoid):
-    """EGM96 as ``base.egm96`` keeps it; see there for its error. Read when it is first asked."""
+    """EGM96, read from its file at the first use."""
 
     def separation(self, latitude: float, longitude: float) -> float:
         """See ``Geoid``."""
@@ -143,16 +146,16 @@ def _grid() -> Egm96Grid:
 
 EGM96: Geoid = Egm96()
 SEA_LEVEL: Geoid = LevelGeoid()
-"""The ellipsoid itself is sea level."""
+"""Sea level equals the ellipsoid."""
 
 
 def parse_geoid(text: str) -> Geoid:
-    """``egm96``, or metres of a ``LevelGeoid``. Raises ``UsageError``."""
+    """Parse ``egm96`` or the metres of a ``LevelGeoid``. Raises ``UsageError``."""
     if text == EGM96_NAME:
         return EGM96
     try:
         return LevelGeoid(float(text))
     except ValueError:
         raise UsageError(
-            f"geoid={text!r}: it is {EGM96_NAME}, or a number of metres above the ellipsoid"
+            f"geoid={text!r}: give {EGM96_NAME}, or a number of metres above the ellipsoid"
         ) from None

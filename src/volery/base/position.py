@@ -1,7 +1,7 @@
-"""Places on the globe. Latitude and longitude are WGS-84 degrees; an altitude always says what it is above.
+"""Positions on the globe: WGS-84 degrees and an altitude with its reference.
 
-The worst accidents users report come from mixing altitudes, so the four kinds are four types and none
-converts into another without the reference that this takes.
+The worst accidents that users report come from mixed altitudes. So the four kinds are four types, and none
+converts into another without the reference that the conversion needs.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class _Altitude:
     metres: float
 
     def __init__(self, metres: float) -> None:
-        """Written out, as that of ``Position``: both are made for most messages of a vehicle."""
+        """Store the value without dataclass overhead: one is created for most messages of a vehicle."""
         if not isfinite(metres):
-            raise UsageError(f"an altitude of {metres} m is not a number one can fly to")
+            raise UsageError(f"an altitude of {metres} m is not finite")
         self.__dict__["metres"] = metres
 
     def __str__(self) -> str:
@@ -27,7 +27,7 @@ class _Altitude:
 
     @property
     def reference(self) -> str:
-        """What it is measured above, for messages."""
+        """Reference of the altitude, for messages."""
         raise TypeError("a bare altitude; use AMSL, Ellipsoidal, AboveHome or AboveGround")
 
 

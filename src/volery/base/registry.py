@@ -1,6 +1,6 @@
-"""How a lower room reaches a higher one: by name, through entry points. Knows no name itself.
+"""Plug-ins: how a lower package reaches a higher one, by name, through entry points.
 
-Third parties register with an entry point of their own package; a test or a script with ``add``.
+Third parties register with an entry point of their own package; a test or a script calls ``add``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class Registry(Generic[T]):
-    """Things of one kind, by name: ``drivers.load("ardupilot")``."""
+    """Plug-ins of one kind by name: ``drivers.load("ardupilot")``."""
 
     def __init__(self, group: str, noun: str) -> None:
         self.group, self.noun = group, noun
@@ -25,22 +25,22 @@ class Registry(Generic[T]):
         self._added[name] = thing
 
     def _installed(self) -> dict[str, dict[str, EntryPoint]]:
-        """By name, what goes by it: more than one thing only if packages disagree."""
+        """Return {name: {value: entry point}}, with several values if packages disagree."""
         found: dict[str, dict[str, EntryPoint]] = {}
         for point in entry_points(group=self.group):
             found.setdefault(point.name, {})[point.value] = point
         return found
 
     def names(self) -> list[str]:
-        """All names, sorted, without importing anything."""
+        """Return all names, sorted, without importing anything."""
         return sorted(self._added.keys() | self._installed().keys())
 
     def load(self, name: str) -> T:
-        """Import and return what goes by *name*.
+        """Import and return the plug-in *name*.
 
         Raises:
-            UsageError: nothing goes by it (lists the valid names), more than one thing does, or it cannot be
-                imported.
+            UsageError: The name is unknown (the message lists the valid names), two packages register it, or
+                the import fails.
         """
         if name in self._added:
             return self._added[name]

@@ -1,4 +1,4 @@
-"""Named random streams. The only owner of ``random``: every draw in a run comes from a stream named here."""
+"""Named random streams. Every random number of a run comes from a stream of this module."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ def _digest(seed: int, name: str) -> bytes:
 
 
 def stream(seed: int, name: str) -> random.Random:
-    """A generator that depends on the run's *seed* and its own *name* only."""
+    """Return a generator that depends only on the *seed* of the run and its own *name*."""
     return random.Random(_digest(seed, name))
 
 
 def key(seed: int, name: str) -> int:
-    """A 64-bit key for counter-based noise in compiled code: draw number *k* is a function of (key, k)."""
+    """Return a 64-bit key for counter-based noise in compiled code: draw *k* is a function of (key, k)."""
     return int.from_bytes(_digest(seed, name)[:8], "big")

@@ -1,4 +1,4 @@
-"""Time is an ``int`` of nanoseconds, everywhere inside. Seconds as ``float`` exist at the doors only."""
+"""Time is an ``int`` of nanoseconds. Seconds as ``float`` occur at the public interface only."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ HOUR: Ns = 60 * MINUTE
 
 
 def from_seconds(seconds: float) -> Ns:
-    """Nearest nanosecond to *seconds* (ties to even)."""
+    """Return the nearest nanosecond to *seconds* (ties to even)."""
     return round(seconds * S)
 
 
 def to_seconds(ns: Ns) -> float:
-    """Seconds as a float. ``from_seconds`` gives the same nanosecond back up to 2**51 ns, 26 days."""
+    """Return seconds. ``from_seconds`` restores the same nanosecond up to 2**51 ns, 26 days."""
     return ns / S
 
 
 def clock(ns: Ns) -> str:
-    """``h:mm:ss.mmm`` for people to read, for example ``0:02:07.250``."""
+    """Format a time as ``h:mm:ss.mmm``, for example ``0:02:07.250``."""
     sign = "-" if ns < 0 else ""
     milliseconds = abs(ns) // MS
     minutes, rest = divmod(milliseconds, 60_000)

@@ -1,8 +1,8 @@
-"""Quantities as people write them: ``2 ms``, ``57600 bit/s``, ``5 Ah``, ``0.5 %``, ``6 / h``, ``30 deg``.
+"""Quantities with units as text: ``2 ms``, ``57600 bit/s``, ``5 Ah``, ``0.5 %``, ``6 / h``, ``30 deg``.
 
-An own table rather than a library of units: the few units that a model needs, so that a slip is refused and
-not read as one of hundreds, and exact rational arithmetic, so that a time is the nanosecond that was written.
-Angles are a dimension of their own.
+A table of its own instead of a units library: it has only the units that a model needs, so a typo is refused
+and not read as one of hundreds, and its rational arithmetic is exact, so a time is the nanosecond that was
+written. Angles are a dimension of their own.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _DEGREE = Fraction(math.pi) / 180
 
 
 class QuantityError(ValueError):
-    """A text that is no quantity, or one of another kind than is expected. The message says what would do."""
+    """A text is no quantity, or not of the expected kind. The message has a valid example."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number of SI units: exact where it was written exactly."""
+    """Value in SI units, exact if it was written exactly."""
 
     value: Fraction
     dimension: Dimension
@@ -50,7 +50,7 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of quantity that is expected somewhere. ``unit`` is the SI unit that values are handed on in."""
+    """Kind of quantity. ``unit`` is the SI unit of its values."""
 
     noun: str
     unit: str
@@ -58,7 +58,7 @@ class Kind:
 
     @property
     def dimension(self) -> Dimension:
-        """What a quantity of this kind must have."""
+        """Dimension of a quantity of this kind."""
         return unit(self.unit).dimension
 
 
@@ -95,7 +95,7 @@ def _table() -> dict[str, Quantity]:
 
 
 UNITS = _table()
-"""Every unit symbol that may be written, with its size in SI units."""
+"""Every valid unit symbol, with its size in SI units."""
 
 TIME = Kind("time", "s", "2 ms, 1.5 s or 15 min")
 FREQUENCY = Kind("frequency", "Hz", "1500 MHz or 1.5 GHz")
@@ -112,7 +112,7 @@ KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, CHARGE, VOLTAGE, BANDWID
 
 
 def unit(text: str) -> Quantity:
-    """The size of a unit such as ``m/s``, ``/ h`` or ``bit/s``; an empty text is the plain number one."""
+    """Return the size of a unit such as ``m/s``, ``/ h`` or ``bit/s``; an empty text is the number one."""
     size, exponents, position = Fraction(1), list(PLAIN), 0
     while position < len(text):
         factor = _FACTOR.match(text, position)
@@ -134,7 +134,7 @@ def _symbol(name: str) -> Quantity:
 
 
 def parse(text: str) -> Quantity:
-    """A number and its unit; ``QuantityError`` says why not."""
+    """Parse a number with its unit. Raises ``QuantityError``."""
     split = _NUMBER.match(text)
     if split is None:
         raise QuantityError(f"{text!r} is not a number with a unit")
@@ -143,9 +143,14 @@ def parse(text: str) -> Quantity:
 
 
 def read(written: object, kind: Kind) -> float:
-    """What was *written*, a text or a number, in the unit of its *kind*.
+    """Return a quantity in the SI unit of its kind.
 
-    A bare number is a ratio or a count; zero alone needs no unit. ``QuantityError`` names what is expected.
+    Args:
+        written: A text, or a number for a ratio, a count or zero.
+        kind: The expected kind.
+
+    Raises:
+        QuantityError: *written* is not of that kind.
     """
     try:
         return float(_exact(written, kind) / unit(kind.unit).value)
@@ -154,7 +159,7 @@ def read(written: object, kind: Kind) -> float:
 
 
 def read_ns(written: object) -> Ns:
-    """A time, to the nearest nanosecond."""
+    """Return a time to the nearest nanosecond. Raises ``QuantityError``."""
     return round(_exact(written, TIME) * S)
 
 
@@ -178,7 +183,7 @@ def _bare(number: float) -> Quantity:
 
 
 def describe(dimension: Dimension) -> str:
-    """What a dimension is, for messages: ``a length``, ``a number without a unit``, ``in m/s^2``."""
+    """Describe a dimension in a message: ``a length``, ``a number without a unit``, ``in m/s^2``."""
     if dimension == PLAIN:
         return "a number without a unit"
     for kind in KINDS:

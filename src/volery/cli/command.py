@@ -110,17 +110,16 @@ def exit_status(output: Output, command: Callable[[], int]) -> int:
             output.notes.print_exception()
         output.complain(f"volery: {error}")
         return BAD_INPUT if isinstance(error, BAD_INPUT_ERRORS) else FAILED
-    except ModuleNotFoundError as error:
-        if output.debug:
-            output.notes.print_exception()
-        output.complain(f"volery: {missing_extra(error) or error}; `volery doctor` lists every part")
-        return BAD_INPUT
     except KeyboardInterrupt:
         output.complain("volery: interrupted")
         return FAILED
     except Exception as error:
         if output.debug:
             output.notes.print_exception()
+        missing = missing_extra(error) if isinstance(error, ModuleNotFoundError) else None
+        if missing is not None:
+            output.complain(f"volery: {missing}")
+            return BAD_INPUT
         output.complain(
             f"volery: internal error: {type(error).__name__}: {error}\n"
             "  --debug shows where. Please report it together with the command."

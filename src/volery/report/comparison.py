@@ -1,4 +1,4 @@
-"""Runs side by side: one table per question, one column per run."""
+"""Tables that compare runs: one table for each subject, one column for each run."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from volery.requirements.record import ComponentRecord, LatencyRecord, RunRecord
 
 
 def _names(dictionaries: Iterable[Iterable[str]]) -> list[str]:
-    """All keys, in the order in which they first occur."""
+    """Return all keys in the order of their first occurrence."""
     return list(dict.fromkeys(name for names in dictionaries for name in names))
 
 
 def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """How each run ended and what it came to as a whole."""
+    """Return the outcome and the totals of each run."""
     rows = [
         ("outcome", [_outcome(record) for record in records]),
         ("requirements met", [_met(record) for record in records]),
@@ -78,7 +78,7 @@ def _vehicles(record: RunRecord) -> list[float | None]:
 
 
 def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """Each requirement: what every run observed, and whether it met the bound."""
+    """Return the observed value and the verdict of each requirement in every run."""
     rows = []
     for name in _names(record.requirements for record in records):
         first = next(record.requirements[name] for record in records if name in record.requirements)
@@ -117,11 +117,11 @@ _IN_SHORT: tuple[tuple[str, Take], ...] = (
     ("late", _QUESTIONS[4][1]),
     ("J", lambda one: Cell(number(one.energy_j, 2), share=one.energy_j)),
 )
-"""For 80 columns."""
+"""Columns of the short table, for 80 characters."""
 
 
 def _on_computers(records: Sequence[RunRecord]) -> list[str]:
-    """The components that a run has on a computer: the others take none of its time in any of them."""
+    """Return the components that at least one run executes on a processor."""
     names = _names(record.components for record in records)
     everywhere = [(name, record.components.get(name)) for name in names for record in records]
     placed = {name for name, one in everywhere if one is not None and one.processor}
@@ -129,7 +129,7 @@ def _on_computers(records: Sequence[RunRecord]) -> list[str]:
 
 
 def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """Each component: where it ran and what it cost there, run beside run."""
+    """Return the processor and the costs of each component in every run."""
     rows = []
     for name in _on_computers(records):
         found = [record.components.get(name) for record in records]
@@ -144,7 +144,7 @@ def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid
 
 
 def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """The same in short: one row per component, the runs beside each other for each question."""
+    """Return the most important costs of each component, in one row."""
     rows = []
     for name in _on_computers(records):
         cells = [Cell(name)]
@@ -157,7 +157,7 @@ def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
 
 
 def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """Each processor: what it was and how busy, run beside run."""
+    """Return the kind, utilisation and energy of each processor in every run."""
     rows = []
     for name in _names(record.processors for record in records):
         found = [record.processors.get(name) for record in records]
@@ -180,7 +180,7 @@ def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) ->
 
 
 def chain_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """Each chain of topics: how old what arrives is, run beside run."""
+    """Return the latency along each chain of topics in every run."""
     rows = []
     for name in _names(record.chains for record in records):
         found = [record.chains.get(name) for record in records]
@@ -203,7 +203,7 @@ _VEHICLE_QUESTIONS: tuple[tuple[str, Callable[[VehicleRecord], Cell]], ...] = (
 
 
 def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
-    """Each vehicle: how far, how long, with what energy, run beside run."""
+    """Return the distance, time and energy of each vehicle in every run."""
     rows = []
     for name in _names(record.vehicles for record in records):
         found = [record.vehicles.get(name) for record in records]
@@ -216,7 +216,7 @@ def vehicle_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> G
 
 
 def _relative(cells: list[Cell]) -> list[Cell]:
-    """Shares become fractions of the largest among the runs; where all are the same, no bars."""
+    """Scale the shares to the largest of the runs; without bars if all are about equal."""
     shares = [cell.share for cell in cells if cell.share is not None]
     largest = max(shares, default=0.0)
     if largest <= 0.0 or min(shares) > 0.99 * largest:
@@ -227,7 +227,7 @@ def _relative(cells: list[Cell]) -> list[Cell]:
 
 
 def all_comparisons(labels: Sequence[str], records: Sequence[RunRecord]) -> list[Grid]:
-    """All tables that have rows, in reading order."""
+    """Return all tables that have rows, in reading order."""
     made = (
         outcome_comparison(labels, records),
         requirements_comparison(labels, records),

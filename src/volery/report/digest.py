@@ -1,15 +1,10 @@
-"""Fewer points that look the same: what keeps a report of a long run small.
+"""The drawn content of a report, folded from the events of a run: tracks, curves, load, parcels, remarks.
 
-Two ways for two purposes. A track keeps the points without which a vehicle, moved evenly from point to point,
-would be more than a tolerance from where it was at that time (top-down time ratio, Meratnia and de By,
-*Spatiotemporal Compression Techniques for Moving Point Objects*, EDBT 2004). A curve keeps the smallest and
-the largest value of each stretch, so that no peak is lost.
-
-What a report draws, folded from the events of a run: tracks, curves, processor load, parcels, remarkable
-moments.
-
-A tap of the stream, as the accounts are; its result is plain lists and numbers that become JSON within the
-document.
+``Digest`` is a tap of the event stream. Its result is plain lists and numbers that become JSON within the
+document. Tracks and curves are thinned, so the report of a long run stays small. A track keeps the points
+without which the interpolated position at some time would be off by more than a tolerance (top-down time
+ratio, Meratnia and de By, *Spatiotemporal Compression Techniques for Moving Point Objects*, EDBT 2004). A
+curve keeps the smallest and the largest value of each stretch, so no peak is lost.
 """
 
 from __future__ import annotations
@@ -45,9 +40,12 @@ Indexes = NDArray[np.int64]
 
 
 def thin_track(times: Floats, points: Floats, tolerance: float) -> Indexes:
-    """Indexes of the points to keep.
+    """Return the indexes of the points to keep.
 
-    *times* are n ascending seconds, *points* n rows of metres; *tolerance* is in metres.
+    Args:
+        times: n ascending times, seconds.
+        points: n rows of coordinates, metres.
+        tolerance: Largest error of the interpolated position, metres.
     """
     count = len(times)
     keep = np.zeros(count, dtype=bool)
@@ -68,7 +66,7 @@ def thin_track(times: Floats, points: Floats, tolerance: float) -> Indexes:
 
 
 def _worst(times: Floats, points: Floats) -> tuple[int, float]:
-    """The inner point that is farthest from even motion between the ends, and how far it is."""
+    """Return the inner point that is farthest from even motion between the ends, and its distance."""
     span = times[-1] - times[0]
     share = (times - times[0]) / span if span > 0 else np.zeros_like(times)
     even = points[0] + share[:, np.newaxis] * (points[-1] - points[0])
@@ -78,7 +76,7 @@ def _worst(times: Floats, points: Floats) -> tuple[int, float]:
 
 
 def thin_curve(values: Floats, stretches: int) -> Indexes:
-    """Indexes of the ends of *values* and of the extremes of so many stretches; NaN is skipped."""
+    """Return the indexes of the ends of *values* and of the extremes of each stretch; NaN is skipped."""
     count = len(values)
     if count <= 2 * stretches:
         return np.flatnonzero(~np.isnan(values))
@@ -105,7 +103,7 @@ Json = dict[str, Any]
 
 @dataclass
 class _Track:
-    """All states of one vehicle, column by column."""
+    """States of one vehicle, column by column."""
 
     kind: str
     columns: dict[str, array[float]] = field(
@@ -133,7 +131,7 @@ class _Track:
 
 
 class Digest:
-    """Call it with the events of a run, at least of the kinds in ``listens``, then ask for its ``data``."""
+    """Stream tap that collects the events in ``listens`` for its ``data``."""
 
     listens: ClassVar[frozenset[type[Any]]] = frozenset(
         (VehicleState, Slice, Activation, Milestone, Message, Failure, Operation, LinkState, Text)
@@ -149,13 +147,13 @@ class Digest:
         self._parcels: dict[str, list[Milestone]] = {}
         self._remarks: list[Json] = []
         self._left_out = 0
-        self._heard: set[tuple[str, str]] = set()
-        self._hears: dict[str, set[str]] = {}
+        self._deliveries: set[tuple[str, str]] = set()
+        self._subscriptions: dict[str, set[str]] = {}
         self._lost: dict[str, list[int]] = {}
         self._last: Ns = 0
 
     def __call__(self, event: Event) -> None:
-        """Take one event in."""
+        """Add one event."""
         match event:
             case VehicleState():
                 self._tracks.setdefault(event.vehicle, _Track("")).add(event)
@@ -196,15 +194,15 @@ class Digest:
         counts = self._lost.setdefault(event.topic, [0, 0])
         counts[0] += 1
         counts[1] += event.received == NONE
-        if (event.topic, event.subscriber) not in self._heard:
-            self._heard.add((event.topic, event.subscriber))
+        if (event.topic, event.subscriber) not in self._deliveries:
+            self._deliveries.add((event.topic, event.subscriber))
             vehicle = event.topic.lstrip("/").partition("/")[0]
             if vehicle in self._tracks:
-                self._hears.setdefault(event.subscriber.strip("/"), set()).add(vehicle)
+                self._subscriptions.setdefault(event.subscriber.strip("/"), set()).add(vehicle)
 
     def _names_of_vehicles(self) -> dict[str, str]:
-        """What a state may call a vehicle: its own name, or a node that listens to it alone."""
-        alone = {name: next(iter(heard)) for name, heard in self._hears.items() if len(heard) == 1}
+        """Return {name in a parcel's state: vehicle}: its own name, or a node that subscribes to it alone."""
+        alone = {name: next(iter(found)) for name, found in self._subscriptions.items() if len(found) == 1}
         return alone | {name: name for name in self._tracks}
 
     def _remark(self, event: Event) -> None:
@@ -230,7 +228,11 @@ class Digest:
             self._left_out += 1
 
     def data(self, ended: float | None = None) -> Json:
-        """Everything to draw, as JSON values; *ended*: when the run did, if not at its last event."""
+        """Return everything to draw as JSON values.
+
+        Args:
+            ended: End of the run in seconds; by default its last event.
+        """
         end = to_seconds(self._last) if ended is None else ended
         return {
             "end": round(end, 3),
@@ -288,7 +290,7 @@ def _merge(bins: list[int], together: int, count: int) -> list[int]:
 
 
 def _mentioned(step: Milestone, names: dict[str, str]) -> str:
-    """Whom of *names* the state, else the detail, speaks of; the longest, since drone_11 contains drone_1."""
+    """Return the vehicle in a state or its detail: the longest name, since drone_11 contains drone_1."""
     for words in (step.state, step.detail):
         found = [name for name in names if name in words]
         if found:
@@ -297,9 +299,9 @@ def _mentioned(step: Milestone, names: dict[str, str]) -> str:
 
 
 def _place(step: Milestone, kinds: dict[str, str], first: bool) -> str:
-    """The place that the state speaks of or that the detail is; what was only ordered is in the store.
+    """Return the place that the state names or that the detail is; an ordered parcel is in the store.
 
-    A place that a detail merely mentions may be where the parcel is to go.
+    A place within a longer detail may be the destination, so it does not count.
     """
     said = [name for name in kinds if name in step.state]
     if said:

@@ -1,11 +1,8 @@
-"""The report of a run as one HTML file that needs no network: ``report.html``, from its folder's trace alone.
+"""HTML documents: the report of a run and the comparison of several, each one file that needs no network.
 
-If the folder has a ``run.json`` its figures are shown, since it alone knows the wall time; else the accounts
-are kept anew from the trace.
-
-Runs side by side in one HTML file: allocations, frequencies, scenarios of the same system.
-
-The documents of a run folder, made anew: also of one whose run was killed and left its trace alone.
+A report is made from the trace of a run folder alone. If the folder has a ``run.json``, its figures are
+shown, since only ``run.json`` has the wall time; else the accounts are computed again from the trace, as for
+a run that was killed.
 """
 
 from __future__ import annotations
@@ -65,7 +62,7 @@ REPORT_FILE = "report.html"
 
 @dataclass(frozen=True)
 class Fact:
-    """A figure worth standing at the top."""
+    """Figure in the headline of the report."""
 
     name: str
     value: str
@@ -75,7 +72,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class ReportContent:
-    """Everything a report is made of."""
+    """Content of a report. ``lost`` describes what is missing from the trace."""
 
     record: RunRecord
     data: Json
@@ -83,11 +80,17 @@ class ReportContent:
 
 
 def gather(folder: Path, *taps: Record) -> ReportContent:
-    """Read the trace of *folder*, and its ``run.json`` if it has one.
+    """Read the trace of a run, and its ``run.json`` if there is one.
 
-    Without a ``run.json`` the accounts are kept anew, *taps* are told every event as well, and requirements
-    that the run did not come to judge are judged by what the trace holds. Raises ``UsageError`` if there is
-    no trace or it breaks off before its set-up.
+    Without ``run.json`` the accounts are computed again, and requirements without a verdict are judged by the
+    events of the trace.
+
+    Args:
+        folder: Run folder.
+        taps: Receive every event, if there is no ``run.json``.
+
+    Raises:
+        UsageError: There is no trace, or it ends before its header.
     """
     with Reading(folder / TRACE_FILE) as reading:
         setup = reading.setup
@@ -107,11 +110,11 @@ def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
 
     accounts = Accounts(reading.setup)
     observers = Observers(bounds_of(reading.setup), reading.setup)
-    everybody: tuple[Record, ...] = (accounts, observers, *taps)
+    receivers: tuple[Record, ...] = (accounts, observers, *taps)
     judged = False
     for event in reading.events():
         judged = judged or isinstance(event, Verdict)
-        for tap in everybody:
+        for tap in receivers:
             tap(event)
     for verdict in () if judged else observers.verdicts(accounts.last):
         accounts(verdict)
@@ -120,18 +123,18 @@ def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
 
 
 def status_of(ending: Mapping[str, str]) -> Status:
-    """How a run ended, by what its trace says of it; one that was killed could not say it."""
+    """Return the status of a run from its trace; ``unfinished`` if the run was killed."""
     known = (status for status in get_args(Status) if status == ending.get("status"))
     return next(known, "unfinished")
 
 
 def write_report(folder: Path) -> Path:
-    """Write ``report.html`` into *folder* and say where it is. ``UsageError`` if that cannot be done."""
+    """Write ``report.html`` into *folder* and return its path. Raises ``UsageError`` if that fails."""
     return write_document(gather(folder), folder)
 
 
 def write_document(material: ReportContent, folder: Path) -> Path:
-    """The same for what has been gathered already."""
+    """Write ``report.html`` from gathered content and return its path."""
     path = folder / REPORT_FILE
     try:
         path.write_text(render(material), encoding="utf-8")
@@ -141,7 +144,7 @@ def write_document(material: ReportContent, folder: Path) -> Path:
 
 
 def environment() -> Environment:
-    """Where templates come from; everything they are given is escaped."""
+    """Return the template environment; it escapes every value."""
     return Environment(
         loader=PackageLoader("volery.report"),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -152,7 +155,7 @@ def environment() -> Environment:
 
 
 def render(material: ReportContent) -> str:
-    """The document."""
+    """Return the HTML of a report."""
     record, data = material.record, material.data
     states = _states(record)
     return (
@@ -190,7 +193,7 @@ def render(material: ReportContent) -> str:
 
 
 def embedded(data: Any) -> Markup:
-    """JSON that can stand within a script element: nothing in it can end the element."""
+    """Return JSON that is safe within a script element."""
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
@@ -249,13 +252,13 @@ def _troubles(record: RunRecord, lost: str) -> list[str]:
 
 
 def _states(record: RunRecord) -> dict[str, int]:
-    """A colour number for each state of parcels, in the order in which they first occur."""
+    """Return a colour number for each state of parcels, in order of first occurrence."""
     names = dict.fromkeys(step.state for parcel in record.parcels.values() for step in parcel.history)
     return {name: index % 8 + 1 for index, name in enumerate(names)}
 
 
 def _lane(name: str, parcel: ParcelRecord, states: dict[str, int], end: float) -> dict[str, Any]:
-    """One parcel as spans of a row that is 100 wide."""
+    """Return one parcel as spans of a row that is 100 wide."""
     steps = parcel.history
     ends = [*(step.at_s for step in steps[1:]), max(end, steps[-1].at_s)]
     whole = max(end, 1e-9)
@@ -319,16 +322,21 @@ COMPARISON_FILE = "comparison.html"
 
 
 class Comparison(NamedTuple):
-    """Runs side by side: as an HTML document and as a table for the terminal."""
+    """Comparison of runs, as an HTML document and as a table for the terminal."""
 
     html: str
     table: RenderableType
 
 
 def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
-    """Compare the runs in *folders*; links to their reports are relative to the folder *beside*.
+    """Compare runs.
 
-    Raises ``UsageError`` if there are fewer than two, or one holds no run.
+    Args:
+        folders: Run folders, at least two.
+        beside: Folder of the comparison, to which the links to the reports are relative; None for no links.
+
+    Raises:
+        UsageError: There are fewer than two folders, or one has no run.
     """
     if len(folders) < 2:
         raise UsageError(f"a comparison takes at least two run folders, not {len(folders)}")
@@ -358,7 +366,7 @@ def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
 
 
 def write_comparison(folders: Sequence[Path], into: Path) -> Path:
-    """Write ``comparison.html`` into the folder *into* and say where it is; ``UsageError`` as ``compare``."""
+    """Write ``comparison.html`` into a folder and return its path. Raises as ``compare`` does."""
     path = into / COMPARISON_FILE
     text = compare(folders, into).html
     try:
@@ -385,7 +393,7 @@ TIMELINE_FILE = "timeline.json"
 
 
 class Recovered(NamedTuple):
-    """What was made: the record, the report, and in words what of the trace is missing (empty: nothing)."""
+    """Recovered documents. ``lost`` describes what is missing from the trace, empty if nothing is."""
 
     record: RunRecord
     report: Path
@@ -393,9 +401,9 @@ class Recovered(NamedTuple):
 
 
 def recover(folder: Path) -> Recovered:
-    """Write ``report.html``, and ``run.json`` and ``timeline.json`` too if the run did not.
+    """Write ``report.html``, and ``run.json`` and ``timeline.json`` if the run did not write them.
 
-    A recovered record has no wall time and no versions, for these stand nowhere but in ``run.json``. Raises
+    A recovered record has no wall time and no versions, since the trace does not contain them. Raises
     ``UsageError`` as ``gather`` does.
     """
     if (folder / RUN_FILE).exists():

@@ -1,7 +1,4 @@
-"""The graph of a run, from its trace: the same picture as of a graph that is there now.
-
-A graph as an SVG: who publishes on the left, topics in the middle, who subscribes on the right.
-"""
+"""A ROS graph as an SVG: publishers on the left, topics in the middle, subscribers on the right."""
 
 from __future__ import annotations
 
@@ -22,38 +19,39 @@ GRAPH_NAME_PREFIX = "/"
 
 
 def graph_of_run(folder: Path) -> GraphSnapshot:
-    """Who said what to whom in the run whose folder this is; rates are over the whole run.
+    """Return the graph of a finished run from its trace; rates are means over the whole run.
 
-    Raises ``UsageError`` if there is no trace in it.
+    Raises:
+        UsageError: The folder has no trace, or nothing was published.
     """
     types: dict[str, str] = {}
-    said: Counter[str] = Counter()
+    messages: Counter[str] = Counter()
     publishers: dict[str, dict[str, None]] = {}
     subscribers: dict[str, dict[str, None]] = {}
     services: dict[str, str] = {}
-    lasted = 0
+    last = 0
     with Reading(folder / TRACE_FILE) as reading:
         for event in reading.events():
             if isinstance(event, Published):
                 types[event.topic] = event.type
-                said[event.topic] += 1
+                messages[event.topic] += 1
                 publishers.setdefault(event.topic, {})[event.publisher] = None
-                lasted = max(lasted, event.at)
+                last = max(last, event.at)
             elif isinstance(event, Message):
                 publishers.setdefault(event.topic, {})[event.publisher] = None
                 subscribers.setdefault(event.topic, {})[event.subscriber] = None
             elif isinstance(event, Call) and event.operation.startswith(GRAPH_NAME_PREFIX):
                 services[event.operation] = event.callee
     if not publishers:
-        raise UsageError(f"{folder}: nobody published anything in this run; there is no graph to show")
-    seconds = to_seconds(lasted) or 1.0
+        raise UsageError(f"{folder}: nothing was published in this run, so there is no graph to show")
+    seconds = to_seconds(last) or 1.0
     topics = tuple(
         TopicSnapshot(
             name,
             types.get(name, ""),
             tuple(sorted(publishers[name])),
             tuple(sorted(subscribers.get(name, ()))),
-            said[name] / seconds if name in said else None,
+            messages[name] / seconds if name in messages else None,
         )
         for name in sorted(publishers)
     )
@@ -64,9 +62,9 @@ def graph_of_run(folder: Path) -> GraphSnapshot:
 
 ROW, PAD, TOP = 34, 20, 46
 RATE = 70
-"""Room for a rate beside a topic's name."""
+"""Width for a rate beside the name of a topic."""
 LETTER = 7.2
-"""Width of a letter in the picture's font, about."""
+"""Approximate width of a letter."""
 _STYLE = """
 text { font: 12px ui-monospace, monospace; fill: #1d2733; }
 .head { font-weight: 600; fill: #5b6b7c; }
@@ -78,7 +76,7 @@ text { font: 12px ui-monospace, monospace; fill: #1d2733; }
 
 
 def graph_svg(graph: GraphSnapshot) -> str:
-    """The whole SVG document. A node that does both stands on both sides."""
+    """Return the SVG document. A node that publishes and subscribes is on both sides."""
     topics = [topic for topic in graph.topics if topic.publishers or topic.subscribers]
     left = _ordered(topic.publishers for topic in topics)
     right = _ordered(topic.subscribers for topic in topics)
@@ -108,7 +106,7 @@ def graph_svg(graph: GraphSnapshot) -> str:
 
 
 def _ordered(groups: Iterable[Sequence[str]]) -> list[str]:
-    """In the order of first appearance: that keeps lines short."""
+    """Return the names in order of first appearance, which keeps the lines short."""
     return list(dict.fromkeys(name for group in groups for name in group))
 
 
@@ -117,7 +115,7 @@ def _width(names: Iterable[str]) -> float:
 
 
 def _column(names: Sequence[str], rows: int) -> dict[str, float]:
-    """The middle of each row, spread over the height."""
+    """Return the middle of each row, spread over the height."""
     step = rows * ROW / max(1, len(names))
     return {name: TOP + (number + 0.5) * step for number, name in enumerate(names)}
 

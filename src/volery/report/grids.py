@@ -1,7 +1,7 @@
-"""The tables of a report as plain data, so that the terminal and the HTML document say the same.
+"""The tables of a report as plain data, so that the terminal and the HTML document show the same.
 
-A cell is what is to be read; its ``share`` (0..1) may be drawn as a bar behind it, its ``status`` as a colour
-beside the words, never instead of them.
+The ``share`` (0..1) of a cell may be drawn as a bar behind its text, its ``status`` as a colour beside the
+text and never instead of it.
 """
 
 from __future__ import annotations
@@ -36,9 +36,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """A heading; numbers stand to the right.
+    """Heading of a column.
 
-    ``hint`` explains it in a sentence. Where there is no room for all, what is not ``essential`` goes first.
+    Attributes:
+        title: Its text.
+        numeric: Align the cells to the right.
+        hint: Explanation in one sentence.
+        essential: Keep the column on a narrow terminal.
     """
 
     title: str
@@ -49,7 +53,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Grid:
-    """A table: every row has a cell for every column."""
+    """A table; every row has one cell for each column."""
 
     title: str
     columns: tuple[Column, ...]
@@ -60,7 +64,7 @@ class Grid:
 
 
 def number(value: float | None, digits: int = 1, unit: str = "") -> str:
-    """A number to be read; a dash if there is none."""
+    """Format a number with a fixed number of digits; a dash for None."""
     if value is None:
         return NOTHING
     text = f"{value:,.{digits}f}".replace(",", "\N{NO-BREAK SPACE}")
@@ -68,7 +72,7 @@ def number(value: float | None, digits: int = 1, unit: str = "") -> str:
 
 
 def figure(value: float | None, unit: str = "") -> str:
-    """A number of any size, to four significant digits."""
+    """Format a number of any size to four significant digits; a dash for None."""
     if value is None:
         return NOTHING
     text = f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
@@ -76,7 +80,7 @@ def figure(value: float | None, unit: str = "") -> str:
 
 
 def energy(joules: float | None) -> str:
-    """Millijoules to megajoules, by size."""
+    """Format an energy in mJ to MJ, by size; a dash for None."""
     if joules is None:
         return NOTHING
     if 0.0 < abs(joules) < 0.1:
@@ -87,41 +91,41 @@ def energy(joules: float | None) -> str:
 
 
 def band(error: float | None) -> str:
-    """``± 20 %``; empty where it is unknown."""
+    """Format a relative error as ``± 20 %``; empty for None."""
     return "" if error is None else f"±\N{NO-BREAK SPACE}{number(100.0 * error, 0, '%')}"
 
 
 def widest_band(record: RunRecord) -> str:
-    """The widest band of the energies of a run's processors; empty if none is known."""
+    """Return the widest error band of the energies of a run's processors; empty if none is known."""
     known = [one.energy_error for one in record.processors.values() if one.energy_error is not None]
     return band(max(known, default=None))
 
 
 def total(values: list[float | None]) -> float | None:
-    """Their sum; ``None`` if one is unknown, since a sum without it would pass for the whole."""
+    """Return the sum, or None if a value is unknown: a partial sum would look like the total."""
     known = [value for value in values if value is not None]
     return sum(known) if values and len(known) == len(values) else None
 
 
 def brief(seconds: float) -> str:
-    """Seconds to a millisecond; what is shorter than ten, to two digits that say something."""
+    """Format seconds to a millisecond, and times below 10 ms to two significant digits."""
     if seconds == 0.0 or seconds >= 0.01:
         return number(seconds, 3)
     return f"{seconds:.{1 - floor(log10(seconds))}f}"
 
 
 def milliseconds(seconds: float | None) -> str:
-    """A response time."""
+    """Format seconds as milliseconds; a dash for None."""
     return number(None if seconds is None else 1e3 * seconds, 2)
 
 
 def moment(seconds: float) -> str:
-    """A point in time of a run, ``h:mm:ss.mmm``."""
+    """Format a time of a run as ``h:mm:ss.mmm``."""
     return clock(from_seconds(seconds))
 
 
 def count(value: int) -> str:
-    """A whole number."""
+    """Format a whole number."""
     return f"{value:,}".replace(",", "\N{NO-BREAK SPACE}")
 
 
@@ -130,20 +134,20 @@ def _offset(offset: OffsetRecord) -> str:
 
 
 def verdict(requirement: RequirementRecord) -> Cell:
-    """Whether a requirement was met."""
+    """Return the verdict of a requirement."""
     if requirement.met is None:
         return Cell("not judged", status="warn")
     return Cell("✓ met", status="good") if requirement.met else Cell("✗ not met", status="bad")
 
 
 def bound(requirement: RequirementRecord) -> str:
-    """``≤ 0.3 m``."""
+    """Format the bound of a requirement, as ``≤ 0.3 m``."""
     sign = {"max": "≤", "min": "≥"}.get(requirement.relation, requirement.relation)
     return f"{sign} {figure(requirement.bound, requirement.unit)}"
 
 
 def requirements_grid(record: RunRecord) -> Grid:
-    """Verdicts."""
+    """Return the verdicts of the requirements."""
     rows = tuple(
         (
             Cell(name),
@@ -165,7 +169,7 @@ def requirements_grid(record: RunRecord) -> Grid:
 
 
 def cost_grid(record: RunRecord) -> Grid:
-    """What each component cost its processor."""
+    """Return the cost of each component on its processor."""
     longest = max((one.cpu_s for one in record.components.values()), default=0.0)
     rows = tuple(_cost_row(name, one, longest) for name, one in record.components.items())
     columns = (
@@ -223,7 +227,7 @@ def _cost_row(name: str, one: ComponentRecord, longest: float) -> tuple[Cell, ..
 
 
 def chains_grid(record: RunRecord) -> Grid:
-    """End-to-end latencies along chains of topics."""
+    """Return the end-to-end latencies along chains of topics."""
     rows = tuple(
         (
             Cell(name),
@@ -250,7 +254,7 @@ MOST_PREEMPTIONS = 20
 
 
 def preemptions_grid(record: RunRecord) -> Grid:
-    """Who had to make way for whom; the most frequent."""
+    """Return the most frequent preemptions."""
     rows = tuple(
         (Cell(one.processor), Cell(one.preempted), Cell(one.by), Cell(count(one.count)))
         for one in record.preemptions[:MOST_PREEMPTIONS]
@@ -260,7 +264,7 @@ def preemptions_grid(record: RunRecord) -> Grid:
 
 
 def ros_calls_grid(record: RunRecord) -> Grid:
-    """How often each component called ROS, by kind of call."""
+    """Return the number of ROS calls of each component, by kind of call."""
     kinds = sorted({kind for one in record.components.values() for kind in one.ros_calls})
     rows = tuple(
         (
@@ -274,7 +278,7 @@ def ros_calls_grid(record: RunRecord) -> Grid:
 
 
 def processors_grid(record: RunRecord) -> Grid:
-    """Processors: what they are, how busy they were, what they took."""
+    """Return the kind, utilisation and energy of each processor."""
     rows = tuple(
         (
             Cell(name),
@@ -302,7 +306,7 @@ def processors_grid(record: RunRecord) -> Grid:
 
 
 def vehicles_grid(record: RunRecord) -> Grid:
-    """Vehicles: how far, how long, with what energy, and how precisely."""
+    """Return the distance, time, energy and errors of each vehicle."""
     rows = tuple(_vehicle_row(name, one) for name, one in record.vehicles.items())
     columns = (
         Column("vehicle"),
@@ -340,7 +344,7 @@ def _vehicle_row(name: str, one: VehicleRecord) -> tuple[Cell, ...]:
 
 
 def operations_grid(record: RunRecord) -> Grid:
-    """What vehicles were asked, and how it ended."""
+    """Return the operations of the vehicles and their outcomes."""
     operations = [(name, each) for name, one in record.vehicles.items() for each in one.operations]
     operations.sort(key=lambda pair: pair[1].start_s)
     rows = tuple(
@@ -372,7 +376,7 @@ def operations_grid(record: RunRecord) -> Grid:
 
 
 def parcels_grid(record: RunRecord) -> Grid:
-    """Parcels and their last state."""
+    """Return the parcels and their last state."""
     rows = tuple(
         (Cell(name), Cell(one.state), Cell(moment(one.history[-1].at_s)), Cell(_story(one), status="quiet"))
         for name, one in record.parcels.items()
@@ -389,7 +393,7 @@ def _story(parcel: ParcelRecord) -> str:
 
 
 def laws_grid(record: RunRecord) -> Grid:
-    """The laws that priced the run, with where they come from and what is to be warned of."""
+    """Return the cost laws of the run, with source, validity and warnings."""
     rows = tuple(
         (
             Cell(law.name),
@@ -407,7 +411,7 @@ def laws_grid(record: RunRecord) -> Grid:
 
 
 def all_grids(record: RunRecord) -> list[Grid]:
-    """All tables that have rows, in reading order."""
+    """Return all tables that have rows, in reading order."""
     made = (
         requirements_grid(record),
         cost_grid(record),
@@ -420,7 +424,7 @@ def all_grids(record: RunRecord) -> list[Grid]:
 
 
 def labels(records: Sequence[RunRecord], names: Iterable[str]) -> list[str]:
-    """What to call runs beside each other: their allocations if these differ, else *names* (of folders)."""
+    """Return names for compared runs: their allocations if these differ, else *names*."""
     allocations = [record.allocation for record in records]
     if all(allocations) and len(set(allocations)) == len(allocations):
         return allocations

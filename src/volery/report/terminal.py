@@ -19,13 +19,13 @@ _STYLES = {"": "", "good": "green", "bad": "bold red", "warn": "yellow", "quiet"
 
 
 class GridTable:
-    """A grid that leaves out what is not essential where the terminal is narrow."""
+    """Grid that omits inessential columns on a narrow terminal."""
 
     def __init__(self, grid: Grid) -> None:
         self.grid = grid
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Give it all columns if they fit without folding."""
+        """Yield the table with all columns if they fit without folding, else the essential ones."""
         whole = _table(self.grid, essential=False)
         unlimited = options.update(max_width=_UNLIMITED)
         fits = Measurement.get(console, unlimited, whole).maximum <= options.max_width
@@ -44,7 +44,7 @@ def _table(grid: Grid, essential: bool) -> Table:
     shown = [index for index, column in enumerate(grid.columns) if column.essential or not essential]
     for index in shown:
         column = grid.columns[index]
-        whole = column.numeric or index == 0  # a name or a figure that is cut off would mislead
+        whole = column.numeric or index == 0  # a truncated name or figure would mislead
         side: JustifyMethod = "right" if column.numeric else "left"
         made.add_column(column.title, justify=side, no_wrap=whole, overflow="fold")
     for row in grid.rows:
@@ -57,7 +57,7 @@ def _text(cell: Cell) -> Text:
 
 
 def headline(record: RunRecord) -> Text:
-    """One line: what was run, how it ended, how fast it was."""
+    """Return one line with the name, outcome and speed of a run."""
     name = " · ".join(part for part in (record.system, record.allocation, record.fidelity) if part)
     good = record.outcome.status == "completed" and record.outcome.requirements_met is not False
     line = Text(name, style="bold")
@@ -71,7 +71,7 @@ def headline(record: RunRecord) -> Text:
 
 
 def summary_table(record: RunRecord) -> RenderableType:
-    """Everything about one run that fits a terminal."""
+    """Return the summary of one run."""
     parts: list[RenderableType] = [headline(record)]
     parts += [GridTable(grid) for grid in all_grids(record)]
     parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
@@ -80,18 +80,18 @@ def summary_table(record: RunRecord) -> RenderableType:
 
 
 def cost_table(record: RunRecord) -> RenderableType:
-    """The cost table alone."""
+    """Return the cost table of one run."""
     return GridTable(cost_grid(record))
 
 
 def comparison_table(records: Sequence[RunRecord], names: Sequence[str] = ()) -> RenderableType:
-    """Runs side by side; *names* is what to call them where their allocations are the same."""
+    """Return the comparison of runs. *names* are used if their allocations are the same."""
     called = labels(records, names or [f"run {index}" for index in range(1, len(records) + 1)])
     return Group(*(GridTable(grid) for grid in all_comparisons(called, records)))
 
 
 def short_comparison(records: Sequence[RunRecord], names: Sequence[str] = ()) -> RenderableType:
-    """How the runs ended, their requirements and their costs; no more."""
+    """Return the outcomes, requirements and costs of runs."""
     called = labels(records, names or [f"run {index}" for index in range(1, len(records) + 1)])
     grids = (make(called, records) for make in (outcome_comparison, requirements_comparison, cost_matrix))
     return Group(*(GridTable(grid) for grid in grids if grid))

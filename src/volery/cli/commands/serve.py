@@ -99,7 +99,7 @@ QGROUNDCONTROL_PORT = 14550
 
 def _mavlink_clients(address: Address, driver: str) -> list[str]:
     where = f"{address.host}:{address.port}"
-    if address.carrier == "tcp":
+    if address.transport == "tcp":
         return [
             f"  listening on tcp://{where}",
             f"  QGroundControl  Application Settings > Comm Links > Add: TCP, {address.host}, {address.port}",
@@ -135,7 +135,7 @@ def _pprzlink_clients(address: Address, driver: str) -> list[str]:
     """Paparazzi's ground segment, pprzlink, pprzros. All need the aircraft in their configuration."""
     from volery.vehicles.address import LOCAL_PORT
 
-    if address.carrier == "tcp":
+    if address.transport == "tcp":
         where = f"tcp://{address.host}:{address.port}"
         return [
             f"  listening on {where}; Paparazzi's own ground segment has no TCP",

@@ -20,7 +20,7 @@ from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import pipe, plan
 from volery.run.distributed.remote_ports import ValueCodec
 
-DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
+DELIVERY = Path(__file__).parents[4] / "examples" / "delivery"
 TYPES = """
 from dataclasses import dataclass
 from enum import Enum
