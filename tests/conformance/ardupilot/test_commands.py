@@ -161,13 +161,13 @@ def test_modes_show_the_recorded_bits(kind: str, bench: Any, facts: Any) -> None
     seen = set()
     for number in rig.autopilot.vehicle.rules.modes:
         for armed in (False, True):
-            rig.vehicle.armed = False
+            rig.vehicle.arming.armed = False
             rig.mode(number)
-            rig.vehicle.armed = armed
+            rig.vehicle.arming.armed = armed
             rig.vehicle.output.send_message("HEARTBEAT")
             rig.run(0.01)
             seen.add((rig.latest["HEARTBEAT"]["custom_mode"], rig.latest["HEARTBEAT"]["base_mode"]))
-    rig.vehicle.armed = False
+    rig.vehicle.arming.armed = False
     recorded = {tuple(pair) for pair in facts["modes"][kind]} - {(16, 65)}
     assert recorded <= seen
 

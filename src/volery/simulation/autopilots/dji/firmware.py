@@ -133,30 +133,29 @@ COPTER = Firmware(
 )
 
 ASSUMED: Mapping[str, str] = {
-    "switching on": f"it speaks after {to_seconds(READY):g} s, knows where it is after "
-    f"{to_seconds(ORIGIN):g} s, and may be trusted after {to_seconds(POSITION):g} s",
-    "activation": "succeeds with any key; the node of 4.1 activates by itself",
-    "authority": "is given while the mode switch is at F and it is activated, to any number of programs at "
-    "once",
-    "mode switch": f"channel {SWITCH} of the transmitter: F above {F_ABOVE}, P below {P_BELOW}, A between; "
-    f"`rc` shows {-500 * SWITCH_SCALE:g} at P, 0 at A, {500 * SWITCH_SCALE:g} at F; any move of "
-    "it takes the authority, and in the air it hovers",
-    "start of the motors": f"shows ENGINE_START for {to_seconds(ENGINE_START_TIME):g} s; home is there",
+    "switching on": f"the node publishes after {to_seconds(READY):g} s, the position is known after "
+    f"{to_seconds(ORIGIN):g} s and trusted after {to_seconds(POSITION):g} s",
+    "activation": "any key succeeds; the node of 4.1 activates automatically",
+    "authority": "given to any number of programs at once while the mode switch is at F and the "
+    "aircraft is activated",
+    "mode switch": f"channel {SWITCH} of the transmitter: F above {F_ABOVE}, P below {P_BELOW}, A "
+    f"between; `rc` shows {-500 * SWITCH_SCALE:g} at P, 0 at A, {500 * SWITCH_SCALE:g} at F; any "
+    "change withdraws the authority, and in flight the aircraft hovers",
+    "start of the motors": f"ENGINE_START for {to_seconds(ENGINE_START_TIME):g} s; sets the home position",
     "an M100": "has no `display_mode`, and shows FINISHED_LANDING for "
     f"{to_seconds(FINISHED_LANDING_TIME):g} s",
-    "`gps_health`": "is 5 once the position may be trusted, 3 with a fix before that, else 0",
-    "set-points": "have no effect during a take-off, and while it goes home or lands by its own decision; "
-    "they end what a program has asked for",
-    "set-points on the ground": f"lift it off above {LIFT_OFF_M:g} m, {LIFT_OFF_M_S:g} m/s or "
+    "`gps_health`": "5 once the position is trusted, 3 with a fix before that, else 0",
+    "set-points": "no effect during a take-off, and while the aircraft goes home or lands by its own "
+    "decision; they end tasks of a program",
+    "set-points on the ground": f"take off above {LIFT_OFF_M:g} m, {LIFT_OFF_M_S:g} m/s or "
     f"{LIFT_OFF_PERCENT:g} % of thrust",
     "set-points not flown": "angular rates, and thrust with anything but angles",
-    "without a position": "set-points about the ground are hovering level; P_GPS becomes ATTITUDE",
-    "missions": f"have {MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints; action {STAY_ACTION} is staying for so "
-    "many milliseconds; they start in the air only",
-    "`ack_data`": f"is {ACCEPTED} where it is accepted, {REFUSED} where it is refused",
-    "altitude for going home": f"is taken from {GO_HOME_ALTITUDES.lowest:g} to "
-    f"{GO_HOME_ALTITUDES.highest:g} m",
-    "battery": "is measured without error; once low it goes home, once critical it lands, and "
-    "set-points do not end that",
+    "without a position": "ground-relative set-points hover level; P_GPS becomes ATTITUDE",
+    "missions": f"{MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints; action {STAY_ACTION} stays for a number "
+    "of milliseconds; they start in flight only",
+    "`ack_data`": f"{ACCEPTED} where accepted, {REFUSED} where refused",
+    "altitude for going home": f"from {GO_HOME_ALTITUDES.lowest:g} to {GO_HOME_ALTITUDES.highest:g} m",
+    "battery": "measured without error; a low one goes home, a critical one lands, and set-points do "
+    "not end that",
 }
 """Subject and assumption, as in docs/dji.md."""

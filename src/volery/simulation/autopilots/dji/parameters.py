@@ -22,7 +22,7 @@ AIRCRAFT = tuple(HARDWARE)
 """Types of aircraft by value of the parameter AIRCRAFT."""
 
 _ASSUMED: tuple[tuple[str, int, float, str], ...] = (
-    ("AIRCRAFT", INT8, 0.0, "0 A3, 1 N3, 2 M100, 3 M600: what it says it is, and which numbers it uses"),
+    ("AIRCRAFT", INT8, 0.0, "0 A3, 1 N3, 2 M100, 3 M600: type of aircraft, and its numbering of states"),
     ("TAKEOFF_HEIGHT", REAL32, 1.2, "metres to which task 4 climbs"),
     ("SETPOINT_TIMEOUT", REAL32, 0.5, "seconds without a set-point after which it brakes and hovers"),
     ("GO_HOME_ALTITUDE", REAL32, 30.0, "metres above home to which it climbs before it goes home"),

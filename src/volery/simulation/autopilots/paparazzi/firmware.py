@@ -123,41 +123,44 @@ ROTORCRAFT = Firmware(
 ASSUMED: Mapping[str, str] = {
     "aircraft": "the stock rotorcraft: settings, blocks and waypoints of the files in "
     "`links/stock_rotorcraft`",
-    "switching on": "telemetry after 2 s, attitude aligned after 4 s, first fix after 12 s; it starts in NAV",
-    "Geo init": "lasts 10 s, then origin and home are where it stands; in the air it changes nothing",
-    "transmitter": "there is none; sticks by RC_4CH, RC_UP (roll, pitch, yaw, throttle, mode) or "
-    "JOYSTICK_RAW (switch at AUTO2) are one",
-    "sticks": "right, nose up and clockwise are positive; a frame is obeyed at once, the last one holds "
+    "switching on": "telemetry after 2 s, attitude aligned after 4 s, first fix after 12 s; the "
+    "start-up mode is NAV",
+    "Geo init": "lasts 10 s, then sets origin and home position at the vehicle; in the air it has no effect",
+    "transmitter": "none; manual control by RC_4CH, RC_UP (roll, pitch, yaw, throttle, mode) or "
+    "JOYSTICK_RAW (switch at AUTO2)",
+    "sticks": "right, nose up and clockwise are positive; a frame acts at once, the last one holds "
     "while the radio is LOST",
     "modes": "KILL, FAILSAFE, HOME, ATTITUDE_DIRECT, ATTITUDE_RC_CLIMB, ATTITUDE_Z_HOLD, HOVER_Z_HOLD, "
-    "NAV and GUIDED are built in; others are refused in silence",
-    "HOME": "flies straight to the waypoint HOME at that waypoint's height, and stays there: it does not "
-    "land",
-    "FAILSAFE": "sinks level and drifts with the wind; out of it lead `mode`, and a transmitter in MANUAL",
-    "KILL": "stops the motors anywhere; only another mode and then `kill_throttle` 0 starts them again",
+    "NAV and GUIDED are built in; others are refused without a report",
+    "HOME": "flies straight to the waypoint HOME at its height and stays there; it does not land",
+    "FAILSAFE": "level descent that drifts with the wind; left by the setting `mode`, or by a "
+    "transmitter in MANUAL",
+    "KILL": "stops the motors anywhere; they start again only in another mode and with `kill_throttle` 0",
     "kill_throttle": "starts motors in every mode but KILL, on the ground and in the air",
-    "arming_status": "ARMED; else why motors were last refused (KILLED, AHRS_NOT_ALLIGNED, LOW_BATTERY); "
-    "else NO_RC, WAITING or UNARMED_IN_AUTO",
-    "in flight": "motors on and the landed detector of the simulated flight stack not sure of the ground",
-    "NAV": "flies at the airframe's speeds, heading as it was when NAV began; on lines and circles it "
-    "follows a point 12 m ahead",
-    "block Takeoff": "climbs over the spot at NAV_CLIMB_VSPEED until 2 m, then goes on in Standby",
-    "block land here": "moves TD below it, sinks to TD's height, then at NAV_DESCEND_VSPEED to the "
-    "ground; there Holding point stops the motors",
-    "blocks in other modes": "run, but for starting and stopping motors; NAV flies where they have come to",
-    "GUIDED": "begins by holding place, height and heading; a set-point 0.3 m above, or a climb above 0.1 "
-    "m/s, lifts it off; on the ground it idles and keeps its motors on",
-    "GUIDED_SETPOINT_NED": "offsets count from the estimate when it arrives; body velocities are turned "
-    "once; numbers that are not finite are ignored",
-    "GUIDED_FULL_NED, REMOTE_GPS_LOCAL": "are not understood",
-    "MISSION_...": "are not understood: the stock plan flies no uploaded mission",
+    "arming_status": "ARMED; else the reason of the last refusal (KILLED, AHRS_NOT_ALLIGNED, "
+    "LOW_BATTERY); else NO_RC, WAITING or UNARMED_IN_AUTO",
+    "in flight": "motors on, and the landed detector of the simulated flight stack does not detect the "
+    "ground",
+    "NAV": "flies at the airframe's speeds with the heading at entry; on lines and circles it follows a "
+    "point 12 m ahead",
+    "block Takeoff": "climbs vertically at NAV_CLIMB_VSPEED to 2 m, then continues with Standby",
+    "block land here": "moves TD below the vehicle, descends to TD's height, then at NAV_DESCEND_VSPEED "
+    "to the ground, where Holding point stops the motors",
+    "blocks in other modes": "execute, except for starting and stopping motors; NAV continues from "
+    "their present state",
+    "GUIDED": "begins by holding position and heading; a set-point 0.3 m above, or a climb above 0.1 "
+    "m/s, takes off; on the ground the motors idle and stay on",
+    "GUIDED_SETPOINT_NED": "offsets count from the estimate at arrival; body velocities are rotated "
+    "once; values that are not finite are ignored",
+    "GUIDED_FULL_NED, REMOTE_GPS_LOCAL": "not supported",
+    "MISSION_...": "not supported: the stock plan flies no uploaded mission",
     "guided in NAV": "does not occur: the stock plan has no guided instruction",
     "EMERGENCY_CMD": "KILL: mode KILL; STANDBY: mode NAV in block Standby; LAND: mode FAILSAFE",
-    "MOVE_WP": "takes effect at once and is answered with WP_MOVED_ENU; nothing before there is an origin",
-    "telemetry": "ATTITUDE and ROTORCRAFT_RADIO_CONTROL each 0.5 s, DL_VALUE 1.1 s and WP_MOVED_ENU 1.3 s "
-    "in turn; ROTORCRAFT_STATUS also when the mode changes",
-    "satellites lost in GUIDED": "changes nothing: it flies on by what the estimator believes",
-    "sea level": "and ellipsoid are one surface",
-    "battery": "is measured without error; only FAILSAFE_ON_BAT_CRITICAL makes it count",
+    "MOVE_WP": "acts at once and is answered by WP_MOVED_ENU; ignored before there is an origin",
+    "telemetry": "ATTITUDE and ROTORCRAFT_RADIO_CONTROL every 0.5 s, DL_VALUE 1.1 s and WP_MOVED_ENU "
+    "1.3 s in turn; ROTORCRAFT_STATUS also when the mode changes",
+    "satellites lost in GUIDED": "no effect: the vehicle flies on with the estimate",
+    "sea level": "coincides with the ellipsoid",
+    "battery": "measured without error; it counts only with FAILSAFE_ON_BAT_CRITICAL",
 }
 """Subject and assumption, as in docs/paparazzi.md."""
