@@ -287,7 +287,7 @@ class PosePublisher:
         self._publish("global_position/local", self._odometry(place, velocity, at))
 
     def _odometry(self, place: frames.Vector, velocity: frames.Vector, at: Ns) -> Any:
-        """Return an odometry. Velocity is ENU in ``global_position/local`` and FLU in ``odom``, as in MAVROS."""
+        """Return an odometry; velocity is ENU in ``global_position/local`` and FLU in ``odom`` (as MAVROS)."""
         odometry = new(_ODOMETRY, header=stamped(at, MAP), child_frame_id=BODY)
         odometry.pose.pose.position = _point(*place)
         odometry.twist.twist.linear = _vector(*velocity)

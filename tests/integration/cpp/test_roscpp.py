@@ -76,7 +76,7 @@ def test_two_nodes_talk(run_model):
 
 
 def test_it_compiles_without_boost(tmp_path):
-    headers = roscpp.generate(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
+    headers = roscpp.generate_headers(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
     for name, text in headers.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)

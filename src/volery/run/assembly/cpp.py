@@ -183,7 +183,7 @@ class TracingCompiler:
 
 
 LANGUAGES = ("c++", "roscpp")
-_ROSCPP = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate)
+_ROSCPP = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate_headers)
 
 
 def is_cpp(component: Component) -> bool:

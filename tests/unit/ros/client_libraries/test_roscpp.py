@@ -21,7 +21,7 @@ HERE = Path(__file__)
 
 
 def test_a_header_and_those_that_it_needs():
-    texts = roscpp.generate(["geometry_msgs/PoseStamped.h", "vector", "mavros_msgs/VFR_HUD.h"], HERE)
+    texts = roscpp.generate_headers(["geometry_msgs/PoseStamped.h", "vector", "mavros_msgs/VFR_HUD.h"], HERE)
     assert {"geometry_msgs/PoseStamped.h", "geometry_msgs/Point.h", "std_msgs/Header.h"} <= set(texts)
     pose = texts["geometry_msgs/PoseStamped.h"]
     assert '#include "std_msgs/Header.h"' in pose
@@ -35,7 +35,7 @@ def test_a_header_and_those_that_it_needs():
 
 
 def test_services_constants_and_arrays():
-    texts = roscpp.generate(
+    texts = roscpp.generate_headers(
         ["std_srvs/SetBool.h", "sensor_msgs/CameraInfo.h", "sensor_msgs/NavSatStatus.h"], HERE
     )
     assert "using Request = SetBoolRequest;" in texts["std_srvs/SetBool.h"]
@@ -48,7 +48,9 @@ def test_services_constants_and_arrays():
 
 
 def test_what_ros_has_and_is_not_offered_says_so():
-    texts = roscpp.generate(["ros/callback_queue.h", "std_msgs/Nothing.h", "ros/ros.h", "foo/bar.h"], HERE)
+    texts = roscpp.generate_headers(
+        ["ros/callback_queue.h", "std_msgs/Nothing.h", "ros/ros.h", "foo/bar.h"], HERE
+    )
     assert set(texts) == {"ros/callback_queue.h", "std_msgs/Nothing.h"}
     assert all("is not offered" in text for text in texts.values())
 

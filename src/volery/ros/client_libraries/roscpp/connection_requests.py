@@ -1,7 +1,4 @@
-"""A ``ros::Timer``: calls back while the node spins.
-
-Topics, services, timers and spinning, as code written for roscpp asks for them.
-"""
+"""Handlers of the requests about topics, services, timers and spinning."""
 
 from __future__ import annotations
 
@@ -15,9 +12,115 @@ from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Sess
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, QoS, ServiceError, Timer
 from volery.ros.messages import from_cdr, service, to_cdr
 
+# -- topics
 
-class CppTimer:
-    """Calls the callable numbered *callback* each *period*, or once."""
+
+def _subscriber_qos(depth: int) -> QoS:
+    """Return a QoS that matches every publisher, because ROS 1 has no QoS."""
+    return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
+
+
+class _Publisher:
+    """A publisher of messages in CDR."""
+
+    def __init__(self, session: Session, arguments: Reader) -> None:
+        topic, self._type = arguments.text(), arguments.text()
+        depth, latched = arguments.integer(), arguments.flag()
+        qos = LATCHED if latched else QoS(depth or None)
+        self.made = session.node.advertise(topic, self._type, qos)
+        self.close = self.made.close
+
+    def publish(self, data: bytes) -> None:
+        """Publish the message that *data* encodes."""
+        self.made.publish(from_cdr(self._type, data))
+
+
+def _publish(session: Session, arguments: Reader) -> None:
+    session.find(arguments.integer(), _Publisher).publish(arguments.raw())
+
+
+def _subscribe(session: Session, arguments: Reader) -> int:
+    topic, kind = arguments.text(), arguments.text()
+    depth, callback = arguments.integer(), arguments.integer()
+
+    def on_message(message: Any) -> None:
+        session.call_back(callback, to_cdr(message))
+
+    return session.keep(session.node.subscribe(topic, kind, on_message, _subscriber_qos(depth)))
+
+
+def _publisher_count(session: Session, arguments: Reader) -> int:
+    count: int = session.entity(arguments.integer()).publishers()
+    return count
+
+
+def _wait_for_message(session: Session, arguments: Reader) -> bytes:
+    topic, kind, within = arguments.text(), arguments.text(), _timeout(arguments.integer())
+    received: list[Any] = []
+    group = session.node.group()
+    subscription = session.node.subscribe(topic, kind, received.append, _subscriber_qos(1), group)
+    try:
+        group.spin_once(within)
+    finally:
+        subscription.close()
+    reply = Writer().flag(bool(received)).done()
+    return reply + to_cdr(received[0]) if received else reply
+
+
+def _timeout(timeout: Ns) -> Ns | None:
+    """Return a time-out of roscpp, of which a negative one means none."""
+    return None if timeout < 0 else timeout
+
+
+# -- services
+
+
+def _serve(session: Session, arguments: Reader) -> int:
+    name, request_type, callback = arguments.text(), arguments.text(), arguments.integer()
+    kind = service(request_type.removesuffix("_Request"))
+
+    def handler(request: Any) -> Any:
+        result = Reader(session.call_back(callback, to_cdr(request)))
+        if not result.flag():
+            raise RefusedRequestError(name, "its handler returned false")
+        return from_cdr(kind.response.__msgtype__, result.raw())
+
+    return session.keep(session.node.serve(name, kind.name, handler))
+
+
+class _Client:
+    """A client of a service whose requests and responses are in CDR."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._request = service(client.type).request.__msgtype__
+
+    def call(self, data: bytes) -> bytes | None:
+        """Return the encoded response, or None if the call fails."""
+        try:
+            return to_cdr(self._client.call(from_cdr(self._request, data)))
+        except ServiceError:
+            return None
+
+
+def _create_client(session: Session, arguments: Reader) -> int:
+    return session.keep(_Client(session.node.client(arguments.text(), arguments.text())))
+
+
+def _call(session: Session, arguments: Reader) -> bytes:
+    response = session.find(arguments.integer(), _Client).call(arguments.raw())
+    return Writer().flag(response is not None).done() + (response or b"")
+
+
+def _wait_for_service(session: Session, arguments: Reader) -> bool:
+    return session.node.wait_for_service(arguments.text(), _timeout(arguments.integer()))
+
+
+# -- timers
+
+
+class _Timer:
+    """A ``ros::Timer``, which calls the callable numbered *callback* each *period*, or once."""
 
     def __init__(self, session: Session, period: Ns, callback: int, *, oneshot: bool) -> None:
         if period <= 0:
@@ -30,28 +133,28 @@ class CppTimer:
         self._oneshot = oneshot
         self._timer: Timer | None = None
         self._expected: Ns = 0
-        self._last: tuple[Ns, Ns] = (0, 0)  # when the last call was expected, and when it was
+        self._last: tuple[Ns, Ns] = (0, 0)  # expected and actual time of the last call
         self._took: Ns = 0
 
     @property
     def started(self) -> bool:
-        """Whether it will call back."""
+        """Whether the timer runs."""
         return self._timer is not None
 
     def start(self) -> None:
-        """Call back, for the first time after one period. Nothing changes if it does already."""
+        """Start the timer; the first call is one period from now. A running timer is not changed."""
         if self._timer is None:
             self._expected = self._session.now() + self._period
             self._timer = self._session.node.timer(self._period, self._fire)
 
     def close(self) -> None:
-        """Call back no longer."""
+        """Stop the timer."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
-    def change(self, period: Ns) -> None:
-        """Another period, counted from now."""
+    def set_period(self, period: Ns) -> None:
+        """Set another period, which begins now."""
         self._period = period
         if self.started:
             self.close()
@@ -70,152 +173,41 @@ class CppTimer:
         self._took = self._session.now() - now
 
 
-def _listening(depth: int) -> QoS:
-    """ROS 1 knows no QoS: a subscriber takes what is offered."""
-    return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
-
-
-class _Publisher:
-    """A publisher of messages that come as bytes."""
-
-    def __init__(self, session: Session, asked: Reader) -> None:
-        topic, self._type = asked.text(), asked.text()
-        depth, latched = asked.integer(), asked.flag()
-        qos = LATCHED if latched else QoS(depth or None)
-        self.made = session.node.advertise(topic, self._type, qos)
-        self.close = self.made.close
-
-    def publish(self, data: bytes) -> None:
-        """Send the message that these bytes are."""
-        self.made.publish(from_cdr(self._type, data))
-
-
-def _publish(session: Session, asked: Reader) -> None:
-    session.find(asked.integer(), _Publisher).publish(asked.raw())
-
-
-def _subscribers(session: Session, asked: Reader) -> int:
-    return session.find(asked.integer(), _Publisher).made.subscribers()
-
-
-def _subscribe(session: Session, asked: Reader) -> int:
-    topic, kind, depth, callback = asked.text(), asked.text(), asked.integer(), asked.integer()
-
-    def received(message: Any) -> None:
-        session.call_back(callback, to_cdr(message))
-
-    return session.keep(session.node.subscribe(topic, kind, received, _listening(depth)))
-
-
-def _publishers(session: Session, asked: Reader) -> int:
-    count: int = session.thing(asked.integer()).publishers()
-    return count
-
-
-def _wait_for_message(session: Session, asked: Reader) -> bytes:
-    topic, kind, within = asked.text(), asked.text(), _within(asked.integer())
-    received: list[Any] = []
-    group = session.node.group()
-    subscription = session.node.subscribe(topic, kind, received.append, _listening(1), group)
-    try:
-        group.spin_once(within)
-    finally:
-        subscription.close()
-    written = Writer().flag(bool(received))
-    return written.done() + to_cdr(received[0]) if received else written.done()
-
-
-def _within(timeout: Ns) -> Ns | None:
-    """roscpp's time-outs: what is below zero is for ever."""
-    return None if timeout < 0 else timeout
-
-
-# -- services
-
-
-def _serve(session: Session, asked: Reader) -> int:
-    name, request, callback = asked.text(), asked.text(), asked.integer()
-    kind = service(request.removesuffix("_Request"))
-
-    def handler(wanted: Any) -> Any:
-        said = Reader(session.call_back(callback, to_cdr(wanted)))
-        if not said.flag():
-            raise RefusedRequestError(name, "its handler returned false")
-        return from_cdr(kind.response.__msgtype__, said.raw())
-
-    return session.keep(session.node.serve(name, kind.name, handler))
-
-
-class _Client:
-    """A client of requests that come as bytes."""
-
-    def __init__(self, client: Client) -> None:
-        self._client = client
-        self._request = service(client.type).request.__msgtype__
-
-    def call(self, data: bytes) -> bytes | None:
-        """The answer's bytes; ``None`` if there is none."""
-        try:
-            return to_cdr(self._client.call(from_cdr(self._request, data)))
-        except ServiceError:
-            return None
-
-
-def _make_client(session: Session, asked: Reader) -> int:
-    return session.keep(_Client(session.node.client(asked.text(), asked.text())))
-
-
-def _call(session: Session, asked: Reader) -> bytes:
-    answer = session.find(asked.integer(), _Client).call(asked.raw())
-    return Writer().flag(answer is not None).done() + (answer or b"")
-
-
-def _wait_for_service(session: Session, asked: Reader) -> bool:
-    return session.node.wait_for_service(asked.text(), _within(asked.integer()))
-
-
-# -- timers and spinning
-
-
-def _timer(session: Session, asked: Reader) -> int:
-    period, oneshot, autostart, callback = asked.integer(), asked.flag(), asked.flag(), asked.integer()
-    timer = CppTimer(session, period, callback, oneshot=oneshot)
+def _create_timer(session: Session, arguments: Reader) -> int:
+    period, oneshot, autostart = arguments.integer(), arguments.flag(), arguments.flag()
+    timer = _Timer(session, period, arguments.integer(), oneshot=oneshot)
     if autostart:
         timer.start()
     return session.keep(timer)
 
 
-def _find_timer(session: Session, asked: Reader) -> CppTimer:
-    return session.find(asked.integer(), CppTimer)
-
-
-def _spin_once(session: Session, flow: CppFiber, asked: Reader) -> None:
-    session.spin(flow, session.node.spin_available)
-
-
-def _spin(session: Session, flow: CppFiber, asked: Reader) -> None:
-    session.spin(flow, session.node.spin)
+def _find_timer(session: Session, arguments: Reader) -> _Timer:
+    return session.find(arguments.integer(), _Timer)
 
 
 SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
-    "advertise": lambda session, asked: session.keep(_Publisher(session, asked)),
+    "advertise": lambda session, arguments: session.keep(_Publisher(session, arguments)),
     "publish": _publish,
-    "subscribers": _subscribers,
+    "subscribers": lambda session, arguments: session.find(
+        arguments.integer(), _Publisher
+    ).made.subscribers(),
     "subscribe": _subscribe,
-    "publishers": _publishers,
+    "publishers": _publisher_count,
     "wait_for_message": _wait_for_message,
     "serve": _serve,
-    "client": _make_client,
+    "client": _create_client,
     "call": _call,
     "wait_for_service": _wait_for_service,
-    "timer": _timer,
-    "timer_start": lambda session, asked: _find_timer(session, asked).start(),
-    "timer_stop": lambda session, asked: _find_timer(session, asked).close(),
-    "timer_started": lambda session, asked: _find_timer(session, asked).started,
-    "timer_period": lambda session, asked: _find_timer(session, asked).change(asked.integer()),
+    "timer": _create_timer,
+    "timer_start": lambda session, arguments: _find_timer(session, arguments).start(),
+    "timer_stop": lambda session, arguments: _find_timer(session, arguments).close(),
+    "timer_started": lambda session, arguments: _find_timer(session, arguments).started,
+    "timer_period": lambda session, arguments: _find_timer(session, arguments).set_period(
+        arguments.integer()
+    ),
 }
 
-WITH_FLOW: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
-    "spin_once": _spin_once,
-    "spin": _spin,
+WITH_FIBER: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
+    "spin_once": lambda session, fiber, arguments: session.spin(fiber, session.node.spin_available),
+    "spin": lambda session, fiber, arguments: session.spin(fiber, session.node.spin),
 }

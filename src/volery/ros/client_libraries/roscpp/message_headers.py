@@ -1,4 +1,4 @@
-"""Headers of message and service types, generated from their definitions: ``std_msgs/String.h`` and so on."""
+"""C++ headers of message and service types, generated from their definitions: ``std_msgs/String.h`` etc."""
 
 from __future__ import annotations
 
@@ -22,12 +22,18 @@ _BASES = {
 _TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Duration": "ros::Duration"}
 
 
-def generate(includes: Sequence[str], path: Path) -> Mapping[str, str]:
-    """The headers that *includes* name, and those they include, by name.
+def generate_headers(includes: Sequence[str], path: Path) -> Mapping[str, str]:
+    """Return the texts of the headers that *includes* name, and of those they include, by name.
 
-    *path* is the component's file or folder: packages of interfaces near it are found. What is of ROS and not
-    offered says so, lest the compiler finds a real one; other names are left to it. ``ModelError`` where an
-    interface's file is no definition.
+    A header of ROS that is not offered becomes an ``#error``, so that the compiler does not find a real one.
+    Other names are left to the compiler.
+
+    Args:
+        includes: Names in the ``#include`` lines of a file.
+        path: File or folder of the component; interface packages near it are found.
+
+    Raises:
+        ModelError: The file of an interface is not a valid definition.
     """
     named = [found for name in includes if (found := _HEADER.match(name))]
     messages.define_packages(path, dict.fromkeys(found[1] for found in named))
@@ -63,7 +69,7 @@ def _add(texts: dict[str, str], package: str, label: str) -> None:
 
 
 def _halves(package: str, label: str) -> Iterable[str]:
-    """``TriggerRequest`` may be half of a service."""
+    """Yield the names of the request or response that a label such as ``TriggerRequest`` may mean."""
     for ending in ("Request", "Response"):
         if label.endswith(ending):
             yield f"{package}/srv/{label.removesuffix(ending)}_{ending}"
@@ -110,7 +116,7 @@ def _ros1(name: str) -> str:
 
 
 def message_header(package: str, label: str, layout: Layout) -> str:
-    """The text of ``package/label.h``."""
+    """Return the text of ``package/label.h``."""
     nested = dict.fromkeys(one.nested for one in layout.fields if one.nested and one.nested not in _TIMES)
     lines = [
         f"// Generated from the definition of {layout.label}.",
@@ -121,7 +127,7 @@ def message_header(package: str, label: str, layout: Layout) -> str:
     lines += ["", f"namespace {package} {{", "", f"struct {label} {{"]
     lines += [f"    using Ptr = boost::shared_ptr<{label}>;"]
     lines += [f"    using ConstPtr = boost::shared_ptr<{label} const>;"]
-    lines += [f"    {_declared(one)}" for one in layout.constants]
+    lines += [f"    {_constant(one)}" for one in layout.constants]
     lines += [f"    {_type(one)} {one.name}{{}};" for one in layout.fields]
     lines += ["    template <class Visitor, class Message>"]
     lines += ["    static void each_([[maybe_unused]] Visitor& visit, [[maybe_unused]] Message& message) {"]
@@ -134,7 +140,7 @@ def message_header(package: str, label: str, layout: Layout) -> str:
     return "\n".join([*lines, "", f"}}  // namespace {package}", ""])
 
 
-def _declared(one: Constant) -> str:
+def _constant(one: Constant) -> str:
     if one.base == "string":
         text = str(one.value).replace("\\", "\\\\").replace('"', '\\"')
         return f'static inline const std::string {one.name} = "{text}";'

@@ -1,11 +1,11 @@
-"""A C++ component's node: what it has on the graph, by the numbers that its code knows them by."""
+"""The node of a C++ component and the entities that its code refers to by number."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
@@ -15,25 +15,22 @@ from volery.ros.client_libraries.abi_codec import CppFiber
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph, ServiceError
 
-Thing = TypeVar("Thing")
-
-
-class Closes(Protocol):
-    """What a node has on the graph."""
-
-    def close(self) -> None:
-        """It is gone."""
+Entity = TypeVar("Entity")
 
 
 class RefusedRequestError(ServiceError):
-    """A handler of the code returned false: its caller is told, the code itself goes on."""
+    """A service handler of the code returned false. The caller gets an error; the code continues."""
 
 
 @dataclass(eq=False)
 class Session:
-    """The node of the component called *component*; there is none before ``ros::init``.
+    """The node of one component; it exists from ``ros::init`` on.
 
-    *nodes* holds, by component, nodes that are there already: ``ros::init`` finds its own there.
+    Args:
+        graph: The graph of the run.
+        component: Name of the component.
+        launch: Launch settings of the component.
+        nodes: Existing nodes by component, which ``ros::init`` uses.
     """
 
     graph: RosGraph
@@ -42,7 +39,7 @@ class Session:
     nodes: Mapping[str, Node] = field(default_factory=dict)
     opened: Node | None = None
     finished: bool = False
-    _things: dict[int, Any] = field(default_factory=dict)
+    _entities: dict[int, Any] = field(default_factory=dict)
     _spinning: dict[Task, CppFiber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -50,7 +47,7 @@ class Session:
         self._ended = Signal(self.kernel, f"{self.component} (ros::waitForShutdown)")
 
     def join(self, name: str, anonymous: bool) -> None:
-        """``ros::init``: a second call changes nothing."""
+        """Execute ``ros::init``; a second call changes nothing."""
         if self.opened is not None:
             return
         launched = self.component != ""
@@ -64,18 +61,18 @@ class Session:
 
     @property
     def node(self) -> Node:
-        """The node; ``UsageError`` before ``ros::init``."""
+        """The node. Raises ``UsageError`` before ``ros::init``."""
         if self.opened is None:
             raise UsageError(f"{self.component}: call ros::init() before the first ros::NodeHandle")
         return self.opened
 
     def ok(self) -> bool:
-        """Whether it has joined and is not shutting down. An interaction point."""
+        """Return whether the node exists and is not shut down. An interaction point."""
         with self.kernel:
             return self.opened is not None and not self.finished
 
     def end(self) -> None:
-        """Shut down: leave the graph, let those who spin return."""
+        """Shut down: leave the graph; spinning tasks return."""
         if not self.finished:
             self.finished = True
             if self.opened is not None:
@@ -83,43 +80,43 @@ class Session:
             self._ended.notify()
 
     def wait_for_end(self) -> None:
-        """Block until it shuts down."""
+        """Block until the shutdown."""
         self._ended.wait_for(lambda: self.finished, ends_activation=True)
 
     def now(self) -> Ns:
-        """ROS time; an interaction point, also before ``ros::init``."""
+        """Return ROS time, also before ``ros::init``. An interaction point."""
         with self.kernel as kernel:
             return self.graph.epoch + kernel.now()
 
-    # -- what the code holds
+    # -- entities that the code refers to
 
-    def keep(self, thing: object) -> int:
-        """The number of *thing* from now on."""
-        number = len(self._things)
-        self._things[number] = thing
+    def keep(self, entity: object) -> int:
+        """Store an entity and return its number."""
+        number = len(self._entities)
+        self._entities[number] = entity
         return number
 
-    def find(self, number: int, kind: type[Thing]) -> Thing:
-        """What has that number."""
-        thing = self._things[number]
-        assert isinstance(thing, kind), f"{number} is no {kind.__name__}"
-        return thing
+    def find(self, number: int, kind: type[Entity]) -> Entity:
+        """Return the entity with a number."""
+        entity = self._entities[number]
+        assert isinstance(entity, kind), f"{number} is no {kind.__name__}"
+        return entity
 
-    def thing(self, number: int) -> Any:
-        """What has that number, of whatever kind."""
-        return self._things[number]
+    def entity(self, number: int) -> Any:
+        """Return the entity with a number, of any kind."""
+        return self._entities[number]
 
     def close(self, number: int) -> None:
-        """Take it off the graph."""
-        self._things[number].close()
+        """Remove an entity from the graph."""
+        self._entities[number].close()
 
-    # -- callbacks run on the stack of whoever spins
+    # -- callbacks, which run on the stack of the spinning fiber
 
-    def spin(self, flow: CppFiber, spinning: Callable[[], object]) -> None:
-        """Run *spinning*, which runs callbacks, for the flow that asked for it."""
+    def spin(self, fiber: CppFiber, spinning: Callable[[], object]) -> None:
+        """Execute *spinning*, which runs callbacks, for the fiber that has requested it."""
         task = current_task(self.kernel)
         before = self._spinning.get(task)
-        self._spinning[task] = flow
+        self._spinning[task] = fiber
         try:
             while True:
                 try:
@@ -134,5 +131,5 @@ class Session:
                 self._spinning[task] = before
 
     def call_back(self, callable_number: int, argument: bytes) -> bytes:
-        """Run a callback of the code; called while ``spin`` is under way."""
+        """Run a callback of the code. Must be called from within ``spin``."""
         return self._spinning[current_task(self.kernel)].call(callable_number, argument)
