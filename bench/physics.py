@@ -75,7 +75,7 @@ def free_world(bodies: int) -> tuple[Clock, World]:
 
 
 def our_steps(bodies: int, simulated: int, per_call: int) -> float:
-    """Body-steps a second of our bodies, *per_call* grid steps between looks."""
+    """Body-steps a second of our bodies, *per_call* grid steps between reads."""
     clock, world = free_world(bodies)
     calls = simulated * STEPS_PER_SECOND // per_call
 
@@ -107,7 +107,7 @@ def flying(vehicles: int) -> tuple[Clock, list[Flight]]:
 
 
 def flight_cost(vehicles: int, simulated: int) -> tuple[float, float]:
-    """Wall milliseconds a simulated second (looked at ten times), and microseconds a look in between."""
+    """Wall milliseconds a simulated second (read ten times), and microseconds a read in between."""
     clock, flights = flying(vehicles)
 
     def fly() -> None:
@@ -116,12 +116,12 @@ def flight_cost(vehicles: int, simulated: int) -> tuple[float, float]:
             for flight in flights:
                 flight.estimate()
 
-    def look() -> None:
+    def read() -> None:
         for _ in range(1000):
             for flight in flights:
                 flight.estimate()
 
-    return seconds_for(fly) / simulated * 1e3, seconds_for(look) / (1000 * vehicles) * 1e6
+    return seconds_for(fly) / simulated * 1e3, seconds_for(read) / (1000 * vehicles) * 1e6
 
 
 def main() -> None:
@@ -146,11 +146,11 @@ def main() -> None:
     verdict = "met" if median(ours) >= WANTED * reference else "NOT met"
     print(f"one body at least {WANTED:.0f} x RotorPy: {verdict}")
     for vehicles in (1, 20):
-        cost, look = flight_cost(vehicles, 20)
+        cost, read = flight_cost(vehicles, 20)
         pace = 1e3 / cost
-        print(f"{vehicles} flying with estimator and control, looked at ten times a second:")
+        print(f"{vehicles} flying with estimator and control, read ten times a second:")
         print(
-            f"  {cost:.2f} ms a simulated second ({pace:,.0f} x real time); a look in between {look:.2f} us"
+            f"  {cost:.2f} ms a simulated second ({pace:,.0f} x real time); a read in between {read:.2f} us"
         )
 
 

@@ -146,7 +146,7 @@ class ArmingTimes(NamedTuple):
     takeoff_slew: Ns = 0
     """Additional ramp of a slow start."""
     abandoned_after: Ns = 0
-    """A vehicle on the ground that no longer wants to fly counts as landed after that time."""
+    """A vehicle on the ground without a request to take off counts as landed after that time."""
 
 
 class ParameterTable(NamedTuple):

@@ -378,8 +378,8 @@ def rover_slope(row: Array, resting: bool) -> None:
     power = row[P_IDLE_POWER] + row[U_PAYLOAD]
     if not resting:
         row[W_SLOPE + S_STEER] = (row[W_THROTTLE] * top - row[W_STATE + S_STEER]) / row[P_STEERING_LAG]
-        wanted = row[W_THROTTLE + 1] * row[P_MAX_SPEED]
-        push = (wanted - speed) / row[P_SPEED_LAG]
+        target = row[W_THROTTLE + 1] * row[P_MAX_SPEED]
+        push = (target - speed) / row[P_SPEED_LAG]
         row[W_SLOPE + S_SPEED] = min(max(push, -row[P_GRIP]), row[P_GRIP])
         rate = turn_rate(row, speed, row[W_STATE + S_STEER])
         w, z = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 3]

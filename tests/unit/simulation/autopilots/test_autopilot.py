@@ -1,4 +1,4 @@
-"""The autopilot as its users see it: making one, its state, several links, an end."""
+"""The public interface of a simulated autopilot: creation, state, links, end."""
 
 from __future__ import annotations
 
@@ -50,22 +50,22 @@ def yard() -> Yard:
     return Yard(Multirotor(sensors="rtk", at=(3.0, 4.0, 0.0)))
 
 
-def test_the_dialect_is_found_by_its_name() -> None:
+def test_a_firmware_is_found_by_its_name() -> None:
     assert firmwares.load("ardupilot") is FIRMWARE
 
 
-def test_the_body_chooses_the_kind() -> None:
+def test_the_kind_of_body_selects_the_firmware() -> None:
     yard = Yard(Multirotor(), Rover(at=(5.0, 0.0, 0.0)))
     assert yard.autopilot(0).firmware.kind == "multirotor"
     assert yard.autopilot(1, system=2).firmware.kind == "rover"
 
 
-def test_a_dialect_of_another_kind_is_refused(yard: Yard) -> None:
+def test_a_firmware_for_another_kind_of_vehicle_is_refused(yard: Yard) -> None:
     with pytest.raises(UsageError, match=r"rover.*multirotor"):
         Autopilot(yard.kernel, yard.flights[0], FIRMWARE.kinds["rover"])
 
 
-def test_a_warm_vehicle_has_its_position_soon(yard: Yard) -> None:
+def test_a_warm_vehicle_has_a_position_within_the_warm_up_time(yard: Yard) -> None:
     autopilot = yard.autopilot(warm=True, name="drone_1")
     yard.run(0.5)
     state = autopilot.state()
@@ -74,7 +74,7 @@ def test_a_warm_vehicle_has_its_position_soon(yard: Yard) -> None:
     assert (state.vehicle, state.armed, state.mode) == ("drone_1", False, "STABILIZE")
 
 
-def test_a_cold_vehicle_sleeps_until_it_is_connected(yard: Yard) -> None:
+def test_a_cold_vehicle_boots_when_it_is_connected(yard: Yard) -> None:
     autopilot = yard.autopilot()
     yard.run(5.0)
     assert isnan(autopilot.state().estimated_x)
@@ -84,7 +84,7 @@ def test_a_cold_vehicle_sleeps_until_it_is_connected(yard: Yard) -> None:
     assert heard[0].system == 1
 
 
-def test_connecting_need_not_switch_it_on(yard: Yard) -> None:
+def test_connecting_can_leave_the_vehicle_off(yard: Yard) -> None:
     autopilot = yard.autopilot()
     ours, theirs = in_process_pair(yard.kernel, MS, "station")
     heard: list[Frame] = []
@@ -101,7 +101,7 @@ def test_the_banner_is_text_and_no_message(yard: Yard) -> None:
     assert b"Init ArduCopter V4.5.6" in yard.autopilot().banner
 
 
-def test_each_vehicle_answers_to_its_own_number() -> None:
+def test_each_vehicle_answers_to_its_own_system_id() -> None:
     yard = Yard(Multirotor(), Multirotor(at=(5.0, 0.0, 0.0)))
     stations = [yard.listen(yard.autopilot(index, system=index + 1, warm=True)) for index in range(2)]
     yard.run(0.5)
@@ -121,7 +121,7 @@ def _reading(system: int) -> dict[str, Any]:
     }
 
 
-def test_a_link_that_is_disconnected_hears_nothing_more(yard: Yard) -> None:
+def test_a_disconnected_link_receives_nothing_more(yard: Yard) -> None:
     autopilot = yard.autopilot(warm=True)
     ours, theirs = in_process_pair(yard.kernel, MS, "station")
     heard: list[Frame] = []
@@ -137,7 +137,7 @@ def test_a_link_that_is_disconnected_hears_nothing_more(yard: Yard) -> None:
     assert not heard
 
 
-def test_a_closed_autopilot_is_silent(yard: Yard) -> None:
+def test_a_closed_autopilot_sends_nothing(yard: Yard) -> None:
     autopilot = yard.autopilot(warm=True)
     _, heard = yard.listen(autopilot)
     yard.run(2.5)
@@ -148,7 +148,7 @@ def test_a_closed_autopilot_is_silent(yard: Yard) -> None:
     assert not heard
 
 
-def test_the_same_seed_says_the_same_words_at_the_same_time() -> None:
+def test_the_same_seed_gives_the_same_messages_at_the_same_times() -> None:
     def story() -> list[tuple[str, str]]:
         yard = Yard(Multirotor(sensors="consumer"))
         station, heard = yard.listen(yard.autopilot(warm=True))

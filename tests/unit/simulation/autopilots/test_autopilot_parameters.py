@@ -30,7 +30,7 @@ def test_parameters_keep_their_order_and_index() -> None:
     assert len(store) == 3
 
 
-def test_a_change_is_seen_by_name_and_by_index() -> None:
+def test_a_changed_value_is_read_by_name_and_by_index() -> None:
     store = Parameters(LISTED)
     assert store.set("C_THIRD", 12.0) == Parameter("C_THIRD", INT16, 12.0)
     assert store["C_THIRD"] == 12.0
@@ -45,7 +45,7 @@ def test_two_vehicles_do_not_share_values() -> None:
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-def test_what_is_no_number_changes_nothing(value: float) -> None:
+def test_a_value_that_is_not_finite_changes_nothing(value: float) -> None:
     store = Parameters(LISTED)
     assert store.set("A_SECOND", value) is None
     assert store["A_SECOND"] == 0.5
@@ -72,7 +72,7 @@ def test_values_fit_their_types(kind: int, given: float, kept: float) -> None:
     assert quantised(kind, given) == kept
 
 
-def test_an_override_takes_the_place_of_the_firmwares_value() -> None:
+def test_an_override_replaces_the_default() -> None:
     assert Parameters(LISTED, {"A_SECOND": 2.0})["A_SECOND"] == 2.0
 
 

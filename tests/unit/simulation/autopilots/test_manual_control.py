@@ -1,4 +1,4 @@
-"""Sticks: pulse widths to deflections, overrides and their ends."""
+"""RC channels: pulse widths to stick positions, overrides and their expiry."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_reversed_throttle_is_closed_at_its_high_end() -> None:
 
 
 @pytest.mark.parametrize("travel", [ChannelRange(1500, 1500, 1500, 20), ChannelRange(2000, 1500, 1000, 20)])
-def test_a_travel_without_a_way_gives_nothing(travel: ChannelRange) -> None:
+def test_a_channel_range_of_zero_width_gives_zero(travel: ChannelRange) -> None:
     assert travel.share(1500) == 0.0
     assert travel.deflection(1500) == 0.0
 
@@ -65,7 +65,7 @@ def test_channels_that_do_not_exist_are_not_overridden() -> None:
     assert sticks.pulses() == [1500]
 
 
-def test_a_map_says_which_channel_is_which_stick() -> None:
+def test_a_stick_map_selects_the_channel_of_each_stick() -> None:
     sticks = RcChannels([1000, 2000, 1500, 1500])
     pilot = StickMap(roll=2, pitch=1, throttle=3, yaw=4, travels=(STICK, STICK, THROTTLE, STICK)).read(sticks)
     assert (pilot.roll, pilot.pitch, pilot.yaw) == (1.0, -1.0, 0.0)

@@ -1,4 +1,4 @@
-"""The plan on board: which items navigate, which item is current."""
+"""The mission on board: items that navigate, and the current item."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from volery.simulation.autopilots.onboard_mission import (
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, TAKEOFF, LAND, RETURN, DELAY])
-def test_items_that_go_somewhere_or_wait_navigate(command: int) -> None:
+def test_items_that_move_or_wait_navigate(command: int) -> None:
     assert MissionItem(command).navigates
     assert not MissionItem(command).is_condition
 
@@ -37,7 +37,7 @@ def test_an_item_without_coordinates_has_no_place() -> None:
     assert MissionItem(LAND, y=-1).has_place
 
 
-def test_choosing_an_item_makes_a_finished_plan_fly_again() -> None:
+def test_choosing_an_item_restarts_a_complete_mission() -> None:
     plan = OnboardMission()
     plan.replace([MissionItem(WAYPOINT), MissionItem(TAKEOFF), MissionItem(LAND)])
     plan.complete = True
@@ -46,7 +46,7 @@ def test_choosing_an_item_makes_a_finished_plan_fly_again() -> None:
 
 
 @pytest.mark.parametrize("index", [-1, 3, 100])
-def test_items_that_are_not_there_cannot_be_chosen(index: int) -> None:
+def test_items_that_do_not_exist_cannot_be_chosen(index: int) -> None:
     plan = OnboardMission()
     plan.replace([MissionItem(WAYPOINT), MissionItem(TAKEOFF), MissionItem(LAND)])
     plan.choose(1)
@@ -54,7 +54,7 @@ def test_items_that_are_not_there_cannot_be_chosen(index: int) -> None:
     assert plan.current == 1
 
 
-def test_another_mission_begins_at_its_start() -> None:
+def test_a_new_mission_begins_at_its_start() -> None:
     plan = OnboardMission()
     plan.replace([MissionItem(WAYPOINT), MissionItem(TAKEOFF)])
     plan.choose(1)

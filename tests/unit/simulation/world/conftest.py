@@ -1,4 +1,4 @@
-"""A clock that is set by hand, and bodies whose battery neither sags nor empties."""
+"""A clock that the test sets, and a battery of constant voltage and unlimited capacity."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The laws against formulas that have a closed form."""
+"""Equations of motion against closed-form solutions."""
 
 import math
 
@@ -25,7 +25,7 @@ def dragless(ideal_battery):
 
 
 def in_the_air(world, spec, height, rotors):
-    """Put the one body of a world into the air, its rotors at speeds that its commands hold."""
+    """Put the body of a world into the air, with rotors at speeds that its commands hold."""
     row = world.arrays.rows[0]
     row[S_POSITION + 2] = height
     row[S_RESTING] = 0.0
@@ -61,7 +61,7 @@ def test_yaw_angle_under_constant_torque(clock, frame, dragless):
     assert world.truth(0).rates[2] == pytest.approx(acceleration * 10.0, rel=1e-9)
 
 
-def test_a_body_at_hover_thrust_stays_where_it_is(clock, frame, dragless):
+def test_a_body_at_hover_thrust_keeps_its_position(clock, frame, dragless):
     world = World(clock, [dragless], frame=frame)
     in_the_air(world, dragless, 100.0, (dragless.hover_speed,) * 4)
     clock.wait(60)
@@ -140,7 +140,7 @@ def test_a_body_upside_down_lies_on_the_ground_and_not_in_it(clock, frame, dragl
     assert world.truth(0).position[2] == pytest.approx(dragless.feet[2], abs=0.02)
 
 
-def test_thrust_turns_the_body_the_way_its_rotors_stand(clock, frame, dragless):
+def test_differential_thrust_rotates_the_body_according_to_the_rotor_positions(clock, frame, dragless):
     """More thrust in front pitches up (backwards), more on the left rolls right."""
     for stronger, axis, sign in (
         (lambda rotor: rotor.forward > 0, 1, -1),

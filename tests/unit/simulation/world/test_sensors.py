@@ -1,4 +1,4 @@
-"""What instruments show, against the errors that their set declares."""
+"""Sensor samples against the errors that their suite declares."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_errors_have_the_declared_deviations(sampled, sensors):
         assert spread == pytest.approx(error.bias_sigma, rel=0.4)
 
 
-def test_every_instrument_of_every_vehicle_has_noise_of_its_own(sampled):
+def test_the_noise_of_sensors_and_vehicles_is_uncorrelated(sampled):
     rows = sampled("consumer")
     series = np.concatenate(
         [np.diff(rows[:, :2, column], axis=0).T for column in (M_GYRO, M_GYRO + 1, M_ACCEL, M_BARO, M_GPS)]
@@ -62,7 +62,7 @@ def test_every_instrument_of_every_vehicle_has_noise_of_its_own(sampled):
     assert np.abs(correlation).max() < 0.35
 
 
-def test_perfect_instruments_have_no_error(sampled):
+def test_perfect_sensors_have_no_error(sampled):
     rows = sampled("perfect")
     assert (rows[..., M_GYRO : M_GYRO + 3] == 0.0).all()
     assert (rows[..., M_GPS] == 0.0).all()

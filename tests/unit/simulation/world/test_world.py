@@ -1,4 +1,4 @@
-"""The grid of time: who looks, and how often, changes nothing."""
+"""The time grid: reads have no effect on results."""
 
 import math
 
@@ -26,8 +26,8 @@ from volery.simulation.world.world import STEP, World
 SPECS = (Multirotor(), Rover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))
 
 
-def fly(clock, frame, looks, seed=3, wind=None):
-    """Three bodies, one second, a fixed schedule of inputs; *looks* are extra ones (milliseconds, body)."""
+def fly(clock, frame, reads, seed=3, wind=None):
+    """Run three bodies for a second with fixed inputs; *reads* are additional ones (milliseconds, body)."""
     clock.now = 0
     world = World(clock, SPECS, seed=seed, frame=frame, wind=wind)
     for millisecond in range(1000):
@@ -35,10 +35,10 @@ def fly(clock, frame, looks, seed=3, wind=None):
         if millisecond % 100 == 7:
             world.set_input(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
             world.set_input(1, U_THROTTLE, 0.1, 0.3)
-        for _ in range(looks.count((millisecond, 0))):
+        for _ in range(reads.count((millisecond, 0))):
             world.advance_to_now(0)
         for body in (1, 2):
-            if (millisecond, body) in looks:
+            if (millisecond, body) in reads:
                 world.advance_to_now(body)
     clock.now = 1000 * MS
     for body in range(3):
@@ -46,7 +46,7 @@ def fly(clock, frame, looks, seed=3, wind=None):
     return world.arrays.rows.tobytes()
 
 
-def test_extra_looks_change_not_a_byte(clock, frame):
+def test_additional_reads_change_no_byte(clock, frame):
     alone = fly(clock, frame, [])
     assert fly(clock, frame, [(m, b) for m in range(0, 1000, 3) for b in range(3)]) == alone
     assert fly(clock, frame, [(8, 0), (8, 0), (9, 0), (10, 2)]) == alone
@@ -78,7 +78,7 @@ def test_a_state_holds_over_its_whole_step(clock, frame):
     assert world.truth(0) == first
 
 
-def test_bodies_that_nobody_looks_at_are_not_computed(clock, frame):
+def test_bodies_that_are_not_read_are_not_advanced(clock, frame):
     world = World(clock, SPECS, frame=frame)
     for _ in range(20):
         clock.wait(0.1)
@@ -88,7 +88,7 @@ def test_bodies_that_nobody_looks_at_are_not_computed(clock, frame):
     assert world.arrays.reached.tolist() == [1000, 0, 1000]
 
 
-def test_bodies_in_view_advance_together_in_one_call(clock, frame):
+def test_bodies_that_are_read_advance_together_in_one_call(clock, frame):
     world = World(clock, SPECS, frame=frame)
     for body in range(3):
         world.advance_to_now(body)
@@ -109,7 +109,7 @@ def test_a_resting_body_does_not_move_or_turn(clock, frame):
     assert after.on_ground
 
 
-def test_wind_carries_what_has_drag(clock, frame, ideal_battery):
+def test_wind_carries_a_body_with_drag(clock, frame, ideal_battery):
     spec = Multirotor(sensors="perfect", battery=ideal_battery)
     world = World(clock, [spec], frame=frame, wind=Wind(east=5.0, north=-2.0))
     row = world.arrays.rows[0]
@@ -159,7 +159,7 @@ def test_gusts_have_their_deviation_and_their_correlation_time(clock, frame):
     assert later == pytest.approx(math.exp(-1.0), abs=0.08)
 
 
-def test_two_bodies_feel_gusts_of_their_own(clock, frame):
+def test_gusts_at_two_bodies_differ(clock, frame):
     world = World(clock, [Multirotor(), Multirotor()], frame=frame, wind=Wind(east=6.0, gust=1.5))
     clock.wait(5)
     world.advance_to_now(0)
@@ -188,14 +188,14 @@ def test_impossible_wind_and_empty_worlds_are_refused(clock, frame):
         World(clock, [], frame=frame)
 
 
-def test_an_unknown_sensor_set_is_named_with_the_valid_ones(clock, frame):
+def test_an_unknown_sensor_suite_is_refused_with_the_valid_names(clock, frame):
     with pytest.raises(
         UsageError, match=r"'consumr' \(did you mean 'consumer'\?\); there is consumer, perfect or rtk"
     ):
         World(clock, [Multirotor(sensors="consumr")], frame=frame)
 
 
-def test_declared_deviations_tell_the_sets_apart():
+def test_declared_deviations_differ_between_sensor_suites():
     assert declared_sigma("consumer").horizontal > 0.5
     assert declared_sigma("rtk").horizontal < 0.05
     assert declared_sigma("perfect") == (0.0, 0.0)
@@ -206,7 +206,7 @@ def test_declared_deviations_tell_the_sets_apart():
     ("latitude", "longitude", "declination", "inclination", "gauss"),
     [(47.40, 8.55, 3.3, 63.4, 0.484), (-35.36, 149.17, 12.4, -66.2, 0.583)],
 )
-def test_the_earths_field_is_that_of_the_charts(latitude, longitude, declination, inclination, gauss):
+def test_the_magnetic_field_matches_published_charts(latitude, longitude, declination, inclination, gauss):
     north, east, down = magnetic_field(LocalFrame(latitude, longitude, 0.0))
     across = math.hypot(north, east)
     assert math.degrees(math.atan2(east, north)) == pytest.approx(declination, abs=4.0)
@@ -214,7 +214,7 @@ def test_the_earths_field_is_that_of_the_charts(latitude, longitude, declination
     assert math.hypot(across, down) == pytest.approx(gauss, rel=0.06)
 
 
-def test_payload_power_is_dated_like_any_input(clock, frame):
+def test_payload_power_acts_from_the_next_grid_step_on(clock, frame):
     world = World(clock, [Rover()], frame=frame)
     world.payload_power(0, 12.0)
     assert world.arrays.rows[0, U_PAYLOAD] == 0.0
@@ -223,7 +223,7 @@ def test_payload_power_is_dated_like_any_input(clock, frame):
     assert truth.payload_j == pytest.approx(12.0 * (10.0 - STEP / 1e9), rel=1e-9)
 
 
-def test_the_digest_of_sources_changes_with_any_of_them(tmp_path):
+def test_the_digest_of_sources_changes_with_any_source(tmp_path):
     one, two = tmp_path / "a.py", tmp_path / "b.py"
     one.write_text("x = 1")
     two.write_text("y = 1")

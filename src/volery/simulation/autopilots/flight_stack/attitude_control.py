@@ -110,10 +110,10 @@ def _rate_targets(row: Array) -> tuple[float, float, float]:
 
 
 @njit(cache=False)
-def _torque(row: Array, axis: int, wanted: float) -> float:
+def _torque(row: Array, axis: int, target: float) -> float:
     """Return the output of one rate's PID as a share of full thrust by which motors differ."""
     rate = row[K_RATES + axis]
-    error = wanted - rate
+    error = target - rate
     if row[K_LANDED] > 0.5 or row[K_SPOOL] < 1.0:
         row[K_RATE_INTEGRAL + axis] *= 1.0 - STEP_S / 0.2
     else:
@@ -147,9 +147,9 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
         low, high = min(low, share), max(high, share)
     scale = 1.0 if high - low <= 1.0 else 1.0 / (high - low)
     low, high = low * scale, high * scale
-    wanted = row[K_THROTTLE] * row[K_SPOOL]
-    collective = clip(wanted, -low, max(1.0 - high, -low))
-    row[K_AT_LOWER_LIMIT] = 1.0 if wanted <= 0.01 - low else 0.0
+    target = row[K_THROTTLE] * row[K_SPOOL]
+    collective = clip(target, -low, max(1.0 - high, -low))
+    row[K_AT_LOWER_LIMIT] = 1.0 if target <= 0.01 - low else 0.0
     room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
     yaw = clip(yaw, -room, room)
     for i in range(4):

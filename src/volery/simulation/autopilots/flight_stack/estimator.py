@@ -238,8 +238,8 @@ def _reset_covariance(row: Array, axis: int, position: float, velocity: float) -
 @njit(cache=False)
 def _switch_aiding(row: Array) -> None:
     """Begin or end the use of satellites as commanded by C_AIDED."""
-    wanted = row[C_AIDED] > 0.5
-    if wanted and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
+    commanded = row[C_AIDED] > 0.5
+    if commanded and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
         row[K_AIDED] = 1.0
         row[K_GPS_AGE] = 0.0
         for axis in range(3):
@@ -252,7 +252,7 @@ def _switch_aiding(row: Array) -> None:
                 row, axis, _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
             )
         row[K_BARO_OFFSET] = row[M_BARO] + row[M_GPS + 2]
-    if not wanted and row[K_AIDED] > 0.5:
+    if not commanded and row[K_AIDED] > 0.5:
         row[K_AIDED] = 0.0
         for axis in range(2):
             row[K_VELOCITY + axis] = 0.0

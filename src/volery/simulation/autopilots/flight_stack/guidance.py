@@ -255,13 +255,13 @@ def _shape_yaw(row: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
     kind = int(row[C_YAW_MODE])
     if kind == 2:
-        wanted = row[C_YAW_RATE]
+        target = row[C_YAW_RATE]
     elif kind == 1:
         error = wrap_angle(row[C_YAW] - row[K_YAW_TARGET])
-        wanted = clip(approach(error, 2.0, _SLEW_BRAKE), -_SLEW, _SLEW)
+        target = clip(approach(error, 2.0, _SLEW_BRAKE), -_SLEW, _SLEW)
     else:
-        wanted = 0.0
-    row[K_YAW_SPEED] = ramp(row[K_YAW_SPEED], wanted, 2.0 * _SLEW_BRAKE * GUIDE_S)
+        target = 0.0
+    row[K_YAW_SPEED] = ramp(row[K_YAW_SPEED], target, 2.0 * _SLEW_BRAKE * GUIDE_S)
     ahead = wrap_angle(row[K_YAW_TARGET] - row[K_EULER + 2])
     if abs(ahead) > 0.5:
         row[K_YAW_TARGET] = wrap_angle(row[K_EULER + 2] + clip(ahead, -0.5, 0.5))

@@ -77,15 +77,15 @@ def _steer_for(row: Array, rate: float, speed: float) -> float:
 
 
 @njit(cache=False)
-def _throttle_for(row: Array, wanted: float) -> float:
+def _throttle_for(row: Array, target: float) -> float:
     """Return the throttle -1..1 for a speed [m/s]: feed-forward and PI."""
-    miss = wanted - _forward_speed(row)
-    if wanted == 0.0 and abs(miss) < 0.05:
+    miss = target - _forward_speed(row)
+    if target == 0.0 and abs(miss) < 0.05:
         row[K_SPEED_INTEGRAL] = 0.0
         return 0.0
     grown = row[K_SPEED_INTEGRAL] + _SPEED_INTEGRAL * miss * _PERIOD
     row[K_SPEED_INTEGRAL] = clip(grown, -0.3, 0.3)
-    return clip(wanted / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
+    return clip(target / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
 
 
 @njit(cache=False)
@@ -133,7 +133,7 @@ def guide_rover(row: Array) -> None:
     else:
         speed, rate = _along(row) if control == DRIVE else _to_point(row)
         row[K_TARGET_VELOCITY] = ramp(row[K_TARGET_VELOCITY], speed, row[C_ACCEL] * _PERIOD)
-        wanted = row[K_TARGET_VELOCITY]
-        row[K_MOTORS] = _steer_for(row, rate, wanted)
-        row[K_MOTORS + 1] = _throttle_for(row, wanted)
+        target = row[K_TARGET_VELOCITY]
+        row[K_MOTORS] = _steer_for(row, rate, target)
+        row[K_MOTORS + 1] = _throttle_for(row, target)
     row[K_THROTTLE] = row[K_MOTORS + 1]

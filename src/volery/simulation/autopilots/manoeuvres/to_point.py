@@ -224,10 +224,10 @@ class Return(Manoeuvre):
     def _return_height(self, height: float, away: float) -> float:
         """Height of the return: lower within a cone about home."""
         tuning = self.vehicle.tuning
-        wanted = tuning.return_height
+        target_height = tuning.return_height
         if tuning.return_cone > 0.0:
-            wanted = min(wanted, max(away * tuning.return_cone, 2.0))
-        return max(height, wanted)
+            target_height = min(target_height, max(away * tuning.return_cone, 2.0))
+        return max(height, target_height)
 
     def _begin(self, name: str, stage: Manoeuvre) -> None:
         self._name, self._stage = name, stage

@@ -268,9 +268,9 @@ class MissionService:
             self._acknowledge(upload.peer, CANCELLED)
             self._upload = None
             return
-        wanted = len(upload.items)
-        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.request(wanted)
-        upload.peer.answer(request, seq=wanted, mission_type=MISSION)
+        index = len(upload.items)
+        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.request(index)
+        upload.peer.answer(request, seq=index, mission_type=MISSION)
         upload.reminder = self._kernel.call_at(self._kernel.now() + REQUEST_PERIOD, self._request_item)
 
     def _drop_upload(self) -> None:

@@ -1,4 +1,4 @@
-"""One vehicle in a world of its own, with a clock that is set by hand."""
+"""One vehicle in a world, with a clock that the test sets."""
 
 import json
 from pathlib import Path
@@ -11,11 +11,11 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, 
 from volery.simulation.world.body_specs import Multirotor, Rover
 
 HERE = LocalFrame(-35.363261, 149.165230, 584.0)
-LOOK = 50 * MS
+READ_PERIOD = 50 * MS
 
 
 class Flown:
-    """A vehicle on its own: drive it, wait, and see what was."""
+    """One vehicle that a test drives and observes."""
 
     def __init__(self, spec, seed=1, wind=None):
         self.now = 0
@@ -25,11 +25,11 @@ class Flown:
         return self.now / S
 
     def wait(self, seconds, until=lambda estimate, truth: False):
-        """Look twenty times a second; returns (seconds since the call, estimate, truth) of each look."""
+        """Read 20 times a second and return (seconds since the call, estimate, truth) of each read."""
         start = self.now
         seen = []
         while self.now < start + round(seconds * S):
-            self.now += LOOK
+            self.now += READ_PERIOD
             estimate, truth = self.flight.estimate(), self.flight.truth()
             seen.append(((self.now - start) / S, estimate, truth))
             if until(estimate, truth):
@@ -40,7 +40,7 @@ class Flown:
         self.flight.drive(Setpoint(control, **targets))
 
     def ready(self, settle=20.0):
-        """Origin set, armed, motors idling."""
+        """Set the origin, and let the motors idle."""
         self.wait(1)
         self.flight.set_origin()
         self.wait(settle)
@@ -49,7 +49,7 @@ class Flown:
         return self
 
     def hover(self, height=10.0, **limits):
-        """At a height above the origin, settled."""
+        """Hover at a height above the origin."""
         self.ready()
         self.drive(Control.POSITION, position=(0.0, 0.0, -height), **limits)
         self.wait(20)

@@ -1,4 +1,4 @@
-"""What the autopilot believes against what is so."""
+"""Estimates against the true state."""
 
 import math
 
@@ -8,7 +8,7 @@ from volery.simulation.autopilots.flight_stack.flight import Control
 
 
 def horizontal_error(estimate, truth, flight):
-    """Metres in the plane between belief and truth, both about the world's origin."""
+    """Return the horizontal distance [m] between estimated and true position."""
     north, east, _ = flight.frame.to_ned(*estimate.geodetic)
     return math.hypot(north - truth.position[1], east - truth.position[0])
 
@@ -19,7 +19,7 @@ def vertical_error(estimate, truth, flight):
 
 
 def around(flown):
-    """A square of 40 m, and what was seen."""
+    """Fly a square of 40 m and return the reads."""
     seen = []
     for north, east in ((40.0, 0.0), (40.0, 40.0), (0.0, 40.0), (0.0, 0.0)):
         flown.drive(
@@ -49,12 +49,12 @@ def test_attitude_and_velocity_are_good_in_flight(drone, seed):
         assert abs((1.0 - 2.0 * (ex * ex + ey * ey)) - upright) < 0.03
         heading = math.pi / 2 - math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         assert abs(math.remainder(heading - estimate.attitude[2], 2.0 * math.pi)) < math.radians(5.0)
-        believed = (estimate.velocity[1], estimate.velocity[0], -estimate.velocity[2])
-        assert math.dist(believed, truth.velocity) < 0.5
+        estimated = (estimate.velocity[1], estimate.velocity[0], -estimate.velocity[2])
+        assert math.dist(estimated, truth.velocity) < 0.5
 
 
 @pytest.mark.parametrize("heading", [0.0, 90.0, -135.0])
-def test_it_aligns_to_any_heading_on_the_ground(drone, heading):
+def test_the_estimator_aligns_to_any_heading_on_the_ground(drone, heading):
     flown = drone("consumer", heading_deg=heading)
     estimate = flown.wait(20)[-1][1]
     assert estimate.attitude_ok
@@ -78,7 +78,7 @@ def test_position_is_valid_only_once_the_origin_is_set(drone):
     assert not flown.wait(1)[-1][1].position_ok
 
 
-def test_without_satellites_it_reckons_on_and_says_so(drone):
+def test_without_satellites_the_estimate_is_dead_reckoning_and_expires(drone):
     flown = drone("consumer").hover()
     flown.flight.block_gps()
     flown.wait(5)
@@ -96,7 +96,7 @@ def test_without_satellites_it_reckons_on_and_says_so(drone):
     assert estimate.gps.fix_type == 3
 
 
-def test_the_fix_is_where_the_vehicle_is(drone):
+def test_a_fix_is_close_to_the_true_position(drone):
     flown = drone("rtk").hover()
     estimate, truth = flown.flight.estimate(), flown.flight.truth()
     fix = estimate.gps
@@ -107,7 +107,7 @@ def test_the_fix_is_where_the_vehicle_is(drone):
     assert fix.h_acc < 0.05
 
 
-def test_instruments_at_rest_show_gravity_field_and_air(drone):
+def test_sensors_at_rest_measure_gravity_magnetic_field_and_pressure(drone):
     flown = drone("perfect", heading_deg=90.0)
     estimate = flown.wait(1)[-1][1]
     assert estimate.accel == pytest.approx((0.0, 0.0, -9.80665), abs=1e-9)
@@ -120,7 +120,7 @@ def test_instruments_at_rest_show_gravity_field_and_air(drone):
     assert estimate.battery_left == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_range_finder_ends_at_its_reach(drone):
+def test_the_range_finder_reports_nothing_beyond_its_range(drone):
     flown = drone("perfect").hover(20.0)
     assert flown.flight.estimate().rangefinder == pytest.approx(20.1, abs=0.1)
     flown.drive(Control.POSITION, position=(0.0, 0.0, -40.0))
@@ -128,7 +128,7 @@ def test_the_range_finder_ends_at_its_reach(drone):
     assert flown.flight.estimate().rangefinder is None
 
 
-def test_a_stuck_barometer_and_compass_show_in_their_samples(drone):
+def test_a_stuck_barometer_and_magnetometer_repeat_their_samples(drone):
     flown = drone("consumer")
     flown.wait(1)
     flown.flight.block_barometer()
@@ -149,7 +149,7 @@ def test_losing_half_of_a_motor_turns_the_vehicle_over(drone):
     assert truth.position[2] < 25.0
 
 
-def test_the_computers_drain_shows_in_the_battery(drone):
+def test_payload_power_is_drawn_from_the_battery(drone):
     flown = drone("perfect")
     flown.wait(1)
     before = flown.flight.estimate().battery_amps
@@ -159,7 +159,7 @@ def test_the_computers_drain_shows_in_the_battery(drone):
     assert flown.flight.truth().payload_j == pytest.approx(10.0, abs=0.1)
 
 
-def test_fixes_come_at_the_declared_rate(drone):
+def test_fixes_arrive_at_the_declared_rate(drone):
     for sensors, rate in (("consumer", 5), ("rtk", 10)):
         flown = drone(sensors)
         first = flown.wait(1)[-1][1].gps.count

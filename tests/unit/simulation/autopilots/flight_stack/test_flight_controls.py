@@ -1,4 +1,4 @@
-"""Each control does what its name says."""
+"""Each control of the inner loops reaches and holds its quantities."""
 
 import math
 from math import radians
@@ -12,7 +12,7 @@ from volery.simulation.world.body_specs import Battery
 from volery.simulation.world.environment_models import Wind
 
 
-def test_off_means_that_motors_stand_still_and_idle_that_they_turn(drone):
+def test_off_stops_the_motors_and_idle_turns_them(drone):
     flown = drone("perfect")
     flown.wait(1)
     assert flown.flight.estimate().motor_pwm == (1000, 1000, 1000, 1000)
@@ -25,7 +25,7 @@ def test_off_means_that_motors_stand_still_and_idle_that_they_turn(drone):
     assert flown.flight.estimate().motors == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_position_holds_still_to_a_nanometre_without_noise(drone):
+def test_position_control_holds_to_a_nanometre_without_noise(drone):
     ideal = Battery(capacity_ah=1e12, resistance_ohm=1e-18)
     flown = drone("perfect", battery=ideal).hover()
     flown.wait(240)
@@ -71,7 +71,7 @@ def test_height_is_kept_while_flying_at_a_velocity(drone):
     assert estimate.velocity[0] == pytest.approx(3.0, abs=0.1)
 
 
-def test_climb_holds_a_rate_and_leans_as_told(drone):
+def test_climb_control_holds_a_rate_and_the_commanded_tilt(drone):
     flown = drone("perfect").hover()
     flown.drive(Control.CLIMB, climb=1.0, roll=radians(5.0))
     flown.wait(4)
@@ -95,7 +95,7 @@ def test_attitude_flies_angles_and_throttle(drone):
 
 
 @pytest.mark.parametrize(("turn", "expected"), [({"yaw": 1.5}, 1.5), ({"yaw": -2.5}, -2.5)])
-def test_yaw_goes_to_an_angle_the_short_way(drone, turn, expected):
+def test_yaw_turns_to_an_angle_by_the_shorter_way(drone, turn, expected):
     flown = drone("perfect").hover()
     flown.drive(Control.POSITION, position=(0.0, 0.0, -10.0), **turn)
     flown.wait(8)
@@ -123,14 +123,14 @@ def test_a_change_of_control_does_not_jerk(drone):
     assert max(abs(tilt - fast.attitude[1]) for tilt in tilts) < radians(12.0)
 
 
-def test_it_holds_its_place_in_gusty_wind(drone):
+def test_position_is_held_in_gusty_wind(drone):
     flown = drone("rtk", wind=Wind(east=6.0, north=3.0, gust=1.0)).hover()
     flown.wait(10)
     errors = [math.dist(estimate.position, (0.0, 0.0, -10.0)) for _, estimate, _ in flown.wait(30)]
     assert max(errors) < 1.0
 
 
-def test_the_landed_detector_is_silent_in_the_air_and_sure_on_the_ground(drone):
+def test_the_landed_detector_reports_the_ground_and_not_the_air(drone):
     flown = drone("consumer").hover(20.0)
     flown.drive(Control.VELOCITY, velocity=(3.0, 0.0, 1.5))
     seen = flown.wait(8)
@@ -144,7 +144,7 @@ def test_the_landed_detector_is_silent_in_the_air_and_sure_on_the_ground(drone):
     assert 1.0 <= seen[-1][0] - touched < 5.0
 
 
-def test_it_takes_off_again_after_a_landing(drone):
+def test_a_landed_vehicle_takes_off_again(drone):
     flown = drone("consumer").hover(5.0)
     flown.drive(Control.POSITION_CLIMB, climb=-0.5)
     flown.wait(30, until=lambda estimate, truth: estimate.landed)
@@ -161,7 +161,7 @@ def test_the_tilt_limit_holds(drone):
     assert radians(12.0) < max(tilts) < radians(18.0)
 
 
-def test_a_rover_steers_as_told_and_stops(rover):
+def test_a_rover_steers_as_commanded_and_stops(rover):
     flown = rover("perfect").ready(2)
     flown.drive(Control.STEER, throttle=0.1, steering=0.5)
     flown.wait(5)
@@ -184,7 +184,7 @@ def test_a_rover_drives_a_heading_and_backwards(rover):
     assert estimate.velocity[0] == pytest.approx(-math.cos(estimate.attitude[2]), abs=0.1)
 
 
-def test_set_points_that_make_no_sense_are_refused(drone):
+def test_invalid_set_points_are_refused(drone):
     flight = drone("perfect").flight
     with pytest.raises(UsageError, match="yaw and a yaw rate"):
         flight.drive(Setpoint(Control.POSITION, yaw=1.0, yaw_rate=1.0))
@@ -194,7 +194,7 @@ def test_set_points_that_make_no_sense_are_refused(drone):
         flight.weaken_motor(7, 0.5)
 
 
-def test_a_look_is_the_same_object_until_the_next_grid_step(drone):
+def test_an_estimate_is_the_same_object_until_the_next_grid_step(drone):
     flown = drone("perfect")
     first = flown.flight.estimate()
     flown.now += 1 * MS
