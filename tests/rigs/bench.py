@@ -41,5 +41,5 @@ class Bench:
     def after(self, seconds: float, action: Callable[[], None]) -> None:
         self.kernel.call_at(self.kernel.now() + round(seconds * S), action)
 
-    def told(self, kind: type) -> list[Any]:
+    def recorded(self, kind: type) -> list[Any]:
         return [event for event in self.events if isinstance(event, kind)]

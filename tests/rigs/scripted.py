@@ -1,5 +1,5 @@
-"""What scripted autopilots that speak MAVLink have in common: they do at once what they are told, and can be
-told to misbehave.
+"""What scripted autopilots that speak MAVLink have in common: they do at once what they are commanded, and can be
+set to misbehave.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Scripted:
     craft: Craft = field(default_factory=Craft)
     refuse: dict[int, list[str]] = field(default_factory=dict)
     ignore: set[int] = field(default_factory=set)
-    heard: list[Frame] = field(default_factory=list)
+    received: list[Frame] = field(default_factory=list)
     streams: set[str] = field(default_factory=set)
     deaf: bool = False
     mute: bool = False
@@ -132,7 +132,7 @@ class Scripted:
     def _receive(self, frame: Frame) -> None:
         if self.deaf:
             return
-        self.heard.append(frame)
+        self.received.append(frame)
         fields = frame.fields
         if frame.name in {"COMMAND_LONG", "COMMAND_INT"}:
             self._command(fields["command"], fields)
@@ -191,10 +191,10 @@ class Scripted:
     # -- asked by tests
 
     def sent(self, name: str) -> list[dict[str, Any]]:
-        """The fields of all frames of this name that it heard."""
-        return [frame.fields for frame in self.heard if frame.name == name]
+        """The fields of all frames of this name that it received."""
+        return [frame.fields for frame in self.received if frame.name == name]
 
     def commands(self) -> list[int]:
-        """The commands that it heard, requests for messages left out."""
-        heard = [frame.fields["command"] for frame in self.heard if frame.name.startswith("COMMAND_")]
-        return [command for command in heard if command not in {INTERVAL, ASK, GET_HOME}]
+        """The commands that it received, requests for messages left out."""
+        received = [frame.fields["command"] for frame in self.received if frame.name.startswith("COMMAND_")]
+        return [command for command in received if command not in {INTERVAL, ASK, GET_HOME}]

@@ -16,22 +16,22 @@ from volery.testing.fault_trials import PHASES, try_fault
 from volery.testing.faults import FAULTS
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
-TOLD = Path(__file__).parents[3] / "docs" / "reference" / "trials.json"
+REFERENCE = Path(__file__).parents[3] / "docs" / "reference" / "trials.json"
 SHARE = 4
 """One trial in so many; which, differs by autopilot, so that all faults meet all phases."""
 
 
 @pytest.fixture(scope="module")
-def told() -> Any:
-    return json.loads(TOLD.read_text(encoding="utf-8"))
+def reference() -> Any:
+    return json.loads(REFERENCE.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
-def test_a_driver_conforms(autopilot: str, told: Any) -> None:
+def test_a_driver_conforms(autopilot: str, reference: Any) -> None:
     report = conformance(f"sim:{autopilot}")
     assert report.conforms, [(one.check, one.detail) for one in report.faults]
     found = {one.check: one.outcome.value for one in report.results}
-    assert found == {one["check"]: one["outcome"] for one in told[autopilot]["checks"]}
+    assert found == {one["check"]: one["outcome"] for one in reference[autopilot]["checks"]}
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
@@ -41,8 +41,8 @@ def test_a_rover_conforms(autopilot: str) -> None:
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
-def test_faults(autopilot: str, told: Any) -> None:
-    shown = {(one["fault"], one["phase"]): one for one in told[autopilot]["faults"]}
+def test_faults(autopilot: str, reference: Any) -> None:
+    shown = {(one["fault"], one["phase"]): one for one in reference[autopilot]["faults"]}
     turn = AUTOPILOTS.index(autopilot)
     assert shown.keys() == {(fault, phase) for fault in FAULTS for phase in PHASES}
     assert not [one for one in shown.values() if one["broken"]]

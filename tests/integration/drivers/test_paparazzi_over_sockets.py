@@ -41,14 +41,14 @@ def test_udp_answering_at_the_uplink_port() -> None:
 
     deaf = UdpLink(kernel, HERE, 0, codec=PPRZLINK)
     ours = UdpLink(kernel, HERE, 0, codec=PPRZLINK, answers_to=deaf.port)
-    heard: list[str] = []
-    deaf.receive(lambda frame: heard.append(frame.name))
+    received: list[str] = []
+    deaf.receive(lambda frame: received.append(frame.name))
     with served(aircraft, PAPARAZZI):
         drone = Drone(kernel, "drone_1", open_driver(kernel, ours, "drone_1", {}))
         kernel.start()
         with kernel.adopt("script"):
             drone.wait_connected()
-            assert drone.telemetry.changed.wait_for(lambda: "GET_SETTING" in heard, 60 * 10**9)
+            assert drone.telemetry.changed.wait_for(lambda: "GET_SETTING" in received, 60 * 10**9)
         drone.close()
         deaf.close()
         assert kernel.close() == []

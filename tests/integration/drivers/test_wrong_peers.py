@@ -1,4 +1,4 @@
-"""What a user is told who points a drone at a URL where something else is, over real sockets."""
+"""Errors for a drone URL at which something else answers, over real sockets."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def said_to_the_user(url: str, within: float = 1.5) -> LinkError:
 
 @contextmanager
 def peer(speak: Callable[[socket.socket], None]) -> Iterator[str]:
-    """A server that speaks to whoever connects, until the context ends."""
+    """A server that answers each client, until the context ends."""
     with closing(socket.create_server((HERE, 0))) as listener:
         over = threading.Event()
 

@@ -43,7 +43,7 @@ def box(metres: float, *, about: float = 0.0) -> tuple[tuple[float, float], ...]
 
 
 def drift(at: Any, metres: float) -> None:
-    """It is carried away, whatever it was told."""
+    """It is carried away, whatever it was commanded."""
     at.craft.north, at.craft.velocity = metres, (2.0, 0.0, 0.0)
     at.after(6, lambda: setattr(at.craft, "velocity", (0.0, 0.0, 0.0)))
 
@@ -98,16 +98,16 @@ def test_outside_the_ways_to_safety_are_open_and_so_is_the_way_back(bench: Make)
         drone.return_home()
 
     at.fly(mission)
-    assert [one.outcome for one in at.told(Operation)][-3:] == ["ok", "ok", "ok"]
+    assert [one.outcome for one in at.recorded(Operation)][-3:] == ["ok", "ok", "ok"]
 
 
-def test_one_that_somebody_else_took_out_of_the_fence_is_left_alone(bench: Make) -> None:
+def test_a_vehicle_that_another_took_out_of_the_fence_gets_no_messages(bench: Make) -> None:
     at = bench(fence=Fence(box(100)))
 
     def pilot() -> None:
         at.autopilot.enter("LOITER")
         drift(at, 130.0)
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
 
     def mission(drone: Any) -> None:
         drone.takeoff(10)
@@ -134,7 +134,7 @@ def test_a_velocity_that_leads_out_is_stopped_and_the_next_call_says_so(bench: M
         drone.set_velocity(north=1.0, lasting=30.0)
         drift(at, 120.0)
         sleep(at.kernel, 12 * S)
-        assert at.told(Operation)[-1].operation == "hold"
+        assert at.recorded(Operation)[-1].operation == "hold"
         with pytest.raises(OutOfBounds, match="20 m outside the fence; it was commanded to hold"):
             drone.set_velocity(north=-1.0)
         drone.goto(north(10))
@@ -236,7 +236,7 @@ def test_below_the_reserve_nothing_but_the_way_back_is_begun(bench: Make) -> Non
             drone.takeoff(10)
 
     at.fly(mission)
-    assert at.told(Operation)[-1].outcome == "LowBattery"
+    assert at.recorded(Operation)[-1].outcome == "LowBattery"
 
 
 def test_below_the_reserve_on_the_way_it_is_held(bench: Make) -> None:
@@ -280,7 +280,7 @@ def test_the_ways_to_safety_take_the_place_of_what_is_under_way(bench: Make, nam
         assert raised == []
 
     at.fly(mission)
-    assert [(one.operation, one.outcome) for one in at.told(Operation)][1:] == [
+    assert [(one.operation, one.outcome) for one in at.recorded(Operation)][1:] == [
         ("goto", "Overridden"),
         (name, "ok"),
     ]
@@ -302,7 +302,7 @@ def test_a_take_off_that_is_landed_does_not_start_over(bench: Make) -> None:
     assert not at.craft.armed
 
 
-def test_kill_stops_the_motors_in_the_air_whoever_flies(bench: Make) -> None:
+def test_kill_stops_the_motors_in_the_air_whatever_the_mode(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -326,7 +326,7 @@ def test_kill_must_be_meant(bench: Make, sure: Any) -> None:
     assert at.craft.armed
 
 
-def test_what_streams_ends_when_somebody_else_takes_it(bench: Make) -> None:
+def test_streams_end_when_another_station_takes_over(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -334,7 +334,7 @@ def test_what_streams_ends_when_somebody_else_takes_it(bench: Make) -> None:
         drone.set_velocity(north=1.0, lasting=60.0)
         at.autopilot.enter("LOITER")
         sleep(at.kernel, 2 * S)
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
         sleep(at.kernel, 5 * S)
         assert not at.autopilot.sent("SET_POSITION_TARGET_GLOBAL_INT")
         assert not at.autopilot.sent("SET_POSITION_TARGET_LOCAL_NED")
@@ -408,7 +408,7 @@ def test_flying_by_hand_needs_no_position(bench: Make) -> None:
         drone.land()
 
     at.fly(mission)
-    assert [one.outcome for one in at.told(Operation)] == ["ok"] * 3
+    assert [one.outcome for one in at.recorded(Operation)] == ["ok"] * 3
 
 
 # -- bad input
@@ -446,16 +446,16 @@ def test_numbers_that_are_none(bench: Make, call: Callable[[Any], None], says: s
 # -- what it does if left alone
 
 
-def test_what_it_does_if_left_alone_is_told_once_it_is_known(bench: Make) -> None:
+def test_the_reaction_to_link_loss_is_recorded_once_it_is_known(bench: Make) -> None:
     at = bench()
     lines = ["", "", "it lands"]
     at.vehicle._driver.on_link_loss = lambda: lines.pop(0) if len(lines) > 1 else lines[0]
 
     def mission(drone: Any) -> None:
         drone.wait_connected()
-        assert not at.told(Text)
+        assert not at.recorded(Text)
         sleep(at.kernel, 5 * S)
         assert drone.on_link_loss == "it lands"
 
     at.fly(mission)
-    assert [one.text for one in at.told(Text)] == ["if this program falls silent: it lands"]
+    assert [one.text for one in at.recorded(Text)] == ["if this program falls silent: it lands"]

@@ -47,7 +47,7 @@ def test_a_mission_of_five_lines(bench: Make) -> None:
     at.fly(mission)
     assert not at.craft.armed
     assert at.autopilot.commands() == [SET_MODE, ARM, TAKEOFF, SPEED, SET_MODE]
-    operations = at.told(Operation)
+    operations = at.recorded(Operation)
     assert [(one.operation, one.outcome) for one in operations] == [
         ("takeoff", "ok"),
         ("goto", "ok"),
@@ -71,10 +71,10 @@ def test_guided_targets_name_their_altitude(bench: Make) -> None:
     assert (last["coordinate_frame"], last["alt"], last["lat_int"]) == (5, 600.0, -353628000)
 
 
-def test_a_ground_station_is_heard_once_a_second_by_the_id_that_may_send_sticks(bench: Make) -> None:
+def test_heartbeats_of_a_ground_station_with_the_id_that_may_send_manual_control(bench: Make) -> None:
     at = bench()
     at.kernel.run(10 * S)
-    beats = [frame for frame in at.autopilot.heard if frame.name == "HEARTBEAT"]
+    beats = [frame for frame in at.autopilot.received if frame.name == "HEARTBEAT"]
     assert len(beats) == 10  # the eleventh is on its way
     assert {(frame.system, frame.component, frame.fields["type"]) for frame in beats} == {(255, 190, 6)}
 
@@ -94,7 +94,7 @@ def test_streams_that_do_not_come_are_asked_for_again(bench: Make) -> None:
     assert len(asked.sent("COMMAND_LONG")) == settled
 
 
-def test_state_as_the_autopilot_told_it(bench: Make) -> None:
+def test_state_as_reported_by_the_autopilot(bench: Make) -> None:
     at = bench()
 
     def look(drone: Any) -> None:
@@ -144,7 +144,7 @@ def test_a_refusal_to_arm_quotes_the_texts_that_follow_it(bench: Make) -> None:
     with pytest.raises(Refused, match="Arm: Gyros inconsistent; Arm: Need Position Estimate") as caught:
         at.fly(up)
     assert "refused to arm (FAILED)" in str(caught.value)
-    assert at.told(Operation)[0].outcome == "Refused"
+    assert at.recorded(Operation)[0].outcome == "Refused"
 
 
 def test_a_refusal_without_a_reason(bench: Make) -> None:
@@ -169,7 +169,7 @@ def test_a_text_in_chunks_is_put_together(bench: Make) -> None:
     at.autopilot.say("STATUSTEXT", severity=2, text=long[:50], id=7, chunk_seq=0)
     at.autopilot.say("STATUSTEXT", severity=2, text=long[50:], id=7, chunk_seq=1)
     at.kernel.run(3 * S)
-    assert [said.text for said in at.told(Text)] == [long]
+    assert [said.text for said in at.recorded(Text)] == [long]
 
 
 # -- undone before lift-off: started over; in the air: never fought
@@ -215,13 +215,13 @@ def test_a_pilot_who_takes_over_in_the_air_is_not_fought(bench: Make) -> None:
         at.after(5, lambda: at.autopilot.enter("LOITER"))
         with pytest.raises(Overridden, match=r"changed from GUIDED to LOITER \(status active\).*to GUIDED"):
             drone.goto(NEAR)
-        before = len(at.autopilot.heard)
+        before = len(at.autopilot.received)
         with pytest.raises(Overridden, match=r"is in LOITER.*switch the vehicle to GUIDED"):
             drone.goto(NEAR)
         with pytest.raises(Overridden):
             drone.land()
         assert drone.come_to_rest() == "is left to the pilot or station in LOITER"
-        assert not [f for f in at.autopilot.heard[before:] if f.name not in {"HEARTBEAT"}]
+        assert not [f for f in at.autopilot.received[before:] if f.name not in {"HEARTBEAT"}]
 
     at.fly(mission)
 
@@ -242,7 +242,7 @@ def test_a_vehicle_that_is_handed_back_is_flown_again(bench: Make) -> None:
     at.fly(mission)
 
 
-def test_a_failsafe_is_told_apart_and_quoted(bench: Make) -> None:
+def test_a_failsafe_is_distinguished_and_quoted(bench: Make) -> None:
     at = bench()
 
     def strike() -> None:
@@ -274,7 +274,7 @@ def test_guided_is_not_commanded_over_a_failsafe_that_took_our_own_mode(bench: M
         sleep(at.kernel, S)
         with pytest.raises(Failsafe, match="is in a failsafe, in ALT_HOLD"):
             drone.goto(NEAR)
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
         sleep(at.kernel, S)
         assert at.autopilot.sent("RC_CHANNELS_OVERRIDE")[-1]["chan3_raw"] == 1500  # else it would sink
 
@@ -311,7 +311,7 @@ def test_a_link_that_falls_silent_in_flight(bench: Make) -> None:
         LinkLost, match=r"no message was received for 5\.\d s.*last: at -35.*mode GUIDED, armed"
     ):
         at.fly(mission)
-    assert [state.state for state in at.told(LinkState)] == ["silent"]
+    assert [state.state for state in at.recorded(LinkState)] == ["silent"]
 
 
 def test_a_link_that_returns_in_flight_is_as_if_nothing_had_happened(bench: Make) -> None:
@@ -327,7 +327,7 @@ def test_a_link_that_returns_in_flight_is_as_if_nothing_had_happened(bench: Make
         drone.goto(NEAR)
 
     at.fly(mission)
-    assert [state.state for state in at.told(LinkState)] == ["silent", "back"]
+    assert [state.state for state in at.recorded(LinkState)] == ["silent", "back"]
     assert at.craft.north == pytest.approx(51.1, abs=0.2)
 
 
@@ -374,7 +374,7 @@ def test_goals_out_of_bounds_are_refused_before_anything_moves(
 
     def mission(drone: Any) -> None:
         drone.takeoff(10)
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
         with pytest.raises(OutOfBounds, match=says):
             drone.goto(goal)
         assert not at.autopilot.sent("SET_POSITION_TARGET_GLOBAL_INT")
@@ -521,8 +521,8 @@ def test_sticks_are_refreshed_and_let_go_once_guided_is_seen(bench: Make) -> Non
     assert [
         at.autopilot.sent("RC_CHANNELS_OVERRIDE")[-1][f"chan{number}_raw"] for number in (1, 2, 3, 4)
     ] == [0] * 4
-    frames = [frame.name for frame in at.autopilot.heard]
-    guided = max(i for i, f in enumerate(at.autopilot.heard) if f.fields.get("command") == SET_MODE)
+    frames = [frame.name for frame in at.autopilot.received]
+    guided = max(i for i, f in enumerate(at.autopilot.received) if f.fields.get("command") == SET_MODE)
     assert "RC_CHANNELS_OVERRIDE" in frames[guided:]  # let go after the change, not before
 
 
@@ -536,7 +536,7 @@ def test_sticks_are_let_go_when_a_pilot_takes_over(bench: Make) -> None:
         sleep(at.kernel, S)
         at.autopilot.enter("LOITER")
         sleep(at.kernel, S)
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
         sleep(at.kernel, 3 * S)
         assert not at.autopilot.sent("RC_CHANNELS_OVERRIDE")
         with pytest.raises(Overridden):
@@ -629,12 +629,12 @@ def test_at_the_end_of_a_program_sticks_are_held_until_it_lands(bench: Make) -> 
         drone.takeoff(10)
         drone.manual_control(0, 0, 0.5, 0)
         drone.stabilize()
-        at.autopilot.heard.clear()
+        at.autopilot.received.clear()
         return str(drone.come_to_rest())
 
     assert at.fly(mission) == "landed"
-    order = [f.name if f.name != "COMMAND_LONG" else str(f.fields["command"]) for f in at.autopilot.heard]
-    released = [n for n, f in enumerate(at.autopilot.heard) if f.fields.get("chan3_raw") == 0]
+    order = [f.name if f.name != "COMMAND_LONG" else str(f.fields["command"]) for f in at.autopilot.received]
+    released = [n for n, f in enumerate(at.autopilot.received) if f.fields.get("chan3_raw") == 0]
     assert order.index(str(SET_MODE)) < released[0]
 
 
@@ -649,13 +649,13 @@ def test_the_end_of_a_program_whose_task_has_not_gone_yet(bench: Make) -> None:
     at.kernel.run(20 * S)
     at.kernel.cancel(scope, "end")
     assert at.fly(lambda drone: drone.come_to_rest()) == "landed"
-    assert [one.outcome for one in at.told(Operation)][-2:] == ["Cancelled", "ok"]
+    assert [one.outcome for one in at.recorded(Operation)][-2:] == ["Cancelled", "ok"]
 
 
 def test_true_errors_are_recorded_where_the_truth_is_known(bench: Make) -> None:
     at = bench(truth=lambda: Position(-35.3628, LONGITUDE, AMSL(595.5)))
     at.fly(lambda drone: (drone.takeoff(10), drone.goto(NEAR)))
-    goto = at.told(Operation)[-1]
+    goto = at.recorded(Operation)[-1]
     assert goto.true_horizontal == pytest.approx(0.0, abs=1e-6)
     assert goto.true_vertical == pytest.approx(1.5)
 

@@ -50,7 +50,7 @@ class Field(Airstrip):
     def pilot_chooses(self, number: int, after_s: float) -> None:
         self.station_sends("COMMAND_LONG", after_s, command=176, param1=1.0, param2=number)
 
-    def told(self, kind: type) -> Iterator[Any]:
+    def recorded(self, kind: type) -> Iterator[Any]:
         return (event for event in self.events if isinstance(event, kind))
 
 
@@ -193,7 +193,7 @@ def test_a_link_that_drops_in_flight_and_returns() -> None:
     field = Field(faults=WireFaults(cuts=((14 * S, 18 * S),)))
     field.fly(square)
     assert [one.outcome for one in field.operations()] == ["ok"] * 4
-    assert [state.state for state in field.told(LinkState)] == ["silent", "back"]
+    assert [state.state for state in field.recorded(LinkState)] == ["silent", "back"]
 
 
 def test_a_vehicle_node_that_hears_its_autopilot_no_more() -> None:
@@ -206,12 +206,12 @@ def test_a_vehicle_node_that_is_not_there() -> None:
     field = Field(mavros=True)
     graph = EmbeddedGraph(field.kernel)
 
-    def nobody(drone: Any) -> None:
+    def absent(drone: Any) -> None:
         driver = open_mavros(field.kernel, graph.node("control"), "craft_2", {})
         Drone(field.kernel, "craft_2", driver).wait_connected(3.0)
 
     with pytest.raises(LinkSilent, match="no vehicle node publishes /craft_2/state"):
-        field.fly(nobody)
+        field.fly(absent)
 
 
 def test_a_rover_over_mavros() -> None:
@@ -260,7 +260,7 @@ def test_a_rover_drives_there_and_back() -> None:
 def test_each_text_stands_in_the_trace_once() -> None:
     field = Field()
     field.fly(lambda drone: (drone.takeoff(5), drone.land()))
-    texts = [event.text for event in field.told(Text)]
+    texts = [event.text for event in field.recorded(Text)]
     assert texts.count("Arming motors") == 1
 
 

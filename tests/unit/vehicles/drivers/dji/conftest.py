@@ -1,4 +1,4 @@
-"""A scripted DJI node: it says what the test wants, notes what is asked, and does at once what it is told."""
+"""A scripted DJI node: it reports what the test sets, notes requests, and obeys at once."""
 
 from __future__ import annotations
 

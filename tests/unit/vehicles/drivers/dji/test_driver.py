@@ -50,10 +50,10 @@ def follows(bench: Any) -> None:
     bench.kernel.every(100 * MS, tick)
 
 
-# -- being heard
+# -- connecting
 
 
-def test_it_is_heard_once_it_has_said_which_aircraft_it_is(bench: Make) -> None:
+def test_the_link_counts_once_the_aircraft_is_known(bench: Make) -> None:
     made = bench()
 
     def body() -> None:
@@ -69,7 +69,7 @@ def test_it_is_heard_once_it_has_said_which_aircraft_it_is(bench: Make) -> None:
     made.run(body)
 
 
-def test_nobody_there_is_told_with_the_topic_that_is_missing(bench: Make) -> None:
+def test_a_missing_node_is_reported_with_its_topic(bench: Make) -> None:
     made = bench()
     lonely = made.graph.node("lonely", context=ExecutionContext("lonely"))
     driver = open_driver(made.kernel, lonely, "d", {"namespace": "/elsewhere/dji_sdk"})
@@ -328,7 +328,7 @@ def test_in_the_air_the_motors_are_stopped_by_force_only(bench: Make) -> None:
     made.run(body)
 
 
-# -- somebody else
+# -- takeover
 
 
 def test_the_pilot_who_moves_the_mode_switch_has_it_until_he_moves_it_back(bench: Make) -> None:

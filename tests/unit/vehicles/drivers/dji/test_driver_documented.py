@@ -9,7 +9,7 @@ import pytest
 
 from volery.simulation.autopilots.dji import firmware as simulated
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters
-from volery.vehicles.drivers.dji import driver as driver
+from volery.vehicles.drivers.dji import driver
 
 PAGE = Path(__file__).parents[5] / "docs" / "dji.md"
 

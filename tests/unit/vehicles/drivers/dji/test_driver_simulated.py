@@ -162,7 +162,7 @@ def test_the_pilot_takes_it_and_gives_it_back() -> None:
             drone.goto(at(40.0, 0.0, 6.0))
         flown.wait(4.0)
         speed = drone.velocity
-        assert hypot(speed.north, speed.east) < 0.5  # it hovers; nobody fights
+        assert hypot(speed.north, speed.east) < 0.5  # it hovers, and no one overrides it
         with pytest.raises(Overridden):
             drone.land()
         flown.switch(2000)

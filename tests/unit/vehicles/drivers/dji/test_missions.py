@@ -68,7 +68,7 @@ def test_landing_elsewhere_is_a_waypoint_over_it() -> None:
         ((Waypoint(point(1.0)), Waypoint(point(5.0, AboveGround(5.0)))), "AMSL and AboveHome"),
     ],
 )
-def test_what_such_an_aircraft_cannot_fly_is_told_before_it_is_sent(
+def test_a_mission_that_cannot_be_flown_is_refused_before_it_is_sent(
     items: tuple[MissionItem, ...], wrong: str
 ) -> None:
     with pytest.raises(UsageError, match=wrong):

@@ -93,11 +93,11 @@ def test_whole_numbers_of_px4_lie_in_the_bytes_of_a_float() -> None:
 def test_a_px4_is_named(bench: Make) -> None:
     at = bench()
     at.autopilot.mute = True
-    told = {"type": 2, "autopilot": 12, "base_mode": 81, "custom_mode": 0, "system_status": 3}
+    fields = {"type": 2, "autopilot": 12, "base_mode": 81, "custom_mode": 0, "system_status": 3}
 
     def beat() -> None:
         at.autopilot.mute = False
-        at.autopilot.say("HEARTBEAT", **told)
+        at.autopilot.say("HEARTBEAT", **fields)
         at.autopilot.mute = True
 
     at.kernel.every(S, beat)

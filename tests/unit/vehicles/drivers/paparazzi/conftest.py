@@ -1,6 +1,6 @@
 """A scripted Paparazzi rotorcraft: no acknowledgements, slow telemetry, settings by number, blocks of a plan.
 
-It does at once what the public definitions say, and can be told to misbehave.
+It does at once what the public definitions say, and can be set to misbehave.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class FakePaparazzi:
     locked: set[str] = field(default_factory=set)
     deaf: bool = False
     mute: bool = False
-    heard: list[Frame] = field(default_factory=list)
+    received: list[Frame] = field(default_factory=list)
     sticks_at: int = -(10**12)
     transmitter: bool = False
 
@@ -151,7 +151,7 @@ class FakePaparazzi:
     def _receive(self, frame: Frame) -> None:
         if self.deaf:
             return
-        self.heard.append(frame)
+        self.received.append(frame)
         fields = frame.fields
         if fields.get("ac_id", AIRCRAFT) != AIRCRAFT:
             return
@@ -220,7 +220,7 @@ class FakePaparazzi:
         craft.flying = craft.flying and craft.armed
 
     def enter(self, mode: str) -> None:
-        """Change the mode, at once and told at once."""
+        """Change the mode, at once and reported at once."""
         self.craft.mode = mode
         self.status()
 
@@ -255,8 +255,8 @@ class FakePaparazzi:
                 self.enter("KILL")
 
     def sent(self, name: str) -> list[dict[str, Any]]:
-        """The fields of all frames of this name that it heard."""
-        return [frame.fields for frame in self.heard if frame.name == name]
+        """The fields of all frames of this name that it received."""
+        return [frame.fields for frame in self.received if frame.name == name]
 
     def written(self, name: str) -> list[float]:
         """What was written to a setting."""

@@ -90,7 +90,7 @@ def test_home_is_the_waypoint_that_is_called_so(listener: Listener) -> None:
     assert moved.altitude.metres == 185.0
 
 
-def test_it_is_heard_once_it_has_told_what_it_is(listener: Listener) -> None:
+def test_the_link_counts_once_the_kind_is_known(listener: Listener) -> None:
     listener.hear("ALIVE", md5sum=(1, 2))
     listener.hear("ROTORCRAFT_FP")
     assert listener.seen.last_message_ns == -1
@@ -109,7 +109,7 @@ def test_motors_that_are_off_do_not_fly(listener: Listener) -> None:
     assert listener.seen.flying
 
 
-def test_other_aircraft_on_the_same_radio_are_not_heard(listener: Listener) -> None:
+def test_other_aircraft_on_the_same_radio_are_ignored(listener: Listener) -> None:
     listener.hear("ROTORCRAFT_STATUS", **STATUS)
     listener.hear("ROTORCRAFT_STATUS", source=8, ap_mode=19)
     assert listener.seen.mode == "NAV"

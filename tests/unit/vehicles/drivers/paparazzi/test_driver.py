@@ -57,7 +57,7 @@ def test_a_mission_of_five_lines(bench: Make) -> None:
     at.fly(mission)
     assert not at.craft.armed
     assert (at.craft.north, at.craft.east) == pytest.approx((0.0, 0.0), abs=0.05)
-    operations = at.told(Operation)
+    operations = at.recorded(Operation)
     assert [(one.operation, one.outcome) for one in operations] == [
         ("takeoff", "ok"),
         ("goto", "ok"),
@@ -168,7 +168,7 @@ def test_far_from_home_it_lands_and_takes_off_without_the_plan(bench: Make) -> N
     assert {fields["flags"] for fields in at.autopilot.sent("GUIDED_SETPOINT_NED")} == {0, 0x40}
 
 
-def test_without_a_fix_it_comes_down_all_the_same(bench: Make) -> None:
+def test_without_a_fix_it_lands_all_the_same(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -271,7 +271,7 @@ def test_a_time_out_tells_what_the_aircraft_shows(bench: Make) -> None:
     said = str(raised.value)
     assert "to start the motors was not seen within 15 s" in said
     assert "look at its arming status" in said
-    assert any(event.text == "arming status: pitch not centered" for event in at.told(Text))
+    assert any(event.text == "arming status: pitch not centered" for event in at.recorded(Text))
 
 
 def test_with_unaligned_attitude_it_is_not_ready(bench: Make) -> None:
@@ -318,7 +318,7 @@ def test_kill_stops_the_motors_anywhere(bench: Make) -> None:
     assert at.autopilot.sent("EMERGENCY_CMD")[0]["cmd"] == 0
 
 
-def test_somebody_else_takes_it(bench: Make) -> None:
+def test_another_station_takes_over(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -330,7 +330,7 @@ def test_somebody_else_takes_it(bench: Make) -> None:
         at.fly(mission)
 
 
-def test_home_that_nobody_asked_for_is_a_failsafe(bench: Make) -> None:
+def test_mode_home_without_a_command_is_a_failsafe(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -398,7 +398,7 @@ def test_another_aircraft_than_the_one_meant(bench: Make) -> None:
         at.fly(lambda drone: drone.wait_connected())
 
 
-def test_nobody_there(bench: Make) -> None:
+def test_a_silent_link(bench: Make) -> None:
     at = bench()
     at.autopilot.mute = True
     with pytest.raises(LinkSilent, match="no message of a Paparazzi aircraft was received"):
@@ -410,7 +410,9 @@ def test_another_kind_of_aircraft(bench: Make) -> None:
     at.autopilot.mute = True
     at.after(
         1,
-        lambda: at.autopilot.link.send(at.autopilot.heard[0]._replace(name="PPRZ_MODE", fields={}, system=7)),
+        lambda: at.autopilot.link.send(
+            at.autopilot.received[0]._replace(name="PPRZ_MODE", fields={}, system=7)
+        ),
     )
     with pytest.raises(CapabilityError, match="is a plane, not a drone"):
         at.fly(lambda drone: drone.wait_connected())

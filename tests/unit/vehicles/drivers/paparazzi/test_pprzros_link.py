@@ -123,21 +123,21 @@ def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
 
 def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
     at = OnGraph(peer, bridged=False)
-    heard: list[Any] = []
+    received: list[Any] = []
 
     def bridge() -> None:
         node = at.graph.node("pprzros")
         publisher = node.advertise("/pprzros/to_ros", TYPE)
-        node.subscribe("/pprzros/from_ros", TYPE, heard.append, group=(group := node.group()))
+        node.subscribe("/pprzros/from_ros", TYPE, received.append, group=(group := node.group()))
         status = Frame("ROTORCRAFT_STATUS", {"ap_mode": 13}, 7, 0)
-        while not heard:
+        while not received:
             sleep(at.kernel, S)
             publisher.publish(to_message(status, at.kernel.now()))
             group.spin_once(0)
 
     at.kernel.spawn(bridge, "bridge", ExecutionContext("bridge"))
     at.fly(lambda drone: drone.wait_connected(), namespace="/")
-    assert heard[0].msg_name == "PING"
+    assert received[0].msg_name == "PING"
 
 
 def test_options_that_make_no_sense(peer: Any) -> None:

@@ -241,15 +241,15 @@ class FakePx4(Scripted):
                 self.craft.up = amsl - HOME[2] / 1000.0
 
     def enter(self, mode: str) -> None:
-        """Somebody changes the mode: at once, and seen with the next heartbeat."""
+        """Another changes the mode: at once, and seen with the next heartbeat."""
         self.intended = self.craft.mode = mode
         self.craft.velocity = (0.0, 0.0, 0.0)
         if mode in {LAND, RTL} and self.kind == 2:
             self.kernel.call_at(self.kernel.now() + 15 * S, lambda: self.down(LAND, RTL))
 
     def since(self, name: str, when: int) -> list[dict[str, Any]]:
-        """Those that it heard after *when*."""
-        both = zip(self.times, self.heard, strict=True)
+        """Those that it received after *when*."""
+        both = zip(self.times, self.received, strict=True)
         return [frame.fields for at, frame in both if frame.name == name and at > when]
 
 

@@ -56,7 +56,7 @@ def test_a_mission_of_five_lines(bench: Make) -> None:
     at.fly(mission)
     assert not at.craft.armed
     assert at.autopilot.commands() == [ARM, TAKEOFF, GO, GO, SPEED, GO, SET_MODE]
-    operations = at.told(Operation)
+    operations = at.recorded(Operation)
     assert [(one.operation, one.outcome) for one in operations] == [
         ("takeoff", "ok"),
         ("goto", "ok"),
@@ -269,7 +269,7 @@ def test_it_goes_back_to_offboard_when_a_velocity_has_just_ended(bench: Make) ->
 
 
 @pytest.mark.parametrize("taken", ["POSCTL", LAND, RTL, HOLD])
-def test_the_stream_ends_when_somebody_takes_the_mode(bench: Make, taken: str) -> None:
+def test_the_stream_ends_when_a_pilot_changes_the_mode(bench: Make, taken: str) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -414,7 +414,7 @@ def test_sticks_are_centred_before_a_mode_that_flies_by_itself_and_then_go_on(be
     assert {(f["x"], f["y"], f["z"], f["r"]) for f in after} == {(0, 0, 500, 0)}
 
 
-def test_sticks_of_somebody_else_end_ours(bench: Make) -> None:
+def test_manual_control_of_another_ends_ours(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
