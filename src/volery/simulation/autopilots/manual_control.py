@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from volery.base.time import Ns
-
-NEVER: Ns = -(1 << 62)
-"""Time of an event that has not happened."""
+from volery.simulation.autopilots.state_groups import NEVER
 
 
 class ChannelRange(NamedTuple):

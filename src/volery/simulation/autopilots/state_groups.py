@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 from volery.base.frames import Vector
 from volery.base.time import Ns
-from volery.simulation.autopilots.manual_control import NEVER
+
+NEVER: Ns = -(1 << 62)
+"""Time of an event that has not happened."""
 
 
 class Home(NamedTuple):

@@ -19,9 +19,10 @@ from volery.kernel.api import Action, Kernel
 from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.endpoint import VehicleOutput
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
-from volery.simulation.autopilots.manual_control import NEVER, RcChannels
+from volery.simulation.autopilots.manual_control import RcChannels
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
 from volery.simulation.autopilots.state_groups import (
+    NEVER,
     ArmingState,
     CommandedLimits,
     FailsafeState,

@@ -71,8 +71,8 @@ QUADROTOR = 2
 CAPABILITIES = 64_495
 """MAV_PROTOCOL_CAPABILITY bits, as recorded."""
 
-BY_HAND = CUSTOM | STABILIZED | MANUAL
-BY_ITSELF = BY_HAND | GUIDED
+MANUAL_BITS = CUSTOM | STABILIZED | MANUAL
+AUTO_BITS = MANUAL_BITS | GUIDED
 LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
 
 READY = round(2.28 * S)
@@ -89,12 +89,12 @@ ALIGNS_ABOVE = 2.5
 MODES = {
     mode.number: mode
     for mode in (
-        Mode(0, "STABILIZE", BY_HAND, Stabilize, pilot=True, manual_throttle=True),
-        Mode(2, "ALT_HOLD", BY_HAND, AltitudeHold, Z_CONTROL, pilot=True),
+        Mode(0, "STABILIZE", MANUAL_BITS, Stabilize, pilot=True, manual_throttle=True),
+        Mode(2, "ALT_HOLD", MANUAL_BITS, AltitudeHold, Z_CONTROL, pilot=True),
         Mode(
             3,
             "AUTO",
-            BY_ITSELF,
+            AUTO_BITS,
             lambda vehicle: FlyMission(vehicle, copter_leg, mission.COPTER_MISSION, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
@@ -104,7 +104,7 @@ MODES = {
         Mode(
             4,
             "GUIDED",
-            BY_ITSELF,
+            AUTO_BITS,
             Guided,
             LEVEL_AND_HEIGHT,
             needs_position=True,
@@ -114,16 +114,16 @@ MODES = {
         Mode(
             5,
             "LOITER",
-            BY_ITSELF,
+            AUTO_BITS,
             Loiter,
             LEVEL_AND_HEIGHT,
             needs_position=True,
             pilot=True,
             user_takeoff=True,
         ),
-        Mode(6, "RTL", BY_ITSELF, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
-        Mode(9, "LAND", BY_HAND, Land, LEVEL_AND_HEIGHT, armable=False),
-        Mode(17, "BRAKE", BY_ITSELF, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(6, "RTL", AUTO_BITS, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(9, "LAND", MANUAL_BITS, Land, LEVEL_AND_HEIGHT, armable=False),
+        Mode(17, "BRAKE", AUTO_BITS, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     )
 }
 
@@ -194,7 +194,7 @@ def on_step(vehicle: Vehicle) -> None:
         vehicle.ground.flight_time += COPTER.periodic.tick
         _notice_flight(vehicle)
     else:
-        _disarm_by_itself(vehicle)
+        _disarm_automatically(vehicle)
 
 
 def _notice_flight(vehicle: Vehicle) -> None:
@@ -210,7 +210,7 @@ def _notice_flight(vehicle: Vehicle) -> None:
             vehicle.send_text(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
 
 
-def _disarm_by_itself(vehicle: Vehicle) -> None:
+def _disarm_automatically(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
     if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:

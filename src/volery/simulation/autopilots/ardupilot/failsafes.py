@@ -18,7 +18,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
 )
 from volery.simulation.autopilots.firmware import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
-from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CONTINUE_MISSION_ON_RADIO, CONTINUE_MISSION_ON_STATION = 1 << 0, 1 << 1
@@ -116,22 +116,22 @@ DISARM_ACTION = 5
 def _on_station_lost(vehicle: Vehicle) -> None:
     vehicle.rc.release()
     options = round(vehicle.parameters["FS_OPTIONS"])
-    keeps = ""
+    exception = ""
     if options & CONTINUE_MISSION_ON_STATION and vehicle.mode.name == "AUTO":
-        keeps = "Continuing Auto Mode"
+        exception = "Continuing Auto Mode"
     elif options & CONTINUE_PILOT_ON_STATION and vehicle.mode.pilot:
-        keeps = "Continuing Pilot Control"
-    _respond(vehicle, "GCS", STATION_ACTIONS.get(round(vehicle.parameters["FS_GCS_ENABLE"]), ()), keeps)
+        exception = "Continuing Pilot Control"
+    _respond(vehicle, "GCS", STATION_ACTIONS.get(round(vehicle.parameters["FS_GCS_ENABLE"]), ()), exception)
 
 
 def _on_radio_lost(vehicle: Vehicle) -> None:
     options = round(vehicle.parameters["FS_OPTIONS"])
-    keeps = ""
+    exception = ""
     if options & CONTINUE_MISSION_ON_RADIO and vehicle.mode.name == "AUTO":
-        keeps = "Continuing Auto"
+        exception = "Continuing Auto"
     elif options & CONTINUE_GUIDED_ON_RADIO and vehicle.mode.name == "GUIDED":
-        keeps = "Continuing Guided Mode"
-    _respond(vehicle, "Radio", RADIO_ACTIONS.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), keeps)
+        exception = "Continuing Guided Mode"
+    _respond(vehicle, "Radio", RADIO_ACTIONS.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), exception)
 
 
 def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
@@ -142,7 +142,7 @@ def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
         _respond(vehicle, "Battery", BATTERY_ACTIONS.get(action, ()), "")
 
 
-def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], keeps: str) -> None:
+def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str) -> None:
     """Report a failsafe and act.
 
     Args:
@@ -160,8 +160,8 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], keeps: str) ->
         disarm(vehicle, COPTER_DISARMED, force=True)
     elif manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
         vehicle.send_text(WARNING, f"{what} Failsafe - Continuing Landing")
-    elif keeps:
-        vehicle.send_text(WARNING, f"{what} Failsafe - {keeps}")
+    elif exception:
+        vehicle.send_text(WARNING, f"{what} Failsafe - {exception}")
     else:
         _enter_first(vehicle, modes)
         vehicle.send_text(WARNING, f"{what} Failsafe")

@@ -71,7 +71,7 @@ GROUND_ROVER = 10
 CAPABILITIES = 61_935
 """MAV_PROTOCOL_CAPABILITY bits, as recorded."""
 
-BY_ITSELF = CUSTOM | GUIDED
+AUTO_BITS = CUSTOM | GUIDED
 STEERED = RATE_CONTROL | ATTITUDE_CONTROL | YAW_CONTROL | XY_CONTROL
 
 READY = round(2.355 * S)
@@ -99,16 +99,16 @@ MODES = {
         Mode(
             10,
             "AUTO",
-            BY_ITSELF,
+            AUTO_BITS,
             lambda vehicle: FlyMission(vehicle, rover_leg, mission.ROVER_MISSION),
             STEERED,
             needs_position=True,
         ),
-        Mode(11, "RTL", BY_ITSELF, ReturnRover, STEERED, needs_position=True, armable=False),
+        Mode(11, "RTL", AUTO_BITS, ReturnRover, STEERED, needs_position=True, armable=False),
         Mode(
             15,
             "GUIDED",
-            BY_ITSELF,
+            AUTO_BITS,
             lambda vehicle: GuidedRover(vehicle, guided_arrived, guided_stale),
             STEERED,
             needs_position=True,

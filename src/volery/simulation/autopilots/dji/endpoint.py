@@ -243,7 +243,7 @@ class DjiEndpoint:
         """Return the present ROS time."""
         return (self._graph.epoch if self._graph else 0) + self._kernel.now()
 
-    # -- the graph
+    # -- ROS graph
 
     def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
         """Serve on a graph.
@@ -314,7 +314,7 @@ class DjiEndpoint:
         with self._kernel.guard:
             return answer(request)
 
-    # -- the aircraft
+    # -- protocol endpoint
 
     def start(self) -> None:
         """Start publishing after power-on."""

@@ -12,8 +12,8 @@ from volery.base.time import Ns, S, from_seconds
 from volery.ros.messages.dji_constants import M100, MISSION_SPEEDS, DisplayMode, FlightStatus, M100Status
 from volery.simulation.autopilots.dji.parameters import AIRCRAFT
 from volery.simulation.autopilots.dji.sdk_setpoints import SdkControl, sdk_command
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 MIN_WAYPOINTS, MAX_WAYPOINTS = 2, 99
@@ -116,7 +116,7 @@ class FlightController:
         self._last_setpoint_ns: Ns = NEVER
         self._requested_by_sdk = False
 
-    # -- what it shows
+    # -- reported state
 
     @property
     def aircraft(self) -> str:
@@ -169,7 +169,7 @@ class FlightController:
     def _is(self, mode: DisplayMode) -> bool:
         return self.vehicle.mode.number == mode
 
-    # -- what a program may ask
+    # -- requests of programs
 
     def activate(self) -> bool:
         """Accept any activation key."""
@@ -359,7 +359,7 @@ class FlightController:
         elif finish != NO_EXIT:
             self.hover()
 
-    # -- what it does by itself
+    # -- automatic actions
 
     def step(self) -> None:
         """Run the automatic actions, ten times a second."""

@@ -67,7 +67,7 @@ class Services:
     def __init__(self, controller: FlightController, on_reference: Callable[[], None]) -> None:
         self._controller = controller
         self._on_reference = on_reference
-        self._joystick = 0  # the flag that set_joystick_mode has stated
+        self._joystick = 0  # control flag of the last set_joystick_mode
 
     def table(self, package: str) -> tuple[Served, ...]:
         """Return the services of the node of a package."""
@@ -189,7 +189,7 @@ class Services:
         vehicle.set_home(request.latitude, request.longitude, vehicle.home.amsl)
         return True
 
-    # -- missions, alike in both
+    # -- missions, in both packages
 
     def _missions(self, package: str) -> tuple[Served, ...]:
         controller, prefix = self._controller, f"{package}/"

@@ -10,8 +10,8 @@ from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.link import ByteLink, Frame, Link
 from volery.links.mavlink_conventions import MessageStreams
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
+from volery.simulation.autopilots.state_groups import NEVER
 
 WAITING = 4
 """Number of texts that wait for a ground station; older ones are lost."""

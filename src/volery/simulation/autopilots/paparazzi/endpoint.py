@@ -55,7 +55,7 @@ class PaparazziEndpoint:
         """Stop serving all links."""
         self._links.clear()
 
-    # -- the clock
+    # -- periodic messages
 
     def start(self) -> None:
         """Start periodic telemetry when the firmware is ready, one kind of message after the other."""
@@ -90,7 +90,7 @@ class PaparazziEndpoint:
         self._clocks.clear()
         self._active = False
 
-    # -- speaking
+    # -- sending
 
     def send_text(self, severity: int, text: str) -> None:
         """Send INFO_MSG on all links and record it."""
@@ -124,7 +124,7 @@ class PaparazziEndpoint:
         """Execute the action at once: the protocol has no acknowledgements."""
         action()
 
-    # -- hearing
+    # -- receiving
 
     def _receive(self, link: Link, frame: Frame) -> None:
         self._kernel.call_at(self._kernel.now() + ANSWER_DELAY, partial(self._handle, link, frame))

@@ -233,7 +233,7 @@ class Navigation:
         self._stage_at: Ns = self._block_at
         self._oval_leg = 0
 
-    # -- the plan
+    # -- progress
 
     def step(self) -> None:
         """Check the exceptions, then run the stage."""
@@ -274,7 +274,7 @@ class Navigation:
         """Time in this stage [s]."""
         return to_seconds(self.vehicle.kernel.now() - self._stage_at)
 
-    # -- places
+    # -- positions
 
     @property
     def position(self) -> Vector:
@@ -318,7 +318,7 @@ class Navigation:
         begin = self.point(start)
         return east * (goal[0] - begin[0]) + north * (goal[1] - begin[1]) < 0.0
 
-    # -- what is to be flown
+    # -- demands
 
     def close_throttle(self) -> None:
         """Demand level flight with idling motors."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from volery.base.time import Ns, S
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RADIO_OK, RADIO_LOST, RADIO_REALLY_LOST = 0, 1, 2

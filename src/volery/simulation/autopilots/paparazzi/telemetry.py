@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Vector, enu_to_ned, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.paparazzi import modes, rotorcraft_state
 from volery.simulation.autopilots.paparazzi.flight_modes import Guided
 from volery.simulation.autopilots.paparazzi.flight_plan import Vertical
 from volery.simulation.autopilots.paparazzi.parameters import NUMBERED, read_setting
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import FULL, state_of
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Fields = dict[str, Any]

@@ -265,12 +265,12 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
 def _override(commander: Commander) -> None:
     """Let moved sticks take over an automatic mode in flight, as COM_RC_OVERRIDE allows."""
     vehicle = commander.vehicle
-    may = round(vehicle.parameters["COM_RC_OVERRIDE"])
+    options = round(vehicle.parameters["COM_RC_OVERRIDE"])
     number = vehicle.mode.number
-    by_itself = number in modes.AUTOMATIC and may & OVERRIDE_AUTOMATIC
-    by_computer = number == modes.OFFBOARD and may & OVERRIDE_OFFBOARD
+    overrides_automatic = number in modes.AUTOMATIC and options & OVERRIDE_AUTOMATIC
+    overrides_offboard = number == modes.OFFBOARD and options & OVERRIDE_OFFBOARD
     resting = vehicle.flies and vehicle.landed
-    if resting or not (by_itself or by_computer):
+    if resting or not (overrides_automatic or overrides_offboard):
         return
     if commander.joystick.moved(vehicle.parameters["COM_RC_STICK_OV"] / 100.0):
         commander.pilot_takes_over()

@@ -78,40 +78,39 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
 
 
 def _orbit(vehicle: Vehicle) -> Manoeuvre:
-    asked = commander_of(vehicle).orbit
-    centre, radius, speed = asked or (vehicle.estimate.position, 5.0, 1.0)
+    centre, radius, speed = commander_of(vehicle).orbit or (vehicle.estimate.position, 5.0, 1.0)
     return Orbit(vehicle, centre, radius, speed)
 
 
 MODES = {
     mode.number: mode
     for mode in (
-        Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, AltitudeHold, pilot=True),
-        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, PositionControl, needs_position=True, pilot=True),
-        Mode(modes.ORBIT, "ORBIT", modes.BY_COMPUTER, _orbit, needs_position=True, armable=False),
-        Mode(modes.ACRO, "ACRO", modes.BY_RATES, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, Offboard, needs_position=True),
-        Mode(modes.STABILIZE, "STABILIZED", modes.BY_HAND, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.BY_ITSELF, _take_off, needs_position=True),
-        Mode(modes.LOITER, "AUTO.LOITER", modes.BY_ITSELF, Hold, needs_position=True),
+        Mode(modes.MANUAL, "MANUAL", modes.MANUAL_BITS, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.ALTCTL, "ALTCTL", modes.MANUAL_BITS, AltitudeHold, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.MANUAL_BITS, PositionControl, needs_position=True, pilot=True),
+        Mode(modes.ORBIT, "ORBIT", modes.OFFBOARD_BITS, _orbit, needs_position=True, armable=False),
+        Mode(modes.ACRO, "ACRO", modes.RATE_BITS, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.OFFBOARD, "OFFBOARD", modes.OFFBOARD_BITS, Offboard, needs_position=True),
+        Mode(modes.STABILIZE, "STABILIZED", modes.MANUAL_BITS, Stabilize, pilot=True, manual_throttle=True),
+        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.AUTO_BITS, _take_off, needs_position=True),
+        Mode(modes.LOITER, "AUTO.LOITER", modes.AUTO_BITS, Hold, needs_position=True),
         Mode(
             modes.MISSION,
             "AUTO.MISSION",
-            modes.BY_ITSELF,
+            modes.AUTO_BITS,
             lambda vehicle: FlyMission(vehicle, mission.leg, mission.MISSION_RULES, lambda _vehicle: True),
             needs_position=True,
         ),
         Mode(
             modes.RTL,
             "AUTO.RTL",
-            modes.BY_ITSELF,
+            modes.AUTO_BITS,
             lambda vehicle: Return(vehicle, report_return_stage),
             needs_position=True,
             armable=False,
         ),
-        Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Descent, armable=False),
-        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.BY_COMPUTER, Hold, needs_position=True, armable=False),
+        Mode(modes.LAND, "AUTO.LAND", modes.AUTO_BITS, Descent, armable=False),
+        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.OFFBOARD_BITS, Hold, needs_position=True, armable=False),
     )
 }
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import struct
 
 from volery.base.time import MS, Ns, from_seconds, to_seconds
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, Commander, commander_of
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 WARNING = 4
@@ -63,11 +63,11 @@ def on_step(vehicle: Vehicle) -> None:
     if vehicle.armed:
         _check_failsafes(commander, passed)
     if vehicle.armed:
-        _disarm_by_itself(commander, now)
+        _disarm_automatically(commander, now)
     commander.report()
 
 
-# --- sticks ------------------------------------------------------------------------------------------------
+# -- manual control
 
 
 def _detect_stick_loss(commander: Commander, now: Ns) -> None:
@@ -79,7 +79,7 @@ def _detect_stick_loss(commander: Commander, now: Ns) -> None:
         commander.log.send(event_interface.STICKS_LOST)
 
 
-# --- ground ------------------------------------------------------------------------------------------------
+# -- ground
 
 
 def _detect_ground(commander: Commander, now: Ns) -> None:
@@ -92,7 +92,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
         vehicle.send_text(INFO, "Takeoff detected\t")
         commander.log.send(event_interface.TAKEOFF_DETECTED)
     elif commander.flying and not vehicle.armed and vehicle.estimate.landed:
-        flying = False  # it fell: nothing is said
+        flying = False  # a fall is not reported
         vehicle.ground.landed = True
     elif commander.flying and vehicle.landed:
         flying = False
@@ -104,7 +104,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
     commander.flying = flying
 
 
-def _disarm_by_itself(commander: Commander, now: Ns) -> None:
+def _disarm_automatically(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies or not vehicle.landed:
         return
@@ -117,7 +117,7 @@ def _disarm_by_itself(commander: Commander, now: Ns) -> None:
         commander.finish_disarming("auto preflight disarming", event_interface.BY_WAITING)
 
 
-# --- failsafes ---------------------------------------------------------------------------------------------
+# -- failsafes
 
 
 def _check_failsafes(commander: Commander, passed: float) -> None:
@@ -247,15 +247,15 @@ def _check_battery(commander: Commander) -> None:
     vehicle, left = commander.vehicle, commander.vehicle.estimate.battery_left
     action = round(vehicle.parameters["COM_LOW_BAT_ACT"])
     if left < vehicle.parameters[EMERGENCY]:
-        _say_once(vehicle, CRITICAL, "Emergency battery level\t")
+        _report_once(vehicle, CRITICAL, "Emergency battery level\t")
         if action and not _outranked(commander, BATTERY_EMERGENCY):
             _react_to_battery(commander, BATTERY_EMERGENCY, modes.LAND)
     elif left < vehicle.parameters[CRITICALLY_LOW]:
-        _say_once(vehicle, CRITICAL, "Critical battery level\t")
+        _report_once(vehicle, CRITICAL, "Critical battery level\t")
         if action and not _outranked(commander, BATTERY_CRITICAL):
             _react_to_battery(commander, BATTERY_CRITICAL, modes.LAND if action == 2 else modes.RTL)
     elif left < vehicle.parameters[LOW]:
-        _say_once(vehicle, WARNING, "Low battery level\t")
+        _report_once(vehicle, WARNING, "Low battery level\t")
 
 
 def _react_to_battery(commander: Commander, name: str, number: int) -> None:
@@ -266,7 +266,7 @@ def _react_to_battery(commander: Commander, name: str, number: int) -> None:
     _hold_first(commander, name, number)
 
 
-def _say_once(vehicle: Vehicle, severity: int, text: str) -> None:
+def _report_once(vehicle: Vehicle, severity: int, text: str) -> None:
     if text not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add(text)
         vehicle.send_text(severity, text)

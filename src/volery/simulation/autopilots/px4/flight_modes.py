@@ -15,7 +15,7 @@ from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
-from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
@@ -305,8 +305,8 @@ class PositionControl(ManualFlight):
 
     def _climb(self) -> float:
         p = self.vehicle.parameters
-        asked = apply_expo(self.vehicle.firmware_state.joystick.now.throttle, p["MPC_HOLD_DZ"])
-        return asked * (p["MPC_Z_VEL_MAX_UP"] if asked > 0.0 else p["MPC_Z_VEL_MAX_DN"])
+        stick = apply_expo(self.vehicle.firmware_state.joystick.now.throttle, p["MPC_HOLD_DZ"])
+        return stick * (p["MPC_Z_VEL_MAX_UP"] if stick > 0.0 else p["MPC_Z_VEL_MAX_DN"])
 
     def step(self) -> None:
         """Follow the sticks; sink without them."""

@@ -11,20 +11,20 @@ from collections.abc import Mapping
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.command import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import SetpointStream
 from volery.simulation.autopilots.px4.pilot_input import Joystick
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
 """MAV_MODE_FLAG."""
 
-BY_ITSELF = CUSTOM | AUTO | GUIDED | STABILIZED
-BY_HAND = CUSTOM | STABILIZED | MANUAL_INPUT
-BY_RATES = CUSTOM | MANUAL_INPUT
-BY_COMPUTER = CUSTOM | STABILIZED
+AUTO_BITS = CUSTOM | AUTO | GUIDED | STABILIZED
+MANUAL_BITS = CUSTOM | STABILIZED | MANUAL_INPUT
+RATE_BITS = CUSTOM | MANUAL_INPUT
+OFFBOARD_BITS = CUSTOM | STABILIZED
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
@@ -147,7 +147,7 @@ class Commander:
         self.reported_at: Ns = NEVER
         self.last_step: Ns = NEVER
 
-    # -- what there is
+    # -- state
 
     @property
     def above_ground(self) -> float:

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manual_control import NEVER
 from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import (
     BODY_NED,
@@ -28,6 +27,7 @@ from volery.simulation.autopilots.onboard_mission import (
 )
 from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
 from volery.simulation.autopilots.px4.flight_modes import climb_share
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CRITICAL = 2

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
-from volery.simulation.autopilots.manual_control import NEVER
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 INVALID = 32_767

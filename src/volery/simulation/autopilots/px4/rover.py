@@ -135,23 +135,23 @@ COMMANDS: dict[int, Handler] = {**commands.SHARED_COMMANDS, commands.REPOSITION:
 MODES = {
     mode.number: mode
     for mode in (
-        Mode(modes.MANUAL, "MANUAL", modes.BY_HAND, StickDrive, pilot=True),
-        Mode(modes.ALTCTL, "ALTCTL", modes.BY_HAND, StickDrive, pilot=True),
-        Mode(modes.POSCTL, "POSCTL", modes.BY_HAND, StickDrive, pilot=True),
-        Mode(modes.ACRO, "ACRO", modes.BY_RATES, StickDrive, pilot=True),
-        Mode(modes.OFFBOARD, "OFFBOARD", modes.BY_COMPUTER, OffboardRover, needs_position=True),
-        Mode(modes.STABILIZE, "STABILIZED", modes.BY_HAND, StickDrive, pilot=True),
-        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.BY_ITSELF, HoldRover, needs_position=True),
-        Mode(modes.LOITER, "AUTO.LOITER", modes.BY_ITSELF, HoldRover, needs_position=True),
+        Mode(modes.MANUAL, "MANUAL", modes.MANUAL_BITS, StickDrive, pilot=True),
+        Mode(modes.ALTCTL, "ALTCTL", modes.MANUAL_BITS, StickDrive, pilot=True),
+        Mode(modes.POSCTL, "POSCTL", modes.MANUAL_BITS, StickDrive, pilot=True),
+        Mode(modes.ACRO, "ACRO", modes.RATE_BITS, StickDrive, pilot=True),
+        Mode(modes.OFFBOARD, "OFFBOARD", modes.OFFBOARD_BITS, OffboardRover, needs_position=True),
+        Mode(modes.STABILIZE, "STABILIZED", modes.MANUAL_BITS, StickDrive, pilot=True),
+        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.AUTO_BITS, HoldRover, needs_position=True),
+        Mode(modes.LOITER, "AUTO.LOITER", modes.AUTO_BITS, HoldRover, needs_position=True),
         Mode(
             modes.MISSION,
             "AUTO.MISSION",
-            modes.BY_ITSELF,
+            modes.AUTO_BITS,
             lambda vehicle: FlyMission(vehicle, rover_leg, mission.MISSION_RULES, lambda _vehicle: True),
             needs_position=True,
         ),
-        Mode(modes.RTL, "AUTO.RTL", modes.BY_ITSELF, ReturnRover, needs_position=True, armable=False),
-        Mode(modes.LAND, "AUTO.LAND", modes.BY_ITSELF, Stand, armable=False),
+        Mode(modes.RTL, "AUTO.RTL", modes.AUTO_BITS, ReturnRover, needs_position=True, armable=False),
+        Mode(modes.LAND, "AUTO.LAND", modes.AUTO_BITS, Stand, armable=False),
     )
 }
 
