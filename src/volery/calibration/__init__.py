@@ -1,1 +1,1 @@
-"""The paper's calibration method on the machine at hand. Not there yet."""
+"""Calibration on the machine at hand: measured costs for the catalogue, and validation of estimates."""

@@ -1,7 +1,4 @@
-"""The computer that is calibrated: its name, its cores, the frequency that it runs at.
-
-A catalogue of the user's, into which calibrations put what they measured.
-"""
+"""The computer that is calibrated: its name, cores and frequency, and its entry in the user's catalogue."""
 
 from __future__ import annotations
 
@@ -17,18 +14,17 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from volery.base.errors import UsageError
-from volery.cost.catalogue import parse_catalogue
-from volery.cost.figures import WithProvenance
+from volery.cost import WithProvenance, parse_catalogue
 
 CPUINFO = Path("/proc/cpuinfo")
 CPUS = Path("/sys/devices/system/cpu")
 TOLERANCE = 0.02
-"""How far a stated frequency may be from the one that a machine reports."""
+"""Greatest relative difference between a stated frequency and the one that the machine reports."""
 
 
 @dataclass(frozen=True)
 class Machine:
-    """``name`` is short enough for a model, ``description`` the processor's own."""
+    """A computer: a short name for models, the processor's own description, cores, frequency in MHz."""
 
     name: str
     description: str
@@ -37,7 +33,15 @@ class Machine:
 
 
 def this_machine(name: str = "", cpuinfo: Path = CPUINFO) -> Machine:
-    """As Linux describes it, under *name* if one is given. ``UsageError`` where it does not."""
+    """Return this computer as Linux describes it.
+
+    Args:
+        name: Name for models; by default it is made from the description.
+        cpuinfo: File with the description.
+
+    Raises:
+        UsageError: There is no description, or no frequency in it.
+    """
     try:
         text = cpuinfo.read_text(encoding="utf-8")
     except OSError as error:
@@ -55,16 +59,23 @@ def _scaled_mhz() -> float:
     try:
         return int((CPUS / "cpu0/cpufreq/scaling_cur_freq").read_text(encoding="ascii")) / 1000.0
     except (OSError, ValueError) as error:
-        raise UsageError(
-            "this machine does not say what frequency it runs at; state it: --frequency"
-        ) from error
+        raise UsageError("this machine does not report its frequency; state it: --frequency") from error
 
 
 @contextmanager
 def at_frequency(machine: Machine, wanted_mhz: float | None, cpus: Path = CPUS) -> Iterator[float]:
-    """Keep all cores at a frequency, MHz, where the machine allows it; give the one that holds.
+    """Keep all cores at a frequency for the duration of the context.
 
-    ``UsageError`` if another one is wanted than the machine runs at and it cannot be set.
+    Args:
+        machine: The computer.
+        wanted_mhz: Frequency, MHz; None for the present one.
+        cpus: Folder of the cores' settings.
+
+    Yields:
+        The frequency, MHz.
+
+    Raises:
+        UsageError: The frequency cannot be set.
     """
     wanted = machine.frequency_mhz if wanted_mhz is None else wanted_mhz
     limits = sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_m[ai][xn]_freq"))
@@ -81,7 +92,7 @@ def at_frequency(machine: Machine, wanted_mhz: float | None, cpus: Path = CPUS) 
         _set(limits, str(round(wanted * 1000.0)))
         yield wanted
     finally:
-        for _ in range(2):  # a least frequency above the greatest is refused: the second pass has room
+        for _ in range(2):  # a minimum above the maximum is refused; the second pass succeeds
             for file, value in before.items():
                 _write(file, value)
 
@@ -101,17 +112,26 @@ def _write(file: Path, text: str) -> None:
     try:
         file.write_text(text, encoding="ascii")
     except OSError:
-        return  # whether it has taken it is looked at afterwards
+        return  # the setting is checked afterwards
 
 
 def put_law(
     file: Path, machine: Machine, where: Sequence[str], law: WithProvenance, reach_mhz: tuple[float, float]
 ) -> None:
-    """Make *law* what stands at *where* (``("code", "python")``) in the machine's entry of the catalogue at
-    *file*, made if need be.
+    """Write a law into the machine's entry of a catalogue; create the file and the entry if they are missing.
 
-    The entry's range of frequencies grows to contain *reach_mhz*; everything else in the file stays. Raises
-    ``ModelError`` if the file is there and no catalogue, ``UsageError`` if it cannot be written.
+    The rest of the file stays as it is.
+
+    Args:
+        file: The catalogue.
+        machine: The computer.
+        where: Path of the law in the entry, such as ``("code", "python")``.
+        law: The law.
+        reach_mhz: Range of frequencies, MHz, that the entry's range is extended to.
+
+    Raises:
+        ModelError: The file exists and is not a catalogue.
+        UsageError: The file cannot be written.
     """
     yaml = YAML()
     yaml.width = 110

@@ -1,1 +1,1 @@
-"""The time of operations on this machine: the figures of its core, for the cost of compiled code."""
+"""Figures of the core of this machine, for the cost of compiled code: times of single operations."""

@@ -1,4 +1,4 @@
-"""From the times of snippets to the figures of a core."""
+"""From the times of microbenchmarks to the figures of a core."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from volery.calibration.processor.microbenchmarks import (
     caches,
     memory_bytes,
 )
-from volery.cost.code_laws import Cache, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
+from volery.cost import Cache, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
 
 WINDOW, TABLES, HISTORY = 512, 12, 60
-"""Not measured, as of a large core; the prediction's were chosen looking at the kernels' first two inputs."""
+"""Not measured: values of a large core; the predictor's were chosen on the kernels' first two inputs."""
 
 LINE_BYTES = 64.0
 
@@ -34,14 +34,21 @@ SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
 
 PIPES_ARE_WHOLE = 0.2
-"""A core has whole pipes and noise only slows: 2.6 a cycle are three pipes, 2.1 are two."""
+"""Fraction that is rounded down: a core has whole pipes and noise only slows, so 2.6 a cycle are three pipes
+and 2.1 are two."""
 
 ALSO = {"malloc": "_Znwm", "free": "_ZdlPvm", "sin": "sincos"}
-"""Symbols that take what others take: operators new and delete, both functions of an angle."""
+"""Symbols with the time of another one: operators new and delete, both functions of an angle."""
 
 
 def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing]) -> CoreLaw:
-    """The core's figures. Latencies are whole cycles; below half a cycle, nothing is executed at all."""
+    """Return the figures of the core. Latencies are whole cycles; below half a cycle nothing is executed.
+
+    Args:
+        machine: The computer.
+        isa: Its instruction set.
+        taken: Times of all snippets.
+    """
     operations: dict[str, OperationTiming] = {}
     for name, snippet in SNIPPETS[isa].items():
         beside = sum(operations[one].latency for one in snippet.less)
@@ -49,7 +56,7 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing]) -> CoreLaw
         operations[name] = OperationTiming(
             latency=round(latency), per_cycle=_pipes(taken[FREE + name].cycles)
         )
-    for name in ("store", "branch"):  # nothing depends on their end
+    for name in ("store", "branch"):  # no instruction depends on their end
         operations[name] = OperationTiming(latency=1.0, per_cycle=operations[name].per_cycle)
     operations["fp_fma"] = operations["fp_multiply"]
     mispredicted = 2.0 * (taken[RANDOM].cycles - taken[NEVER].cycles)
@@ -82,7 +89,7 @@ def _pipes(cycles: float) -> float:
 
 
 def _memory(taken: Mapping[str, Timing], load: float, mhz: float) -> MemoryLaw:
-    """Caches as large as the system says; what lies behind them is memory."""
+    """Return the caches with the sizes that the system reports, and memory."""
     first, second, third = caches()
     behind_ns = taken[BEHIND].cycles * 1000.0 / mhz
     row_ns = taken[ROW].cycles * 1000.0 / mhz

@@ -1,4 +1,4 @@
-/* Calls of libraries whose time is taken, with arguments that a robot's code has; X and Y change from call to call. */
+/* Library calls that are timed, with arguments as in the code of robots. X and Y change from call to call. */
 LIBRARY(sin, sin(X))
 LIBRARY(cos, cos(X))
 LIBRARY(tan, tan(X))

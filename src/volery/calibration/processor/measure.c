@@ -1,7 +1,7 @@
-/* Times loops of snippets against a loop of single cycles, in turns: NAME REPETITIONS... -> a line per round.
+/* Times loops of snippets against a loop of single cycles, alternately: NAME REPETITIONS... -> a line per round.
  *
  * A line: the name, nanoseconds of one pass of the snippets, of one of the single cycles (both of process time).
- * The loops of snippets, tick among them, the table of CASES and what memory is gone through are generated before this file.
+ * The loops of snippets (tick among them), the table CASES and the sizes of memory are generated before this file.
  */
 #include <math.h>
 #include <stdint.h>
@@ -22,7 +22,7 @@ static uint64_t mixed(uint64_t x) {
     return x ^ x << 17;
 }
 
-/* One branch, taken as the lowest bits say: at random, or never. */
+/* One branch that is taken by the lowest bit: at random, or never. */
 static void branches(long passes, uint64_t state, uint64_t mask) {
     volatile long sink = 0;
     long taken = 0;
@@ -39,7 +39,7 @@ static void branches(long passes, uint64_t state, uint64_t mask) {
 static void branches_random(long passes) { branches(passes, 88172645463325252ull, ~0ull); }
 static void branches_never(long passes) { branches(passes, 88172645463325252ull, 0); }
 
-/* Sixty-four loads a pass, each of which needs the one before, round a circle of lines in random order. */
+/* Sixty-four dependent loads a pass, along a circular list of lines in random order. */
 enum { LINE = 64, EACH = LINE / sizeof(uint32_t) };
 
 static uint32_t *circle_of(uint32_t lines) {
@@ -70,7 +70,7 @@ static void go_round(long passes, size_t bytes) {
     left = at;
 }
 
-/* Sixty-four lines in a row. */
+/* Sixty-four consecutive lines. */
 static void in_a_row(long passes, size_t bytes) {
     static double *numbers;
     static size_t at;
@@ -139,7 +139,7 @@ int main(int count, char **words) {
             if (strcmp(cases[i].name, words[word]) != 0)
                 continue;
             long passes = 1;
-            cases[i].run(passes); /* what it sets up is not timed */
+            cases[i].run(passes); /* the set-up is not timed */
             while (timed(cases[i].run, passes) * passes < 50e3)
                 passes *= 2;
             for (int round = atoi(words[word + 1]); round > 0; --round) {

@@ -1,12 +1,8 @@
-"""Instructions whose time is taken, for each class of operations: dependent ones and independent ones.
+"""Microbenchmarks of a core: latency and throughput of each class of operations, branches, caches, libraries.
 
-A snippet is assembly for GCC's and clang's ``asm``. ``chain`` is a link of a dependent chain, of ``links``
-operations; what it has beside them is named in ``less`` and taken off again. ``free`` is an independent one,
-with ``{0}`` for the number of one of eight registers.
-
-Builds the program of snippets, runs it, and gives each snippet's time in cycles with its spread.
-
-The whole calibration: every snippet in turn, kept after each, so that a broken-off one goes on.
+Snippets of assembly are compiled into one program with ``measure.c`` and timed in cycles: each against a loop
+of dependent additions, one a cycle, since the frequency of the core is neither known nor constant. Results
+are kept after each snippet, so that an interrupted calibration continues.
 """
 
 from __future__ import annotations
@@ -25,12 +21,19 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from volery.base.errors import UsageError
-from volery.cost.native.compilation import llvm_toolchain, run_tool
+from volery.cost.native import llvm_toolchain, run_tool
 
 
 @dataclass(frozen=True)
 class Snippet:
-    """One class: see the module."""
+    """Assembly of one class of operations, for the ``asm`` of GCC and clang.
+
+    Attributes:
+        chain: A link of a dependent chain, for the latency.
+        free: An independent operation, for the throughput; ``{0}`` is the number of one of eight registers.
+        links: Operations in ``chain``.
+        less: Classes of other operations in ``chain``, whose latency is subtracted.
+    """
 
     chain: str
     free: str
@@ -80,7 +83,7 @@ X86_64 = {
 SNIPPETS = {"x86_64": X86_64}
 
 FORWARD = {"x86_64": "addsd %%xmm1, %%xmm0; movsd %%xmm0, 256(%%rsi); movsd 256(%%rsi), %%xmm0"}
-"""A sum that goes through memory: what is more than the sum is the way from a store to a load."""
+"""A sum through memory: its latency less that of the sum is that of store-to-load forwarding."""
 
 NOTHING = {"x86_64": "nop"}
 
@@ -94,31 +97,31 @@ PROLOGUE = {
         ", ".join(f'"{name}"' for name in (*_CHANGED, "cc", "memory")),
     )
 }
-"""What stands before a loop and at its end, where the pointer and the passes are, and what it changes."""
+"""Text before a loop and at its end, constraints of the pointer and the passes, and changed registers."""
 
 IF_ODD = {
     "x86_64": '__asm__ volatile("test $1, %b1; je 1f; add $1, %0; 1:" : "+r"(taken) : "r"(bits) : "cc")',
 }
-"""A branch by the lowest bit of a number that is there at once."""
+"""A branch by the lowest bit of a register whose value is available at once."""
 
 
 CHAIN, FREE, LIBRARY, MEMORY = "chain_", "free_", "library_", "memory_"
 RANDOM, NEVER, WIDTH, FORWARDED = "branches_random", "branches_never", "width", "forward"
 SECOND, THIRD, BEHIND, ROW = "memory_second", "memory_third", "memory_behind", "memory_row"
 LARGEST_THIRD = 32 << 20
-"""A third cache that is larger is shared by many, and counts as memory."""
+"""Largest third cache, bytes: a larger one is shared by many cores and counts as memory."""
 UNROLLED, PASSES = 48, 20
 BRANCHES = CALLS = LOADS = 64
-"""How many branches, calls and lines of memory a pass of ``measure.c`` has."""
+"""Branches, calls and lines of memory in a pass of ``measure.c``."""
 
 ROUNDS, MOST_ROUNDS = 15, 150
 MAX_SPREAD = 0.01
-"""A median is tight if half its quartiles' distance, over the root of the rounds, is less, relatively."""
+"""Largest relative spread of a precise median: half its inter-quartile range over the root of the rounds."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """``cycles`` of one operation: a median; ``spread``: its relative error; the frequency meanwhile."""
+    """Cycles of one operation (median), its relative spread, the rounds, and the frequency meanwhile, MHz."""
 
     cycles: float
     spread: float
@@ -127,12 +130,12 @@ class Timing:
 
     @property
     def tight(self) -> bool:
-        """False if the machine was too noisy."""
+        """Whether the median is precise; False if the machine was too noisy."""
         return self.spread <= MAX_SPREAD
 
 
 def isa() -> str:
-    """The instruction set of this machine. ``UsageError`` if there are no snippets for it."""
+    """Return the instruction set of this machine; raise ``UsageError`` if there are no snippets for it."""
     here = platform.machine()
     if here not in SNIPPETS:
         raise UsageError(f"no snippets for {here} yet: code is calibrated on {' and '.join(SNIPPETS)} only")
@@ -140,7 +143,7 @@ def isa() -> str:
 
 
 def build(folder: Path) -> Path:
-    """Compile the program; ``UsageError`` says which package brings the compiler."""
+    """Compile the program in ``folder``; raise ``UsageError`` if the compiler is missing."""
     here = files("volery.calibration.processor")
     measure = _generated(isa()) + here.joinpath("measure.c").read_text(encoding="utf-8")
     (folder / "measure.c").write_text(measure, encoding="utf-8")
@@ -152,14 +155,14 @@ def build(folder: Path) -> Path:
 
 
 def snippet_names() -> tuple[str, ...]:
-    """All that is timed."""
+    """Return the names of all snippets."""
     library = tuple(LIBRARY + name for name in _calls())
     memory = (SECOND, THIRD, BEHIND, ROW)
     return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *memory, *library)
 
 
 def time_snippet(program: Path, name: str) -> Timing:
-    """Time one snippet until its median is tight, or has been taken from ``MOST_ROUNDS`` rounds."""
+    """Time a snippet until its median is precise, for at most ``MOST_ROUNDS`` rounds."""
     each = {RANDOM: BRANCHES, NEVER: BRANCHES}.get(name, UNROLLED * PASSES)
     each = CALLS if name.startswith((LIBRARY, MEMORY)) else each
     cycles: list[float] = []
@@ -186,7 +189,7 @@ def _spread(values: list[float]) -> float:
 
 
 def _loops(machine: str) -> list[tuple[str, str, int]]:
-    """Every loop: its name, its snippet, how often the snippet stands in it."""
+    """Return all loops as (name, snippet, repetitions of the snippet)."""
     loops = [("tick", SNIPPETS[machine]["alu"].chain, UNROLLED)]
     for name, snippet in SNIPPETS[machine].items():
         loops.append((CHAIN + name, snippet.chain, UNROLLED))
@@ -198,15 +201,17 @@ def _loops(machine: str) -> list[tuple[str, str, int]]:
 
 
 class CacheGeometry(NamedTuple):
-    """A cache of this machine."""
+    """Size and associativity of a cache of this machine."""
 
     bytes: int
     ways: int
 
 
 def caches() -> tuple[CacheGeometry, CacheGeometry, CacheGeometry]:
-    """The caches for data of this machine, from the first on. One that the system says nothing of is taken to
-    be as usual; where there is no third one that counts, it is as the second.
+    """Return the data caches of this machine, from the first on.
+
+    A cache that the system does not report is taken to have a usual size. The third is equal to the second
+    where there is none or where it counts as memory.
     """
     found = dict(_found())
     first, second = found.get(1, CacheGeometry(32 << 10, 8)), found.get(2, CacheGeometry(512 << 10, 8))
@@ -215,15 +220,13 @@ def caches() -> tuple[CacheGeometry, CacheGeometry, CacheGeometry]:
 
 
 def memory_bytes() -> int:
-    """So many bytes do not fit into the caches, and are not so many that finding their pages takes longer
-    than memory does.
-    """
+    """Return a number of bytes that exceeds the caches, but not the reach of the translation buffer."""
     _, second, third = caches()
     return 2 * third.bytes if third != second else 8 * second.bytes
 
 
 def _found() -> Iterator[tuple[int, CacheGeometry]]:
-    """What Linux says, by level."""
+    """Yield the caches that Linux reports, with their levels."""
     for one in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
         with suppress(OSError, ValueError):
             size, ways, level, kind = (
@@ -243,7 +246,7 @@ def _calls() -> list[str]:
 
 
 def _generated(machine: str) -> str:
-    """What stands before ``measure.c``: the loops, and the table of cases."""
+    """Return the text before ``measure.c``: the loops and the table of cases."""
     begin, end, (numbers, passes), changed = PROLOGUE[machine]
     first, second, third = caches()
     out = [
@@ -266,11 +269,11 @@ def _generated(machine: str) -> str:
 
 
 ShowSnippet = Callable[[str, int, int], None]
-"""Told after each snippet: its name, how many are done, of how many."""
+"""Called after each snippet with its name, the number of completed snippets and the number of all."""
 
 
 def measure(notes: Path, show: ShowSnippet) -> dict[str, Timing]:
-    """Time every snippet that *notes* does not have yet, and write it there."""
+    """Time every snippet that the file ``notes`` does not contain yet, and add it there."""
     taken = read_notes(notes)
     wanted = snippet_names()
     with TemporaryDirectory(prefix="volery-processor-") as folder:
@@ -279,21 +282,21 @@ def measure(notes: Path, show: ShowSnippet) -> dict[str, Timing]:
             if name not in taken:
                 taken[name] = time_snippet(program, name)
                 notes.write_text(
-                    json.dumps({one: asdict(told) for one, told in taken.items()}), encoding="utf-8"
+                    json.dumps({one: asdict(found) for one, found in taken.items()}), encoding="utf-8"
                 )
             show(name, number, len(wanted))
     return {name: taken[name] for name in wanted}
 
 
 def read_notes(notes: Path) -> dict[str, Timing]:
-    """What an earlier run took; nothing if there was none or its notes cannot be read."""
+    """Return the results of an interrupted run; empty if there are none or they cannot be read."""
     try:
-        told = json.loads(notes.read_text(encoding="utf-8"))
-        return {name: Timing(**one) for name, one in told.items()}
+        found = json.loads(notes.read_text(encoding="utf-8"))
+        return {name: Timing(**one) for name, one in found.items()}
     except (OSError, ValueError, TypeError):
         return {}
 
 
 def noisy_snippets(taken: dict[str, Timing]) -> list[str]:
-    """What is not known tightly."""
+    """Return the names of snippets whose median is not precise."""
     return [name for name, one in taken.items() if not one.tight]

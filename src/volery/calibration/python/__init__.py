@@ -1,1 +1,1 @@
-"""What Python's operations take on the machine at hand: ``volery calibrate python``."""
+"""Times of Python's operations on the machine at hand: ``volery calibrate python``."""

@@ -1,15 +1,14 @@
-"""Costs that explain measured times: none is negative, and a few odd measurements do not bend the rest.
+"""Fit of the costs of Python's operations to measured times: ``volery calibrate python``.
 
-Minimises sum of rho(relative residual) over c >= 0, rho growing like the square for small residuals and like
-the absolute value for large ones: iteratively reweighted least squares, each by coordinate descent.
+Many statements are timed in a loop, each with a few operations, and the costs are found that explain all of
+them. Then whole programs are timed. They take longer than the sum of their operations in loops, since a
+processor predicts less of a program, by a factor that differs little from program to program. The costs
+contain that factor; its spread is their error. Programs by which the costs are judged elsewhere take no part
+in the fit.
 
-``volery calibrate python``: what Python's operations take on the machine at hand.
-
-Many statements are timed in a loop, each with a few operations in it, and the costs are found that explain
-all of them (``nonnegative``). Then whole programs are timed: they take longer than the sum of their
-operations in loops, since a processor foresees less of a program, by a factor that differs little from
-program to program. That factor goes into the costs, and its spread is their error. No program that the costs
-are judged by elsewhere takes part in this.
+The fit minimises the sum of rho(relative residual) over c >= 0, where rho is quadratic for small residuals
+and linear for large ones, so that a few outliers do not distort it: iteratively reweighted least squares,
+each by coordinate descent. scipy would be a dependency for this one function.
 """
 
 from __future__ import annotations
@@ -32,22 +31,29 @@ from volery.calibration.python.timed_code import (
     timed_programs,
     timed_statements,
 )
-from volery.cost.code_laws import CodeLaw
-from volery.cost.figures import Figure
-from volery.cost.python_operations import OPERATIONS, OperationTable, operation_table
+from volery.cost import OPERATIONS, CodeLaw, Figure, OperationTable, operation_table
 
 Floats = NDArray[np.float64]
 
 _ROUNDS = 25
 _SWEEPS = 40
-_SMALL = 0.03  # a relative residual below it counts by its square
+_SMALL = 0.03  # relative residuals below it count by their square
 
 
 def fit_costs(counts: Floats, times: Floats, weights: Floats, floor: float) -> Floats:
-    """Costs by column of *counts* (measurements x operations), so that counts @ costs are near *times*.
+    """Fit costs so that ``counts @ costs`` is near ``times``.
 
-    Residuals are relative to the time, or to *floor* where that is greater; *weights* say how much a
-    measurement matters. An operation that no measurement contains costs 0.
+    Residuals are relative to the time, or to ``floor`` where that is greater. An operation that no
+    measurement contains costs 0.
+
+    Args:
+        counts: Counts of operations, measurements x operations.
+        times: Measured times.
+        weights: Weights of the measurements.
+        floor: Least time that residuals are related to.
+
+    Returns:
+        Costs by operation, in the unit of the times.
     """
     scale = 1.0 / np.maximum(times, floor)
     costs = np.zeros(counts.shape[1])
@@ -60,7 +66,7 @@ def fit_costs(counts: Floats, times: Floats, weights: Floats, floor: float) -> F
 
 
 def _descend(matrix: Floats, wanted: Floats, start: Floats) -> Floats:
-    """Least squares of matrix @ c - wanted over c >= 0, from *start*."""
+    """Minimise the squares of ``matrix @ c - wanted`` over c >= 0 by coordinate descent from ``start``."""
     costs = start.copy()
     lengths = (matrix * matrix).sum(axis=0)
     left = wanted - matrix @ costs
@@ -73,41 +79,46 @@ def _descend(matrix: Floats, wanted: Floats, start: Floats) -> Floats:
 
 
 FLOOR_NS = 10.0
-"""Statements below it are judged by nanoseconds, not by percent: that much does the loop around vary."""
+"""Errors of shorter statements are absolute, ns, since the time of the loop around them varies as much."""
 LEAST_NS = 0.1
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What came out. ``costs`` are nanoseconds by operation, in context; errors are relative."""
+    """Result of a calibration; all errors are relative.
+
+    Attributes:
+        costs: Times of operations in programs, ns.
+        in_context: Time of programs over the sum of their operations alone in loops.
+        statements: Error of each statement, without the context.
+        programs: Error of each program by the costs and the context that the others gave.
+        loose: Pieces whose median is not known well enough, and half of its 95 % interval.
+        slowdown: Time on this machine over the time by the table that comes with volery.
+        slowdown_spread: Mean deviation of the programs' slowdowns.
+        rounds: Rounds that every piece had at least.
+    """
 
     costs: dict[str, float]
     in_context: float
     statements: dict[str, float]
-    """Error of each statement, without the context."""
     programs: dict[str, float]
-    """Error of each program by the costs and the context that the others gave."""
     loose: Mapping[str, float]
-    """Pieces whose medians are not known as well as was asked for, and how well they are: the half of the
-    95 % interval."""
     slowdown: float
-    """Times as long as by the table that comes with volery: this machine against the one it was made on."""
     slowdown_spread: float
     rounds: int
-    """That every piece had at least."""
 
     @property
     def program_error(self) -> float:
-        """The mean size of the errors of programs."""
+        """Mean absolute error of the programs."""
         return mean(abs(error) for error in self.programs.values())
 
     @property
     def pieces(self) -> int:
-        """How many were timed."""
+        """Number of pieces that were timed."""
         return len(self.statements) + len(self.programs) + 1
 
     def law(self, machine: str, frequency_mhz: float) -> CodeLaw:
-        """The law of the processor that was measured, which ran at *frequency_mhz*."""
+        """Return the law of the measured processor, which ran at ``frequency_mhz``."""
         source = f"volery calibrate python: CPU time of {len(self.programs)} programs on {machine}"
         slowdown = Figure(
             value=round(self.slowdown, 3),
@@ -125,7 +136,7 @@ class Calibration:
         )
 
     def table(self, machine: str) -> OperationTable:
-        """As the package keeps it; *machine* is what it was measured on."""
+        """Return the table of operations for the package; ``machine`` names the computer."""
         errors = [abs(error) for error in self.programs.values()]
         return OperationTable(
             provenance="measured",
@@ -143,19 +154,22 @@ class Calibration:
 
 
 def calibrate(
-    rounds: Rounds = DEFAULT_ROUNDS, tell: ShowRounds = no_progress, beside: Sequence[TimedCode] = ()
+    rounds: Rounds = DEFAULT_ROUNDS, show: ShowRounds = no_progress, beside: Sequence[TimedCode] = ()
 ) -> Calibration:
-    """Time everything and find the costs; *tell* as in ``pieces.measure``.
+    """Time all statements and programs and fit the costs.
 
-    *beside* are pieces to be timed in the same rounds, which the costs do not know of.
+    Args:
+        rounds: How many rounds.
+        show: See ``timed_code.measure``.
+        beside: Pieces that are timed in the same rounds and do not take part in the fit.
     """
     statements, whole = timed_statements(), timed_programs()
-    measure([*statements, *whole, *beside], rounds, tell)
+    measure([*statements, *whole, *beside], rounds, show)
     return evaluate(statements, whole, rounds)
 
 
 def evaluate(statements: Sequence[TimedCode], whole: Sequence[TimedCode], rounds: Rounds) -> Calibration:
-    """The costs from pieces that have been timed; the first statement is the empty one."""
+    """Fit the costs to pieces that have been timed; the first statement is the empty one."""
     empty, counts = statements[0], np.array([one.counts() for one in statements])
     counts = counts[1:] - counts[0]
     times = np.array([one.median for one in statements[1:]]) - empty.median
@@ -180,7 +194,7 @@ def evaluate(statements: Sequence[TimedCode], whole: Sequence[TimedCode], rounds
 
 
 def _without_itself(names: Sequence[str], ratios: Sequence[float]) -> dict[str, float]:
-    """The error of each program by the context that the others gave."""
+    """Return the error of each program by the context that the others gave (leave-one-out)."""
     errors = {}
     for index, name in enumerate(names):
         others = [*ratios[:index], *ratios[index + 1 :]]
@@ -193,5 +207,5 @@ def _shipped_ratio(one: TimedCode) -> float:
 
 
 def interpreter() -> str:
-    """``CPython 3.11``."""
+    """Return the name and version of the interpreter, such as ``CPython 3.11``."""
     return f"{platform.python_implementation()} {'.'.join(platform.python_version_tuple()[:2])}"

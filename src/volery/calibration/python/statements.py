@@ -1,7 +1,7 @@
-"""The pieces of Python that an interpreter's operations are timed by.
+"""Statements by which the operations of an interpreter are timed.
 
-Each is a statement, run in a loop within a function after ``PREAMBLE``. Every operation occurs in several of
-them beside different others, so that the costs that explain all of them together can be told apart.
+Each is run in a loop within a function after ``PREAMBLE``. Every operation occurs in several statements
+together with different others, so that a fit can separate their costs.
 """
 
 from __future__ import annotations
@@ -166,4 +166,4 @@ STATEMENTS = (
     "h = {}\nfor k in text: h[k] = len(h)",
     "c = 0\nfor k in l: c += give(k) * 2",
 )  # fmt: skip
-"""The statements."""
+"""The statements, grouped by the operations that they are meant for."""

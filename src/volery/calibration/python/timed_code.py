@@ -1,7 +1,7 @@
-"""Pieces of Python that can be run for their time, and counted for what they do.
+"""Pieces of Python code that are timed, and counted for their operations.
 
-Times are CPU time of the thread, which other programs do not add to; that they share caches and cores' upper
-speed is why each piece is timed in rounds that go through all of them, and the median counts.
+Times are CPU time of the thread, to which other programs do not add. They do share caches and the cores'
+frequency; so the pieces are timed in rounds over all of them, and the median counts.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from types import ModuleType
 
 from volery.base.time import MS, Ns
 from volery.calibration.python.statements import PREAMBLE, STATEMENTS
-from volery.cost import StepCounter
-from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS
+from volery.cost import OPERATIONS, STEPS_PER_NS, StepCounter
 
 ShowRounds = Callable[[int, int, int], None]
 
@@ -30,16 +29,24 @@ _NO_STATEMENT = "pass"
 _WORTH_TIMING: Ns = 2 * MS
 _TIMES = 8
 _DIGITS = 32
-"""Bits for how often an operation is done: enough for any piece here."""
+"""Bits for the count of an operation: enough for any piece here."""
 
 
 def no_progress(done: int, most: int, pieces: int) -> None:
-    """Tells nobody."""
+    """Report nothing."""
 
 
 @dataclass
 class TimedCode:
-    """A piece of code. ``run`` does it once *times* times over; ``nanoseconds`` are of one time, by round."""
+    """A piece of code.
+
+    Attributes:
+        name: Its name.
+        text: Its source.
+        load: Returns a function that executes it a number of times, instrumented if a counter is given.
+        times: Executions in a measurement.
+        nanoseconds: Time of one execution by round, ns.
+    """
 
     name: str
     text: str
@@ -52,47 +59,47 @@ class TimedCode:
         return self.load(None)
 
     def warm_up(self) -> None:
-        """Find out how often it must be run to be worth timing."""
+        """Double the executions of a measurement until it is long enough."""
         while self._cpu() < _WORTH_TIMING:
             self.times *= 2
 
     def _cpu(self) -> Ns:
-        run = self._run  # loads it the first time, which is not to be timed
+        run = self._run  # loaded at the first access, which is not timed
         before = thread_time_ns()
         run(self.times)
         return thread_time_ns() - before
 
     def measure(self) -> None:
-        """One more round."""
+        """Add a round."""
         self.nanoseconds.append(self._cpu() / self.times)
 
     @property
     def median(self) -> float:
-        """Nanoseconds of one time."""
+        """Median time of one execution, ns."""
         return median(self.nanoseconds)
 
     @property
     def spread(self) -> float:
-        """The middle half of the rounds, relative to the median."""
+        """Inter-quartile range of the rounds, relative to the median."""
         low, _, high = quantiles(self.nanoseconds, n=4)
         return (high - low) / self.median
 
     @property
     def half_width(self) -> float:
-        """Of the median's 95 % interval, relative: 1.57 quartile distances over the square root of n.
+        """Half of the median's 95 % interval, relative: 1.57 inter-quartile ranges over the square root of n.
 
         McGill, Tukey and Larsen, *Variations of Box Plots*, The American Statistician 32(1), 1978.
         """
         return 1.57 * self.spread / math.sqrt(len(self.nanoseconds))
 
     def counted_ns(self, costs: Mapping[str, float]) -> float:
-        """What one time takes by *costs* of operations."""
+        """Return the time of one execution by ``costs`` of operations, ns."""
         return self._counted(StepCounter(costs)) / STEPS_PER_NS / _TIMES
 
     def counts(self) -> list[float]:
-        """How often each operation is done in one time, in the order of ``OPERATIONS``.
+        """Return the count of each operation in one execution, in the order of ``OPERATIONS``.
 
-        Each is counted in digits of its own of one great number.
+        Each is counted in its own digits of one large number.
         """
         steps = StepCounter({name: 1 << place * _DIGITS for place, name in enumerate(OPERATIONS)}, exact=True)
         left = self._counted(steps) // STEPS_PER_NS
@@ -103,9 +110,9 @@ class TimedCode:
         return found
 
     def _counted(self, steps: StepCounter) -> int:
-        """Steps of doing it ``_TIMES`` times."""
+        """Return the steps of ``_TIMES`` executions."""
         run = self.load(steps)
-        run(0)  # what happens however often it is run does not count
+        run(0)  # the part outside the executions does not count
         steps.take()
         run(0)
         nothing = steps.take()
@@ -114,7 +121,7 @@ class TimedCode:
 
 
 def timed_statements() -> list[TimedCode]:
-    """The calibration's own statements; the first is none at all: what the others contain beside theirs."""
+    """Return the statements of the calibration; the first is empty, which is the part of all others too."""
     return [_snippet(statement) for statement in (_NO_STATEMENT, *STATEMENTS)]
 
 
@@ -129,7 +136,7 @@ def _snippet(statement: str) -> TimedCode:
 
 
 def timed_programs() -> list[TimedCode]:
-    """The calibration's own programs."""
+    """Return the programs of the calibration."""
     folder = files("volery.calibration.python").joinpath("programs")
     found = sorted(
         (file.name, file.read_text(encoding="utf-8")) for file in folder.iterdir() if file.is_file()
@@ -138,7 +145,7 @@ def timed_programs() -> list[TimedCode]:
 
 
 def timed_program(name: str, text: str, seed: int = 1) -> TimedCode:
-    """A program with ``prepare(seed)``, which is not timed, and ``run(state)``, which is."""
+    """Return a program whose ``run(state)`` is timed and whose ``prepare(seed)`` is not."""
 
     def load(steps: StepCounter | None) -> Callable[[int], object]:
         module = _module(name, text, steps)
@@ -166,7 +173,7 @@ def _module(name: str, text: str, steps: StepCounter | None) -> ModuleType:
 
 @dataclass(frozen=True)
 class Rounds:
-    """How often pieces are timed: *least* times, then until each median is known to *within*, or *most*."""
+    """Number of rounds: ``least`` for all, then until each median is known to ``within``, or ``most``."""
 
     least: int = 9
     most: int = 31
@@ -177,11 +184,14 @@ DEFAULT_ROUNDS = Rounds()
 
 
 def measure(
-    pieces: Sequence[TimedCode], rounds: Rounds = DEFAULT_ROUNDS, tell: ShowRounds = no_progress
+    pieces: Sequence[TimedCode], rounds: Rounds = DEFAULT_ROUNDS, show: ShowRounds = no_progress
 ) -> None:
-    """Time each of *pieces* once a round; in the end only those that are not known well enough.
+    """Time each piece once a round; after ``rounds.least`` rounds only those that are not known well enough.
 
-    *tell* is told how many rounds are done, of how many, and how many pieces the next one is for.
+    Args:
+        pieces: The pieces, whose ``nanoseconds`` grow.
+        rounds: How many rounds.
+        show: Called before each round with the completed rounds, the most rounds and the pieces of the round.
     """
     with _no_collection():
         for piece in pieces:
@@ -192,14 +202,14 @@ def measure(
                 left = [piece for piece in left if piece.half_width > rounds.within]
             if not left:
                 break
-            tell(done, rounds.most, len(left))
+            show(done, rounds.most, len(left))
             for piece in left:
                 piece.measure()
 
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without the garbage collector, whose time would fall on whoever is running."""
+    """Disable the garbage collector, whose time would be charged to the running piece."""
     was = gc.isenabled()
     gc.disable()
     try:

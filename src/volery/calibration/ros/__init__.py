@@ -1,6 +1,6 @@
-"""What calls into ROS cost on the machine at hand: the paper's method, for roscpp, rospy and rclpy.
+"""Cost of calls into ROS on the machine at hand: the paper's method, for roscpp, rospy and rclpy.
 
-A *probe* is one fresh process of the client library that goes through everything once and prints what its CPU
-clocks said; a *round* is what one probe said. A campaign is as many rounds as it takes. What a call costs is
-the difference between cycles with it and idle cycles, so that the library's threads are in it.
+A probe is a new process of the client library that makes all calls once and prints the readings of its CPU
+clocks; a round is the output of one probe. A campaign has as many rounds as the figures require. The cost of
+a call is the difference between cycles with it and idle cycles, so it contains the library's threads.
 """

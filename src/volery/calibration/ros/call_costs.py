@@ -1,10 +1,8 @@
-"""What a probe says, and what follows from it for each call: points to fit a law to.
+"""Costs of calls into ROS from the output of probes: points, lines through them, and their precision.
 
-From points to laws: straight lines, how far the points lie from them, and how sure they are.
-
-A line goes through the medians at each x, with weights that make *relative* residuals least: a call that is
-cheap is to be estimated as well as one that is dear. How sure it is: the same from rounds drawn with
-repetition (bootstrap over whole rounds, since what one probe measures hangs together).
+A line goes through the medians at each x, with weights that minimise relative residuals: a cheap call is to
+be estimated as well as an expensive one. The precision is that of lines through rounds drawn with replacement
+(bootstrap over whole rounds, since the measurements of one probe are correlated).
 """
 
 from __future__ import annotations
@@ -20,20 +18,20 @@ from volery.base.seeds import stream
 from volery.base.time import S
 
 Clock = Literal["process_ns", "caller_ns"]
-"""CPU time of the whole process, or of the calling thread alone."""
+"""CPU time of the whole process, or of the calling thread."""
 
 Points = dict[str, dict[float, list[float]]]
-"""Call -> x -> what one of them took, ns, once for each time it was measured."""
+"""{call: {x: measured times of one call, ns}}."""
 
 ONCE = ("init", "node_handle", "advertise", "subscribe", "service_client", "advertise_service")
-"""Calls that are made once by a fresh process."""
+"""Calls that a new process makes once."""
 
 
 SECOND_US = 1e6
 
 
 class Sample(NamedTuple):
-    """One line of a probe: so many cycles of something took so much CPU time and time on the wall."""
+    """One line of a probe: a number of cycles, their CPU times and their time on the wall clock, ns."""
 
     what: str
     x: float
@@ -43,7 +41,7 @@ class Sample(NamedTuple):
     caller_ns: int
 
     def each(self, clock: Clock) -> float:
-        """CPU time of one cycle, ns."""
+        """Return the CPU time of one cycle, ns."""
         return float(getattr(self, clock)) / self.cycles
 
 
@@ -51,15 +49,15 @@ Round = tuple[Sample, ...]
 
 
 def read_round(lines: Iterable[str]) -> Round:
-    """What a probe has printed. ``LinkError`` if that is something else."""
+    """Parse the output of a probe; raise ``LinkError`` if it is not a measurement."""
     try:
         return tuple(Sample(**json.loads(line)) for line in lines if line.startswith("{"))
     except (ValueError, TypeError) as error:
-        raise LinkError(f"a probe said what is no measurement: {error}") from error
+        raise LinkError(f"the output of a probe is not a measurement: {error}") from error
 
 
 def points_of(one: Round, clock: Clock) -> Points:
-    """What each call took in one round."""
+    """Return the times of each call in one round."""
     taken = _RoundAnalysis(one, clock)
     points: Points = {}
     for call, x, value in [*taken.once(), *taken.loops(), *taken.publishing(), *taken.hearing()]:
@@ -68,7 +66,7 @@ def points_of(one: Round, clock: Clock) -> Points:
 
 
 def merged(several: Sequence[Points]) -> Points:
-    """The points of several rounds together."""
+    """Merge the points of several rounds."""
     found: Points = {}
     for points in several:
         for call, by_x in points.items():
@@ -81,7 +79,7 @@ Point = tuple[str, float, float]
 
 
 class _RoundAnalysis:
-    """One round by one clock. Idle cycles and the probe's own waiting are taken off everything."""
+    """Times of calls in one round by one clock, less idle cycles and the probe's own waiting."""
 
     def __init__(self, samples: Round, clock: Clock) -> None:
         self._clock: Clock = clock
@@ -94,7 +92,7 @@ class _RoundAnalysis:
         self._idle = max(0.0, spent / waited) if waited else 0.0
 
     def _alone(self, one: Sample) -> float:
-        """Of a single call, without what the process would have spent anyway."""
+        """Return the time of a single call without what the idle process would have spent."""
         return one.each(self._clock) - self._own - self._idle * one.waited_ns
 
     def _single(self, what: str) -> float | None:
@@ -102,7 +100,7 @@ class _RoundAnalysis:
         return median([self._alone(one) for one in found]) if found else None
 
     def once(self) -> Iterable[Point]:
-        """Registrations, and connections: what they take beyond the same without a peer."""
+        """Yield registrations, and connections less the same call without a peer."""
         for call in ONCE:
             value = self._single(call)
             if value is not None:
@@ -117,14 +115,14 @@ class _RoundAnalysis:
             yield "accept", 0.0, (self._alone(one) - advertise) / one.x
 
     def loops(self) -> Iterable[Point]:
-        """Sleeps, and waiting in ``spin``."""
+        """Yield sleeps, and waiting in ``spin``."""
         for one in self._by_name.get("sleep", []):
             yield "sleep", one.x, one.each(self._clock)
         for one in self._by_name.get("wait", []):
             yield "wait", SECOND_US, one.each(self._clock) * S / one.waited_ns
 
     def publishing(self) -> Iterable[Point]:
-        """Whole cycles minus the idle cycles before them."""
+        """Yield publishing cycles less the idle cycles before them."""
         idle, publish = self._by_name.get("idle", []), self._by_name.get("publish", [])
         for without, whole in zip(idle, publish, strict=False):
             yield "publish", whole.x, whole.each(self._clock) - without.each(self._clock)
@@ -151,11 +149,11 @@ def _grouped(samples: Round) -> dict[str, list[Sample]]:
 
 
 TYPICAL_X = {"publish": 4.0, "publish_next": 2.0, "sleep": 50_000.0, "wait": 1_000_000.0}
-"""Where a law is judged: four subscribers (two), 50 ms, a second."""
+"""x at which a law is judged: four subscribers (two), 50 ms, a second."""
 
 DRAWS = 200
 NEGLIGIBLE_NS = 5_000.0
-"""An interval of less to each side is tight whatever the figure: a twentieth of what a cycle takes."""
+"""Half width of an interval that is precise enough for every figure: a twentieth of a cycle's cost."""
 
 LOW, HIGH = 0.025, 0.975
 
@@ -167,16 +165,24 @@ class CostLine(NamedTuple):
     per_x: float = 0.0
 
     def at(self, x: float) -> float:
-        """Its value."""
+        """Return the value at x."""
         return self.constant + self.per_x * x
 
 
 @dataclass(frozen=True)
 class CallCost:
-    """What one call takes. ``caller`` is the part of ``whole`` that the calling thread spends.
+    """Cost of one call, ns.
 
-    ``low`` and ``high`` bound a typical call (95 per cent); ``spread`` is the inter-quartile range of single
-    measurements relative to the law; ``residual`` the greatest distance of a median from the line, relative.
+    Attributes:
+        call: Its name.
+        whole: CPU time of the process over x.
+        caller: Part of ``whole`` of the calling thread.
+        low: Lower bound of a typical call (95 % interval).
+        high: Upper bound of a typical call.
+        spread: Inter-quartile range of single measurements, relative to the line.
+        residual: Greatest distance of a median from the line, relative.
+        count: Number of measurements.
+        points: Measurements by x.
     """
 
     call: str
@@ -191,30 +197,30 @@ class CallCost:
 
     @property
     def typical(self) -> float:
-        """What a typical call takes, ns."""
+        """Cost of a typical call, ns."""
         return self.whole.at(TYPICAL_X.get(self.call, 0.0))
 
     @property
     def half_width(self) -> float:
-        """Half of the interval, relative to a typical call, or to ``NEGLIGIBLE_NS`` if that takes less."""
+        """Half of the interval, relative to a typical call (to ``NEGLIGIBLE_NS`` if that is greater)."""
         return (self.high - self.low) / 2.0 / max(self.typical, NEGLIGIBLE_NS)
 
     def is_tight(self, within: float) -> bool:
-        """Whether it is known to *within* (relative)."""
+        """Return whether the relative precision is ``within`` or better."""
         return self.half_width <= within or (self.high - self.low) / 2.0 <= NEGLIGIBLE_NS
 
 
 def fit(by_x: dict[float, list[float]]) -> CostLine:
-    """The line through the medians at each x, nowhere below zero for an x that is not.
+    """Fit a line through the medians at each x, which is nowhere negative for x >= 0.
 
-    With one x only: a constant if that is 0, else proportional.
+    With one x only the line is constant if that x is 0, else proportional.
     """
     medians = {x: median(values) for x, values in by_x.items()}
     if len(medians) == 1:
         [(x, value)] = medians.items()
         return CostLine(0.0, max(0.0, value) / x) if x else CostLine(max(0.0, value))
     constant, per_x = _least_squares(medians)
-    if per_x < 0.0:  # noise has turned a part of it below zero, which no cost is
+    if per_x < 0.0:  # noise has made one of them negative
         return CostLine(max(0.0, median(medians.values())))
     if constant < 0.0:
         return CostLine(0.0, max(0.0, median(value / x for x, value in medians.items() if x)))
@@ -222,7 +228,7 @@ def fit(by_x: dict[float, list[float]]) -> CostLine:
 
 
 def _least_squares(medians: dict[float, float]) -> tuple[float, float]:
-    """Constant and slope, residuals weighted by the value."""
+    """Return constant and slope that minimise relative residuals."""
     weights = {x: max(value, NEGLIGIBLE_NS) ** -2 for x, value in medians.items()}
     total = sum(weights.values())
     mean_x = sum(weights[x] * x for x in medians) / total
@@ -233,7 +239,7 @@ def _least_squares(medians: dict[float, float]) -> tuple[float, float]:
 
 
 def call_costs(rounds: Sequence[Round], seed: int = 1) -> dict[str, CallCost]:
-    """What every call takes, by the rounds so far."""
+    """Return the cost of every call by the rounds so far."""
     whole = [points_of(one, "process_ns") for one in rounds]
     together, callers = merged(whole), merged([points_of(one, "caller_ns") for one in rounds])
     drawn = _drawn(whole, seed)
@@ -268,7 +274,7 @@ def _cost(
 
 
 def _drawn(rounds: Sequence[Points], seed: int) -> dict[str, list[float]]:
-    """The typical cost of each call, from as many rounds drawn with repetition, many times."""
+    """Return bootstrap samples of the typical cost of each call: rounds drawn with replacement."""
     random = stream(seed, "calibrate/bootstrap")
     found: dict[str, list[float]] = {}
     for _ in range(DRAWS):
@@ -279,7 +285,7 @@ def _drawn(rounds: Sequence[Points], seed: int) -> dict[str, list[float]]:
 
 
 def _quantile(ordered: Sequence[float], share: float) -> float:
-    """Linear between order statistics."""
+    """Return a quantile, linear between order statistics."""
     place = share * (len(ordered) - 1)
     below = int(place)
     above = min(below + 1, len(ordered) - 1)

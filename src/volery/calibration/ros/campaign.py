@@ -1,6 +1,6 @@
-"""As many rounds as it takes until every figure is known, or until it is said which is not.
+"""Rounds of measurement until every figure is known well enough, or the greatest number is reached.
 
-What was measured is kept in a file, a line each round: a campaign that was broken off goes on from there.
+Rounds are kept in a file, a line each, so that an interrupted campaign continues.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from volery.calibration.ros.call_costs import CallCost, Round, Sample, call_cost
 from volery.calibration.ros.probe_environment import Pace, ProbeSetup
 
 PERIODS_MS = (20.0, 50.0)
-"""Of the cycles that calls are measured in, one a round: what has slept longer finds its caches colder."""
+"""Periods of measured cycles, ms, in turn by round: caches are colder after a longer sleep."""
 
 LEAST_ROUNDS = 3
-"""Fewer say nothing about their spread."""
+"""Least number of rounds that shows their spread."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a campaign was measured under: rounds of another one do not mix with it."""
+    """Conditions of a campaign; rounds under other conditions do not belong to it."""
 
     client: str
     processor: str
@@ -33,7 +33,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Plan:
-    """At least and at most so many rounds; ``within`` is how well, relative, each figure is to be known."""
+    """Least and greatest number of rounds, and the relative precision ``within`` of each figure."""
 
     least: int = 10
     most: int = 30
@@ -42,7 +42,7 @@ class Plan:
     pace: Pace = field(default_factory=Pace)
 
     def pace_of(self, number: int) -> Pace:
-        """That of round *number*: least and greatest counts each time, others in turn, in an order drawn."""
+        """Return the pace of a round: the least and greatest counts and two others, in random order."""
         counts = self.pace.counts
         random = stream(self.seed, f"calibrate/{number}")
         between = counts[1:-1]
@@ -56,7 +56,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Progress:
-    """After each round: how many there are, and the figures that are not known well enough yet."""
+    """State after a round: completed rounds, most rounds, figures that are not known well enough yet."""
 
     rounds: int
     most: int
@@ -67,7 +67,7 @@ Show = Callable[[Progress], None]
 
 
 class CampaignLog:
-    """The file that rounds are kept in. ``UsageError`` if it holds those of other circumstances."""
+    """File of completed rounds; raises ``UsageError`` if it has rounds under other conditions."""
 
     def __init__(self, file: Path, under: Conditions) -> None:
         self._file = file
@@ -87,18 +87,18 @@ class CampaignLog:
             raise UsageError(f"{file} holds rounds of {known}, not of {header}: remove it or move it away")
 
     def keep(self, one: Round) -> None:
-        """Add a round."""
+        """Append a round."""
         self.rounds.append(one)
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(one) + "\n")
 
     def forget(self) -> None:
-        """The campaign is over."""
+        """Delete the file after the campaign."""
         self._file.unlink(missing_ok=True)
 
 
 def _whole(lines: list[str]) -> Iterator[str]:
-    """A last line that was cut off by a crash is left out."""
+    """Yield the lines without a last one that is incomplete after a crash."""
     for number, line in enumerate(lines):
         if number < len(lines) - 1 or line.endswith("]]"):
             yield line
@@ -107,7 +107,7 @@ def _whole(lines: list[str]) -> Iterator[str]:
 def run_campaign(
     stage: ProbeSetup, plan: Plan, notebook: CampaignLog, show: Show = lambda progress: None
 ) -> None:
-    """Measure rounds until all figures are tight or there are enough of them."""
+    """Measure rounds until all figures are precise or the plan's greatest number is reached."""
     while True:
         done = len(notebook.rounds)
         loose = uncertain_costs(notebook.rounds, plan.within) if done >= plan.least else ()
@@ -118,5 +118,5 @@ def run_campaign(
 
 
 def uncertain_costs(rounds: Iterable[Round], within: float) -> tuple[CallCost, ...]:
-    """The calls whose cost is not known to *within*."""
+    """Return the costs whose relative precision is worse than ``within``."""
     return tuple(cost for cost in call_costs(list(rounds)).values() if not cost.is_tight(within))

@@ -1,4 +1,4 @@
-"""Where probes run: a graph of their own, whom they talk to, how each client library's is started."""
+"""Environment of probes: a ROS graph of their own, their peers, and the command for each client library."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from volery.ros.transports.ros1.master import environment
 CLIENTS = ("roscpp", "rospy", "rclpy")
 PROBES = Path(str(files("volery.calibration.ros").joinpath("probes")))
 MESSAGES = ("geometry_msgs", "sensor_msgs", "nav_msgs")
-"""Packages that nodes like to include, where they are installed."""
+"""Packages of messages that nodes often include, used where they are installed."""
 
-GOOD_BYE_S = 10.0
+STOP_TIMEOUT_S = 10.0
 LIMIT_S = 120.0
 _DOMAIN = "77"
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How long a probe measures what. ``sleeps_ms`` and ``counts`` are measured in the order given."""
+    """Durations of a probe, ms, and the sleeps and numbers of subscribers in the order of measurement."""
 
     block_ms: float = 600.0
     period_ms: float = 50.0
@@ -40,21 +40,21 @@ class Pace:
     counts: tuple[int, ...] = (1, 2, 4, 8)
 
     def arguments(self) -> list[str]:
-        """As a probe takes them."""
+        """Return the arguments of a probe."""
         listed = [",".join(f"{one:g}" for one in several) for several in (self.sleeps_ms, self.counts)]
         return [f"{self.block_ms:g}", f"{self.period_ms:g}", *listed]
 
 
 @dataclass(frozen=True)
 class ProbeSetup:
-    """A graph with somebody to talk to. ``command`` starts the probe, ``environment`` is that of its node."""
+    """A ROS graph with peers: the command that starts a probe, and the environment of its node."""
 
     client: str
     command: tuple[str, ...]
     environment: Mapping[str, str]
 
     def probe(self, pace: Pace) -> Round:
-        """One round. ``LinkError`` if the probe fails, with its last words."""
+        """Run a probe; raise ``LinkError`` with its last output if it fails."""
         try:
             done = subprocess.run(
                 [*self.command, *pace.arguments()],
@@ -69,13 +69,13 @@ class ProbeSetup:
         except subprocess.TimeoutExpired as error:
             raise LinkSilent(f"the {self.client} probe did not end within {LIMIT_S:g} s") from error
         if done.returncode:
-            said = done.stderr.strip().splitlines()[-3:]
-            raise LinkError(f"the {self.client} probe failed: {' / '.join(said) or done.returncode}")
+            lines = done.stderr.strip().splitlines()[-3:]
+            raise LinkError(f"the {self.client} probe failed: {' / '.join(lines) or done.returncode}")
         return read_round(done.stdout.splitlines())
 
 
 def check_client(client: str, python: str = "") -> None:
-    """``UsageError`` if there is no such client library, or not all that it needs, with what to install."""
+    """Raise ``UsageError`` naming what to install if a client library or a part of it is missing."""
     if client not in CLIENTS:
         raise UsageError(f"no client library {client!r}; there is {choices(CLIENTS)}")
     if client == "rclpy":
@@ -112,29 +112,33 @@ def _check_imports(python: str, *modules: str) -> None:
 
 
 def roscpp_flags() -> tuple[list[str], list[str]]:
-    """What to compile and what to link a roscpp node with. ``UsageError`` names the missing package."""
+    """Return the options for compiling and linking with roscpp; raise ``UsageError`` if it is missing."""
     if shutil.which("pkg-config") is None:
         raise UsageError("roscpp is found by pkg-config, which is not there: on Debian install pkg-config")
     there = [one for one in MESSAGES if not subprocess.call(["pkg-config", "--exists", one])]
     modules = ("roscpp", "std_msgs", "std_srvs", *there)
     found = []
     for option in ("--cflags", "--libs"):
-        asked = subprocess.run(["pkg-config", option, *modules], capture_output=True, text=True, check=False)
-        if asked.returncode:
+        done = subprocess.run(["pkg-config", option, *modules], capture_output=True, text=True, check=False)
+        if done.returncode:
             raise UsageError(
                 f"no roscpp on this machine: on Debian install libroscpp-dev, libstd-msgs-dev and "
-                f"libstd-srvs-dev (pkg-config says: {asked.stderr.strip().splitlines()[0]})"
+                f"libstd-srvs-dev (pkg-config says: {done.stderr.strip().splitlines()[0]})"
             )
-        found.append(shlex.split(asked.stdout))
+        found.append(shlex.split(done.stdout))
     return found[0], found[1]
 
 
 def roscpp_program(
     name: str, sources: Sequence[Path], flags: Sequence[str] = (), libraries: Sequence[str] = ()
 ) -> Path:
-    """The program of *sources*, compiled and linked against roscpp, or as it was made before.
+    """Compile and link a program with roscpp, reusing cached objects.
 
-    *flags* go to the compiler, *libraries* to the linker, by the names that follow ``-l``.
+    Args:
+        name: Name of the program, for error messages.
+        sources: C++ files.
+        flags: Options of the compiler.
+        libraries: Libraries without the leading ``-l``.
     """
     compile_with, link_with = roscpp_flags()
     tools = CppToolchain(name)
@@ -144,19 +148,21 @@ def roscpp_program(
 
 @contextmanager
 def own_master() -> Iterator[str]:
-    """The address of a ROS master that nobody else is on."""
-    with socket() as asked:
-        asked.bind(("127.0.0.1", 0))
-        port = asked.getsockname()[1]
+    """Start a ROS master without other nodes for the duration of the context; yield its address."""
+    with socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
     with Roscore(f"http://127.0.0.1:{port}") as core:
         yield core.uri
 
 
 @contextmanager
 def probe_setup(client: str, python: str = "") -> Iterator[ProbeSetup]:
-    """A graph of one's own on loopback, with sinks on it, for probes of *client*.
+    """Set up a ROS graph on loopback with the peers of a probe.
 
-    *python* is the interpreter that has rospy or rclpy, by default this one.
+    Args:
+        client: Client library of the probe.
+        python: Interpreter that has rospy or rclpy, by default this one.
     """
     check_client(client, python)
     interpreter = python or sys.executable
@@ -177,7 +183,7 @@ def _roscpp_probe() -> Path:
 
 
 def _for_ros2() -> dict[str, str]:
-    """A domain apart, on loopback; what another virtual environment has left behind is taken out."""
+    """Return the environment of a ROS 2 domain on loopback, without settings of other installations."""
     kept = {
         key: value
         for key, value in os.environ.items()
@@ -207,7 +213,7 @@ def _sinks(command: Sequence[str], surroundings: Mapping[str, str]) -> Iterator[
     finally:
         process.stdin.close()
         try:
-            process.wait(GOOD_BYE_S)
+            process.wait(STOP_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

@@ -1,9 +1,8 @@
-"""From costs to an entry of the catalogue, in a file of the user's.
+"""Results of a campaign: an entry of the user's catalogue, and a plot.
 
-A campaign knows one frequency: its law holds there only. The law of a second campaign at another frequency
-joins it to lines over the frequency, as in the paper.
-
-Points and lines as an SVG: publish over subscribers, sleep over its length, every other call as a bar.
+A campaign has one frequency, and its law is valid there only. The law of a second campaign at another
+frequency joins it to lines over the frequency, as in the paper. The plot shows publish over subscribers,
+sleep over its length, and every other call as a bar.
 """
 
 from __future__ import annotations
@@ -17,12 +16,10 @@ from statistics import median
 from volery.calibration.machine import Machine, put_law
 from volery.calibration.ros.call_costs import CallCost, CostLine
 from volery.calibration.ros.campaign import Conditions
-from volery.cost.catalogue import read_catalogue
-from volery.cost.figures import Line, line_through
-from volery.cost.ros_law import CallFigures, RosLaw
+from volery.cost import CallFigures, Line, RosLaw, line_through, read_catalogue
 
 CALLBACK = ("spin_once_first", "spin_once_next")
-"""What the embedded graph prices when a callback begins."""
+"""Calls that the embedded graph prices when a callback begins."""
 
 _UNITS = {
     "publish": "subscriber",
@@ -33,7 +30,7 @@ _UNITS = {
 
 
 def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
-    """The law that holds at the frequency of one campaign."""
+    """Return the law at the frequency of a campaign."""
     calls = {call: _figures(cost) for call, cost in _with_slope(costs).items()}
     if CALLBACK[1] not in calls and "receive" in calls:  # rospy: its threads call back as messages come
         received = calls.pop("receive").model_copy(
@@ -54,7 +51,7 @@ def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
 
 
 def _with_slope(costs: Mapping[str, CallCost]) -> dict[str, CallCost]:
-    """``publish_next`` is measured at one number of subscribers: what each adds is what it adds elsewhere."""
+    """Give ``publish_next``, measured at one number of subscribers only, the slope of ``publish``."""
     first, following = costs.get("publish"), costs.get("publish_next")
     if first is None or following is None or following.typical <= 0.0:
         return {call: cost for call, cost in costs.items() if call != "publish_next"}
@@ -72,7 +69,7 @@ def _through_point(x: float, value: float, per_x: float) -> CostLine:
 
 
 def _common(costs: Mapping[str, CallCost]) -> list[CallCost]:
-    """What a node does again and again, by which a law as a whole is judged."""
+    """Return the costs of frequent calls, by which a law as a whole is judged."""
     return [costs[call] for call in ("publish", "sleep") if call in costs]
 
 
@@ -96,7 +93,7 @@ def _line(value: float) -> Line:
 
 
 def join_laws(known: RosLaw, new: RosLaw) -> RosLaw:
-    """Two laws of one frequency each become one between them; otherwise *new* stands alone."""
+    """Join two laws of one frequency each to a law between them; else return ``new``."""
     low, high = sorted((known, new), key=lambda law: law.least_mhz)
     one_point = known.least_mhz == known.greatest_mhz
     if not one_point or low.least_mhz == high.least_mhz:
@@ -131,10 +128,19 @@ def _through(at_low: float, low: CallFigures, at_high: float, high: CallFigures)
 
 
 def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
-    """Put *law* into the catalogue at *file*, made if need be, in place of what it has of this library.
+    """Write a law into a catalogue in place of the one of the same library; create the file if it is missing.
 
-    Returns the law that stands there now. ``ModelError`` if the file is there and no catalogue,
-    ``UsageError`` if it cannot be written.
+    Args:
+        file: The catalogue.
+        machine: The computer.
+        law: The law at one frequency, which is joined with a known one at another frequency.
+
+    Returns:
+        The law that was written.
+
+    Raises:
+        ModelError: The file exists and is not a catalogue.
+        UsageError: The file cannot be written.
     """
     known = read_catalogue(file).processors.get(machine.name) if file.exists() else None
     before = known.ros.get(law.client) if known is not None else None
@@ -144,7 +150,7 @@ def write_entry(file: Path, machine: Machine, law: RosLaw) -> RosLaw:
 
 
 def format_line(line: CostLine, call: str) -> str:
-    """Microseconds, and what each subscriber (n) or millisecond adds."""
+    """Return a cost in microseconds with its part per subscriber (n) or per millisecond."""
     unit = _UNITS.get(call)
     if unit is None:
         return f"{line.constant / 1e3:.1f}"
@@ -172,7 +178,7 @@ text { font: 12px ui-monospace, monospace; fill: #1d2733; }
 
 
 def plot_svg(costs: Mapping[str, CallCost], title: str) -> str:
-    """The whole SVG document."""
+    """Return an SVG document with points and lines of the costs."""
     lines = [costs[call] for call in ("publish", "sleep") if call in costs]
     single = [cost for call, cost in costs.items() if call not in ("publish", "sleep", "wait")]
     height = TOP + HIGH + 70 + ROW * len(single) + 20

@@ -1,7 +1,7 @@
-"""Whom a probe of ROS 1 talks to: run as a program beside a campaign, until its standard input ends.
+"""Peers of a ROS 1 probe: a program that runs during a campaign until its standard input ends.
 
 Eight nodes in one process. Topic ``calibration/to_N`` has N subscribers, ``calibration/quiet`` a publisher
-that says nothing, ``calibration/feed`` one that speaks twenty times a second.
+that never publishes, ``calibration/feed`` one that publishes twenty times a second.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FEED_S = 0.05
 
 
 def _ignore(message: Any) -> None:
-    """Hear it."""
+    """Receive a message."""
 
 
 def _node(number: int) -> Any:

@@ -1,5 +1,5 @@
-"""Estimate against measurement: a model's nodes as plain processes of rospy and roscpp on a real ROS master.
+"""Validation of estimates: a model's nodes as plain processes of rospy and roscpp on a real ROS master.
 
-Nothing of volery's runs in them but a meter that notes where ``main`` begins. What they take is read from
-outside, from each process's own CPU clock.
+A process contains nothing of volery but a meter that records the beginning of ``main``. Its cost is read from
+outside, from its own CPU clock.
 """

@@ -1,10 +1,8 @@
-"""What was estimated beside what was measured: the paper's Table III for each node, and its Table IV.
+"""Comparison of estimated and measured CPU time of a model's nodes: Tables III and IV of the paper.
 
-Estimated is what a simulation of the same model charges a node in the same time: ROS calls by the law of its
-client library, its own code as the fidelity says. Measured is the CPU time of the node's process, whole; what
-of it is ROS is what the estimate of the node's own code leaves.
-
-Several runs of a model's nodes, and the simulation that they are compared with.
+The estimate is what a simulation of the same model charges a node in the same time: ROS calls by the law of
+its client library, its own code by the fidelity. The measurement is the CPU time of the node's process. The
+measured ROS time is the measurement less the estimate of the node's own code.
 """
 
 from __future__ import annotations
@@ -28,14 +26,12 @@ from volery.run.result import Options
 from volery.run.simulate import simulate
 
 TOLERANCE = 0.15
-"""Of the measured time: how far an estimate may be off, where the measured runs themselves do not differ by
-more.
-"""
+"""Allowed relative error of an estimate, unless the measured runs differ by more."""
 
 
 @dataclass(frozen=True)
 class NodeEstimate:
-    """CPU seconds of one node: what ROS takes, what its own code takes, and how often it called what."""
+    """Estimated CPU time of one node, s: of ROS, of its own code; and its ROS calls by name."""
 
     ros_s: float
     code_s: float
@@ -43,13 +39,13 @@ class NodeEstimate:
 
     @property
     def whole_s(self) -> float:
-        """Together."""
+        """CPU time of ROS and of its own code, s."""
         return self.ros_s + self.code_s
 
 
 @dataclass(frozen=True)
 class NodeComparison:
-    """One node: the estimate, and the measured CPU seconds of every run."""
+    """One node: the estimate, and the measured CPU time of each run, s."""
 
     node: str
     language: str
@@ -58,12 +54,12 @@ class NodeComparison:
 
     @property
     def measured_s(self) -> float:
-        """The median run."""
+        """CPU time of the median run, s."""
         return median(self.runs_s)
 
     @property
     def spread_s(self) -> float:
-        """The inter-quartile range of the runs; 0 for a single one."""
+        """Inter-quartile range of the runs, s; 0 for a single run."""
         if len(self.runs_s) < 2:
             return 0.0
         low, _, high = quantiles(self.runs_s, n=4, method="inclusive")
@@ -71,45 +67,45 @@ class NodeComparison:
 
     @property
     def difference(self) -> float:
-        """Estimated minus measured, relative to measured."""
+        """Estimated minus measured time, relative to the measured time."""
         return (self.estimate.whole_s - self.measured_s) / self.measured_s
 
     @property
     def allowed(self) -> float:
-        """The greater of ``TOLERANCE`` and half the spread, relative to measured."""
+        """The greater of ``TOLERANCE`` and half the spread, relative to the measured time."""
         return max(TOLERANCE, self.spread_s / 2.0 / self.measured_s)
 
     @property
     def holds(self) -> bool:
-        """Whether the estimate is as near as is allowed."""
+        """Whether the estimate is within the allowed error."""
         return abs(self.difference) <= self.allowed
 
     # -- Table IV
 
     @property
     def measured_ros_s(self) -> float:
-        """What the estimate of its own code leaves of the measured time."""
+        """Measured time less the estimate of the node's own code, s."""
         return max(0.0, self.measured_s - self.estimate.code_s)
 
     @property
     def ros_share(self) -> float:
-        """Of the measured time."""
+        """Share of ROS in the measured time."""
         return self.measured_ros_s / self.measured_s
 
     @property
     def ros_error(self) -> float:
-        """Of the estimate of ROS time, relative to the measured."""
+        """Error of the estimate of ROS time, relative to the measured ROS time."""
         if not self.measured_ros_s:
             return 0.0
         return abs(self.estimate.ros_s - self.measured_ros_s) / self.measured_ros_s
 
     @property
     def impact(self) -> float:
-        """What that error does to the estimate of the whole; without any estimate it is ``ros_share``."""
+        """Effect of ``ros_error`` on the whole estimate; it is ``ros_share`` without any estimate of ROS."""
         return self.ros_share * self.ros_error
 
     def as_data(self) -> dict[str, object]:
-        """For JSON."""
+        """Return the comparison as JSON data."""
         return {
             "node": self.node,
             "language": self.language,
@@ -128,7 +124,7 @@ class NodeComparison:
 
 
 def node_estimates(record: RunRecord, nodes: Sequence[str]) -> dict[str, NodeEstimate]:
-    """What a simulation has charged each of *nodes*."""
+    """Return what a simulation has charged each node."""
     found = {}
     for name in nodes:
         one = record.components[name]
@@ -139,7 +135,7 @@ def node_estimates(record: RunRecord, nodes: Sequence[str]) -> dict[str, NodeEst
 def compare_nodes(
     languages: Mapping[str, str], estimated: Mapping[str, NodeEstimate], runs: Sequence[Mapping[str, Ns]]
 ) -> list[NodeComparison]:
-    """One line for each node that *runs* measured; *languages* by node."""
+    """Return a comparison for each node that the runs have measured."""
     return [
         NodeComparison(node, languages[node], estimated[node], tuple(run[node] / S for run in runs))
         for node in runs[0]
@@ -147,13 +143,18 @@ def compare_nodes(
 
 
 ShowRun = Callable[[int], None]
-"""Told how many runs are done."""
+"""Called with the number of completed runs."""
 
 
 def prepare_nodes(system: System) -> tuple[NodeProgram, ...]:
-    """The nodes of *system*, ready to start. Errors of ``node_programs``, and ``UsageError`` without ROS."""
+    """Return the nodes of a system, ready to start.
+
+    Raises:
+        ModelError: A component is not a node of rospy or roscpp.
+        UsageError: No node is measured, or ROS or a compiler is missing.
+    """
     if not any(one.processor for one in system.instances):
-        raise UsageError("the model has no node that runs on a processor: nothing is to be measured")
+        raise UsageError("the model has no node that runs on a processor, so there is nothing to measure")
     for language in sorted({one.component.language for one in system.instances}):
         if language in ("rospy", "roscpp"):
             check_client(language)
@@ -163,7 +164,11 @@ def prepare_nodes(system: System) -> tuple[NodeProgram, ...]:
 def measure_runs(
     nodes: Sequence[NodeProgram], count: int, duration: Ns, show: ShowRun = lambda done: None
 ) -> tuple[list[MeasuredRun], bool]:
-    """*count* runs on a master of their own; fewer, and false, if Ctrl-C breaks them off."""
+    """Measure ``count`` runs on a ROS master of their own.
+
+    Returns:
+        The runs, and False if Ctrl-C has ended the measurement early.
+    """
     done: list[MeasuredRun] = []
     try:
         with own_master() as master, measurement_session(nodes, master, duration) as run:
@@ -176,7 +181,11 @@ def measure_runs(
 
 
 def estimate_nodes(system: System, fidelity: str = "code") -> dict[str, NodeEstimate]:
-    """What a simulation of *system* charges its nodes. ``EstimateError`` if it does not come to its end."""
+    """Return what a simulation of a system charges its nodes.
+
+    Raises:
+        EstimateError: The simulation fails.
+    """
     run = simulate(system, Options(fidelity=fidelity))
     if not run.completed:
         reason = run.error or run.record.outcome.reason
@@ -187,7 +196,7 @@ def estimate_nodes(system: System, fidelity: str = "code") -> dict[str, NodeEsti
 def compare(
     system: System, estimate: Mapping[str, NodeEstimate], runs: Sequence[MeasuredRun]
 ) -> tuple[NodeComparison, ...]:
-    """Each node's estimate beside what *runs* measured. ``UsageError`` without a run."""
+    """Compare each node's estimate with the measured runs; raise ``UsageError`` without a run."""
     if not runs:
         raise UsageError("no run was measured to its end")
     languages = {one.name: one.component.language for one in system.instances}

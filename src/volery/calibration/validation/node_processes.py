@@ -1,7 +1,4 @@
-"""How each node of a model is started as a process of its own client library.
-
-One run of a model's nodes on a real master, and what each of them took.
-"""
+"""Nodes of a model as processes of their own client libraries on a real ROS master, and their CPU time."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ METERS = Path(str(files("volery.calibration.validation").joinpath("meters")))
 
 @dataclass(frozen=True)
 class NodeProgram:
-    """A node: ``command`` starts it. One of the environment is started and not ``measured``."""
+    """A node and the command that starts it. Nodes of the environment are not ``measured``."""
 
     instance: str
     node: str
@@ -43,10 +40,11 @@ class NodeProgram:
 
 
 def node_programs(system: System) -> tuple[NodeProgram, ...]:
-    """Those of all nodes of *system*, the environment's first.
+    """Return the programs of all nodes of a system, the environment's first; compile those of roscpp.
 
-    Compiles what is roscpp. ``ModelError`` for a component that is no node of rospy or roscpp that stands
-    alone; ``UsageError`` if roscpp or a compiler is missing.
+    Raises:
+        ModelError: A component is not a stand-alone node of rospy or roscpp.
+        UsageError: roscpp or a compiler is missing.
     """
     for instance in system.instances:
         _check(system, instance)
@@ -59,7 +57,7 @@ def _check(system: System, instance: Instance) -> None:
     if component.language not in ("rospy", "roscpp") or not component.path:
         raise _cannot(instance, f"is {component.language}, and what is measured is nodes of rospy and roscpp")
     if commanded_by(instance):
-        raise _cannot(instance, "commands a vehicle, which is nothing that a plain node can do")
+        raise _cannot(instance, "commands a vehicle, which a plain node cannot do")
     if component.language == "rospy":
         file = system.file_of(component)
         if component.stated_class or script_or_class(file, component.class_name, component.where):
@@ -92,7 +90,7 @@ def _compiled(instance: Instance, file: Path) -> Path:
 
 
 def _arguments(instance: Instance) -> Iterator[str]:
-    """As roslaunch gives them."""
+    """Yield the arguments of a node as roslaunch gives them."""
     yield f"__name:={instance.name}"
     if instance.namespace != "/":
         yield f"__ns:={instance.namespace}"
@@ -107,26 +105,35 @@ MeasuredRun = dict[str, Ns]
 
 READY: Ns = 30 * S
 SETTLE: Ns = S
-GLANCE: Ns = 20 * MS
-GOOD_BYE_S = 5.0
+POLL_PERIOD: Ns = 20 * MS
+STOP_TIMEOUT_S = 5.0
 
 
 @dataclass
 class _NodeProcess:
-    """A node's process. ``began`` (on the monotonic clock) and ``spent`` are what its meter noted."""
+    """A node's process.
+
+    Attributes:
+        program: The node.
+        process: Its process.
+        note: File that its meter writes at the beginning of ``main``.
+        output: File with its output.
+        began: Beginning of ``main`` on the monotonic clock, ns.
+        spent: CPU time of the process before ``main``, ns.
+    """
 
     program: NodeProgram
     process: subprocess.Popen[bytes]
     note: Path
-    said: Path
+    output: Path
     began: Ns = 0
     spent: Ns = 0
 
-    def look(self) -> bool:
-        """Whether its ``main`` has begun. ``ComponentError`` if it has ended."""
+    def has_begun(self) -> bool:
+        """Return whether ``main`` has begun; raise ``ComponentError`` if the process has ended."""
         if self.process.poll():
-            said = self.said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            last = said[-1] if said else f"exit status {self.process.returncode}"
+            lines = self.output.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+            last = lines[-1] if lines else f"exit status {self.process.returncode}"
             raise ComponentError(self.program.instance, f"ended while it was measured: {last}")
         noted = self.note.read_text(encoding="ascii").split() if self.note.exists() else []
         if len(noted) == 2:
@@ -134,14 +141,14 @@ class _NodeProcess:
         return len(noted) == 2
 
     def cpu(self) -> Ns:
-        """CPU time of the process since its ``main`` began."""
+        """Return the CPU time of the process since the beginning of ``main``, ns."""
         return process_cpu(self.process.pid) - self.spent
 
 
 def process_cpu(pid: int) -> Ns:
-    """What all threads of a process have taken so far, by its own CPU clock (``clock_getcpuclockid(3)``).
+    """Return the CPU time of all threads of a process so far, ns, by ``clock_getcpuclockid(3)``.
 
-    Works for a process that has ended as long as nobody has waited for it.
+    The clock of a process that has ended is valid until the process is waited for.
     """
     return time.clock_gettime_ns((~pid << 3) | 2)
 
@@ -150,10 +157,19 @@ def process_cpu(pid: int) -> Ns:
 def measurement_session(
     programs: Sequence[NodeProgram], master: str, duration: Ns
 ) -> Iterator[Callable[[], MeasuredRun]]:
-    """The nodes of *programs* that are not measured, for as long as the context lasts, on the master at that
-    address. What it gives runs the others once, and says what each took in its first *duration*.
+    """Keep the nodes that are not measured running for the duration of the context.
 
-    ``ComponentError`` names a node that ends with an error, ``LinkSilent`` one that does not begin.
+    Args:
+        programs: All nodes.
+        master: Address of the ROS master.
+        duration: Time from the beginning of ``main`` to the reading of the clock, ns.
+
+    Yields:
+        A function that runs the measured nodes once and returns the CPU time of each.
+
+    Raises:
+        ComponentError: A node ends with an error.
+        LinkSilent: A node does not begin.
     """
     with TemporaryDirectory(prefix="volery-measure-") as folder:
         surroundings = {**environment(master), "ROS_LOG_DIR": folder}
@@ -173,7 +189,7 @@ def _run(programs: Sequence[NodeProgram], nodes: _NodeProcesses, duration: Ns) -
         for node in sorted(started, key=lambda one: one.began):
             _sleep(node.began + duration - time.monotonic_ns())
             taken[node.program.instance] = node.cpu()
-            node.look()
+            node.has_begun()
     return {one.instance: taken[one.instance] for one in programs if one.measured}
 
 
@@ -184,23 +200,23 @@ def _sleep(duration: Ns) -> None:
 def _wait_started(nodes: Sequence[_NodeProcess]) -> None:
     end = time.monotonic_ns() + READY
     for node in nodes:
-        while not node.look():
+        while not node.has_begun():
             if time.monotonic_ns() > end:
                 raise LinkSilent(f"{node.program.instance} did not begin within {READY / S:g} s")
-            _sleep(GLANCE)
+            _sleep(POLL_PERIOD)
 
 
 def _wait_registered(master: Master, nodes: Sequence[_NodeProcess]) -> None:
-    """Wait until the master knows them."""
+    """Wait until the nodes are registered at the master."""
     end = time.monotonic_ns() + READY
     while missing := [one.program.node for one in nodes if not master.find("lookupNode", one.program.node)]:
         if time.monotonic_ns() > end:
             raise LinkSilent(f"{missing[0]} did not join the ROS graph within {READY / S:g} s")
-        _sleep(GLANCE)
+        _sleep(POLL_PERIOD)
 
 
 class _NodeProcesses:
-    """Starts nodes, and stops at the end of its context what it has started."""
+    """Starts nodes, and stops those that it has started at the end of its context."""
 
     def __init__(self, folder: Path, surroundings: Mapping[str, str]) -> None:
         self._folder, self._surroundings = folder, surroundings
@@ -213,28 +229,28 @@ class _NodeProcesses:
         self.stop()
 
     def start(self, program: NodeProgram) -> _NodeProcess:
-        """Start it."""
-        note, said = (self._folder / f"{program.instance}.{ending}" for ending in ("meter", "out"))
+        """Start the process of a node."""
+        note, output = (self._folder / f"{program.instance}.{ending}" for ending in ("meter", "out"))
         note.unlink(missing_ok=True)  # of the run before
-        with said.open("wb") as output:
+        with output.open("wb") as stream:
             process = subprocess.Popen(
                 program.command,
                 env={**self._surroundings, "VOLERY_METER": str(note)},
                 stdin=subprocess.DEVNULL,
-                stdout=output,
+                stdout=stream,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
-        running = _NodeProcess(program, process, note, said)
-        self._started.append(running)
-        return running
+        started = _NodeProcess(program, process, note, output)
+        self._started.append(started)
+        return started
 
     def stop(self) -> None:
-        """With SIGINT, at which alone roscpp says good-bye; harder if that takes long."""
+        """Stop all with SIGINT, which lets roscpp unregister; kill those that do not end."""
         for one in self._started:
             with suppress(ProcessLookupError):
                 os.kill(one.process.pid, signal.SIGINT)
-        end = time.monotonic() + GOOD_BYE_S
+        end = time.monotonic() + STOP_TIMEOUT_S
         for one in self._started:
             try:
                 one.process.wait(max(0.0, end - time.monotonic()))

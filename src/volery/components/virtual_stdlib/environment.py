@@ -31,8 +31,8 @@ _PURE = ("struct_time", "strptime", "asctime", "timezone", "tzname")
 _DRAWS = (
     "betavariate", "binomialvariate", "choice", "choices", "expovariate", "gammavariate", "gauss",
     "getrandbits", "getstate", "lognormvariate", "normalvariate", "paretovariate", "randbytes", "randint",
-    "random", "randrange", "sample", "seed", "setstate", "shuffle", "triangular", "uniform", "vonmisesvariate",
-    "weibullvariate",
+    "random", "randrange", "sample", "seed", "setstate", "shuffle", "triangular", "uniform",
+    "vonmisesvariate", "weibullvariate",
 )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
-"""What calls of rospy or rclpy cost this process.
+"""Probe of rospy or rclpy: CPU time of calls into the client library.
 
-A program of its own, run by whichever Python has the client library: it needs that and nothing of volery's.
-Arguments and output are those of ``roscpp.cpp``, behind the name of the library.
+A program of its own for the Python that has the client library: it does not import volery. Its arguments are
+the name of the library and those of ``roscpp.cpp``; its output is that of ``roscpp.cpp``.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from typing import Any, NamedTuple, Protocol
 
 CONNECT_S, SETTLE_S, GLANCE_S = 10.0, 0.1, 0.05
 SPIN_BLOCKS = 2.5
-"""Messages are rarer than cycles."""
+"""Blocks of receiving, which are longer since messages are rarer than cycles."""
 HALF_S = 0.5
 NODE, DEPTH = "calibration_probe", 10
 
-heard = [0]
+received = [0]
 
 
-def hear(message: Any) -> None:
-    """The callback of every subscription."""
-    heard[0] += 1
+def on_message(message: Any) -> None:
+    """Count a message of any subscription."""
+    received[0] += 1
 
 
 class Ends(NamedTuple):
-    """A publisher or a subscription: what it does, to how many it is connected, how it is closed."""
+    """A publisher or a subscription: functions that publish, count its peers and close it."""
 
     publish: Callable[[], Any]
     peers: Callable[[], int]
@@ -36,7 +36,7 @@ class Ends(NamedTuple):
 
 
 class Client(Protocol):
-    """What a probe asks of a client library. ``spin_once`` is ``None`` where the library has none."""
+    """Calls into a client library. ``spin_once`` is None where the library has none."""
 
     @property
     def spin_once(self) -> Callable[[], Any] | None: ...  # noqa: D102 - each is the library's own
@@ -51,7 +51,7 @@ class Client(Protocol):
 
 
 class Rospy:
-    """rospy: its node begins with ``init_node``, its callbacks run in threads of their own."""
+    """rospy: ``init_node`` creates the node, callbacks run in threads of their own."""
 
     spin_once = None
 
@@ -61,38 +61,38 @@ class Rospy:
         self._service: Any = import_module("std_srvs.srv").Trigger
 
     def init(self) -> None:
-        """Join."""
+        """Create the node."""
         self._rospy.init_node(NODE)
 
     def node_handle(self) -> None:
-        """Nothing: ``init_node`` has done it."""
+        """Do nothing: ``init_node`` has created the node."""
 
     def advertise(self, topic: str) -> Ends:
-        """A publisher whose ``publish`` returns before the message is sent."""
+        """Create a publisher whose ``publish`` returns before the message is sent."""
         made = self._rospy.Publisher(topic, self._type, queue_size=DEPTH)
         message = self._type(data=[0.0] * 4)
         return Ends(lambda: made.publish(message), made.get_num_connections, made.unregister)
 
     def subscribe(self, topic: str) -> Ends:
-        """A subscription."""
-        made = self._rospy.Subscriber(topic, self._type, hear, queue_size=DEPTH)
+        """Create a subscription."""
+        made = self._rospy.Subscriber(topic, self._type, on_message, queue_size=DEPTH)
         return Ends(lambda: None, made.get_num_connections, made.unregister)
 
     def service_client(self) -> object:
-        """A proxy of a service."""
-        return self._rospy.ServiceProxy("calibration/nobody", self._service)
+        """Create a proxy of a service."""
+        return self._rospy.ServiceProxy("calibration/absent", self._service)
 
     def advertise_service(self) -> object:
-        """A service."""
+        """Create a service."""
         return self._rospy.Service("calibration/service", self._service, lambda request: None)
 
     def sleeper(self, seconds: float) -> Callable[[], Any]:
-        """``Rate.sleep``."""
+        """Return ``Rate.sleep``."""
         sleep: Callable[[], Any] = self._rospy.Rate(1.0 / seconds).sleep
         return sleep
 
     def wait(self, seconds: float) -> None:
-        """As ``rospy.spin`` does it: half seconds of sleep."""
+        """Wait as ``rospy.spin`` does: in sleeps of half a second."""
         for _ in range(max(1, round(seconds / HALF_S))):
             self._rospy.rostime.wallsleep(min(seconds, HALF_S))
 
@@ -108,15 +108,15 @@ class Rclpy:
         self._node: Any = None
 
     def init(self) -> None:
-        """Begin a context."""
+        """Create the context."""
         self._rclpy.init()
 
     def node_handle(self) -> None:
-        """Make the node."""
+        """Create the node."""
         self._node = self._rclpy.create_node(NODE)
 
     def advertise(self, topic: str) -> Ends:
-        """A reliable publisher."""
+        """Create a reliable publisher."""
         made = self._node.create_publisher(self._type, topic, DEPTH)
         message = self._type(data=[0.0] * 4)
         return Ends(
@@ -126,34 +126,34 @@ class Rclpy:
         )
 
     def subscribe(self, topic: str) -> Ends:
-        """A reliable subscription."""
-        made = self._node.create_subscription(self._type, topic, hear, DEPTH)
+        """Create a reliable subscription."""
+        made = self._node.create_subscription(self._type, topic, on_message, DEPTH)
         peers = lambda: self._node.count_publishers(topic)  # noqa: E731 - one of three that belong together
         return Ends(lambda: None, peers, lambda: self._node.destroy_subscription(made))
 
     def service_client(self) -> object:
-        """A client."""
-        made: object = self._node.create_client(self._service, "calibration/nobody")
+        """Create a client."""
+        made: object = self._node.create_client(self._service, "calibration/absent")
         return made
 
     def advertise_service(self) -> object:
-        """A service."""
+        """Create a service."""
         made: object = self._node.create_service(
             self._service, "calibration/service", lambda request, response: response
         )
         return made
 
     def sleeper(self, seconds: float) -> Callable[[], Any]:
-        """``Clock.sleep_for``."""
+        """Return ``Clock.sleep_for``."""
         clock, duration = self._node.get_clock(), self._duration(seconds=seconds)
         return lambda: clock.sleep_for(duration)
 
     def spin_once(self) -> None:
-        """Run what is ready."""
+        """Run the callbacks that are ready."""
         self._rclpy.spin_once(self._node, timeout_sec=0.0)
 
     def wait(self, seconds: float) -> None:
-        """As ``rclpy.spin`` does it."""
+        """Wait as ``rclpy.spin`` does."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self._rclpy.spin_once(self._node, timeout_sec=left)
@@ -163,16 +163,16 @@ CLIENTS: dict[str, Callable[[], Client]] = {"rospy": Rospy, "rclpy": Rclpy}
 
 
 class Measured:
-    """What passes between its making and ``tell``."""
+    """Readings of the clocks between construction and ``report``."""
 
     def __init__(self) -> None:
         self._start = _clocks()
 
-    def tell(self, what: str, x: float, cycles: int) -> None:
-        """Print it."""
+    def report(self, what: str, x: float, cycles: int) -> None:
+        """Print the differences."""
         waited, process, caller = (now - then for now, then in zip(_clocks(), self._start, strict=True))
-        told = {"what": what, "x": x, "cycles": cycles, "waited_ns": waited}
-        sys.stdout.write(json.dumps({**told, "process_ns": process, "caller_ns": caller}) + "\n")
+        line = {"what": what, "x": x, "cycles": cycles, "waited_ns": waited}
+        sys.stdout.write(json.dumps({**line, "process_ns": process, "caller_ns": caller}) + "\n")
         sys.stdout.flush()
 
 
@@ -181,16 +181,16 @@ def _clocks() -> tuple[int, int, int]:
 
 
 def nothing() -> None:
-    """An idle cycle's call."""
+    """Do nothing, as the call of an idle cycle."""
 
 
 def once(what: str, call: Callable[[], Any], done: Callable[[], bool] = lambda: True, x: float = 0) -> None:
-    """One call, and what it makes the library do shortly after."""
+    """Measure one call and the work of the library shortly after it."""
     measured = Measured()
     call()
     _until(done)
     time.sleep(SETTLE_S)
-    measured.tell(what, x, 1)
+    measured.report(what, x, 1)
 
 
 def _until(done: Callable[[], bool]) -> None:
@@ -218,10 +218,10 @@ class Probe:
         for _ in range(cycles):
             call()
             sleep()
-        measured.tell(what, x, cycles)
+        measured.report(what, x, cycles)
 
     def joining(self) -> None:
-        """A node begins."""
+        """Measure the creation of the node."""
         once("nothing", nothing)
         once("init", self._client.init)
         once("node_handle", self._joined)
@@ -234,8 +234,8 @@ class Probe:
     def registrations(self) -> None:
         """Each first call of its kind."""
         client, keep = self._client, self._kept.append
-        once("advertise", lambda: keep(client.advertise("calibration/unheard")))
-        once("subscribe", lambda: keep(client.subscribe("calibration/unsaid")))
+        once("advertise", lambda: keep(client.advertise("calibration/unused")))
+        once("subscribe", lambda: keep(client.subscribe("calibration/silent")))
         hearing: list[Ends] = []
         once(
             "connect",
@@ -248,15 +248,15 @@ class Probe:
         if client.spin_once is not None:
             measured = Measured()
             client.spin_once()
-            measured.tell("spin_once_first", 0, 1)
+            measured.report("spin_once_first", 0, 1)
 
     def sleeping(self, times_ms: list[float]) -> None:
-        """Idle cycles of several lengths."""
+        """Measure idle cycles of several lengths."""
         for ms in times_ms:
             self._block("sleep", ms * 1000.0, ms / 1000.0, nothing)
 
     def publishing(self, counts: list[float]) -> None:
-        """Whole cycles and idle cycles, to so many subscribers."""
+        """Measure publishing and idle cycles for several numbers of subscribers."""
         for count in counts:
             made: list[Ends] = []
             once(
@@ -273,7 +273,7 @@ class Probe:
             time.sleep(SETTLE_S)
 
     def spinning(self) -> None:
-        """Cycles that publish once, twice, and twice with a spin: who comes next finds the library awake."""
+        """Measure cycles that publish once, twice, and twice with a spin: later calls find warm threads."""
         first = self._client.advertise("calibration/to_1")
         other = self._client.advertise("calibration/to_2")
         _until(lambda: first.peers() > 0 and other.peers() > 1)
@@ -288,20 +288,20 @@ class Probe:
         other.close()
 
     def receiving(self) -> None:
-        """Waiting for messages where none come and where some do."""
+        """Measure waiting for messages without and with messages."""
         wait = self._client.wait
         time.sleep(SETTLE_S)
         measured = Measured()
         wait(SPIN_BLOCKS * self._block_s)
-        measured.tell("wait", 0, 1)
+        measured.report("wait", 0, 1)
         feed = self._client.subscribe("calibration/feed")
-        none = heard[0]
-        _until(lambda: (wait(GLANCE_S), heard[0] > none)[1])
+        none = received[0]
+        _until(lambda: (wait(GLANCE_S), received[0] > none)[1])
         wait(SETTLE_S)
-        before = heard[0]
+        before = received[0]
         measured = Measured()
         wait(SPIN_BLOCKS * self._block_s)
-        measured.tell("receive", 0, max(1, heard[0] - before))
+        measured.report("receive", 0, max(1, received[0] - before))
         feed.close()
 
 
@@ -310,7 +310,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def main(library: str, block_ms: str, period_ms: str, sleeps: str, counts: str) -> None:
-    """All of it, in the order of ``roscpp.cpp``."""
+    """Make all measurements in the order of ``roscpp.cpp``."""
     probe = Probe(CLIENTS[library](), float(block_ms) / 1000.0, float(period_ms) / 1000.0)
     probe.joining()
     probe.registrations()

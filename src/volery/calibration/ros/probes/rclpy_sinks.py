@@ -1,6 +1,6 @@
-"""Whom a probe of rclpy talks to, by the names of ``volery.calibration.ros.sinks``, which is for ROS 1.
+"""Peers of an rclpy probe, with the topics of ``volery.calibration.ros.sinks`` (for ROS 1).
 
-A program of its own, run by whichever Python has rclpy: it needs nothing of volery's.
+A program of its own for the Python that has rclpy: it does not import volery.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def _until_left(over: threading.Event) -> None:
 
 
 def main() -> None:
-    """Stay until standard input ends."""
+    """Run until the standard input ends."""
     rclpy: Any = import_module("rclpy")
     kind: Any = import_module("std_msgs.msg").Float64MultiArray
     rclpy.init()

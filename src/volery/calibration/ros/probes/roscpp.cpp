@@ -1,4 +1,4 @@
-// What calls of roscpp cost this process. Prints one JSON object a line:
+// Probe of roscpp: CPU time of calls into the client library. Prints one JSON object a line:
 //   {"what": .., "x": .., "cycles": .., "waited_ns": .., "process_ns": .., "caller_ns": ..}
 // process_ns: CPU time of the whole process; caller_ns: of the calling thread; waited_ns: time on the wall.
 // Usage: roscpp BLOCK_MS PERIOD_MS SLEEP_MS,SLEEP_MS,.. SUBSCRIBERS,SUBSCRIBERS,..
@@ -22,11 +22,11 @@ using Message = std_msgs::Float64MultiArray;
 using Action = std::function<void()>;
 
 const int kConnectMs = 10000;
-const int kGlanceMs = 50;  // each look costs the probe a little, so there are few
+const int kGlanceMs = 50;  // a check costs some CPU time, so there are few
 const int kSettleMs = 100;
 const double kSpinBlocks = 2.5;  // messages are rarer than cycles
 
-long heard = 0;
+long received = 0;
 
 long ns(clockid_t clock) {
   timespec now;
@@ -40,13 +40,13 @@ void pause(int ms) {
   nanosleep(&wanted, nullptr);
 }
 
-// What passes between its making and tell().
+// Readings of the clocks between construction and report().
 class Measured {
  public:
   Measured()
       : wall_(ns(CLOCK_MONOTONIC)), process_(ns(CLOCK_PROCESS_CPUTIME_ID)), caller_(ns(CLOCK_THREAD_CPUTIME_ID)) {}
 
-  void tell(const char* what, double x, long cycles) const {
+  void report(const char* what, double x, long cycles) const {
     const long caller = ns(CLOCK_THREAD_CPUTIME_ID) - caller_;
     const long process = ns(CLOCK_PROCESS_CPUTIME_ID) - process_;
     const long wall = ns(CLOCK_MONOTONIC) - wall_;
@@ -64,16 +64,16 @@ void until(const std::function<bool()>& done) {
   for (int waited = 0; !done() && waited < kConnectMs; waited += kGlanceMs) pause(kGlanceMs);
 }
 
-// One call, and what it makes the library do shortly after.
+// Measures one call and the work of the library shortly after it.
 void once(const char* what, const Action& call, const std::function<bool()>& done = [] { return true; }, double x = 0) {
   Measured measured;
   call();
   until(done);
   pause(kSettleMs);
-  measured.tell(what, x, 1);
+  measured.report(what, x, 1);
 }
 
-// As many cycles of a call and a sleep as fit into a block.
+// Measures as many cycles of a call and a sleep as fit into a block.
 void block(const char* what, double x, double period_ms, double block_ms, const Action& call) {
   const long cycles = std::max(3L, static_cast<long>(block_ms / period_ms));
   const ros::Duration period(period_ms / 1000.0);
@@ -86,7 +86,7 @@ void block(const char* what, double x, double period_ms, double block_ms, const 
     call();
     period.sleep();
   }
-  measured.tell(what, x, cycles);
+  measured.report(what, x, cycles);
 }
 
 std::vector<double> numbers(const char* text) {
@@ -96,25 +96,25 @@ std::vector<double> numbers(const char* text) {
   return found;
 }
 
-void onMessage(const Message::ConstPtr&) { ++heard; }
+void onMessage(const Message::ConstPtr&) { ++received; }
 
 bool onRequest(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&) { return true; }
 
 void registrations(ros::NodeHandle& node) {
   ros::Publisher publisher;
-  ros::Subscriber subscriber, hearing;
+  ros::Subscriber subscriber, connected;
   ros::ServiceClient client;
   ros::ServiceServer server;
-  once("advertise", [&] { publisher = node.advertise<Message>("calibration/unheard", 10); });
-  once("subscribe", [&] { subscriber = node.subscribe("calibration/unsaid", 10, onMessage); });
-  once("connect", [&] { hearing = node.subscribe("calibration/quiet", 10, onMessage); },
-       [&] { return hearing.getNumPublishers() > 0; });
-  once("service_client", [&] { client = node.serviceClient<std_srvs::Trigger>("calibration/nobody"); });
+  once("advertise", [&] { publisher = node.advertise<Message>("calibration/unused", 10); });
+  once("subscribe", [&] { subscriber = node.subscribe("calibration/silent", 10, onMessage); });
+  once("connect", [&] { connected = node.subscribe("calibration/quiet", 10, onMessage); },
+       [&] { return connected.getNumPublishers() > 0; });
+  once("service_client", [&] { client = node.serviceClient<std_srvs::Trigger>("calibration/absent"); });
   once("advertise_service", [&] { server = node.advertiseService("calibration/service", onRequest); });
   once("settle", [] {});
   Measured measured;
   ros::spinOnce();
-  measured.tell("spin_once_first", 0, 1);
+  measured.report("spin_once_first", 0, 1);
 }
 
 void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const std::vector<double>& counts) {
@@ -131,7 +131,7 @@ void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const 
   }
 }
 
-// Cycles that publish once, twice, and twice with a spin: who comes next finds the library's threads awake.
+// Measures cycles that publish once, twice, and twice with a spin: later calls find warm threads.
 void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
   Message message;
   message.data.resize(4);
@@ -151,7 +151,7 @@ void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
   });
 }
 
-// As ros::spin() does.
+// Waits as ros::spin() does.
 void spin_for(double ms) {
   const long end = ns(CLOCK_MONOTONIC) + static_cast<long>(ms * 1e6);
   while (ns(CLOCK_MONOTONIC) < end) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
@@ -161,19 +161,19 @@ void receiving(ros::NodeHandle& node, double block_ms) {
   pause(kSettleMs);
   Measured waiting;
   spin_for(kSpinBlocks * block_ms);
-  waiting.tell("wait", 0, 1);
+  waiting.report("wait", 0, 1);
   ros::Subscriber feed = node.subscribe("calibration/feed", 10, onMessage);
-  const long none = heard;
+  const long none = received;
   until([none] {
     ros::spinOnce();
-    return heard > none;
+    return received > none;
   });
   pause(kSettleMs);
   ros::spinOnce();
-  const long before = heard;
+  const long before = received;
   Measured measured;
   spin_for(kSpinBlocks * block_ms);
-  measured.tell("receive", 0, std::max(1L, heard - before));
+  measured.report("receive", 0, std::max(1L, received - before));
   feed.shutdown();
 }
 }  // namespace

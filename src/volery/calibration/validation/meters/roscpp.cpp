@@ -1,4 +1,4 @@
-// Linked to a node that is measured: notes, before main begins, the CPU time that loading the program has taken.
+// Linked to a measured node: before main begins, records the CPU time of loading the program.
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>

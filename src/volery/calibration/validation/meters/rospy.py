@@ -1,7 +1,7 @@
-"""Runs a node's script, and notes before that the CPU time that Python and the imports have taken.
+"""Run a node's script after recording the CPU time of Python's start and of the imports.
 
-A program of its own: ``rospy.py SCRIPT ARGUMENT..``. It imports what the script will import of ROS and of the
-standard library, since that is no part of what the node does.
+A program of its own: ``rospy.py SCRIPT ARGUMENT..``. It imports the ROS and standard library modules
+that the script imports, since their import does not belong to the cost of the node.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 
 def imported(source: str) -> Iterator[str]:
-    """The modules of ROS and of the standard library that a script names."""
+    """Yield the modules of ROS and of the standard library that a script imports."""
     for node in ast.walk(ast.parse(source)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -30,10 +30,10 @@ def imported(source: str) -> Iterator[str]:
 
 
 def main(script: str, *arguments: str) -> None:
-    """Import, note, run."""
+    """Import the modules, record the clocks and run the script."""
     sys.path[0] = str(Path(script).parent)
     for name in imported(Path(script).read_text(encoding="utf-8")):
-        with suppress(ImportError):  # the script itself is to say so
+        with suppress(ImportError):  # the script itself reports it
             import_module(name)
     sys.argv = [script, *arguments]
     noted = f"{time.monotonic_ns()} {time.process_time_ns()}\n"

@@ -1,23 +1,23 @@
-/* Which cache serves each access of a traced program.
+/* Model of the caches: which level serves each access of a traced program.
  *
  * VOLERY_CACHES=SIZE/WAYS,...   bytes and ways of each cache, from the first on; lines have 64 bytes
  *
- * A cache is sets of lines, of which the one that was not used for longest leaves. Pages are numbered in the order
- * in which they are touched first, so that it does not matter where the system has put them. A line that comes
- * after one of the last that were missed is fetched ahead: what a second cache has of it is there in time.
+ * Caches are set-associative with least-recently-used replacement. Pages are numbered in the order of their first
+ * access, so that the result does not depend on physical addresses. A line next to one of the last misses is
+ * prefetched: if the second cache or a later one has it, it arrives in time.
  */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { LINE = 6, PAGE = 12, MOST_CACHES = 4, STREAMS = 16, FETCHED_AHEAD = 8 };
+enum { LINE = 6, PAGE = 12, MOST_CACHES = 4, STREAMS = 16, PREFETCHED = 8 };
 
-void volery_tell_access(uint32_t what);
+void volery_record_access(uint32_t what);
 
 typedef struct {
     uint64_t sets;
     unsigned ways;
-    uint64_t *lines; /* of each set, the youngest first; 0: nothing yet */
+    uint64_t *lines; /* of each set, the most recently used first; 0: empty */
 } Cache;
 
 static Cache caches[MOST_CACHES];
@@ -57,8 +57,8 @@ static uint64_t line_of(uint64_t address) {
     return pages[at].number << (PAGE - LINE) | (address >> LINE & ((1u << (PAGE - LINE)) - 1));
 }
 
-/* Whether the line was there; it is the youngest of its set now. */
-static int touched(Cache *cache, uint64_t line) {
+/* Return whether the cache has the line, and make it the most recently used of its set. */
+static int access_line(Cache *cache, uint64_t line) {
     uint64_t *set = cache->lines + line % cache->sets * cache->ways, moved = line;
     for (unsigned way = 0; way < cache->ways; ++way) {
         uint64_t here = set[way];
@@ -94,12 +94,12 @@ __attribute__((constructor)) static void read_caches(void) { volery_model_caches
 
 static unsigned level_of(uint64_t line) {
     unsigned level = 0;
-    while (level < count && !touched(&caches[level], line))
+    while (level < count && !access_line(&caches[level], line))
         ++level;
     return level;
 }
 
-/* *what*: twice the number of the access within its block, and one more for a store. */
+/* Record an access. `what` is twice its number within its block, plus one for a store. */
 void volery_access(const void *address, uint32_t what) {
     if (!count)
         return;
@@ -107,12 +107,12 @@ void volery_access(const void *address, uint32_t what) {
     unsigned level = level_of(line);
     if (!level)
         return;
-    unsigned ahead = streamed(line) ? FETCHED_AHEAD : 0;
+    unsigned ahead = streamed(line) ? PREFETCHED : 0;
     if (!ahead || level == count)
-        volery_tell_access(what << 4 | ahead | level);
+        volery_record_access(what << 4 | ahead | level);
 }
 
-/* What is copied or filled as a whole: its lines are there afterwards. */
+/* Access all lines of a range that is copied or filled. */
 void volery_range(const void *address, uint64_t length) {
     uint64_t first = (uintptr_t)address >> LINE, last = ((uintptr_t)address + length - 1) >> LINE;
     for (uint64_t line = first; count && length && line <= last; ++line)

@@ -1,4 +1,4 @@
-/* Beside an instrumented program: writes what it counted, or which blocks it entered, when it ends.
+/* Runtime of an instrumented program: writes its counters or its trace when it ends.
  *
  * VOLERY_COUNTS=FILE   counters at the end, less those at the beginning (64 bits each)
  * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE,
@@ -13,13 +13,13 @@
 extern uint64_t volery_counters[] __attribute__((weak));
 extern const uint64_t volery_counters_length __attribute__((weak));
 
-enum { HELD = 1 << 14 };
+enum { BUFFERED = 1 << 14 };
 
 static uint64_t *before;
 static FILE *trace;
-static uint32_t held[HELD];
+static uint32_t buffer[BUFFERED];
 static uint64_t entered, window, stride;
-static unsigned holds;
+static unsigned used;
 
 static uint64_t number(const char *name, uint64_t otherwise) {
     const char *text = getenv(name);
@@ -27,39 +27,39 @@ static uint64_t number(const char *name, uint64_t otherwise) {
 }
 
 static void flush(void) {
-    fwrite(held, sizeof *held, holds, trace);
-    holds = 0;
+    fwrite(buffer, sizeof *buffer, used, trace);
+    used = 0;
 }
 
-static void hold(uint32_t told) {
-    held[holds++] = told;
-    if (holds == HELD)
+static void append(uint32_t record) {
+    buffer[used++] = record;
+    if (used == BUFFERED)
         flush();
 }
 
-static int is_seen(void) {
+static int in_window(void) {
     return trace && entered && (entered - 1) % stride < window;
 }
 
 void volery_trace(uint32_t block) {
     if (trace && entered++ % stride < window)
-        hold(block);
+        append(block);
 }
 
 void volery_switch(uint32_t value) {
-    if (is_seen())
-        hold(value | 1u << 31);
+    if (in_window())
+        append(value | 1u << 31);
 }
 
-void volery_tell_access(uint32_t what) {
-    if (is_seen())
-        hold(what | 1u << 30);
+void volery_record_access(uint32_t what) {
+    if (in_window())
+        append(what | 1u << 30);
 }
 
-/* The same for code that is loaded by another program. */
-void volery_trace_into(const char *name, uint64_t of_each, uint64_t so_many) {
-    window = of_each;
-    stride = so_many;
+/* Begin a trace of code that is loaded by another program. */
+void volery_trace_into(const char *name, uint64_t blocks, uint64_t of_blocks) {
+    window = blocks;
+    stride = of_blocks;
     trace = fopen(name, "wb");
 }
 

@@ -1,8 +1,9 @@
-/* Times activations on this machine, in cycles: ACTIVATE() of the text before this file, PREPARE() before the first.
+/* Times activations on this machine in cycles. The text before this file defines ACTIVATE(), and PREPARE() for the
+ * preparation before the first activation.
  *
- * Between two activations other code runs, as on a robot: its branches make the predictor forget. Each activation
- * is held against additions that depend on each other, one a cycle, just before and after it. A line per
- * activation: its cycles. (On AArch64 and x86-64 alike an addition of two registers takes one cycle.)
+ * Other code with branches runs between two activations, as on a robot, and evicts the predictor's entries. An
+ * activation is compared with dependent additions just before and after it, one a cycle on AArch64 and x86-64.
+ * Prints one line per activation: its cycles.
  */
 #include <stdint.h>
 #include <stdio.h>
