@@ -80,7 +80,7 @@ def test_it_compiles_without_boost(tmp_path):
     for name, text in headers.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    _check("pose_keeper.cpp", *(f"-I{one}" for one in (roscpp.FALLBACK, tmp_path, roscpp.INCLUDE, INCLUDE)))
+    _check("pose_keeper.cpp", *(f"-I{one}" for one in (roscpp.FALLBACK, tmp_path, roscpp.INCLUDE, *INCLUDE)))
 
 
 def test_it_compiles_with_the_real_roscpp():

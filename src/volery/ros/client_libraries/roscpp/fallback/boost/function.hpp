@@ -1,4 +1,4 @@
-// In place of Boost's header where Boost is not installed.
+// Replacement of the Boost header of the same name, for machines without Boost.
 #pragma once
 #include <functional>
 

@@ -1,4 +1,4 @@
-// ROS_INFO and its kin: lines of the trace.
+// ROS_INFO and the other log macros, which record lines in the trace.
 #pragma once
 #include <cstdarg>
 #include <cstdio>
@@ -17,7 +17,7 @@ enum Level { Debug, Info, Warn, Error, Fatal, Count };
 }
 using Level = levels::Level;
 
-// All levels go into the trace; who reads it chooses.
+// All levels are recorded in the trace, so the logger level has no effect.
 inline bool set_logger_level(const std::string&, levels::Level) { return true; }
 inline void notifyLoggerLevelsChanged() {}
 
@@ -40,7 +40,7 @@ __attribute__((format(printf, 1, 2))) inline std::string formatted(const char* f
     return text.data();
 }
 
-// Whether a line that comes at most once a period is due; *last* is when it last was.
+// Returns whether a line that is logged at most once a period is due; updates the time *last* of the last line.
 inline bool due(Time& last, double period) {
     auto const now = Time::now();
     if (!last.isZero() && now < last + Duration(period)) return false;

@@ -1,4 +1,4 @@
-// Joining the graph, spinning, leaving.
+// Functions to join the graph, spin and leave the graph.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -13,7 +13,7 @@ enum InitOption : std::uint32_t { NoSigintHandler = 1, AnonymousName = 2, NoRoso
 }
 using InitOption = init_options::InitOption;
 
-// As in a launch file, the component's name names the node, whatever is said here.
+// As in a launch file, the name of the component names the node, whatever name is given here.
 inline void init(const M_string&, const std::string& name, std::uint32_t options = 0) {
     bool const anonymous = (options & init_options::AnonymousName) != 0;
     volery::request("ros.init", volery::Writer().put(name).put(anonymous));
@@ -33,7 +33,7 @@ inline void waitForShutdown() { volery::request("ros.wait_for_shutdown"); }
 
 // Run the callbacks that are ready.
 inline void spinOnce() { volery::request("ros.spin_once"); }
-// Run callbacks as they come, until the node shuts down.
+// Run callbacks as they become ready, until the node shuts down.
 inline void spin() { volery::request("ros.spin"); }
 
 class SingleThreadedSpinner {
@@ -47,7 +47,7 @@ void spin(Spinner& spinner) {
 
 #define VOLERY_REFUSED(what) __attribute__((error("volery: " what)))
 
-// A component has one flow of control; these would bring threads of their own.
+// A component has one flow of control, so spinners with threads of their own are refused.
 class AsyncSpinner {
 public:
     VOLERY_REFUSED("ros::AsyncSpinner is not offered: a component has one flow of control; call ros::spin() or "

@@ -1,4 +1,4 @@
-// What generated messages are made of: their bytes, and how they are shown.
+// Encoding, decoding and printing of generated messages.
 #pragma once
 #include <algorithm>
 #include <boost/array.hpp>
@@ -25,7 +25,7 @@ namespace detail {
 template <class Type>
 constexpr bool is_number = std::is_arithmetic_v<Type>;
 
-// Writes CDR as ROS 2 does: little endian, each number aligned to its size from behind a head of four bytes.
+// Writes CDR as ROS 2 does: little endian, each number aligned to its size after a header of four bytes.
 class CdrWriter {
 public:
     template <class Field>
@@ -149,7 +149,7 @@ private:
     volery::Reader in_;
 };
 
-// Shows a message as rostopic does.
+// Prints a message as rostopic does.
 class Printer {
 public:
     Printer(std::ostream& out, int depth) : out_(out), depth_(depth) {}
@@ -207,7 +207,7 @@ private:
     int depth_;
 };
 
-// These are not inlined: what they take belongs to the price of the call into ROS, not to the component's code.
+// Not inlined: their execution time belongs to the cost of the call into ROS, not to the component's code.
 template <class Message>
 __attribute__((noinline)) std::string to_bytes(const Message& message) {
     CdrWriter writer;
@@ -223,7 +223,7 @@ __attribute__((noinline)) void from_bytes(volery::Reader in, Message& message) {
 
 }  // namespace detail
 
-// How messages are shown, and when two are the same. Each package's namespace names these as its own.
+// Printing and comparison of messages. The namespace of each package imports these operators.
 namespace message_operators {
 
 template <class Message>

@@ -1,4 +1,4 @@
-// Names of the graph, of this node, and the parameters by absolute name.
+// Resolution of graph names, and the name of this node.
 #pragma once
 #include <map>
 #include <string>

@@ -1,7 +1,7 @@
 // ros::NodeHandle.
 #pragma once
 #ifndef BOOST_BIND_GLOBAL_PLACEHOLDERS
-#define BOOST_BIND_GLOBAL_PLACEHOLDERS  // callbacks say _1, as roscpp's own examples do
+#define BOOST_BIND_GLOBAL_PLACEHOLDERS  // callbacks are bound with _1, as in roscpp's examples
 #endif
 #include <boost/bind.hpp>
 #include <boost/function.hpp>
@@ -19,7 +19,7 @@
 
 namespace ros {
 
-// A namespace of this node: "" its own, "~" its private one. Any number of them are one node.
+// A namespace of this node: "" is its own, "~" its private one. All handles belong to the same node.
 class NodeHandle {
 public:
     NodeHandle(const std::string& ns = "", const M_string& = {}) { enter("", ns); }
@@ -42,40 +42,41 @@ public:
         auto const name = resolveName(topic);
         auto with = volery::Writer().put(name).put(Message::name_());
         with.put(static_cast<std::int64_t>(queue_size)).put(latch);
-        return Publisher(held("ros.advertise", with, name), latch);
+        return Publisher(create("ros.advertise", with, name), latch);
     }
 
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (Class::*callback)(Parameter),
                          Class* object, const TransportHints& = {}) {
-        return hear<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
+        return make_subscriber<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
     }
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          void (Class::*callback)(Parameter) const, Class* object, const TransportHints& = {}) {
-        return hear<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
+        return make_subscriber<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
     }
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (Class::*callback)(Parameter),
                          const boost::shared_ptr<Class>& object, const TransportHints& = {}) {
-        return hear<Parameter>(topic, queue_size, [=](Parameter message) { (object.get()->*callback)(message); });
+        return make_subscriber<Parameter>(topic, queue_size,
+                                          [=](Parameter message) { (object.get()->*callback)(message); });
     }
     template <class Parameter>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (*callback)(Parameter),
                          const TransportHints& = {}) {
-        return hear<Parameter>(topic, queue_size, callback);
+        return make_subscriber<Parameter>(topic, queue_size, callback);
     }
     template <class Message>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          const boost::function<void(const boost::shared_ptr<Message const>&)>& callback,
                          const VoidConstPtr& = VoidConstPtr(), const TransportHints& = {}) {
-        return hear<const boost::shared_ptr<Message const>&>(topic, queue_size, callback);
+        return make_subscriber<const boost::shared_ptr<Message const>&>(topic, queue_size, callback);
     }
     template <class Message, class Parameter>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          const boost::function<void(Parameter)>& callback,
                          const VoidConstPtr& = VoidConstPtr(), const TransportHints& = {}) {
-        return hear<Parameter>(topic, queue_size, callback);
+        return make_subscriber<Parameter>(topic, queue_size, callback);
     }
 
     // -- services
@@ -168,14 +169,14 @@ private:
     void enter(const std::string& parent, const std::string& ns) {
         namespace_ = volery::request("ros.node_handle", volery::Writer().put(parent).put(ns)).text();
     }
-    static std::shared_ptr<detail::Held> held(const char* question, const volery::Writer& with,
+    static std::shared_ptr<detail::Entity> create(const char* request_name, const volery::Writer& with,
                                               const std::string& name,
                                               std::int64_t callable = detail::NO_CALLABLE) {
-        return std::make_shared<detail::Held>(volery::request(question, with).integer(), name, callable);
+        return std::make_shared<detail::Entity>(volery::request(request_name, with).integer(), name, callable);
     }
 
     template <class Parameter, class Callback>
-    Subscriber hear(const std::string& topic, std::uint32_t queue_size, Callback callback) {
+    Subscriber make_subscriber(const std::string& topic, std::uint32_t queue_size, Callback callback) {
         using Adapter = detail::Adapted<Parameter>;
         using Message = typename Adapter::Message;
         auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
@@ -185,7 +186,7 @@ private:
         auto const name = resolveName(topic);
         auto with = volery::Writer().put(name).put(Message::name_());
         with.put(static_cast<std::int64_t>(queue_size)).put(callable);
-        return Subscriber(held("ros.subscribe", with, name, callable));
+        return Subscriber(create("ros.subscribe", with, name, callable));
     }
 
     template <class Request, class Response, class Handler>
@@ -199,7 +200,7 @@ private:
         });
         auto const name = resolveName(service);
         auto const with = volery::Writer().put(name).put(Request::name_()).put(callable);
-        return ServiceServer(held("ros.serve", with, name, callable));
+        return ServiceServer(create("ros.serve", with, name, callable));
     }
 
     std::string namespace_;
@@ -207,7 +208,7 @@ private:
 
 namespace topic {
 
-// The next message of a topic; null if none comes in time. A negative time-out: for ever.
+// Return the next message of a topic, or null after a time-out. A negative time-out means none.
 template <class Message>
 boost::shared_ptr<Message const> waitForMessage(const std::string& topic, Duration timeout = Duration(-1.0)) {
     auto const with = volery::Writer().put(topic).put(Message::name_()).put(timeout.toNSec());

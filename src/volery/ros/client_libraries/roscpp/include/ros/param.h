@@ -1,4 +1,4 @@
-// Parameters, converted as roscpp does: whole numbers where floating ones are asked for, not the other way round.
+// Parameters. As in roscpp an integer is converted to a floating-point number, but not the other way round.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -12,7 +12,7 @@
 namespace ros {
 namespace detail {
 
-// A value of the tree of parameters, on its way over the border: a letter for its kind, then itself.
+// A parameter value is encoded as a letter for its kind, followed by the value.
 inline void put_value(volery::Writer& out, bool value) { out.put("b").put(value); }
 inline void put_value(volery::Writer& out, int value) { out.put("i").put(value); }
 inline void put_value(volery::Writer& out, double value) { out.put("d").put(value); }
@@ -33,7 +33,7 @@ void put_value(volery::Writer& out, const std::map<std::string, Value>& values) 
     }
 }
 
-// False where what is there is of another kind.
+// Return false if the value is of another kind.
 inline bool get_value(volery::Reader& in, bool& value) {
     auto const kind = in.text();
     if (kind == "b" || kind == "i") return value = in.flag(), true;
@@ -91,7 +91,7 @@ bool get_value(volery::Reader& in, std::map<std::string, Value>& values) {
 
 namespace param {
 
-// Whether there is such a parameter of such a kind; *value* is left alone otherwise.
+// Return whether a parameter of this kind exists; otherwise *value* is not changed.
 template <class Value>
 bool get(const std::string& name, Value& value) {
     auto answer = volery::request("ros.param_get", volery::Writer().put(name));

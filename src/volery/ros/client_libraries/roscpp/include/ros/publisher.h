@@ -2,21 +2,21 @@
 #pragma once
 #include <string>
 
-#include "ros/held.h"
+#include "ros/entity.h"
 #include "ros/message.h"
 
 namespace ros {
 
-// Copies share the advertisement; it ends with the last of them.
+// Copies share the advertisement, which ends with the last copy.
 class Publisher : public detail::Handle {
 public:
     Publisher() = default;
-    Publisher(std::shared_ptr<detail::Held> held, bool latched) : Handle(std::move(held)), latched_(latched) {}
+    Publisher(std::shared_ptr<detail::Entity> entity, bool latched) : Handle(std::move(entity)), latched_(latched) {}
 
     template <class Message>
     void publish(const Message& message) const {
-        if (!held_) throw Exception("publish() on an invalid ros::Publisher");
-        volery::request("ros.publish", volery::Writer().put(held_->handle()).put(detail::to_bytes(message)));
+        if (!entity_) throw Exception("publish() on an invalid ros::Publisher");
+        volery::request("ros.publish", volery::Writer().put(entity_->handle()).put(detail::to_bytes(message)));
     }
     template <class Message>
     void publish(const boost::shared_ptr<Message>& message) const {

@@ -9,15 +9,15 @@ public:
     explicit Rate(double frequency) : Rate(Duration(1.0 / frequency)) {}
     explicit Rate(const Duration& period) : period_(period) { reset(); }
 
-    // Until the next release. A loop that is late goes on at once.
+    // Block until the next release. A loop that is late continues at once.
     bool sleep() {
         auto answer = volery::request("ros.rate_sleep", volery::Writer().put(handle_));
         cycle_.fromNSec(answer.integer());
         return cycle_ <= period_;
     }
-    // Count anew from now.
+    // Restart the period now.
     void reset() { handle_ = volery::request("ros.rate", volery::Writer().put(period_.toNSec())).integer(); }
-    // How long the last cycle computed, and how long it may be.
+    // Duration of the last cycle, and the period.
     Duration cycleTime() const { return cycle_; }
     Duration expectedCycleTime() const { return period_; }
 

@@ -1,4 +1,4 @@
-// roscpp on the embedded graph: what <ros/ros.h> offers, in virtual time.
+// roscpp on the embedded graph: the content of <ros/ros.h> in virtual time.
 #pragma once
 #include "ros/console.h"
 #include "ros/init.h"

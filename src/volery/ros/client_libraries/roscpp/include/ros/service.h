@@ -2,13 +2,13 @@
 #pragma once
 #include <string>
 
-#include "ros/held.h"
+#include "ros/entity.h"
 #include "ros/message.h"
 #include "ros/names.h"
 
 namespace ros {
 
-// Copies share the service; it ends with the last of them.
+// Copies share the service, which ends with the last copy.
 class ServiceServer : public detail::Handle {
 public:
     using Handle::Handle;
@@ -32,7 +32,7 @@ public:
     ServiceClient() = default;
     ServiceClient(std::int64_t handle, std::string name) : handle_(handle), name_(std::move(name)) {}
 
-    // False if nobody serves it or the handler fails; blocks until the answer is there.
+    // Block until the response arrives; return false without a server or if the handler fails.
     template <class Service>
     bool call(Service& service) {
         return call(service.request, service.response);
@@ -46,7 +46,7 @@ public:
         return call(request, response);
     }
     bool exists() { return waitForExistence(Duration(0.0)); }
-    // A negative time-out: for ever.
+    // A negative time-out means none.
     bool waitForExistence(Duration timeout = Duration(-1.0)) {
         auto const with = volery::Writer().put(name_).put(timeout.toNSec());
         return isValid() && volery::request("ros.wait_for_service", with).flag();

@@ -1,15 +1,15 @@
-// ros::Subscriber, and how a callback's argument is made from a message.
+// ros::Subscriber, and the conversion of a message to the argument of a callback.
 #pragma once
 #include <boost/function.hpp>
 #include <string>
 #include <type_traits>
 
-#include "ros/held.h"
+#include "ros/entity.h"
 #include "ros/message.h"
 
 namespace ros {
 
-// How a message came. Accepted wherever roscpp takes one; sending never waits here.
+// Accepted wherever roscpp takes transport hints, without effect.
 class TransportHints {
 public:
     TransportHints& reliable() { return *this; }
@@ -24,7 +24,7 @@ using VoidConstPtr = boost::shared_ptr<void const>;
 
 namespace detail {
 
-// The message type of a callback's parameter, and the parameter from the message.
+// The message type of a callback's parameter, and the conversion of a message to the parameter.
 template <class Parameter>
 struct Adapter {
     using Message = std::remove_cv_t<Parameter>;
@@ -47,7 +47,7 @@ boost::shared_ptr<Message> received(volery::Reader in) {
 
 }  // namespace detail
 
-// Copies share the subscription; it ends with the last of them.
+// Copies share the subscription, which ends with the last copy.
 class Subscriber : public detail::Handle {
 public:
     using Handle::Handle;

@@ -1,4 +1,4 @@
-// ros::Time, ros::Duration and their wall-clock kin, which here run on the clock of the run, too.
+// ros::Time, ros::Duration and their wall-clock variants, which also use the clock of the run.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -27,7 +27,7 @@ inline std::int64_t nanoseconds(double seconds) {
 
 }  // namespace detail
 
-// What spans have in common; Self is the kind of span.
+// Base class of durations; Self is the derived class.
 template <class Self>
 class DurationBase {
 public:
@@ -84,7 +84,7 @@ public:
     WallDuration() = default;
 };
 
-// What points in time have in common; Span is the difference of two.
+// Base class of points in time; Span is the type of their difference.
 template <class Self, class Span>
 class TimeBase {
 public:

@@ -2,7 +2,7 @@
 #pragma once
 #include <boost/function.hpp>
 
-#include "ros/held.h"
+#include "ros/entity.h"
 #include "ros/time.h"
 
 namespace ros {
@@ -25,19 +25,19 @@ using WallTimerCallback = boost::function<void(const WallTimerEvent&)>;
 
 namespace detail {
 
-// Calls back each period while the node spins. Copies share it; it ends with the last of them.
+// Calls back each period while the node spins. Copies share the timer, which ends with the last copy.
 template <class Event, class Time, class Span>
 class TimerOf : public Handle {
 public:
     using Handle::Handle;
-    void start() { order("ros.timer_start"); }
-    void stop() { order("ros.timer_stop"); }
+    void start() { request("ros.timer_start"); }
+    void stop() { request("ros.timer_stop"); }
     void setPeriod(const Span& period, bool = true) {
-        if (held_) volery::request("ros.timer_period", volery::Writer().put(held_->handle()).put(period.toNSec()));
+        if (entity_) volery::request("ros.timer_period", volery::Writer().put(entity_->handle()).put(period.toNSec()));
     }
     bool hasStarted() const { return count("ros.timer_started") != 0; }
     bool hasPending() const { return hasStarted(); }
-    bool isValid() const { return held_ != nullptr; }
+    bool isValid() const { return entity_ != nullptr; }
 
     static TimerOf make(Span period, boost::function<void(const Event&)> callback, bool oneshot, bool autostart) {
         auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
@@ -50,7 +50,7 @@ public:
             callback(event);
         });
         auto const with = volery::Writer().put(period.toNSec()).put(oneshot).put(autostart).put(callable);
-        return TimerOf(std::make_shared<Held>(volery::request("ros.timer", with).integer(), "", callable));
+        return TimerOf(std::make_shared<Entity>(volery::request("ros.timer", with).integer(), "", callable));
     }
 };
 

@@ -1,0 +1,68 @@
+// An entity of this node on the graph: a publisher, a subscription, a service or a timer.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "volery/abi.h"
+
+namespace ros {
+namespace detail {
+
+constexpr std::int64_t NO_CALLABLE = -1;
+
+// Removed from the graph with the last handle that shares it.
+class Entity {
+public:
+    Entity(std::int64_t handle, std::string name, std::int64_t callable = NO_CALLABLE)
+        : handle_(handle), name_(std::move(name)), callable_(callable) {}
+    Entity(const Entity&) = delete;
+    Entity& operator=(const Entity&) = delete;
+    ~Entity() { close(); }
+
+    void close() noexcept {
+        if (!open_) return;
+        open_ = false;
+        volery::try_request("ros.close", volery::Writer().put(handle_));
+        if (callable_ != NO_CALLABLE) volery::unregister_callable(callable_);
+    }
+    bool open() const { return open_; }
+    std::int64_t handle() const { return handle_; }
+    const std::string& name() const { return name_; }
+
+private:
+    std::int64_t handle_;
+    std::string name_;
+    std::int64_t callable_;
+    bool open_ = true;
+};
+
+// Base class of ros::Publisher, ros::Subscriber, ros::ServiceServer and ros::Timer.
+class Handle {
+public:
+    Handle() = default;
+    explicit Handle(std::shared_ptr<Entity> entity) : entity_(std::move(entity)) {}
+    void shutdown() {
+        if (entity_) entity_->close();
+    }
+    operator void*() const { return entity_ && entity_->open() ? entity_.get() : nullptr; }
+    bool operator==(const Handle& other) const { return entity_ == other.entity_; }
+    bool operator!=(const Handle& other) const { return entity_ != other.entity_; }
+    bool operator<(const Handle& other) const { return entity_ < other.entity_; }
+
+protected:
+    // Make a request about the entity; without an entity do nothing.
+    void request(const char* request_name) const {
+        if (entity_) volery::request(request_name, volery::Writer().put(entity_->handle()));
+    }
+    std::string name() const { return entity_ ? entity_->name() : ""; }
+    // Make a request about the entity that returns a number; without an entity return 0.
+    std::int64_t count(const char* request_name) const {
+        return entity_ ? volery::request(request_name, volery::Writer().put(entity_->handle())).integer() : 0;
+    }
+    std::shared_ptr<Entity> entity_;
+};
+
+}  // namespace detail
+}  // namespace ros
