@@ -21,6 +21,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     GUIDED,
     INFO,
     MANUAL,
+    SHARED_CHECKS,
     STABILIZED,
     Check,
     between_uptimes,
@@ -28,10 +29,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     failing_checks,
     in_other_modes,
     in_position_modes,
-    lost_position,
-    low_battery,
     mode_not_armable,
-    no_mission,
 )
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -73,6 +71,7 @@ CAPABILITIES = 64_495
 
 MANUAL_BITS = CUSTOM | STABILIZED | MANUAL
 AUTO_BITS = MANUAL_BITS | GUIDED
+"""``base_mode`` of a disarmed vehicle, as recorded."""
 LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
 
 READY = round(2.28 * S)
@@ -137,9 +136,7 @@ CHECKS = (
     Check("AHRS: EKF3 not started", in_other_modes(0.0, 4.28)),
     Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
-    Check("Battery 1 below minimum arming voltage", low_battery),
-    Check("Need Position Estimate", lost_position),
-    Check("Mode requires mission", no_mission),
+    *SHARED_CHECKS,
 )
 
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))

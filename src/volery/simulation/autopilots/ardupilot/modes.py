@@ -70,6 +70,14 @@ def low_battery(vehicle: Vehicle) -> bool:
     return 0.0 < vehicle.estimate.battery_volts < volts or left < charge
 
 
+SHARED_CHECKS = (
+    Check("Battery 1 below minimum arming voltage", low_battery),
+    Check("Need Position Estimate", lost_position),
+    Check("Mode requires mission", no_mission),
+)
+"""The last checks of copter and rover."""
+
+
 def failing_checks(vehicle: Vehicle, checks: Sequence[Check]) -> list[str]:
     """Return the texts of the checks that fail, in the firmware's order."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:

@@ -21,14 +21,12 @@ from volery.simulation.autopilots.ardupilot.modes import (
     GUIDED,
     MANUAL,
     ROVER_DISARMED,
+    SHARED_CHECKS,
     WARNING,
     Check,
     between_uptimes,
     failing_checks,
-    lost_position,
-    low_battery,
     mode_not_armable,
-    no_mission,
 )
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -125,9 +123,7 @@ CHECKS = (
     Check("Compass not healthy", between_uptimes(0.0, 2.4)),
     Check("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
-    Check("Battery 1 below minimum arming voltage", low_battery),
-    Check("Need Position Estimate", lost_position),
-    Check("Mode requires mission", no_mission),
+    *SHARED_CHECKS,
 )
 
 HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))

@@ -24,7 +24,7 @@ from volery.simulation.autopilots.px4.flight_modes import (
 from volery.simulation.autopilots.px4.modes import INFO, commander_of
 from volery.simulation.autopilots.px4.offboard import Offboard
 from volery.simulation.autopilots.px4.parameters import COPTER_SUPPORTED, copter_tuning
-from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, Mode, ParameterTable, Vehicle
+from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
 
 
 def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
@@ -82,37 +82,26 @@ def _orbit(vehicle: Vehicle) -> Manoeuvre:
     return Orbit(vehicle, centre, radius, speed)
 
 
-MODES = {
-    mode.number: mode
-    for mode in (
-        Mode(modes.MANUAL, "MANUAL", modes.MANUAL_BITS, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.ALTCTL, "ALTCTL", modes.MANUAL_BITS, AltitudeHold, pilot=True),
-        Mode(modes.POSCTL, "POSCTL", modes.MANUAL_BITS, PositionControl, needs_position=True, pilot=True),
-        Mode(modes.ORBIT, "ORBIT", modes.OFFBOARD_BITS, _orbit, needs_position=True, armable=False),
-        Mode(modes.ACRO, "ACRO", modes.RATE_BITS, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.OFFBOARD, "OFFBOARD", modes.OFFBOARD_BITS, Offboard, needs_position=True),
-        Mode(modes.STABILIZE, "STABILIZED", modes.MANUAL_BITS, Stabilize, pilot=True, manual_throttle=True),
-        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.AUTO_BITS, _take_off, needs_position=True),
-        Mode(modes.LOITER, "AUTO.LOITER", modes.AUTO_BITS, Hold, needs_position=True),
-        Mode(
-            modes.MISSION,
-            "AUTO.MISSION",
-            modes.AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, mission.leg, mission.MISSION_RULES, lambda _vehicle: True),
-            needs_position=True,
+MODES = modes.mode_table(
+    {
+        modes.MANUAL: Stabilize,
+        modes.ALTCTL: AltitudeHold,
+        modes.POSCTL: PositionControl,
+        modes.ORBIT: _orbit,
+        modes.ACRO: Stabilize,
+        modes.OFFBOARD: Offboard,
+        modes.STABILIZE: Stabilize,
+        modes.TAKEOFF: _take_off,
+        modes.LOITER: Hold,
+        modes.MISSION: lambda vehicle: FlyMission(
+            vehicle, mission.leg, mission.MISSION_RULES, lambda _vehicle: True
         ),
-        Mode(
-            modes.RTL,
-            "AUTO.RTL",
-            modes.AUTO_BITS,
-            lambda vehicle: Return(vehicle, report_return_stage),
-            needs_position=True,
-            armable=False,
-        ),
-        Mode(modes.LAND, "AUTO.LAND", modes.AUTO_BITS, Descent, armable=False),
-        Mode(modes.FOLLOW, "AUTO.FOLLOW", modes.OFFBOARD_BITS, Hold, needs_position=True, armable=False),
-    )
-}
+        modes.RTL: lambda vehicle: Return(vehicle, report_return_stage),
+        modes.LAND: Descent,
+        modes.FOLLOW: Hold,
+    },
+    flies=True,
+)
 
 
 def _on_step(vehicle: Vehicle) -> None:

@@ -101,7 +101,7 @@ class ArmingChecks(NamedTuple):
 
 
 def _modes(checks: ArmingChecks) -> int:
-    """Return the modes that could be flown now, as one bit for each navigation state."""
+    """Return the modes that could be flown now, one bit for each ``nav_state`` of VehicleStatus."""
     missing: list[int] = []
     if not checks.position:
         missing += [2, 3, 4, 5, 17, 18, 19, 20, 21, 22]

@@ -7,7 +7,8 @@ the others only when the user requests a mode, moves the sticks or disarms.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
@@ -16,7 +17,7 @@ from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import SetpointStream
 from volery.simulation.autopilots.px4.pilot_input import Joystick
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
 """MAV_MODE_FLAG."""
@@ -25,6 +26,7 @@ AUTO_BITS = CUSTOM | AUTO | GUIDED | STABILIZED
 MANUAL_BITS = CUSTOM | STABILIZED | MANUAL_INPUT
 RATE_BITS = CUSTOM | MANUAL_INPUT
 OFFBOARD_BITS = CUSTOM | STABILIZED
+"""``base_mode`` of a disarmed vehicle, as recorded."""
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
@@ -65,24 +67,41 @@ NEEDS_STICKS = frozenset({MANUAL, ALTCTL, POSCTL, ACRO, STABILIZE})
 AUTOMATIC = frozenset({TAKEOFF, LOITER, MISSION, RTL, LAND, ORBIT, FOLLOW})
 """Modes that moved sticks take over."""
 
-NAVIGATION_STATE: Mapping[int, int] = {
-    MANUAL: 0,
-    ALTCTL: 1,
-    POSCTL: 2,
-    MISSION: 3,
-    LOITER: 4,
-    RTL: 5,
-    ACRO: 10,
-    OFFBOARD: 14,
-    STABILIZE: 15,
-    TAKEOFF: 17,
-    LAND: 18,
-    FOLLOW: 19,
-    ORBIT: 21,
-}
-"""Bits of the modes in events: ``nav_state`` of VehicleStatus."""
+_MODES = (
+    Mode(MANUAL, "MANUAL", MANUAL_BITS, Manoeuvre, pilot=True),
+    Mode(ALTCTL, "ALTCTL", MANUAL_BITS, Manoeuvre, pilot=True),
+    Mode(POSCTL, "POSCTL", MANUAL_BITS, Manoeuvre, pilot=True),
+    Mode(ORBIT, "ORBIT", OFFBOARD_BITS, Manoeuvre, needs_position=True, armable=False),
+    Mode(ACRO, "ACRO", RATE_BITS, Manoeuvre, pilot=True),
+    Mode(OFFBOARD, "OFFBOARD", OFFBOARD_BITS, Manoeuvre, needs_position=True),
+    Mode(STABILIZE, "STABILIZED", MANUAL_BITS, Manoeuvre, pilot=True),
+    Mode(TAKEOFF, "AUTO.TAKEOFF", AUTO_BITS, Manoeuvre, needs_position=True),
+    Mode(LOITER, "AUTO.LOITER", AUTO_BITS, Manoeuvre, needs_position=True),
+    Mode(MISSION, "AUTO.MISSION", AUTO_BITS, Manoeuvre, needs_position=True),
+    Mode(RTL, "AUTO.RTL", AUTO_BITS, Manoeuvre, needs_position=True, armable=False),
+    Mode(LAND, "AUTO.LAND", AUTO_BITS, Manoeuvre, armable=False),
+    Mode(FOLLOW, "AUTO.FOLLOW", OFFBOARD_BITS, Manoeuvre, needs_position=True, armable=False),
+)
+"""What the kinds of vehicles share of each mode, without its manoeuvre."""
 
-DESCEND_STATE = 12
+
+def mode_table(manoeuvres: Mapping[int, Callable[[Vehicle], Manoeuvre]], *, flies: bool) -> dict[int, Mode]:
+    """Return the modes of one kind of vehicle.
+
+    Args:
+        manoeuvres: Manoeuvre by mode; the vehicle has no other modes.
+        flies: Whether sticks command thrust and POSCTL needs a position, as on a multirotor.
+    """
+    return {
+        mode.number: replace(
+            mode,
+            manoeuvre=manoeuvres[mode.number],
+            manual_throttle=flies and mode.number in (MANUAL, ACRO, STABILIZE),
+            needs_position=mode.needs_position or (flies and mode.number == POSCTL),
+        )
+        for mode in _MODES
+        if mode.number in manoeuvres
+    }
 
 
 CRITICAL, INFO = 2, 6

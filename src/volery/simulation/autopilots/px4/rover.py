@@ -29,7 +29,7 @@ from volery.simulation.autopilots.px4.firmware import own_parameters, px4_firmwa
 from volery.simulation.autopilots.px4.modes import commander_of
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, OffboardTarget
 from volery.simulation.autopilots.px4.parameters import ROVER_SUPPORTED, rover_tuning
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, ParameterTable, Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, ParameterTable, Vehicle
 
 GROUND_ROVER = 10
 """MAV_TYPE."""
@@ -132,28 +132,24 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
 
 COMMANDS: dict[int, Handler] = {**commands.SHARED_COMMANDS, commands.REPOSITION: on_reposition}
 
-MODES = {
-    mode.number: mode
-    for mode in (
-        Mode(modes.MANUAL, "MANUAL", modes.MANUAL_BITS, StickDrive, pilot=True),
-        Mode(modes.ALTCTL, "ALTCTL", modes.MANUAL_BITS, StickDrive, pilot=True),
-        Mode(modes.POSCTL, "POSCTL", modes.MANUAL_BITS, StickDrive, pilot=True),
-        Mode(modes.ACRO, "ACRO", modes.RATE_BITS, StickDrive, pilot=True),
-        Mode(modes.OFFBOARD, "OFFBOARD", modes.OFFBOARD_BITS, OffboardRover, needs_position=True),
-        Mode(modes.STABILIZE, "STABILIZED", modes.MANUAL_BITS, StickDrive, pilot=True),
-        Mode(modes.TAKEOFF, "AUTO.TAKEOFF", modes.AUTO_BITS, HoldRover, needs_position=True),
-        Mode(modes.LOITER, "AUTO.LOITER", modes.AUTO_BITS, HoldRover, needs_position=True),
-        Mode(
-            modes.MISSION,
-            "AUTO.MISSION",
-            modes.AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, rover_leg, mission.MISSION_RULES, lambda _vehicle: True),
-            needs_position=True,
+MODES = modes.mode_table(
+    {
+        modes.MANUAL: StickDrive,
+        modes.ALTCTL: StickDrive,
+        modes.POSCTL: StickDrive,
+        modes.ACRO: StickDrive,
+        modes.OFFBOARD: OffboardRover,
+        modes.STABILIZE: StickDrive,
+        modes.TAKEOFF: HoldRover,
+        modes.LOITER: HoldRover,
+        modes.MISSION: lambda vehicle: FlyMission(
+            vehicle, rover_leg, mission.MISSION_RULES, lambda _vehicle: True
         ),
-        Mode(modes.RTL, "AUTO.RTL", modes.AUTO_BITS, ReturnRover, needs_position=True, armable=False),
-        Mode(modes.LAND, "AUTO.LAND", modes.AUTO_BITS, Stand, armable=False),
-    )
-}
+        modes.RTL: ReturnRover,
+        modes.LAND: Stand,
+    },
+    flies=False,
+)
 
 
 @cache
