@@ -80,9 +80,9 @@ def test_what_a_probe_prints_is_read() -> None:
     sample = Probe().round()[0]
     lines = ["[INFO] something of ROS", json.dumps(sample._asdict())]
     assert read_round(lines) == (sample,)
-    with pytest.raises(LinkError, match="no measurement"):
+    with pytest.raises(LinkError, match="not a measurement"):
         read_round(['{"what": "idle"}'])
-    with pytest.raises(LinkError, match="no measurement"):
+    with pytest.raises(LinkError, match="not a measurement"):
         read_round(["{half"])
 
 
