@@ -140,6 +140,6 @@ def test_ctrl_c_leaves_a_campaign_to_go_on_with(ros: None, tmp_path: Path) -> No
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert "0 rounds were measured, and 3 are the least: the same command goes on from" in said
+    assert "0 rounds were measured, at least 3 are needed; the same command continues from" in said
     assert rounds.exists()
     assert not out.exists()

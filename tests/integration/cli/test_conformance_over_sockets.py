@@ -47,7 +47,7 @@ def checked(address: str, folder: Path, *arguments: str) -> dict[str, dict[str, 
 
 def test_nothing_moves_without_leave(address: str, tmp_path: Path) -> None:
     found = checked(address, tmp_path, "--only", "heard,readiness,takeoff,wrong-system-id")
-    assert found["heard"]["outcome"] == "passed"
+    assert found["identification"]["outcome"] == "passed"
     assert found["readiness"]["outcome"] == "passed"
     assert found["takeoff"]["outcome"] == "not possible here"
     assert "--fly" in found["takeoff"]["detail"]

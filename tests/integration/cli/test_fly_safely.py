@@ -156,7 +156,7 @@ def test_a_fence_that_is_not_there(fly: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--reserve", "lots"), "--reserve lots: a share of the battery, such as 20% or 0.2"),
+        (("--reserve", "lots"), "--reserve lots: give a share of the battery, such as 20% or 0.2"),
         (("--reserve", "120%"), "a share of the battery"),
         (("--reserve", "nan"), "a share of the battery"),
         (("--ceiling", "nan"), "leaves no room to fly"),
@@ -207,7 +207,7 @@ def test_calls_that_make_no_sense(fly: Any, call: str, says: str) -> None:
         ("sim:ardupilo", "no driver named 'ardupilo' (did you mean 'ardupilot'?); there is ardupilot, "),
         ("px5+udp://:14540", "no driver named 'px5'"),
         ("px4+upd://:14540", "no transport 'upd' (did you mean 'udp'?)"),
-        ("dji+tcp://127.0.0.1:5000", "dji is reached over a graph"),
+        ("dji+tcp://127.0.0.1:5000", "dji is reached over a ROS graph"),
         ("px4+udp://", "lacks the port"),
         ("ardupilot+serial:///dev/ttyUSB0?baud=fast", "baud='fast' is not a number"),
         ("14540", "is not an address"),

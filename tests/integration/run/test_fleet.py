@@ -126,7 +126,7 @@ def test_each_has_a_system_id_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("urls", "error", "says"),
     [
-        ({}, UsageError, "a fleet of no vehicles"),
+        ({}, UsageError, "a fleet needs at least one vehicle"),
         ({"a": "sim:ardupilo"}, UsageError, r"ardupilo.*did you mean 'ardupilot'"),
         (
             {"a": "ardupilot+tcp://127.0.0.1:5760", "b": "sim:ardupilot"},
@@ -160,7 +160,7 @@ def test_fleets_that_make_no_sense(urls: dict[str, str], error: type[Exception],
 def test_a_vehicle_that_is_not_in_it(pair: Fleet) -> None:
     with pytest.raises(UsageError, match=r"no vehicle 'lft' in the fleet .did you mean 'left'"):
         pair["lft"]
-    with pytest.raises(UsageError, match="a fleet of no vehicles"):
+    with pytest.raises(UsageError, match="a fleet needs at least one vehicle"):
         Fleet({})
 
 
