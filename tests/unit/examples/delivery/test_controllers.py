@@ -240,7 +240,7 @@ class Landing:
 
 def test_it_lands_on_the_beacon(bench, city):
     landing = Landing(bench, city)
-    assert landing.land() == ["nobody asked for this landing", "", "done"]
+    assert landing.land() == ["this landing was not requested", "", "done"]
     assert hypot(landing.drone.enu[0], landing.drone.enu[1] - 400.0) < 0.3
     assert landing.drone.done == [("land", landing.pad)]
 
