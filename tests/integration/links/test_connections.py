@@ -33,14 +33,14 @@ HERE = "127.0.0.1"
 
 
 class Bench:
-    """A wall clock, what its links heard, and ``until``: run on until something has happened."""
+    """A wall clock, the frames that its links received, and ``until``, which runs until a condition holds."""
 
     def __init__(self) -> None:
         self.states: list[LinkState] = []
         self.kernel = WallKernel(record=self._record)
         self.changed = Signal(self.kernel, "the bench")
         self.links: list[CodedLink] = []
-        self.heard: dict[CodedLink, list[Frame]] = {}
+        self.received: dict[CodedLink, list[Frame]] = {}
         self._asked = 0
 
     def _record(self, event: object) -> None:
@@ -50,10 +50,10 @@ class Bench:
 
     def add(self, link: CodedLink) -> CodedLink:
         self.links.append(link)
-        self.heard[link] = []
+        self.received[link] = []
 
         def note(frame: Frame) -> None:
-            self.heard[link].append(frame)
+            self.received[link].append(frame)
             self.changed.notify()
 
         link.receive(note)
@@ -102,10 +102,10 @@ def test_a_client_and_a_server_talk_both_ways(bench: Bench) -> None:
     client = bench.add(TcpClient(bench.kernel, HERE, server.port))
     bench.until(lambda: not client.problem())
     client.send(ASK)
-    bench.until(lambda: bench.heard[server])
+    bench.until(lambda: bench.received[server])
     server.send(BEAT)
-    bench.until(lambda: bench.heard[client])
-    assert bench.heard[client][0].fields["autopilot"] == 3
+    bench.until(lambda: bench.received[client])
+    assert bench.received[client][0].fields["autopilot"] == 3
 
 
 def test_a_server_serves_several_clients_and_survives_one_that_leaves(bench: Bench) -> None:
@@ -118,12 +118,12 @@ def test_a_server_serves_several_clients_and_survives_one_that_leaves(bench: Ben
     bench.until(lambda: server.clients == 2)
     server.send_bytes(b"Init ArduCopter\n")
     server.send(BEAT)
-    bench.until(lambda: bench.heard[first] and bench.heard[second])
+    bench.until(lambda: bench.received[first] and bench.received[second])
     assert list(first.statistics.lines) == ["Init ArduCopter"]
     first.close()
     bench.until(lambda: server.clients == 1)
     server.send(BEAT)
-    bench.until(lambda: len(bench.heard[second]) == 2)
+    bench.until(lambda: len(bench.received[second]) == 2)
     assert joined == ["one", "one"]
 
 
@@ -146,20 +146,20 @@ def test_a_connection_that_breaks_comes_back(bench: Bench) -> None:
     again = bench.add(TcpServer(bench.kernel, HERE, port))
     bench.until(lambda: not client.problem())
     client.send(ASK)
-    bench.until(lambda: bench.heard[again])
+    bench.until(lambda: bench.received[again])
     assert [state.state for state in bench.states if state.link == client.name] == ["up", "lost", "back"]
 
 
 @pytest.mark.parametrize(
-    ("speaks", "says"),
+    ("sent", "expected"),
     [(b"SSH-2.0-OpenSSH_9.6\r\n", "only text arrives: 'SSH-2.0"), (bytes(range(130, 200)), "no MAVLink")],
 )
-def test_a_peer_that_speaks_something_else_is_named(bench: Bench, speaks: bytes, says: str) -> None:
+def test_another_protocol_is_named(bench: Bench, sent: bytes, expected: str) -> None:
     with closing(socket.create_server((HERE, 0))) as listener:
         client = bench.add(TcpClient(bench.kernel, HERE, listener.getsockname()[1]))
         with closing(listener.accept()[0]) as peer:
-            peer.sendall(speaks)
-            bench.until(lambda: says in client.problem())
+            peer.sendall(sent)
+            bench.until(lambda: expected in client.problem())
 
 
 def test_a_host_that_does_not_exist(bench: Bench) -> None:
@@ -172,21 +172,21 @@ def test_a_port_that_is_taken(bench: Bench) -> None:
         TcpServer(bench.kernel, HERE, listener.getsockname()[1])
 
 
-def test_udp_bound_answers_the_first_who_speaks_and_nobody_else(bench: Bench) -> None:
+def test_a_bound_udp_link_answers_the_first_sender_only(bench: Bench) -> None:
     bound = UdpLink(bench.kernel, HERE, 0)
     bench.add(bound)
     assert "nothing arrives at" in bound.problem()
     first = bench.add(UdpLink(bench.kernel, HERE, 0, (HERE, bound.port)))
-    assert "nobody" in first.problem()
+    assert "no answer" in first.problem()
     first.send(BEAT)
-    bench.until(lambda: bench.heard[bound])
+    bench.until(lambda: bench.received[bound])
     other = bench.add(UdpLink(bench.kernel, HERE, 0, (HERE, bound.port)))
     other.send(BEAT)
     bound.send(ASK)
-    bench.until(lambda: bench.heard[first])
+    bench.until(lambda: bench.received[first])
     first.send(BEAT)
-    bench.until(lambda: len(bench.heard[bound]) == 2)  # the other's was not one of them
-    assert bench.heard[other] == []
+    bench.until(lambda: len(bench.received[bound]) == 2)  # the other's was not one of them
+    assert bench.received[other] == []
     assert bound.problem() == first.problem() == ""
 
 
@@ -203,7 +203,7 @@ def test_a_serial_line_both_ways_and_its_end(bench: Bench) -> None:
     line = bench.add(SerialLink(bench.kernel, os.ttyname(theirs), 57600))
     bench.until(lambda: "nothing arrives" in line.problem())
     os.write(ours, encode(BEAT, 0))
-    bench.until(lambda: bench.heard[line])
+    bench.until(lambda: bench.received[line])
     line.send(ASK)
     assert os.read(ours, 300) == encode(ASK, 0)
     os.close(theirs)
@@ -226,7 +226,7 @@ def test_links_from_addresses(bench: Bench) -> None:
     client = bench.add(open_link(bench.kernel, parse(f"ardupilot+tcp://{HERE}:{port}")))
     bench.until(lambda: joined)
     server.send(BEAT)
-    bench.until(lambda: bench.heard[client])
+    bench.until(lambda: bench.received[client])
     bound = UdpLink(bench.kernel, "", 0)
     bench.add(bound)
     for sender in (
@@ -235,7 +235,7 @@ def test_links_from_addresses(bench: Bench) -> None:
     ):
         bench.add(sender)
     sender.send(BEAT)
-    bench.until(lambda: bench.heard[bound])
+    bench.until(lambda: bench.received[bound])
 
 
 def test_a_link_that_is_closed_says_so_and_drops_what_is_sent(bench: Bench) -> None:
@@ -244,5 +244,5 @@ def test_a_link_that_is_closed_says_so_and_drops_what_is_sent(bench: Bench) -> N
     client.send(BEAT)
     client.send_bytes(b"text")
     client.arrived(encode(BEAT, 0))
-    assert bench.heard[client] == []
+    assert bench.received[client] == []
     assert client.problem() == "the link was closed"

@@ -27,7 +27,7 @@ class Aviary:
         self.priced: list[tuple[str, str]] = []
         self.graph = EmbeddedGraph(self.kernel, self._tariff)
         ours, self._theirs = in_process_pair(self.kernel, MS, name="drone_1")
-        self._theirs.receive(self._hear)
+        self._theirs.receive(self._on_frame)
         self.sent: list[Frame] = []
         self.answers: dict[str, Callable[[dict[str, Any]], None]] = {}
         self.node = VehicleNode(
@@ -44,34 +44,34 @@ class Aviary:
 
         return price
 
-    def _hear(self, frame: Frame) -> None:
+    def _on_frame(self, frame: Frame) -> None:
         self.sent.append(frame)
         answer = self.answers.get(frame.name)
         if answer is not None:
             answer(frame.fields)
 
-    def say(self, name: str, /, **fields: Any) -> None:
+    def emit(self, name: str, /, **fields: Any) -> None:
         """The autopilot sends a message."""
-        self.say_as(1, name, **fields)
+        self.emit_as(1, name, **fields)
 
-    def say_as(self, system: int, name: str, /, **fields: Any) -> None:
+    def emit_as(self, system: int, name: str, /, **fields: Any) -> None:
         """A vehicle with that system id sends a message."""
         self._theirs.send(Frame(name, fields, system, 1))
 
     def heartbeat(self, **fields: Any) -> None:
-        self.say("HEARTBEAT", **{"type": 2, "autopilot": 3, "base_mode": 81, "system_status": 3, **fields})
+        self.emit("HEARTBEAT", **{"type": 2, "autopilot": 3, "base_mode": 81, "system_status": 3, **fields})
 
     def asked(self, *names: str) -> list[dict[str, Any]]:
         """The fields of what the autopilot was sent under these names."""
         return [frame.fields for frame in self.sent if frame.name in names]
 
-    def hear(self, topic: str, message_type: str) -> list[Any]:
+    def listen(self, topic: str, message_type: str) -> list[Any]:
         """Collect the messages of a topic."""
-        heard = self.got[topic] = []
-        self.user.subscribe(f"/drone_1/{topic}", message_type, heard.append)
-        return heard
+        received = self.got[topic] = []
+        self.user.subscribe(f"/drone_1/{topic}", message_type, received.append)
+        return received
 
-    def tell(self, topic: str, message_type: str, **fields: Any) -> None:
+    def publish(self, topic: str, message_type: str, **fields: Any) -> None:
         """Publish once, from the user's node."""
         publisher = self.user.advertise(f"/drone_1/{topic}", message_type)
         publisher.publish(messages.new(message_type, **fields))

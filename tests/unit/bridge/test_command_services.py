@@ -11,7 +11,7 @@ LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT
 
 
 def acknowledge(aviary: Any, result: int = 0) -> None:
-    aviary.answers["COMMAND_LONG"] = lambda fields: aviary.say(
+    aviary.answers["COMMAND_LONG"] = lambda fields: aviary.emit(
         "COMMAND_ACK", command=fields["command"], result=result
     )
 
@@ -64,10 +64,10 @@ def test_in_progress_is_not_the_end(aviary: Any) -> None:
 
     def slowly(fields: dict[str, Any]) -> None:
         if fields["command"] == 400:
-            aviary.say("COMMAND_ACK", command=511, result=4)  # of another command
-            aviary.say("COMMAND_ACK", command=400, result=5)
+            aviary.emit("COMMAND_ACK", command=511, result=4)  # of another command
+            aviary.emit("COMMAND_ACK", command=400, result=5)
             later = aviary.kernel.now() + 3000 * MS
-            aviary.kernel.call_at(later, lambda: aviary.say("COMMAND_ACK", command=400, result=0))
+            aviary.kernel.call_at(later, lambda: aviary.emit("COMMAND_ACK", command=400, result=0))
 
     aviary.answers["COMMAND_LONG"] = slowly
     assert aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True).success
@@ -134,7 +134,7 @@ def vector(x: float, y: float, z: float) -> dict[str, float]:
 
 def test_a_global_set_point(aviary: Any) -> None:
     aviary.connect()
-    aviary.tell(
+    aviary.publish(
         "setpoint_raw/global",
         "mavros_msgs/GlobalPositionTarget",
         coordinate_frame=5,
@@ -167,7 +167,7 @@ def test_a_local_set_point_is_turned_by_its_frame(
     aviary: Any, frame: int, position: tuple[float, float, float], yaw: float
 ) -> None:
     aviary.connect()
-    aviary.tell(
+    aviary.publish(
         "setpoint_raw/local",
         "mavros_msgs/PositionTarget",
         coordinate_frame=frame,
@@ -183,7 +183,7 @@ def test_a_position_above_the_ellipsoid_becomes_amsl(raised_aviary: Any) -> None
     aviary = raised_aviary
     aviary.connect()
     pose = {"position": {"latitude": 47.0, "longitude": 8.0, "altitude": 547.0}}
-    aviary.tell("setpoint_position/global", "geographic_msgs/GeoPoseStamped", pose=pose)
+    aviary.publish("setpoint_position/global", "geographic_msgs/GeoPoseStamped", pose=pose)
     sent = only(aviary, GLOBAL)
     assert (sent["alt"], sent["coordinate_frame"], sent["type_mask"]) == (500.0, 5, 0x9F8)
     assert sent["yaw"] == pytest.approx(pi / 2)
@@ -191,7 +191,7 @@ def test_a_position_above_the_ellipsoid_becomes_amsl(raised_aviary: Any) -> None
 
 def test_a_local_position(aviary: Any) -> None:
     aviary.connect()
-    aviary.tell(
+    aviary.publish(
         "setpoint_position/local", "geometry_msgs/PoseStamped", pose={"position": vector(1.0, 2.0, 3.0)}
     )
     sent = only(aviary, LOCAL)
@@ -201,7 +201,7 @@ def test_a_local_position(aviary: Any) -> None:
 def test_a_velocity(aviary: Any) -> None:
     aviary.connect()
     twist = {"linear": vector(1.0, 2.0, 0.5), "angular": vector(0.0, 0.0, 0.25)}
-    aviary.tell("setpoint_velocity/cmd_vel", "geometry_msgs/TwistStamped", twist=twist)
+    aviary.publish("setpoint_velocity/cmd_vel", "geometry_msgs/TwistStamped", twist=twist)
     sent = only(aviary, LOCAL)
     assert (sent["vx"], sent["vy"], sent["vz"], sent["yaw_rate"]) == (2.0, 1.0, -0.5, -0.25)
     assert (sent["coordinate_frame"], sent["type_mask"]) == (1, 0x5C7)
@@ -210,8 +210,8 @@ def test_a_velocity(aviary: Any) -> None:
 def test_sticks(aviary: Any) -> None:
     aviary.connect()
     channels = [1500, 1400, 1600, 0, *[65535] * 14]
-    aviary.tell("rc/override", "mavros_msgs/OverrideRCIn", channels=channels)
-    aviary.tell(
+    aviary.publish("rc/override", "mavros_msgs/OverrideRCIn", channels=channels)
+    aviary.publish(
         "manual_control/send", "mavros_msgs/ManualControl", x=100.0, y=-200.4, z=500.0, r=0.0, buttons=3
     )
     sent = only(aviary, "RC_CHANNELS_OVERRIDE")
@@ -223,8 +223,8 @@ def test_sticks(aviary: Any) -> None:
 
 def test_a_set_point_that_makes_no_sense_is_dropped_with_a_warning(aviary: Any) -> None:
     aviary.connect()
-    aviary.tell("setpoint_raw/global", "mavros_msgs/GlobalPositionTarget", latitude=nan)
-    aviary.tell("manual_control/send", "mavros_msgs/ManualControl", x=1e6)
+    aviary.publish("setpoint_raw/global", "mavros_msgs/GlobalPositionTarget", latitude=nan)
+    aviary.publish("manual_control/send", "mavros_msgs/ManualControl", x=1e6)
     aviary.run(100 * MS)
     assert aviary.asked(GLOBAL, "MANUAL_CONTROL") == []
     warned = [event.text.partition(":")[0] for event in aviary.of_texts()]
@@ -235,17 +235,17 @@ def test_parameters_are_read_and_set_by_their_type(aviary: Any) -> None:
     aviary.connect()
     values = {"RTL_ALT": (1500.0, 6), "GUID_TIMEOUT": (3.0, 9)}
 
-    def tell(name: str) -> None:
+    def publish(name: str) -> None:
         value, kind = values[name]
-        aviary.say("PARAM_VALUE", param_id="OTHER", param_value=9.0, param_type=9)
-        aviary.say("PARAM_VALUE", param_id=name, param_value=value, param_type=kind)
+        aviary.emit("PARAM_VALUE", param_id="OTHER", param_value=9.0, param_type=9)
+        aviary.emit("PARAM_VALUE", param_id=name, param_value=value, param_type=kind)
 
     def store(fields: dict[str, Any]) -> None:
         values[fields["param_id"]] = (fields["param_value"], fields["param_type"])
-        tell(fields["param_id"])
+        publish(fields["param_id"])
 
     aviary.answers["PARAM_REQUEST_READ"] = lambda fields: (
-        tell(fields["param_id"]) if fields["param_id"] in values else None
+        publish(fields["param_id"]) if fields["param_id"] in values else None
     )
     aviary.answers["PARAM_SET"] = store
     answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id="RTL_ALT")
@@ -274,22 +274,22 @@ def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
         nonlocal expected
         expected = fields["count"]
         stored.clear()
-        aviary.say("MISSION_REQUEST", seq=0)
+        aviary.emit("MISSION_REQUEST", seq=0)
 
     def item(fields: dict[str, Any]) -> None:
         stored.append(fields)
         if len(stored) < expected:
-            aviary.say("MISSION_REQUEST_INT", seq=len(stored))
+            aviary.emit("MISSION_REQUEST_INT", seq=len(stored))
         else:
-            aviary.say("MISSION_ACK", type=0)
+            aviary.emit("MISSION_ACK", type=0)
 
     aviary.answers["MISSION_COUNT"] = count
     aviary.answers["MISSION_ITEM_INT"] = item
-    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.say("MISSION_COUNT", count=len(stored))
-    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.say(
+    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.emit("MISSION_COUNT", count=len(stored))
+    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.emit(
         "MISSION_ITEM_INT", **stored[fields["seq"]]
     )
-    aviary.answers["MISSION_CLEAR_ALL"] = lambda fields: aviary.say("MISSION_ACK", type=0)
+    aviary.answers["MISSION_CLEAR_ALL"] = lambda fields: aviary.emit("MISSION_ACK", type=0)
     route = [
         waypoint(frame=3, command=22, z_alt=10.0, is_current=True),
         waypoint(
@@ -303,7 +303,7 @@ def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
         ),
         waypoint(frame=1, command=16, x_lat=12.5, y_long=-2.25, z_alt=-5.0),
     ]
-    shown = aviary.hear("mission/waypoints", "mavros_msgs/WaypointList")
+    shown = aviary.listen("mission/waypoints", "mavros_msgs/WaypointList")
     pushed = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=route)
     assert (pushed.success, pushed.wp_transfered) == (True, 3)
     assert [(one["seq"], one["x"], one["y"], one["z"]) for one in stored] == [
@@ -319,7 +319,7 @@ def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
 
 def test_a_mission_that_is_refused_or_not_answered(aviary: Any) -> None:
     aviary.connect()
-    aviary.answers["MISSION_COUNT"] = lambda fields: aviary.say("MISSION_ACK", type=4)
+    aviary.answers["MISSION_COUNT"] = lambda fields: aviary.emit("MISSION_ACK", type=4)
     refused = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()])
     assert (refused.success, refused.wp_transfered) == (False, 0)
     for empty in ({}, {"waypoints": [waypoint()], "start_index": 1}):
@@ -333,7 +333,7 @@ def test_a_mission_that_is_refused_or_not_answered(aviary: Any) -> None:
 
 def test_the_current_waypoint(aviary: Any) -> None:
     aviary.connect()
-    aviary.answers["MISSION_SET_CURRENT"] = lambda fields: aviary.say(
+    aviary.answers["MISSION_SET_CURRENT"] = lambda fields: aviary.emit(
         "MISSION_CURRENT", seq=min(fields["seq"], 3)
     )
     assert aviary.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=2).success

@@ -15,21 +15,21 @@ def xyz(vector: Any) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
-def test_nobody_is_told_what_nobody_wants(aviary: Any) -> None:
+def test_topics_on_demand_need_a_subscription(aviary: Any) -> None:
     aviary.connect()
     before = sum(call.startswith("publish") for _, call in aviary.priced)
-    aviary.say("SERVO_OUTPUT_RAW", servo1_raw=1100)
+    aviary.emit("SERVO_OUTPUT_RAW", servo1_raw=1100)
     aviary.run(200 * MS)
     assert sum(call.startswith("publish") for _, call in aviary.priced) == before
 
 
 def test_the_receivers_own_speed_and_satellites(aviary: Any) -> None:
     aviary.connect()
-    twists = aviary.hear("global_position/raw/gps_vel", "geometry_msgs/TwistStamped")
-    seen = aviary.hear("global_position/raw/satellites", "std_msgs/UInt32")
-    aviary.say("GPS_RAW_INT", vel=500, cog=9000, satellites_visible=11)
+    twists = aviary.listen("global_position/raw/gps_vel", "geometry_msgs/TwistStamped")
+    seen = aviary.listen("global_position/raw/satellites", "std_msgs/UInt32")
+    aviary.emit("GPS_RAW_INT", vel=500, cog=9000, satellites_visible=11)
     aviary.run(200 * MS)
-    aviary.say("GPS_RAW_INT", vel=65535, cog=65535, satellites_visible=255)
+    aviary.emit("GPS_RAW_INT", vel=65535, cog=65535, satellites_visible=255)
     aviary.run(200 * MS)
     [twist] = twists
     assert xyz(twist.twist.linear) == pytest.approx((5.0, 0.0, 0.0))  # east
@@ -38,10 +38,10 @@ def test_the_receivers_own_speed_and_satellites(aviary: Any) -> None:
 
 def test_odometry_about_the_autopilots_origin_has_its_velocity_in_the_body(aviary: Any) -> None:
     aviary.connect()
-    poses = aviary.hear("local_position/odom", ODOMETRY)
-    twists = aviary.hear("local_position/velocity_body", "geometry_msgs/TwistStamped")
-    aviary.say("ATTITUDE", rollspeed=0.1, pitchspeed=0.2, yawspeed=0.3, **EAST)
-    aviary.say("LOCAL_POSITION_NED", x=1.0, y=2.0, z=-3.0, vx=0.5, vy=4.0, vz=0.25)
+    poses = aviary.listen("local_position/odom", ODOMETRY)
+    twists = aviary.listen("local_position/velocity_body", "geometry_msgs/TwistStamped")
+    aviary.emit("ATTITUDE", rollspeed=0.1, pitchspeed=0.2, yawspeed=0.3, **EAST)
+    aviary.emit("LOCAL_POSITION_NED", x=1.0, y=2.0, z=-3.0, vx=0.5, vy=4.0, vz=0.25)
     aviary.run(200 * MS)
     [odometry], [twist] = poses, twists
     assert (odometry.header.frame_id, odometry.child_frame_id) == ("map", "base_link")
@@ -55,15 +55,15 @@ def test_odometry_about_the_autopilots_origin_has_its_velocity_in_the_body(aviar
 
 def test_odometry_about_home(aviary: Any) -> None:
     aviary.connect()
-    heard = aviary.hear("global_position/local", ODOMETRY)
+    received = aviary.listen("global_position/local", ODOMETRY)
     place = {"lat": 470000000, "lon": 80010000, "alt": 410_000, "relative_alt": 10_000}
-    aviary.say("GLOBAL_POSITION_INT", **place, vx=100, vy=200, vz=-50)
+    aviary.emit("GLOBAL_POSITION_INT", **place, vx=100, vy=200, vz=-50)
     aviary.run(200 * MS)
-    assert heard == []  # about what?
-    aviary.say("HOME_POSITION", latitude=470000000, longitude=80000000, altitude=400_000)
-    aviary.say("GLOBAL_POSITION_INT", **place, vx=100, vy=200, vz=-50)
+    assert received == []  # about what?
+    aviary.emit("HOME_POSITION", latitude=470000000, longitude=80000000, altitude=400_000)
+    aviary.emit("GLOBAL_POSITION_INT", **place, vx=100, vy=200, vz=-50)
     aviary.run(200 * MS)
-    [odometry] = heard
+    [odometry] = received
     assert xyz(odometry.pose.pose.position) == pytest.approx((76.06, 0.0, 10.0), abs=0.05)
     assert xyz(odometry.twist.twist.linear) == (2.0, 1.0, 0.5)
 
@@ -71,8 +71,8 @@ def test_odometry_about_home(aviary: Any) -> None:
 def test_the_origin_and_home_are_ellipsoidal(raised_aviary: Any) -> None:
     aviary = raised_aviary
     aviary.connect()
-    origins = aviary.hear("global_position/gp_origin", "geographic_msgs/GeoPointStamped")
-    aviary.say("GPS_GLOBAL_ORIGIN", latitude=470000000, longitude=80000000, altitude=400_000)
+    origins = aviary.listen("global_position/gp_origin", "geographic_msgs/GeoPointStamped")
+    aviary.emit("GPS_GLOBAL_ORIGIN", latitude=470000000, longitude=80000000, altitude=400_000)
     aviary.run(200 * MS)
     [origin] = origins
     assert (origin.position.latitude, origin.position.longitude) == (47.0, 8.0)
@@ -82,21 +82,21 @@ def test_the_origin_and_home_are_ellipsoidal(raised_aviary: Any) -> None:
 def test_px4s_altitudes(aviary: Any) -> None:
     aviary.heartbeat(autopilot=12)
     aviary.run(200 * MS)
-    heard = aviary.hear("altitude", "mavros_msgs/Altitude")
-    aviary.say(
+    received = aviary.listen("altitude", "mavros_msgs/Altitude")
+    aviary.emit(
         "ALTITUDE", altitude_monotonic=1.0, altitude_amsl=488.0, altitude_local=2.0, altitude_relative=3.0
     )
     aviary.run(200 * MS)
-    [one] = heard
+    [one] = received
     assert (one.monotonic, one.amsl, one.local, one.relative) == (1.0, 488.0, 2.0, 3.0)
 
 
-def test_numbers_that_make_no_sense_are_told_once_and_do_no_harm(aviary: Any) -> None:
+def test_invalid_numbers_are_reported_once(aviary: Any) -> None:
     aviary.connect()
-    heard = aviary.hear("setpoint_raw/target_local", "mavros_msgs/PositionTarget")
+    received = aviary.listen("setpoint_raw/target_local", "mavros_msgs/PositionTarget")
     for yaw in (float("inf"), float("inf"), nan, 0.0):
-        aviary.say("POSITION_TARGET_LOCAL_NED", coordinate_frame=1, yaw=yaw)
+        aviary.emit("POSITION_TARGET_LOCAL_NED", coordinate_frame=1, yaw=yaw)
         aviary.run(200 * MS)
-    assert len(heard) == 2  # not a number is what PX4 says of what it does not hold
+    assert len(received) == 2  # not a number is what PX4 says of what it does not hold
     [warning] = aviary.of_texts()
     assert warning.text.startswith("POSITION_TARGET_LOCAL_NED: not published")

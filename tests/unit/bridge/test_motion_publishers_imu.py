@@ -32,10 +32,10 @@ SI = {"xacc": 0.980665, "yacc": 1.96133, "zacc": -9.80665, "xgyro": 0.01, "ygyro
 )
 def test_a_measurement(aviary: Any, name: str, fields: dict[str, float]) -> None:
     aviary.connect()
-    felt, fields_heard = aviary.hear("imu/data_raw", IMU), aviary.hear("imu/mag", FIELD)
-    together = aviary.hear("imu/data", IMU)
-    aviary.say(name, **fields)
-    aviary.say("ATTITUDE", rollspeed=0.5)
+    felt, fields_heard = aviary.listen("imu/data_raw", IMU), aviary.listen("imu/mag", FIELD)
+    together = aviary.listen("imu/data", IMU)
+    aviary.emit(name, **fields)
+    aviary.emit("ATTITUDE", rollspeed=0.5)
     aviary.run(200 * MS)
     [raw], [field], [data] = felt, fields_heard, together
     assert xyz(raw.linear_acceleration) == pytest.approx((0.980665, -1.96133, 9.80665), rel=1e-6)
@@ -48,30 +48,30 @@ def test_a_measurement(aviary: Any, name: str, fields: dict[str, float]) -> None
 
 def test_the_better_source_wins(aviary: Any) -> None:
     aviary.connect()
-    felt = aviary.hear("imu/data_raw", IMU)
-    aviary.say("RAW_IMU", zacc=-1000)
+    felt = aviary.listen("imu/data_raw", IMU)
+    aviary.emit("RAW_IMU", zacc=-1000)
     aviary.run(200 * MS)
-    aviary.say("HIGHRES_IMU", zacc=-5.0)
+    aviary.emit("HIGHRES_IMU", zacc=-5.0)
     aviary.run(200 * MS)
-    aviary.say("RAW_IMU", zacc=-1000)
+    aviary.emit("RAW_IMU", zacc=-1000)
     aviary.run(200 * MS)
     assert [message.linear_acceleration.z for message in felt] == pytest.approx([9.80665, 5.0])
 
 
 def test_without_a_measurement_the_acceleration_is_unknown(aviary: Any) -> None:
     aviary.connect()
-    heard = aviary.hear("imu/data", IMU)
-    aviary.say("ATTITUDE")
+    received = aviary.listen("imu/data", IMU)
+    aviary.emit("ATTITUDE")
     aviary.run(200 * MS)
-    assert heard[0].linear_acceleration_covariance[0] == -1.0
+    assert received[0].linear_acceleration_covariance[0] == -1.0
 
 
 def test_pressures_and_temperature(aviary: Any) -> None:
     aviary.connect()
-    pressures = aviary.hear("imu/static_pressure", "sensor_msgs/FluidPressure")
-    differences = aviary.hear("imu/diff_pressure", "sensor_msgs/FluidPressure")
-    degrees = aviary.hear("imu/temperature_imu", "sensor_msgs/Temperature")
-    aviary.say("SCALED_PRESSURE", press_abs=910.5, press_diff=0.25, temperature=2150)
+    pressures = aviary.listen("imu/static_pressure", "sensor_msgs/FluidPressure")
+    differences = aviary.listen("imu/diff_pressure", "sensor_msgs/FluidPressure")
+    degrees = aviary.listen("imu/temperature_imu", "sensor_msgs/Temperature")
+    aviary.emit("SCALED_PRESSURE", press_abs=910.5, press_diff=0.25, temperature=2150)
     aviary.run(200 * MS)
     assert (pressures[0].fluid_pressure, differences[0].fluid_pressure) == (91_050.0, 25.0)
     assert degrees[0].temperature == 21.5

@@ -16,9 +16,9 @@ ORIGIN = LocalFrame(43.47, -3.83, 25.0)
 
 
 def listening(topic: str, aviary: Aviary) -> list[Any]:
-    heard: list[Any] = []
-    aviary.user.subscribe(topic, TF, heard.append)
-    return heard
+    received: list[Any] = []
+    aviary.user.subscribe(topic, TF, received.append)
+    return received
 
 
 def placed(message: Any) -> tuple[str, str, tuple[float, float, float]]:
@@ -32,12 +32,12 @@ def turn(rotation: Any) -> tuple[float, float, float, float]:
 
 
 def test_the_body_about_the_autopilots_own_origin(aviary: Aviary) -> None:
-    heard = listening("/tf", aviary)
+    received = listening("/tf", aviary)
     aviary.connect()
-    aviary.say("ATTITUDE", roll=0.0, pitch=0.0, yaw=pi / 2)
-    aviary.say("LOCAL_POSITION_NED", x=3.0, y=5.0, z=-7.0)
+    aviary.emit("ATTITUDE", roll=0.0, pitch=0.0, yaw=pi / 2)
+    aviary.emit("LOCAL_POSITION_NED", x=3.0, y=5.0, z=-7.0)
     aviary.run(200 * MS)
-    [message] = heard
+    [message] = received
     assert placed(message) == ("map", "drone_1/base_link", pytest.approx((5.0, 3.0, 7.0)))
     w, *rest = turn(message.transforms[0].transform.rotation)  # it looks to the east: no turn, in ENU
     assert (abs(w), *rest) == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-6)
@@ -45,33 +45,33 @@ def test_the_body_about_the_autopilots_own_origin(aviary: Aviary) -> None:
 
 def test_with_an_origin_all_vehicles_have_one_map() -> None:
     aviary = Aviary(origin=ORIGIN)
-    heard = listening("/tf", aviary)
+    received = listening("/tf", aviary)
     aviary.connect()
     latitude, longitude, amsl = ORIGIN.from_enu((40.0, -9.0, 12.0))
-    aviary.say("ATTITUDE", roll=0.0, pitch=0.0, yaw=0.0)
-    aviary.say("LOCAL_POSITION_NED", x=0.0, y=0.0, z=0.0)
+    aviary.emit("ATTITUDE", roll=0.0, pitch=0.0, yaw=0.0)
+    aviary.emit("LOCAL_POSITION_NED", x=0.0, y=0.0, z=0.0)
     place = {"lat": round(latitude * 1e7), "lon": round(longitude * 1e7), "alt": round(amsl * 1000)}
-    aviary.say("GLOBAL_POSITION_INT", hdg=0, **place)
+    aviary.emit("GLOBAL_POSITION_INT", hdg=0, **place)
     aviary.run(200 * MS)
-    [message] = heard
+    [message] = received
     assert placed(message) == ("map", "drone_1/base_link", pytest.approx((40.0, -9.0, 12.0), abs=0.02))
 
 
 def test_without_an_attitude_there_is_no_transform(aviary: Aviary) -> None:
-    heard = listening("/tf", aviary)
+    received = listening("/tf", aviary)
     aviary.connect()
-    aviary.say("LOCAL_POSITION_NED", x=3.0, y=5.0, z=-7.0)
+    aviary.emit("LOCAL_POSITION_NED", x=3.0, y=5.0, z=-7.0)
     aviary.run(200 * MS)
-    assert heard == []
+    assert received == []
 
 
-def test_the_autopilots_own_frames_are_told_once_to_whoever_comes(aviary: Aviary) -> None:
+def test_static_transforms_are_published_once_and_latched(aviary: Aviary) -> None:
     aviary.connect()
     aviary.heartbeat()
     aviary.run(1000 * MS)
-    heard = listening("/tf_static", aviary)
+    received = listening("/tf_static", aviary)
     aviary.run(200 * MS)
-    [message] = heard
+    [message] = received
     found = {(one.header.frame_id, one.child_frame_id): one.transform.rotation for one in message.transforms}
     half = sqrt(0.5)
     assert turn(found["map", "map_ned"]) == pytest.approx((0.0, half, half, 0.0))

@@ -20,24 +20,24 @@ def serve(aviary: Any, bytewise: bool = False, lost: Callable[[str], bool] = lam
     """Answer as an autopilot that keeps ``KEPT``; *lost*: what gets lost when all are listed."""
     names = list(KEPT)
 
-    def tell(name: str) -> None:
+    def publish(name: str) -> None:
         kind, value = KEPT[name]
         written = to_bytewise(kind, value) if bytewise else value
         about = {"param_index": names.index(name), "param_count": len(names), "param_type": kind}
-        aviary.say("PARAM_VALUE", param_id=name, param_value=written, **about)
+        aviary.emit("PARAM_VALUE", param_id=name, param_value=written, **about)
 
     def listed(fields: dict[str, Any]) -> None:
         for name in names:
             if not lost(name):
-                tell(name)
+                publish(name)
 
     def read(fields: dict[str, Any]) -> None:
         name = fields["param_id"] or names[fields["param_index"]]
         if name in KEPT:
-            tell(name)
+            publish(name)
 
     def written(fields: dict[str, Any]) -> None:
-        aviary.say("PARAM_VALUE", **{key: fields[key] for key in ("param_id", "param_value", "param_type")})
+        aviary.emit("PARAM_VALUE", **{key: fields[key] for key in ("param_id", "param_value", "param_type")})
 
     aviary.answers.update({"PARAM_REQUEST_LIST": listed, "PARAM_REQUEST_READ": read, "PARAM_SET": written})
 
@@ -69,10 +69,10 @@ def test_one_is_set(aviary: Any, autopilot: int, sent: float) -> None:
 def test_all_are_pulled_and_those_that_were_changed_are_pushed(aviary: Any) -> None:
     aviary.connect()
     serve(aviary, lost=lambda name: name == "RTL_ALT")  # asked for once more by its index
-    heard = aviary.hear("param/param_value", "mavros_msgs/Param")
+    received = aviary.listen("param/param_value", "mavros_msgs/Param")
     answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (True, 3)
-    assert {message.param_id for message in heard} == set(KEPT)
+    assert {message.param_id for message in received} == set(KEPT)
     got = aviary.user.get_parameter("/drone_1/param")
     assert got == {"ARMING_CHECK": 1, "RTL_ALT": 15.5, "SYSID": -3}
     aviary.user.set_parameter("/drone_1/param/RTL_ALT", 20.0)
@@ -91,7 +91,7 @@ def test_what_is_known_is_not_asked_for_again(aviary: Any) -> None:
     assert aviary.asked("PARAM_REQUEST_LIST") == []
 
 
-def test_silence_is_no_success(aviary: Any) -> None:
+def test_no_answer_is_no_success(aviary: Any) -> None:
     aviary.connect()
     answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (False, 0)

@@ -34,7 +34,7 @@ class Aviary:
         link, self.aircraft = in_process_pair(self.kernel, MS, "craft", PPRZLINK)
         self.told: list[Frame] = []
         self.aircraft.receive(self.told.append)
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
         self.graph = EmbeddedGraph(self.kernel)
         serve_pprzros(self.graph, link, "craft_1", ExecutionContext("pprzros"))
         self.kernel.spawn(self._control, "control", ExecutionContext("control"))
@@ -43,7 +43,7 @@ class Aviary:
         node = self.graph.node("control")
         self.publisher = node.advertise(f"/craft_1/{FROM_ROS}", TYPE)
         group = node.group()
-        node.subscribe(f"/craft_1/{TO_ROS}", TYPE, self.heard.append, group=group)
+        node.subscribe(f"/craft_1/{TO_ROS}", TYPE, self.received.append, group=group)
         group.spin()
 
     def publish(self, message: Any) -> None:
@@ -71,7 +71,7 @@ def test_what_the_aircraft_says_is_published() -> None:
     aviary.kernel.run(S)
     aviary.aircraft.send(ALIVE)
     aviary.kernel.run(2 * S)
-    (message,) = aviary.heard
+    (message,) = aviary.received
     assert (message.msg_name, message.sender_id, message.comp_id) == ("ALIVE", 7, 1)
     assert to_frame(message).fields == {"md5sum": (1, 2, 3)}
 

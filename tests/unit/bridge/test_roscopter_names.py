@@ -25,52 +25,52 @@ def test_the_types_are_those_of_the_real_one() -> None:
 @pytest.mark.parametrize(("fix_type", "status"), [(0, -1), (2, -1), (3, 0), (5, 0)])
 def test_gps_is_amsl(roscopter: Any, fix_type: int, status: int) -> None:
     roscopter.heartbeat()
-    heard = roscopter.hear("gps", "sensor_msgs/NavSatFix")
+    received = roscopter.listen("gps", "sensor_msgs/NavSatFix")
     roscopter.run(10 * MS)
-    roscopter.say("GPS_RAW_INT", lat=473977418, lon=-85455939, alt=488_100, fix_type=fix_type)
+    roscopter.emit("GPS_RAW_INT", lat=473977418, lon=-85455939, alt=488_100, fix_type=fix_type)
     roscopter.run(10 * MS)
-    [fix] = heard
+    [fix] = received
     assert (fix.latitude, fix.longitude, fix.altitude) == (47.3977418, -8.5455939, 488.1)
     assert (fix.status.status, fix.status.service) == (status, 1)
 
 
 def test_state_is_that_of_the_heartbeat(roscopter: Any) -> None:
-    heard = roscopter.hear("state", "roscopter/State")
+    received = roscopter.listen("state", "roscopter/State")
     roscopter.heartbeat(base_mode=81, custom_mode=0)
     roscopter.run(10 * MS)
     roscopter.heartbeat(base_mode=128 | 8, custom_mode=4)
     roscopter.run(10 * MS)
-    seen = [(message.armed, message.guided, message.mode) for message in heard]
+    seen = [(message.armed, message.guided, message.mode) for message in received]
     assert seen == [(False, False, "STABILIZE"), (True, True, "GUIDED")]
 
 
 def test_frames_are_published_as_they_arrive(roscopter: Any) -> None:
     roscopter.heartbeat()
-    heard = roscopter.hear("attitude", "roscopter/Attitude")
+    received = roscopter.listen("attitude", "roscopter/Attitude")
     roscopter.run(10 * MS)
     for roll in (0.5, 0.25):
-        roscopter.say(
+        roscopter.emit(
             "ATTITUDE", roll=roll, pitch=-0.5, yaw=1.0, rollspeed=2.0, pitchspeed=-2.0, yawspeed=0.5
         )
         roscopter.run(2 * MS)
-    assert [message.roll for message in heard] == [0.5, 0.25]
-    last = heard[-1]  # NED and FRD, as MAVLink has it
+    assert [message.roll for message in received] == [0.5, 0.25]
+    last = received[-1]  # NED and FRD, as MAVLink has it
     angles = (last.pitch, last.yaw, last.rollspeed, last.pitchspeed, last.yawspeed)
     assert angles == (-0.5, 1.0, 2.0, -2.0, 0.5)
 
 
 def test_the_head_up_display_and_the_channels(roscopter: Any) -> None:
     roscopter.heartbeat()
-    huds = roscopter.hear("vfr_hud", "roscopter/VFR_HUD")
-    channels = roscopter.hear("rc", RC)
+    huds = roscopter.listen("vfr_hud", "roscopter/VFR_HUD")
+    channels = roscopter.listen("rc", RC)
     roscopter.run(10 * MS)
-    roscopter.say("VFR_HUD", airspeed=1.5, groundspeed=2.5, heading=271, throttle=40, alt=900.5, climb=-0.5)
+    roscopter.emit("VFR_HUD", airspeed=1.5, groundspeed=2.5, heading=271, throttle=40, alt=900.5, climb=-0.5)
     eight = {f"chan{number}_raw": 1000 + number for number in range(1, 9)}
-    roscopter.say("RC_CHANNELS_RAW", **eight)
+    roscopter.emit("RC_CHANNELS_RAW", **eight)
     roscopter.run(10 * MS)
-    roscopter.say("RC_CHANNELS", chancount=16, **{**eight, "chan1_raw": 1500, "chan9_raw": 1900})
+    roscopter.emit("RC_CHANNELS", chancount=16, **{**eight, "chan1_raw": 1500, "chan9_raw": 1900})
     roscopter.run(10 * MS)
-    roscopter.say("RC_CHANNELS_RAW", **eight)  # what it has in RC_CHANNELS already
+    roscopter.emit("RC_CHANNELS_RAW", **eight)  # what it has in RC_CHANNELS already
     roscopter.run(10 * MS)
     [hud] = huds
     assert (hud.airspeed, hud.groundspeed, hud.heading, hud.throttle) == (1.5, 2.5, 271, 40)
@@ -89,22 +89,22 @@ def test_the_head_up_display_and_the_channels(roscopter: Any) -> None:
         ("HIGHRES_IMU", {"time_usec": BOOTED}, {"zacc": -9.80665, "xgyro": 0.25, "ymag": 0.33}),
     ],
 )
-def test_the_raw_imu_is_in_thousandths_whoever_measured(
+def test_the_raw_imu_is_in_thousandths_from_every_source(
     roscopter: Any, name: str, time: dict[str, int], fields: dict[str, float]
 ) -> None:
     roscopter.heartbeat()
-    heard = roscopter.hear("raw_imu", "roscopter/Mavlink_RAW_IMU")
+    received = roscopter.listen("raw_imu", "roscopter/Mavlink_RAW_IMU")
     roscopter.run(10 * MS)
-    roscopter.say(name, **time, **fields)
+    roscopter.emit(name, **time, **fields)
     roscopter.run(10 * MS)
-    [message] = heard
+    [message] = received
     assert message.time_usec == BOOTED
     assert (message.zacc, message.xgyro, message.ymag) == (-1000, 250, 330)
 
 
 def test_sticks_reach_eight_channels_and_leave_the_others(roscopter: Any) -> None:
     roscopter.connect()
-    roscopter.tell("send_rc", RC, channel=[1500, 1500, 1620, 1700, 0, 0, 0, 0])
+    roscopter.publish("send_rc", RC, channel=[1500, 1500, 1620, 1700, 0, 0, 0, 0])
     roscopter.run(10 * MS)
     [sent] = roscopter.asked("RC_CHANNELS_OVERRIDE")
     assert [sent[f"chan{number}_raw"] for number in range(1, 9)] == [1500, 1500, 1620, 1700, 0, 0, 0, 0]
@@ -113,7 +113,7 @@ def test_sticks_reach_eight_channels_and_leave_the_others(roscopter: Any) -> Non
 
 def test_a_channel_that_is_none_is_dropped_with_a_warning(roscopter: Any) -> None:
     roscopter.connect()
-    roscopter.tell("send_rc", RC, channel=[-1, 0, 0, 0, 0, 0, 0, 0])
+    roscopter.publish("send_rc", RC, channel=[-1, 0, 0, 0, 0, 0, 0, 0])
     roscopter.run(10 * MS)
     assert roscopter.asked("RC_CHANNELS_OVERRIDE") == []
     [warning] = roscopter.of_texts()
@@ -123,7 +123,7 @@ def test_a_channel_that_is_none_is_dropped_with_a_warning(roscopter: Any) -> Non
 def test_without_leave_it_takes_no_sticks(aviary_of: Any) -> None:
     aviary = aviary_of(names=ROSCOPTER, period=None)
     aviary.connect()
-    aviary.tell("send_rc", RC, channel=[1500] * 8)
+    aviary.publish("send_rc", RC, channel=[1500] * 8)
     aviary.run(S)
     assert aviary.asked("RC_CHANNELS_OVERRIDE") == []
 
@@ -131,7 +131,7 @@ def test_without_leave_it_takes_no_sticks(aviary_of: Any) -> None:
 @pytest.mark.parametrize(("service", "wanted"), [("arm", 1.0), ("disarm", 0.0)])
 def test_arming(roscopter: Any, service: str, wanted: float) -> None:
     roscopter.connect()
-    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.say("COMMAND_ACK", command=400, result=0)
+    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.emit("COMMAND_ACK", command=400, result=0)
     empty(roscopter, service)
     [sent] = [one for one in roscopter.asked("COMMAND_LONG") if one["command"] == 400]
     assert sent["param1"] == wanted
@@ -140,7 +140,7 @@ def test_arming(roscopter: Any, service: str, wanted: float) -> None:
 
 def test_a_refusal_is_a_warning(roscopter: Any) -> None:
     roscopter.connect()
-    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.say("COMMAND_ACK", command=400, result=4)
+    roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.emit("COMMAND_ACK", command=400, result=4)
     empty(roscopter, "arm")
     assert [event.text for event in roscopter.of_texts()] == ["arm: the autopilot says FAILED"]
 
@@ -153,7 +153,7 @@ def test_it_asks_for_all_streams_until_they_come(roscopter: Any) -> None:
     assert {(one["req_stream_id"], one["req_message_rate"], one["start_stop"]) for one in asked} == {
         (0, 10, 1)
     }
-    roscopter.say("ATTITUDE", yaw=pi)
+    roscopter.emit("ATTITUDE", yaw=pi)
     roscopter.run(S)
     roscopter.sent.clear()
     roscopter.run(S)
@@ -168,14 +168,14 @@ def test_a_px4_is_asked_for_messages(roscopter: Any) -> None:
     assert set(asked.values()) == {100_000.0}
 
 
-def test_of_several_on_one_link_the_one_that_is_wanted_is_heard(aviary_of: Any) -> None:
+def test_one_of_several_autopilots_on_a_link_is_selected(aviary_of: Any) -> None:
     aviary = aviary_of(names=ROSCOPTER, period=None, vehicle=7)
-    heard = aviary.hear("state", "roscopter/State")
+    received = aviary.listen("state", "roscopter/State")
     aviary.heartbeat()  # of system 1
     aviary.run(S)
-    assert heard == []
+    assert received == []
     assert aviary.node.summary == ""
-    aviary.say_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
+    aviary.emit_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
     aviary.run(S)
-    assert [message.mode for message in heard] == ["GUIDED"]
+    assert [message.mode for message in received] == ["GUIDED"]
     assert aviary.node.summary == "ArduPilot (system 7): GUIDED, armed"

@@ -19,7 +19,7 @@ def test_an_attitude_set_point(aviary: Any) -> None:
     aviary.connect()
     north = {"w": HALF, "x": 0.0, "y": 0.0, "z": HALF}  # yaw 90 degrees anticlockwise from east
     rates = vector(0.1, 0.2, 0.3)
-    aviary.tell(
+    aviary.publish(
         "setpoint_raw/attitude",
         "mavros_msgs/AttitudeTarget",
         type_mask=7,
@@ -37,28 +37,28 @@ def test_an_attitude_set_point(aviary: Any) -> None:
 def test_a_velocity_without_a_header(aviary: Any) -> None:
     aviary.connect()
     twist = {"linear": vector(1.0, 2.0, 0.5), "angular": vector(0.0, 0.0, 0.25)}
-    aviary.tell("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/Twist", **twist)
+    aviary.publish("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/Twist", **twist)
     sent = only(aviary, "SET_POSITION_TARGET_LOCAL_NED")
     assert (sent["vx"], sent["vy"], sent["vz"], sent["yaw_rate"]) == (2.0, 1.0, -0.5, -0.25)
 
 
 def test_a_text_for_ground_stations(aviary: Any) -> None:
     aviary.connect()
-    aviary.tell("statustext/send", "mavros_msgs/StatusText", severity=4, text="low on tea" + "!" * 60)
+    aviary.publish("statustext/send", "mavros_msgs/StatusText", severity=4, text="low on tea" + "!" * 60)
     sent = only(aviary, "STATUSTEXT")
     assert (sent["severity"], sent["text"]) == (4, "low on tea" + "!" * 40)
 
 
 def test_where_it_is_going(aviary: Any) -> None:
     aviary.connect()
-    local = aviary.hear("setpoint_raw/target_local", "mavros_msgs/PositionTarget")
-    globally = aviary.hear("setpoint_raw/target_global", "mavros_msgs/GlobalPositionTarget")
-    attitudes = aviary.hear("setpoint_raw/target_attitude", "mavros_msgs/AttitudeTarget")
+    local = aviary.listen("setpoint_raw/target_local", "mavros_msgs/PositionTarget")
+    globally = aviary.listen("setpoint_raw/target_global", "mavros_msgs/GlobalPositionTarget")
+    attitudes = aviary.listen("setpoint_raw/target_attitude", "mavros_msgs/AttitudeTarget")
     moving = {"vx": 0.5, "vy": 0.25, "vz": -0.125, "yaw": 0.0, "yaw_rate": 0.5, "type_mask": 3576}
-    aviary.say("POSITION_TARGET_LOCAL_NED", coordinate_frame=1, x=1.0, y=2.0, z=-3.0, **moving)
+    aviary.emit("POSITION_TARGET_LOCAL_NED", coordinate_frame=1, x=1.0, y=2.0, z=-3.0, **moving)
     place = {"lat_int": 473977418, "lon_int": 85455939, "alt": 20.0}
-    aviary.say("POSITION_TARGET_GLOBAL_INT", coordinate_frame=6, **place, **moving)
-    aviary.say("ATTITUDE_TARGET", q=[1.0, 0.0, 0.0, 0.0], body_pitch_rate=0.5, thrust=0.25)
+    aviary.emit("POSITION_TARGET_GLOBAL_INT", coordinate_frame=6, **place, **moving)
+    aviary.emit("ATTITUDE_TARGET", q=[1.0, 0.0, 0.0, 0.0], body_pitch_rate=0.5, thrust=0.25)
     aviary.run(200 * MS)
     [one], [other], [attitude] = local, globally, attitudes
     assert (xyz(one.position), xyz(one.velocity)) == ((2.0, 1.0, 3.0), (0.25, 0.5, 0.125))
@@ -71,11 +71,11 @@ def test_where_it_is_going(aviary: Any) -> None:
 
 def test_the_state_of_the_system_and_of_its_ports(aviary: Any) -> None:
     aviary.connect()
-    states = aviary.hear("sys_status", "mavros_msgs/SysStatus")
-    ports = aviary.hear("rc/out", "mavros_msgs/RCOut")
-    said = {"onboard_control_sensors_present": 7, "onboard_control_sensors_health": 3, "load": 250}
-    aviary.say("SYS_STATUS", **said, voltage_battery=12_600, current_battery=350, battery_remaining=80)
-    aviary.say("SERVO_OUTPUT_RAW", servo1_raw=1100, servo16_raw=1900)
+    states = aviary.listen("sys_status", "mavros_msgs/SysStatus")
+    ports = aviary.listen("rc/out", "mavros_msgs/RCOut")
+    status = {"onboard_control_sensors_present": 7, "onboard_control_sensors_health": 3, "load": 250}
+    aviary.emit("SYS_STATUS", **status, voltage_battery=12_600, current_battery=350, battery_remaining=80)
+    aviary.emit("SERVO_OUTPUT_RAW", servo1_raw=1100, servo16_raw=1900)
     aviary.run(200 * MS)
     [state], [out] = states, ports
     assert (state.sensors_present, state.sensors_health, state.load) == (7, 3, 250)
@@ -85,13 +85,13 @@ def test_the_state_of_the_system_and_of_its_ports(aviary: Any) -> None:
 
 def test_the_waypoint_that_is_the_current_one(aviary: Any) -> None:
     aviary.connect()
-    heard = aviary.hear("mission/waypoints", "mavros_msgs/WaypointList")
-    aviary.say("MISSION_CURRENT", seq=3)
+    received = aviary.listen("mission/waypoints", "mavros_msgs/WaypointList")
+    aviary.emit("MISSION_CURRENT", seq=3)
     aviary.run(200 * MS)
-    assert heard == []  # of which mission?
-    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.say("MISSION_COUNT", count=1)
-    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.say("MISSION_ITEM_INT", seq=0, command=16)
+    assert received == []  # of which mission?
+    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.emit("MISSION_COUNT", count=1)
+    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.emit("MISSION_ITEM_INT", seq=0, command=16)
     assert aviary.call("mission/pull", "mavros_msgs/WaypointPull").wp_received == 1
-    aviary.say("MISSION_CURRENT", seq=4)
+    aviary.emit("MISSION_CURRENT", seq=4)
     aviary.run(200 * MS)
-    assert [(message.current_seq, len(message.waypoints)) for message in heard] == [(3, 1), (4, 1)]
+    assert [(message.current_seq, len(message.waypoints)) for message in received] == [(3, 1), (4, 1)]

@@ -27,58 +27,58 @@ WELL = {
 
 
 @pytest.fixture
-def heard(aviary: Aviary) -> list[Any]:
+def received(aviary: Aviary) -> list[Any]:
     messages: list[Any] = []
     aviary.user.subscribe("/diagnostics", "diagnostic_msgs/DiagnosticArray", messages.append)
     return messages
 
 
-def last(heard: list[Any]) -> dict[str, tuple[int, str]]:
-    return {one.name.partition(": ")[2]: (one.level, one.message) for one in heard[-1].status}
+def last(received: list[Any]) -> dict[str, tuple[int, str]]:
+    return {one.name.partition(": ")[2]: (one.level, one.message) for one in received[-1].status}
 
 
-def values(heard: list[Any], name: str) -> dict[str, str]:
-    [status] = [one for one in heard[-1].status if one.name == f"drone_1/mavros: {name}"]
+def values(received: list[Any], name: str) -> dict[str, str]:
+    [status] = [one for one in received[-1].status if one.name == f"drone_1/mavros: {name}"]
     return {one.key: one.value for one in status.values}
 
 
-def test_before_anything_is_known_that_is_said(aviary: Aviary, heard: list[Any]) -> None:
+def test_missing_data_is_stale(aviary: Aviary, received: list[Any]) -> None:
     aviary.connect()
-    found = last(heard)
+    found = last(received)
     assert found["FCU connection"] == (OK, "connected")
     assert found["Heartbeat"] == (OK, "Normal")
     assert found["System"] == found["Battery"] == (STALE, "no SYS_STATUS yet")
     assert found["GPS"] == (STALE, "no GPS_RAW_INT yet")
 
 
-def test_a_vehicle_that_is_well(aviary: Aviary, heard: list[Any]) -> None:
+def test_a_healthy_vehicle(aviary: Aviary, received: list[Any]) -> None:
     aviary.connect()
-    aviary.say("SYS_STATUS", **WELL)
-    aviary.say("GPS_RAW_INT", fix_type=3, satellites_visible=11, eph=80)
+    aviary.emit("SYS_STATUS", **WELL)
+    aviary.emit("GPS_RAW_INT", fix_type=3, satellites_visible=11, eph=80)
     aviary.connect()
-    assert {level for level, _ in last(heard).values()} == {OK}
-    assert values(heard, "Battery") == {"Voltage": "12.60", "Current": "15.0", "Remaining": "87"}
-    assert values(heard, "GPS")["Satellites visible"] == "11"
-    assert values(heard, "System")["CPU Load (%)"] == "12.3"
-    assert values(heard, "Heartbeat")["Mode"] == "STABILIZE"
+    assert {level for level, _ in last(received).values()} == {OK}
+    assert values(received, "Battery") == {"Voltage": "12.60", "Current": "15.0", "Remaining": "87"}
+    assert values(received, "GPS")["Satellites visible"] == "11"
+    assert values(received, "System")["CPU Load (%)"] == "12.3"
+    assert values(received, "Heartbeat")["Mode"] == "STABILIZE"
 
 
-def test_what_is_wrong(aviary: Aviary, heard: list[Any]) -> None:
+def test_problems_are_reported(aviary: Aviary, received: list[Any]) -> None:
     aviary.connect()
     ill = {**WELL, "onboard_control_sensors_health": 0x0F, "battery_remaining": 12}
-    aviary.say("SYS_STATUS", **ill)
-    aviary.say("GPS_RAW_INT", fix_type=1, satellites_visible=4, eph=65535)
+    aviary.emit("SYS_STATUS", **ill)
+    aviary.emit("GPS_RAW_INT", fix_type=1, satellites_visible=4, eph=65535)
     aviary.run(200 * MS)
     aviary.heartbeat(system_status=5)
     aviary.run(200 * MS)
-    found = last(heard)
+    found = last(received)
     assert found["System"] == (ERROR, "sensors are not well: 0x00000020")
     assert found["Battery"] == (WARN, "below 20 %")
     assert found["GPS"] == (WARN, "No fix")
     assert found["Heartbeat"] == (ERROR, "critical")
 
 
-def test_an_autopilot_that_falls_silent(aviary: Aviary, heard: list[Any]) -> None:
+def test_an_autopilot_that_stops_sending(aviary: Aviary, received: list[Any]) -> None:
     aviary.connect()
     aviary.run(12 * S)
-    assert last(heard) == {"FCU connection": (ERROR, "not connected")}
+    assert last(received) == {"FCU connection": (ERROR, "not connected")}

@@ -24,7 +24,7 @@ def test_frames_arrive_after_the_delay_in_order() -> None:
     assert seen == [(5 * MS, "one"), (5 * MS, "two")]
 
 
-def test_a_closed_end_neither_sends_nor_hears() -> None:
+def test_a_closed_end_neither_sends_nor_receives() -> None:
     kernel = VirtualKernel()
     ours, theirs = in_process_pair(kernel, name="radio")
     seen: list[Frame] = []

@@ -64,7 +64,7 @@ def test_mavlink_1_is_read_and_named_as_the_problem_until_mavlink_2_comes() -> N
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
         (b"", ""),
         (b"SSH-2.0-OpenSSH_9.6\r\n", "only text arrives: 'SSH-2.0-OpenSSH_9.6'"),
@@ -73,11 +73,11 @@ def test_mavlink_1_is_read_and_named_as_the_problem_until_mavlink_2_comes() -> N
         (b"".join(BEAT[:-1] + b"\x00" for _ in range(5)) + b"\0" * 300, "no whole MAVLink frame (5 corrupt"),
     ],
 )
-def test_the_problem_in_words(data: bytes, says: str) -> None:
+def test_problem_describes_the_received_bytes(data: bytes, expected: str) -> None:
     parser = MavlinkParser()
     assert parser.feed(data) == []
-    assert says in parser.problem()
-    assert bool(says) == bool(parser.problem())
+    assert expected in parser.problem()
+    assert bool(expected) == bool(parser.problem())
 
 
 def test_a_broken_connection_leaves_no_half_frame() -> None:

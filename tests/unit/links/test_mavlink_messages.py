@@ -46,7 +46,7 @@ def test_a_text_is_cut_to_its_field_and_at_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "fields", "says"),
+    ("name", "fields", "expected"),
     [
         ("HARTBEAT", {}, "did you mean 'HEARTBEAT'"),
         ("HEARTBEAT", {"custom_node": 1}, "did you mean 'custom_mode'"),
@@ -55,8 +55,8 @@ def test_a_text_is_cut_to_its_field_and_at_zero() -> None:
         ("BATTERY_STATUS", {"voltages": [1] * 11}, "room for 10"),
     ],
 )
-def test_what_does_not_fit_is_named(name: str, fields: dict[str, object], says: str) -> None:
-    with pytest.raises(UsageError, match=says):
+def test_errors_name_fields_that_do_not_fit(name: str, fields: dict[str, object], expected: str) -> None:
+    with pytest.raises(UsageError, match=expected):
         encode(Frame(name, fields, 1, 1), 0)
 
 

@@ -71,7 +71,7 @@ def test_what_a_single_file_does_not_say_is_as_in_the_stock_rotorcraft(tmp_path:
     assert aircraft.system is None
 
 
-def test_an_unknown_name_is_told_with_what_there_is(tmp_path: Path) -> None:
+def test_an_unknown_name_is_reported_with_the_known_ones(tmp_path: Path) -> None:
     aircraft = read_aircraft(folder(tmp_path, settings=SETTINGS, flight_plan=PLAN))
     with pytest.raises(UsageError) as raised:
         aircraft.block("Take off")
@@ -83,7 +83,7 @@ def test_an_unknown_name_is_told_with_what_there_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "expected"),
     [
         ("<settings>\n<dl_setting", "mine.xml:2: not XML"),
         ("", "mine.xml"),
@@ -103,10 +103,10 @@ def test_an_unknown_name_is_told_with_what_there_is(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, says: str) -> None:
+def test_errors_name_file_and_line(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(ModelError) as raised:
         read_aircraft(folder(tmp_path, mine=text))
-    assert says in str(raised.value)
+    assert expected in str(raised.value)
 
 
 def test_no_file_outside_is_read(tmp_path: Path) -> None:

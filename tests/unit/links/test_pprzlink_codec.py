@@ -91,7 +91,7 @@ def test_values_are_those_of_the_wire() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frame", "says"),
+    ("frame", "expected"),
     [
         (Frame("ALIV", {}, 7, 0), "no message 'ALIV' here (did you mean 'ALIVE'?)"),
         (Frame("BLOCK", {"block": 3}, 0, 0), "BLOCK has no field 'block' (did you mean 'block_id'?)"),
@@ -107,14 +107,14 @@ def test_values_are_those_of_the_wire() -> None:
         (Frame("ALIVE", {}, 7, 16), "components 0 to 15"),
     ],
 )
-def test_what_cannot_be_written_is_refused_by_name(frame: Frame, says: str) -> None:
+def test_what_cannot_be_written_is_refused_by_name(frame: Frame, expected: str) -> None:
     with pytest.raises(UsageError) as raised:
         PPRZLINK.encode(frame, 0)
-    assert says in str(raised.value)
+    assert expected in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
         (b"", ""),
         (ALIVE, ""),
@@ -130,11 +130,11 @@ def test_what_cannot_be_written_is_refused_by_name(frame: Frame, says: str) -> N
         ),
     ],
 )
-def test_the_problem_in_words(data: bytes, says: str) -> None:
+def test_problem_describes_the_received_bytes(data: bytes, expected: str) -> None:
     parser = PprzlinkParser()
     parser.feed(data)
-    assert says in parser.problem()
-    assert bool(says) == bool(parser.problem())
+    assert expected in parser.problem()
+    assert bool(expected) == bool(parser.problem())
 
 
 def test_a_broken_connection_leaves_no_half_frame() -> None:

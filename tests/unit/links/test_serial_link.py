@@ -1,4 +1,4 @@
-"""What a serial line says when its device cannot be opened."""
+"""What a serial line expected when its device cannot be opened."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.links.serial_link import SerialLink
 
 
 @pytest.mark.parametrize(
-    ("error", "says"),
+    ("error", "expected"),
     [
         (
             serial.SerialException(errno.EACCES, "could not open port /dev/ttyUSB0: Permission denied"),
@@ -25,7 +25,7 @@ from volery.links.serial_link import SerialLink
         (OSError(errno.EIO, "Input/output error"), "/dev/ttyUSB0: Input/output error"),
     ],
 )
-def test_why_it_cannot_be_opened(error: OSError, says: str) -> None:
+def test_errors_of_opening_are_explained(error: OSError, expected: str) -> None:
     line = SerialLink.__new__(SerialLink)  # without its reader's thread
     line._device = "/dev/ttyUSB0"
-    assert says in line._explain(error)
+    assert expected in line._explain(error)

@@ -15,7 +15,7 @@ COUNT = 400
 
 
 def arrivals(faults: WireFaults, seed: int = 1) -> tuple[list[tuple[int, int]], object]:
-    """(when, which) of those of 400 numbered frames, one each 10 ms, that came; what the end has heard."""
+    """Return (time, number) of the arrived ones of 400 frames sent every 10 ms, and the statistics."""
     kernel = VirtualKernel()
     ours, theirs = faulty_pair(kernel, "radio", faults, stream(seed, "radio"))
     seen: list[tuple[int, int]] = []
@@ -40,9 +40,9 @@ def test_frames_are_dropped_as_often_as_stated_and_the_same_ones_for_the_same_se
 
 
 def test_turned_bits_are_caught_by_the_checksum() -> None:
-    seen, heard = arrivals(WireFaults(flip=0.01))
+    seen, statistics = arrivals(WireFaults(flip=0.01))
     assert len(seen) < COUNT
-    assert heard.corrupt > 0
+    assert statistics.corrupt > 0
     assert [number for _, number in seen] == sorted(number for _, number in seen)
 
 
@@ -107,7 +107,7 @@ def test_faults_as_an_address_states_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stated", "says"),
+    ("stated", "expected"),
     [
         ({"drop": "2"}, "no probability"),
         ({"drop": "much"}, "not a number"),
@@ -115,6 +115,6 @@ def test_faults_as_an_address_states_them() -> None:
         ({"drp": "0"}, "did you mean 'drop'"),
     ],
 )
-def test_faults_that_make_no_sense(stated: dict[str, str], says: str) -> None:
-    with pytest.raises(UsageError, match=says):
+def test_faults_that_make_no_sense(stated: dict[str, str], expected: str) -> None:
+    with pytest.raises(UsageError, match=expected):
         parse_wire_faults(stated)

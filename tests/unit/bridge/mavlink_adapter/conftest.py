@@ -1,4 +1,4 @@
-"""A simulated vehicle that does not speak MAVLink, its interpreter, a vehicle node, and a user's node."""
+"""A simulated vehicle that does not speak MAVLink, its adapter, a vehicle node, and a user's node."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FRAME = LocalFrame(46.0825, -103.8995, 900.0)
 
 
 class Flown:
-    """``frames`` is all that the vehicle said, ``texts`` what was said in words on ``statustext``."""
+    """A vehicle behind an adapter. ``frames`` are all frames of the vehicle, ``texts`` its status texts."""
 
     def __init__(self, url: str, **options: Any) -> None:
         self.events: list[Any] = []
@@ -36,11 +36,11 @@ class Flown:
         self.fleet = fleet_of(self.kernel, [wanted], 1)
         self.driver = open_simulated_driver(self.kernel, self.fleet, wanted, 1)
         self.graph = EmbeddedGraph(self.kernel)
-        self.interpreter = MavlinkAdapter(self.kernel, self.driver, ExecutionContext("bridge"))
+        self.adapter = MavlinkAdapter(self.kernel, self.driver, ExecutionContext("bridge"))
         names = options.setdefault("names", MAVROS)
         rates = {"streams": dict.fromkeys(names.streams, 10), "period": None}
         stated = VehicleNodeOptions(geoid=LevelGeoid(GEOID_M), **{**rates, **options})
-        self.node = VehicleNode(self.graph, self.interpreter, "/d", stated)
+        self.node = VehicleNode(self.graph, self.adapter, "/d", stated)
         self.node.start(ExecutionContext("bridge"), self.kernel.root)
         self.user = self.graph.node("user", context=ExecutionContext("user"))
         self.frames: list[Frame] = []
@@ -49,13 +49,13 @@ class Flown:
 
     def tap(self) -> None:
         """From now on the vehicle node hears nothing: all frames come here."""
-        self.interpreter.receive(self.frames.append)
+        self.adapter.receive(self.frames.append)
 
     def send(self, name: str, **fields: Any) -> None:
         """As the vehicle node would."""
-        self.interpreter.send(Frame(name, fields, 255, 191))
+        self.adapter.send(Frame(name, fields, 255, 191))
 
-    def said(self, name: str) -> list[dict[str, Any]]:
+    def messages_of(self, name: str) -> list[dict[str, Any]]:
         return [frame.fields for frame in self.frames if frame.name == name]
 
     def run(self, seconds: float) -> None:
@@ -71,7 +71,7 @@ class Flown:
             assert self.kernel.now() < end, (self.texts, self.node.summary)
             self.run(0.2)
 
-    def hear(self, topic: str, kind: str) -> None:
+    def listen(self, topic: str, kind: str) -> None:
         self.user.subscribe(f"/d/{topic}", kind, lambda message: self._latest.update({topic: message}))
 
     def last(self, topic: str) -> Any:
@@ -110,7 +110,7 @@ class Flown:
 
     @property
     def texts(self) -> list[str]:
-        """What was told in words: those of the interpreter."""
+        """What was told in words: those of the adapter."""
         return [event.text for event in self.events if isinstance(event, Text) and event.severity <= 4]
 
     @property
@@ -131,7 +131,7 @@ def flown() -> type[Flown]:
 
 @pytest.fixture(params=["paparazzi", "dji"])
 def ready(request: Any) -> Flown:
-    """Switched on a while ago, heard, with a fix."""
+    """Switched on a while ago, received, with a fix."""
     made = Flown(f"sim:{request.param}?start=warm")
     made.until(lambda: made.driver.telemetry.position is not None, 30.0)
     made.run(2.0)

@@ -37,7 +37,7 @@ def test_telemetry_is_what_the_autopilot_says(ready: Any) -> None:
         "vfr_hud": "mavros_msgs/VfrHud",
     }
     for topic, kind in topics.items():
-        ready.hear(topic, kind)
+        ready.listen(topic, kind)
     ready.run(3.0)
     seen, last = ready.driver.telemetry, ready.last
     assert (last("state").connected, last("state").mode, last("state").armed) == (True, seen.mode, False)
@@ -57,9 +57,9 @@ def test_telemetry_is_what_the_autopilot_says(ready: Any) -> None:
 
 
 def test_it_is_armed_flown_to_set_points_and_landed(ready: Any) -> None:
-    ready.hear("state", "mavros_msgs/State")
-    ready.hear("local_position/pose", "geometry_msgs/PoseStamped")
-    ready.hear("local_position/velocity_local", "geometry_msgs/TwistStamped")
+    ready.listen("state", "mavros_msgs/State")
+    ready.listen("local_position/pose", "geometry_msgs/PoseStamped")
+    ready.listen("local_position/velocity_local", "geometry_msgs/TwistStamped")
     assert ready.command("cmd/arming", "CommandBool", value=True) == (True, 0)
     ready.run(0.3)
     assert ready.last("state").armed
@@ -86,7 +86,7 @@ def test_it_is_armed_flown_to_set_points_and_landed(ready: Any) -> None:
     assert ready.texts == []
 
 
-def test_a_new_place_takes_that_of_the_old_and_a_command_that_of_both(ready: Any) -> None:
+def test_a_new_target_replaces_the_old_and_a_command_replaces_targets(ready: Any) -> None:
     ready.take_off(5.0)
     for x in (30.0, -8.0):
         pose = {"position": {"x": x, "z": 5.0}, "orientation": {"w": 1.0}}
@@ -115,8 +115,8 @@ def test_a_global_place_is_above_the_ellipsoid(ready: Any) -> None:
     assert ready.true == pytest.approx((0.0, 5.56, 7.0), abs=1.5)
 
 
-def test_what_cannot_be_is_refused_with_a_reason(ready: Any) -> None:
-    ready.hear("statustext/recv", "mavros_msgs/StatusText")
+def test_refusals_have_a_reason(ready: Any) -> None:
+    ready.listen("statustext/recv", "mavros_msgs/StatusText")
     kind = kind_of(ready)
     assert ready.command("cmd/command", "CommandLong", command=181) == (False, 3)
     ready.run(0.3)
@@ -134,7 +134,9 @@ def test_what_cannot_be_is_refused_with_a_reason(ready: Any) -> None:
     for _ in range(20):
         ready.publish("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/Twist", linear={"x": 1.0})
         ready.run(0.1)
-    assert [text for text in ready.texts if "it is on the ground" in text] == [ready.texts[-1]]  # said once
+    assert [text for text in ready.texts if "it is on the ground" in text] == [
+        ready.texts[-1]
+    ]  # messages_of once
 
 
 def test_in_the_air_it_is_not_disarmed_unless_by_force(ready: Any) -> None:
@@ -155,7 +157,7 @@ def test_a_command_that_is_overtaken_is_cancelled(flown: Any) -> None:
     made.run(0.1)
     made.send("COMMAND_LONG", command=21)
     made.run(5.0)
-    assert [(ack["command"], ack["result"]) for ack in made.said("COMMAND_ACK")] == [
+    assert [(ack["command"], ack["result"]) for ack in made.messages_of("COMMAND_ACK")] == [
         (400, 1),
         (22, 6),
         (21, 0),
@@ -163,7 +165,7 @@ def test_a_command_that_is_overtaken_is_cancelled(flown: Any) -> None:
     assert "arm: not while it is to take off to 5 m" in made.texts[-1]
 
 
-def test_a_paparazzi_flies_no_missions_and_says_so(flown: Any) -> None:
+def test_a_paparazzi_refuses_missions(flown: Any) -> None:
     made = flown("sim:paparazzi?start=warm")
     made.run(30.0)
     pushed = made.call(
@@ -177,7 +179,7 @@ def test_a_paparazzi_flies_no_missions_and_says_so(flown: Any) -> None:
 def test_a_dji_flies_a_mission(flown: Any) -> None:
     made = flown("sim:dji?start=warm")
     made.run(5.0)
-    made.hear("mission/waypoints", "mavros_msgs/WaypointList")
+    made.listen("mission/waypoints", "mavros_msgs/WaypointList")
     plan = [
         waypoint(22, height=6.0),
         waypoint(16, 46.08258, -103.8995, 6.0),
@@ -200,7 +202,7 @@ def test_a_dji_flies_a_mission(flown: Any) -> None:
 
 
 @pytest.mark.parametrize(("autopilot", "mode"), [("paparazzi", "ATTITUDE_RC_CLIMB"), ("dji", "ATTITUDE")])
-def test_sticks_fly_it_and_let_go_of_it_is_held(flown: Any, autopilot: str, mode: str) -> None:
+def test_manual_control_flies_and_its_end_holds(flown: Any, autopilot: str, mode: str) -> None:
     made = flown(f"sim:{autopilot}?start=warm")
     made.run(30.0)
     made.take_off(8.0)
@@ -230,7 +232,7 @@ def test_roscopter_reads_and_arms_it(
         "vfr_hud": "roscopter/VFR_HUD",
         "attitude": "roscopter/Attitude",
     }.items():
-        made.hear(topic, kind)
+        made.listen(topic, kind)
     made.run(30.0)
     assert made.last("gps").altitude == pytest.approx(900.0, abs=3.0)  # above the sea
     assert made.last("gps").status.status == 0
@@ -246,7 +248,7 @@ def test_roscopter_reads_and_arms_it(
     assert made.texts == []
 
 
-def test_before_it_is_heard_nothing_is_said_and_when_it_falls_silent_no_more(flown: Any) -> None:
+def test_messages_are_sent_only_while_telemetry_arrives(flown: Any) -> None:
     made = flown("sim:paparazzi?start=cold")
     made.tap()
     made.run(0.5)
@@ -255,13 +257,13 @@ def test_before_it_is_heard_nothing_is_said_and_when_it_falls_silent_no_more(flo
     assert {frame.name for frame in made.frames} == {"HEARTBEAT"}  # nobody has asked for more
     made.send("REQUEST_DATA_STREAM", req_stream_id=0, req_message_rate=10, start_stop=1)
     made.run(4.0)
-    assert not made.said("GLOBAL_POSITION_INT")  # it does not know where it is
+    assert not made.messages_of("GLOBAL_POSITION_INT")  # it does not know where it is
     made.driver.close()  # no word comes through any more
     made.run(2.0)
     made.frames.clear()
     made.run(5.0)
     assert made.frames == []
-    assert made.interpreter.problem()
+    assert made.adapter.problem()
 
 
 HOSTILE = [
@@ -291,7 +293,7 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize(("name", "fields"), HOSTILE)
-def test_nonsense_ends_in_words(flown: Any, name: str, fields: dict[str, Any]) -> None:
+def test_invalid_messages_are_reported(flown: Any, name: str, fields: dict[str, Any]) -> None:
     made = flown("sim:paparazzi?start=warm")
     made.run(25.0)
     made.send(name, **fields)
@@ -299,12 +301,12 @@ def test_nonsense_ends_in_words(flown: Any, name: str, fields: dict[str, Any]) -
     assert not made.driver.telemetry.armed
     made.tap()
     made.run(2.0)
-    assert made.said("HEARTBEAT")  # it lives
+    assert made.messages_of("HEARTBEAT")  # it lives
 
 
-def test_a_pilot_who_takes_it_is_shown_and_not_fought(flown: Any) -> None:
+def test_a_takeover_by_the_pilot_is_reported_and_respected(flown: Any) -> None:
     made = flown("sim:dji?start=warm")
-    made.hear("state", "mavros_msgs/State")
+    made.listen("state", "mavros_msgs/State")
     made.run(5.0)
     made.take_off(4.0)
     made.fleet.autopilots["d"].vehicle.rc.transmitter[4] = 1500  # the mode switch
@@ -315,10 +317,10 @@ def test_a_pilot_who_takes_it_is_shown_and_not_fought(flown: Any) -> None:
     assert made.driver.telemetry.flying
 
 
-def test_it_is_closed_with_a_command_under_way(flown: Any) -> None:
+def test_it_is_closed_during_a_command(flown: Any) -> None:
     made = flown("sim:paparazzi?start=warm")
     made.run(30.0)
     made.send("COMMAND_LONG", command=22, param7=20.0)
     made.run(6.0)
-    made.interpreter.close()
+    made.adapter.close()
     assert made.kernel.close() == []

@@ -31,7 +31,7 @@ FRAME = LocalFrame(46.0, -103.0, 900.0)
 
 
 class Bird:
-    """What a driver says of itself; nothing is known at first."""
+    """What a driver encoded of itself; nothing is known at first."""
 
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
@@ -39,7 +39,7 @@ class Bird:
         self.offboard_mode = "GUIDED"
         self.encoder = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
 
-    def hear(self, at: int = 5 * S, **facts: Any) -> None:
+    def update(self, at: int = 5 * S, **facts: Any) -> None:
         for name, value in {
             "last_message_ns": at,
             "kind": "drone",
@@ -48,7 +48,7 @@ class Bird:
         }.items():
             setattr(self.telemetry, name, value)
 
-    def says(self, name: str) -> Any:
+    def encoded(self, name: str) -> Any:
         fields = self.encoder.encode_new(name)
         return None if fields is None else quantised(Frame(name, fields, 1, 1)).fields
 
@@ -62,47 +62,47 @@ def bird() -> Bird:
 def seen(bird: Bird) -> Telemetry:
     """10 m north, 4 m up, looking east."""
     latitude, longitude, _ = FRAME.from_enu((0.0, 10.0, 0.0))
-    bird.hear(home=HOME, position=Position(latitude, longitude, AMSL(904.0)), above_home=4.0)
+    bird.update(home=HOME, position=Position(latitude, longitude, AMSL(904.0)), above_home=4.0)
     bird.telemetry.attitude = Attitude(0.0, 0.0, 90.0)
     return bird.telemetry
 
 
-def test_of_an_unknown_vehicle_nothing_is_said(bird: Bird) -> None:
-    assert [name for name in bird.encoder.messages if bird.says(name) is not None] == []
+def test_nothing_is_encoded_of_an_unknown_vehicle(bird: Bird) -> None:
+    assert [name for name in bird.encoder.messages if bird.encoded(name) is not None] == []
 
 
-def test_what_is_not_known_is_not_said_or_said_to_be_unknown(bird: Bird) -> None:
-    bird.hear(mode="NAV")
-    said = {name for name in bird.encoder.messages if bird.says(name) is not None}
-    assert said == {"HEARTBEAT", "EXTENDED_SYS_STATE"}
-    bird.hear(battery=Battery(nan, 12.25, nan), position=HOME)
-    status = bird.says("SYS_STATUS")
+def test_unknown_values_are_omitted_or_marked(bird: Bird) -> None:
+    bird.update(mode="NAV")
+    found = {name for name in bird.encoder.messages if bird.encoded(name) is not None}
+    assert found == {"HEARTBEAT", "EXTENDED_SYS_STATE"}
+    bird.update(battery=Battery(nan, 12.25, nan), position=HOME)
+    status = bird.encoded("SYS_STATUS")
     known = (status["voltage_battery"], status["current_battery"], status["battery_remaining"])
     assert known == (12_250, -1, -1)
-    fix = bird.says("GPS_RAW_INT")
+    fix = bird.encoded("GPS_RAW_INT")
     assert (fix["fix_type"], fix["satellites_visible"], fix["eph"], fix["vel"]) == (0, 255, 65_535, 65_535)
-    assert bird.says("GLOBAL_POSITION_INT") is None  # how fast, how high?
-    bird.hear(velocity=Velocity(1.0, 2.0, -3.0), above_home=0.0)
-    place = bird.says("GLOBAL_POSITION_INT")
+    assert bird.encoded("GLOBAL_POSITION_INT") is None  # how fast, how high?
+    bird.update(velocity=Velocity(1.0, 2.0, -3.0), above_home=0.0)
+    place = bird.encoded("GLOBAL_POSITION_INT")
     assert (place["alt"], place["vx"], place["vy"], place["vz"]) == (900_000, 100, 200, 300)
     assert place["hdg"] == 65_535
-    assert bird.says("LOCAL_POSITION_NED") is None  # about where?
-    assert bird.says("VFR_HUD") is None
+    assert bird.encoded("LOCAL_POSITION_NED") is None  # about where?
+    assert bird.encoded("VFR_HUD") is None
 
 
-def test_only_what_was_heard_anew_is_said_again(bird: Bird, seen: Telemetry) -> None:
-    bird.hear(mode="NAV", velocity=Velocity(0.0, 0.0, 0.0))
+def test_only_new_content_is_encoded_again(bird: Bird, seen: Telemetry) -> None:
+    bird.update(mode="NAV", velocity=Velocity(0.0, 0.0, 0.0))
     for name in ("HEARTBEAT", "GLOBAL_POSITION_INT", "ATTITUDE", "HOME_POSITION"):
-        assert bird.says(name) is not None
-        assert bird.says(name) is None
+        assert bird.encoded(name) is not None
+        assert bird.encoded(name) is None
         assert bird.encoder.encode(name) is not None  # whoever asks is told
-    bird.hear(at=6 * S)
-    assert bird.says("HEARTBEAT") is not None
-    assert bird.says("GLOBAL_POSITION_INT") is None  # of that nothing was heard
+    bird.update(at=6 * S)
+    assert bird.encoded("HEARTBEAT") is not None
+    assert bird.encoded("GLOBAL_POSITION_INT") is None  # of that nothing was heard
     here = seen.position
     assert here is not None
-    bird.hear(position=Position(here.latitude, here.longitude, here.altitude))
-    assert bird.says("GLOBAL_POSITION_INT") is not None  # it says that it is still there
+    bird.update(position=Position(here.latitude, here.longitude, here.altitude))
+    assert bird.encoded("GLOBAL_POSITION_INT") is not None  # it encoded that it is still there
 
 
 @pytest.mark.parametrize(
@@ -117,44 +117,44 @@ def test_only_what_was_heard_anew_is_said_again(bird: Bird, seen: Telemetry) -> 
         ({"mode": "LAND", "autopilot": "somebody's"}, 0, 9, 1, 3),
     ],
 )
-def test_a_heartbeat_says_whose_mode_it_is(
+def test_the_heartbeat_identifies_autopilot_and_mode(
     bird: Bird, facts: dict[str, Any], autopilot: int, mode: int, base: int, status: int
 ) -> None:
-    bird.hear(**facts)
-    beat = bird.says("HEARTBEAT")
-    said = (beat["autopilot"], beat["type"], beat["custom_mode"], beat["base_mode"], beat["system_status"])
-    assert said == (autopilot, 2, mode, base, status)
+    bird.update(**facts)
+    beat = bird.encoded("HEARTBEAT")
+    found = (beat["autopilot"], beat["type"], beat["custom_mode"], beat["base_mode"], beat["system_status"])
+    assert found == (autopilot, 2, mode, base, status)
 
 
 @pytest.mark.parametrize(
     ("fix", "kind"),
     [("no_fix", 1), ("3d", 3), ("rtk", 5), ("gps health 3", 1), ("gps health 5", 3), ("?", 0)],
 )
-def test_words_for_fixes(bird: Bird, fix: str, kind: int) -> None:
-    bird.hear(fix=fix, position=HOME, satellites=9)
-    said = bird.says("GPS_RAW_INT")
-    assert (said["fix_type"], said["satellites_visible"]) == (kind, 9)
+def test_fix_types(bird: Bird, fix: str, kind: int) -> None:
+    bird.update(fix=fix, position=HOME, satellites=9)
+    found = bird.encoded("GPS_RAW_INT")
+    assert (found["fix_type"], found["satellites_visible"]) == (kind, 9)
 
 
 def test_places_about_home(bird: Bird, seen: Telemetry) -> None:
-    bird.hear(velocity=Velocity(1.0, 2.0, 3.0))
-    local = bird.says("LOCAL_POSITION_NED")
+    bird.update(velocity=Velocity(1.0, 2.0, 3.0))
+    local = bird.encoded("LOCAL_POSITION_NED")
     assert (local["x"], local["y"], local["z"]) == pytest.approx((10.0, 0.0, -4.0), abs=1e-3)
     assert (local["vx"], local["vy"], local["vz"]) == (1.0, 2.0, -3.0)
-    home = bird.says("HOME_POSITION")
+    home = bird.encoded("HOME_POSITION")
     assert (home["latitude"], home["altitude"], home["x"]) == (460_000_000, 900_000, 0.0)
     assert isnan(home["approach_x"])
-    assert bird.says("GPS_GLOBAL_ORIGIN")["longitude"] == -1_030_000_000
-    turned = bird.says("ATTITUDE")
+    assert bird.encoded("GPS_GLOBAL_ORIGIN")["longitude"] == -1_030_000_000
+    turned = bird.encoded("ATTITUDE")
     assert turned["yaw"] == pytest.approx(pi / 2)
     assert isnan(turned["rollspeed"])
 
 
 def test_items_of_a_mission(bird: Bird) -> None:
-    bird.hear(mission_item=3, mission_reached=2)
-    assert bird.says("MISSION_CURRENT")["seq"] == 3
-    assert bird.says("MISSION_ITEM_REACHED")["seq"] == 2
-    assert bird.says("MISSION_ITEM_REACHED") is None
+    bird.update(mission_item=3, mission_reached=2)
+    assert bird.encoded("MISSION_CURRENT")["seq"] == 3
+    assert bird.encoded("MISSION_ITEM_REACHED")["seq"] == 2
+    assert bird.encoded("MISSION_ITEM_REACHED") is None
 
 
 # -- set-points
@@ -204,12 +204,12 @@ def test_altitudes_by_their_frame(seen: Telemetry, frame: int, kind: type) -> No
 
 
 @pytest.mark.parametrize("mask", [0x0FFF, POSITION | 1, VELOCITY | 8])
-def test_half_a_set_point_is_none(seen: Telemetry, mask: int) -> None:
+def test_incomplete_set_points_are_refused(seen: Telemetry, mask: int) -> None:
     with pytest.raises(UsageError, match="neither a whole position nor a whole velocity"):
         local_target(local(1, mask), seen)
 
 
-def test_before_it_knows_where_it_is_there_is_no_place(bird: Bird) -> None:
+def test_without_an_own_position_there_is_no_local_target(bird: Bird) -> None:
     with pytest.raises(UsageError, match="not known yet"):
         local_target(local(1, POSITION), bird.telemetry)
 

@@ -1,4 +1,4 @@
-"""message_filters over the faces: what the same file does with the real one is compared on real ROS."""
+"""message_filters over the client libraries; the same file is compared with the real one on real ROS."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from std_msgs.msg import String
 
 
 def listened(stage: Any, filters: str, talk: str) -> list[Any]:
-    """A node with *filters* hears what another one says a second later."""
+    """A node with *filters* receives what another node publishes a second later."""
     stage.script(
         "listener",
         f"{IMPORTS}\nrospy.init_node('listener')\n"
-        "def tell(*heard):\n    out([one.header.stamp.to_nsec() for one in heard])\n"
+        "def report(*messages):\n    out([one.header.stamp.to_nsec() for one in messages])\n"
         f"{filters}\nrospy.spin()\n",
     )
     stage.script("talker", f"{IMPORTS}\n{TALK}\nrospy.sleep(1)\n{talk}\n")
@@ -40,19 +40,19 @@ BOTH = "both = [message_filters.Subscriber(name, PointStamped) for name in ('a',
 
 
 def test_messages_of_the_same_stamp_belong_together(stage: Any) -> None:
-    filters = f"{BOTH}message_filters.TimeSynchronizer(both, 5).registerCallback(tell)"
+    filters = f"{BOTH}message_filters.TimeSynchronizer(both, 5).registerCallback(report)"
     talk = "pose('a', (1, 0), (2, 0), (3, 0))\npose('b', (2, 0), (4, 0), (1, 0))"
     assert listened(stage, filters, talk) == [[2_000_000_000] * 2, [1_000_000_000] * 2]
 
 
 def test_a_full_queue_gives_up_the_oldest_stamp(stage: Any) -> None:
-    filters = f"{BOTH}message_filters.TimeSynchronizer(both, 2).registerCallback(tell)"
+    filters = f"{BOTH}message_filters.TimeSynchronizer(both, 2).registerCallback(report)"
     talk = "pose('a', (3, 0), (1, 0), (2, 0))\npose('b', (1, 0), (2, 0), (3, 0))"
     assert listened(stage, filters, talk) == [[2_000_000_000] * 2, [3_000_000_000] * 2]
 
 
 def test_the_nearest_within_the_slop_belong_together(stage: Any) -> None:
-    filters = f"{BOTH}message_filters.ApproximateTimeSynchronizer(both, 5, 0.1).registerCallback(tell)"
+    filters = f"{BOTH}message_filters.ApproximateTimeSynchronizer(both, 5, 0.1).registerCallback(report)"
     talk = "pose('a', (1, 0), (1, 60_000_000), (2, 0)); pose('b', (1, 50_000_000), (2, 100_000_000))"
     assert listened(stage, filters, talk) == [[1_060_000_000, 1_050_000_000]]  # 0.1 s are too much
 
@@ -73,7 +73,7 @@ rospy.sleep(1)
 """
     assert listened(stage, filters, talk) == ["a worda word!"]
     warned = [event.text for event in stage.events if "without a 'header'" in getattr(event, "text", "")]
-    assert len(warned) == 1  # the cache was not told that it may
+    assert len(warned) == 1  # the cache was hidden that it may
 
 
 def test_with_a_node_first_it_is_rclpys(stage: Any) -> None:

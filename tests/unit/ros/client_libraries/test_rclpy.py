@@ -48,9 +48,9 @@ from std_msgs.msg import String
 class Listener(Node):
     def __init__(self):
         super().__init__("listener")
-        self.create_subscription(String, "chatter", self.heard, 10)
+        self.create_subscription(String, "chatter", self.received, 10)
 
-    def heard(self, message):
+    def received(self, message):
         out((self.get_clock().now().nanoseconds, message.data))
         if message.data.endswith("3"):
             rclpy.shutdown()
@@ -64,8 +64,8 @@ out("ended")
 def test_a_talker_and_a_listener(stage: Stage) -> None:
     stage.script("talker", TALKER)
     stage.script("listener", LISTENER)
-    heard = stage.run(5 * S)
-    assert heard == [(500 * MS * (n + 1), f"Hello {n}") for n in range(4)] + ["ended"]
+    received = stage.run(5 * S)
+    assert received == [(500 * MS * (n + 1), f"Hello {n}") for n in range(4)] + ["ended"]
     assert [text.text for text in stage.of(Text)][:2] == ["sent Hello 0", "sent Hello 1"]
     assert {event.topic for event in stage.of(Published)} == {"/chatter"}
 
@@ -135,7 +135,7 @@ def test_a_service_and_its_client(stage: Stage) -> None:
     assert stage.run(5 * S) == ["waiting", "waiting", 42]
 
 
-def test_a_call_that_blocks_needs_somebody_who_spins(stage: Stage) -> None:
+def test_a_blocking_call_needs_another_task_that_spins(stage: Stage) -> None:
     stage.script("adder", ADDER)
     stage.script(
         "asker",

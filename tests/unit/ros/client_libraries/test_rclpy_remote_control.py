@@ -1,4 +1,4 @@
-"""What others do with an rclpy node: hear its log, set its parameters, lead it through its life."""
+"""Access to an rclpy node by other nodes: log, parameters and lifecycle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_the_log_is_a_topic_for_who_listens(stage: Any) -> None:
         rclpy.init()
         node = rclpy.create_node("station", enable_rosout=False)
         node.create_subscription(Log, "/rosout", lambda m: out((m.level, m.name, m.msg, m.line)), 9)
-        node.get_logger().info("not told")
+        node.get_logger().info("hidden")
         rclpy.spin(node)
         """,
     )
@@ -30,7 +30,7 @@ def test_the_log_is_a_topic_for_who_listens(stage: Any) -> None:
         rclpy.spin_once(node, timeout_sec=0.5)
         node.get_logger().warning("hot")
         node.get_logger().get_child("motor").log("hotter", 40)
-        node.get_logger().debug("not told")
+        node.get_logger().debug("hidden")
         get_logger("apart").info("of no node")
         """,
     )
@@ -46,7 +46,7 @@ def test_levels_of_loggers_go_by_name(stage: Any) -> None:
         rclpy.init()
         node = rclpy.create_node("node")
         logging.set_logger_level("node", logging.LoggingSeverity.DEBUG)
-        out(node.get_logger().debug("told now"))
+        out(node.get_logger().debug("shown now"))
         out(logging.get_logger_effective_level("node.part").name)
         out((logging.get_logger_level("other").name, logging.get_logging_severity_from_string("warn").name))
         """,
@@ -63,10 +63,10 @@ def test_a_lifecycle_led_from_within(stage: Any) -> None:
         rclpy.init()
         node = rclpy.create_node("watcher")
 
-        def hear(event):
+        def receive(event):
             out((event.transition.label, event.start_state.label, event.goal_state.label))
 
-        node.create_subscription(TransitionEvent, "/node/transition_event", hear, 10)
+        node.create_subscription(TransitionEvent, "/node/transition_event", receive, 10)
         rclpy.spin(node)
         """,
     )
@@ -98,14 +98,14 @@ def test_a_lifecycle_led_from_within(stage: Any) -> None:
             out(str(error))
         """,
     )
-    said = stage.run(S)
-    assert [one for one in said if not isinstance(one, tuple)] == [
+    lines = stage.run(S)
+    assert [one for one in lines if not isinstance(one, tuple)] == [
         "rests",
         ["SUCCESS", "SUCCESS", "FAILURE"],
         "moves",
         "No transition matching cleanup found for current state active",
     ]
-    assert [one for one in said if isinstance(one, tuple)] == [
+    assert [one for one in lines if isinstance(one, tuple)] == [
         ("configure", "unconfigured", "configuring"),
         ("transition_success", "configuring", "inactive"),
         ("activate", "inactive", "activating"),

@@ -96,7 +96,7 @@ def _run(stage: Any, body: Any, name: str = "node") -> None:
         raise failed[0]
 
 
-def test_callbacks_run_on_the_stack_of_whoever_spins(stage):
+def test_callbacks_run_on_the_stack_of_the_spinning_fiber(stage):
     code = Code(stage, "node")
     word = to_cdr(new("std_msgs/String", data="hello"))
 
@@ -108,7 +108,7 @@ def test_callbacks_run_on_the_stack_of_whoever_spins(stage):
         for _ in range(3):
             code.ask("publish", Writer().integer(publisher).raw(word))
         code.ask("sleep", Writer().integer(S))
-        assert not code.called, "nobody has spun yet"
+        assert not code.called, "not spun yet"
         code.ask("spin_once")
 
     _run(stage, body)
@@ -146,7 +146,7 @@ def test_a_handler_that_returns_false_is_a_refusal_and_no_failure(stage):
     server, client = Code(stage, "server"), Code(stage, "client")
     empty = to_cdr(new("std_srvs/srv/SetBool_Response"))
     server.returns = Writer().flag(False).raw(empty).done()
-    told: list[bool] = []
+    results: list[bool] = []
 
     def serve() -> None:
         server.ask("init", Writer().text("server").flag(False))
@@ -158,9 +158,9 @@ def test_a_handler_that_returns_false_is_a_refusal_and_no_failure(stage):
         assert client.ask("wait_for_service", Writer().text("/set").integer(-1)).flag()
         number = client.ask("client", Writer().text("/set").text("std_srvs/srv/SetBool")).integer()
         request = to_cdr(new("std_srvs/srv/SetBool_Request"))
-        told.extend(client.ask("call", Writer().integer(number).raw(request)).flag() for _ in range(2))
+        results.extend(client.ask("call", Writer().integer(number).raw(request)).flag() for _ in range(2))
 
     stage.kernel.spawn(serve, "server", ExecutionContext("server"))
     _run(stage, call, "client")
-    assert told == [False, False]
+    assert results == [False, False]
     assert len(server.called) == 2

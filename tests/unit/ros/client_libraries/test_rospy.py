@@ -79,8 +79,8 @@ rospy.sleep(1)
 """,
     )
     refused = ["ROSSerializationException"] * 2
-    heard = [(1.0, 2.0, 3.0), (4.0, 0.0, 0.0), (5.0, 6.0, 7.0)]
-    assert stage.run() == [*refused, (1, "/a"), *heard]
+    received = [(1.0, 2.0, 3.0), (4.0, 0.0, 0.0), (5.0, 6.0, 7.0)]
+    assert stage.run() == [*refused, (1, "/a"), *received]
 
 
 def test_a_latched_message_reaches_who_comes_late(stage: Any) -> None:
@@ -332,8 +332,8 @@ for _ in range(6):
 """,
     )
     stage.run()
-    said = [(event.at, event.severity, event.text) for event in stage.of(Text) if event.source == "n"]
-    assert said == [
+    lines = [(event.at, event.severity, event.text) for event in stage.of(Text) if event.source == "n"]
+    assert lines == [
         (0, 6, "height 2.0 m"),
         (0, 4, "plain 100%"),
         (0, 3, "bad"),

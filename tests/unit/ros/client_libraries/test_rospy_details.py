@@ -24,9 +24,9 @@ def test_the_log_is_a_topic_for_who_listens(stage: Any) -> None:
         """
 from rosgraph_msgs.msg import Log
 rospy.init_node("station")
-def hear(one):
+def receive(one):
     out((one.level, one.name, one.msg, one.line, one.header.stamp.to_sec()))
-rospy.Subscriber("/rosout", Log, hear)
+rospy.Subscriber("/rosout", Log, receive)
 rospy.spin()
 """,
     )
@@ -36,17 +36,17 @@ rospy.spin()
 rospy.init_node("robot")
 rospy.sleep(1)
 rospy.loginfo("battery at %d %%", 80)
-rospy.logdebug("not told")
+rospy.logdebug("hidden")
 rospy.logerr_throttle(10, "hot")
 rospy.logerr_throttle(10, "hot")
 """,
     )
-    said = stage.run(3 * S)
-    assert [(one[0], one[1], one[2], one[4]) for one in said] == [
+    lines = stage.run(3 * S)
+    assert [(one[0], one[1], one[2], one[4]) for one in lines] == [
         (INFO, "/robot", "battery at 80 %", 1.0),
         (ERROR, "/robot", "hot", 1.0),
     ]
-    assert said[1][3] == said[0][3] + 2
+    assert lines[1][3] == lines[0][3] + 2
     assert {"/rosout"} == {one.name for one in stage.graph.topics()}
 
 
@@ -62,10 +62,10 @@ def test_messages_of_any_type(stage: Any) -> None:
         "relay",
         """
 rospy.init_node("relay")
-def hear(message):
+def receive(message):
     header = message._connection_header
     out((header["type"], header["topic"], message._buff))
-rospy.Subscriber("chatter", rospy.AnyMsg, hear)
+rospy.Subscriber("chatter", rospy.AnyMsg, receive)
 rospy.spin()
 """,
     )

@@ -1,4 +1,4 @@
-"""tf2 over the faces: rospy's and rclpy's, and the old tf."""
+"""tf2 with rospy and rclpy, and the older tf."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 
 
-def told(child, parent, at, x, w=1.0, z=0.0):
+def stamped(child, parent, at, x, w=1.0, z=0.0):
     made = TransformStamped(child_frame_id=child)
     made.header.frame_id = parent
     made.header.stamp = rospy.Time.from_sec(at)
@@ -32,13 +32,13 @@ def told(child, parent, at, x, w=1.0, z=0.0):
 
 rospy.init_node("broadcaster")
 static = tf2_ros.StaticTransformBroadcaster()
-static.sendTransform(told("camera", "base", 0.0, 0.5))
-static.sendTransform([told("laser", "base", 0.0, 0.25)])
+static.sendTransform(stamped("camera", "base", 0.0, 0.5))
+static.sendTransform([stamped("laser", "base", 0.0, 0.25)])
 moving = tf2_ros.TransformBroadcaster()
 rospy.sleep(0.1)  # until others listen: what moves is not kept
-moving.sendTransform(told("base", "odom", 1.0, 2.0))
-moving.sendTransform(told("base", "odom", 2.0, 4.0, 0.5 ** 0.5, 0.5 ** 0.5))
-moving.sendTransform(told("elsewhere", "island", 2.0, 0.0))
+moving.sendTransform(stamped("base", "odom", 1.0, 2.0))
+moving.sendTransform(stamped("base", "odom", 2.0, 4.0, 0.5 ** 0.5, 0.5 ** 0.5))
+moving.sendTransform(stamped("elsewhere", "island", 2.0, 0.0))
 """
 ASKING = """
 import rospy
@@ -127,7 +127,7 @@ out(rospy.get_time())
     assert stage.run(5 * S) == [[4.0, 0, 0, 0.707107, 0.707107], 1.35]
 
 
-def test_rclpy_nodes_tell_and_ask(stage: Any) -> None:
+def test_rclpy_nodes_publish_and_look_up(stage: Any) -> None:
     stage.script(
         "broadcaster",
         """
@@ -137,9 +137,9 @@ from rclpy.node import Node
 from tf2_ros import StaticTransformBroadcaster, TransformBroadcaster
 
 
-class Told(Node):
+class Station(Node):
     def __init__(self):
-        super().__init__("told")
+        super().__init__("station")
         static, self.moving = StaticTransformBroadcaster(self), TransformBroadcaster(self)
         static.sendTransform(self.made("camera", "base"))
         self.create_timer(0.1, lambda: self.moving.sendTransform(self.made("base", "odom")))
@@ -153,7 +153,7 @@ class Told(Node):
 
 
 rclpy.init()
-rclpy.spin(Told())
+rclpy.spin(Station())
 """,
     )
     stage.script(
