@@ -9,6 +9,7 @@ import pytest
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import MS, S
 from volery.model.components import Activity, Figure, Reference
+from volery.model.faults import MotorDead
 from volery.model.instances import Connection, Target, TargetKind
 from volery.model.reader import check, load
 from volery.model.reading import ProcessorKind
@@ -145,7 +146,7 @@ def test_a_carried_computer_drains_its_carrier_and_serves_it(workshop):
     assert mains.processor("onboard").powered_by is None
 
 
-def test_an_allocation_says_where_a_vehicles_node_runs(workshop):
+def test_an_allocation_places_a_vehicles_node(workshop):
     workshop.change("control: onboard}", "control: onboard, rover_1: ground}")
     assert workshop.load().vehicle("rover_1").processor == "ground"
 
@@ -229,7 +230,7 @@ def test_ros_is_needed_by_a_language_or_a_topic_port(workshop):
     assert not workshop.load().needs_ros
 
 
-def test_looking_up_what_is_not_there(workshop):
+def test_an_unknown_name_is_looked_up(workshop):
     with pytest.raises(UsageError, match=r"no vehicle named 'drone_2' \(did you mean 'drone_1'\?\)"):
         workshop.load().vehicle("drone_2")
 
@@ -273,7 +274,7 @@ def test_a_processor_whose_settings_are_not_known_is_not_warned_of(workshop):
     assert workshop.load(None, None, board).warnings == ()
 
 
-def test_a_check_tells_the_warnings_of_every_variant_once(workshop):
+def test_a_check_has_the_warnings_of_every_variant_once(workshop):
     assert len(check(workshop.file, workshop.vocabulary, [BOARD % 1450]).warnings) == 1
 
 
@@ -292,3 +293,17 @@ def test_a_catalogue_that_the_model_brings_along(workshop):
         workshop.load(None, None, board)
     with pytest.raises(ModelError, match=r"platform\.catalogues.*cannot be read"):
         workshop.load(None, None, "platform.catalogues=[gone.yaml]")
+
+
+def test_a_fault_is_read_with_its_arguments_and_defaults(workshop):
+    workshop.change(
+        "  workload:",
+        "  faults:\n"
+        "    weak: {kind: motor-dead, vehicle: drone_1, at: 5 s, thrust: 60 %}\n"
+        "    front: {kind: wind, at: 1 min, duration: 20 s, speed: 36 km/h}\n"
+        "  workload:",
+    )
+    weak, front = workshop.load().environment.faults
+    assert weak == MotorDead(name="weak", at_ns=5 * S, vehicle="drone_1", motor=1, thrust=0.6)
+    assert (front.speed_m_s, front.direction_deg, front.duration_ns) == (10.0, 270.0, 20 * S)
+    assert (weak.kind, weak.subject, front.subject) == ("motor-dead", "drone_1", "wind")

@@ -169,7 +169,7 @@ def test_a_vehicle_flies_and_lands() -> None:
     assert books().vehicles["d"].landed is None
 
 
-def test_without_truth_the_estimate_counts_and_what_nobody_knows_does_not() -> None:
+def test_without_truth_the_estimate_counts_and_what_is_unknown_does_not() -> None:
     unknown = {"x": nan, "y": nan, "z": nan, "vx": nan, "vy": nan, "vz": nan, "volts": nan}
     flight = books(
         state(0, **unknown),
@@ -249,7 +249,7 @@ def test_the_same_from_the_run_and_from_its_trace(tmp_path: Path) -> None:
     assert accounts.record("completed").components["drone_control"].deadline_misses > 0
 
 
-def test_run_json_says_wall_time_and_comes_back(tmp_path: Path) -> None:
+def test_run_json_has_the_wall_time_and_is_read_back(tmp_path: Path) -> None:
     accounts = Accounts(SETUP)
     accounts(Text(10 * S, "x", 6, ""))
     record = accounts.record("interrupted", "Ctrl-C", circumstances=Circumstances(2.0, {"volery": "1"}))

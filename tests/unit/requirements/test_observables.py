@@ -183,7 +183,7 @@ def test_everything_published_can_be_observed(published):
     unit(published.unit)
 
 
-def test_latency_goes_back_to_what_a_node_had_heard_when_it_spoke():
+def test_latency_counts_from_what_a_node_had_received_when_it_published():
     def received(topic, sent, received, publisher="camera", subscriber="/finder"):
         return Message(sent * MS, received * MS, topic, publisher, subscriber, 1)
 

@@ -23,7 +23,7 @@ def test_every_event_of_a_run_survives_the_round_trip() -> None:
     assert seen == set(OWN_EVENTS)
 
 
-def test_definition_has_wide_numbers_first_and_words_last() -> None:
+def test_definition_has_wide_numbers_first_and_strings_last() -> None:
     assert Codec(Slice).definition == (
         "int64 start\nint64 end\nint32 core\nstring processor\nstring task\nstring component\n"
     )
@@ -42,13 +42,13 @@ def test_bytes_are_those_of_cdr() -> None:
     )
 
 
-def test_words_in_any_script_and_with_lone_surrogates() -> None:
+def test_strings_in_any_script_and_with_lone_surrogates() -> None:
     codec = Codec(Text)
     assert codec.decode(codec.encode(Text(0, "drøne", 1, "日本 \0 x"))).text == "日本 \0 x"
     assert codec.decode(codec.encode(Text(0, "", 1, "\udc80"))).text == "?"
 
 
-def test_more_words_than_are_remembered_still_come_back() -> None:
+def test_more_strings_than_are_cached_are_decoded() -> None:
     codec = Codec(Text)
     for number in range(10_000):
         event = Text(number, "s", 6, f"line {number}")

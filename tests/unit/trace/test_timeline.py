@@ -100,7 +100,7 @@ def test_a_killed_writer_leaves_what_the_format_calls_an_open_array(tmp_path: Pa
     writer.close()
 
 
-def test_a_folder_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
+def test_a_missing_folder_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot write"):
         TimelineWriter(tmp_path / "none" / "t")
 

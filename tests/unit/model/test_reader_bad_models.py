@@ -139,7 +139,7 @@ SPOILT = {
         "platform.processors.ground.cores",
         ["intel-i5-3470 has 4 cores, not 64"],
     ),
-    "carried by nobody": (
+    "carried by an unknown vehicle": (
         ("carried_by: drone_1", "carried_by: drone_9"),
         "drone_9",
         "platform.processors.onboard.carried_by",
@@ -319,6 +319,39 @@ SPOILT = {
         "environment.faults.f.kind",
         ["no kind of fault named 'meteor'", "barometer-stuck, battery-cell-dead"],
     ),
+    "fault with an argument of another kind": (
+        ("  workload:", "  faults: {f: {kind: gps-lost, vehicle: drone_1, at: 5 s, motor: 2}}\n  workload:"),
+        "gps-lost",
+        "environment.faults.f.motor",
+        ["unknown key; valid here: at, duration, kind or vehicle"],
+    ),
+    "fault with an argument out of range": (
+        (
+            "  workload:",
+            "  faults: {f: {kind: motor-dead, vehicle: drone_1, at: 5 s, motor: 5}}\n  workload:",
+        ),
+        "motor-dead",
+        "environment.faults.f.motor",
+        ["5 is too much: at most 4"],
+    ),
+    "fault of an unknown computer": (
+        ("  workload:", "  faults: {f: {kind: computer-stopped, processor: bord, at: 5 s}}\n  workload:"),
+        "computer-stopped",
+        "environment.faults.f.processor",
+        ["no processor named 'bord'", "ground or onboard"],
+    ),
+    "a motor of a rover": (
+        ("  workload:", "  faults: {f: {kind: motor-dead, vehicle: rover_1, at: 5 s}}\n  workload:"),
+        "motor-dead",
+        "environment.faults.f.vehicle",
+        ["no multirotor named 'rover_1'", "there is drone_1"],
+    ),
+    "a fault without a time": (
+        ("  workload:", "  faults: {f: {kind: wind}}\n  workload:"),
+        "{kind: wind}",
+        "environment.faults.f.at",
+        ["this key is missing"],
+    ),
     "unknown observable": (
         ("drone_1.landing_offset", "drone_1.landing_ofset"),
         "landing_ofset",
@@ -396,7 +429,7 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("case", SPOILT, ids=lambda case: case.replace(" ", "-"))
-def test_what_is_wrong_is_said_with_its_line(workshop, case):
+def test_a_message_names_line_path_and_remedy(workshop, case):
     (old, new), blamed, path, pieces = SPOILT[case]
     workshop.change(old, new, "model.yaml" if old in workshop.file.read_text() else "city.yaml")
     file = "model.yaml" if blamed in workshop.file.read_text() else "city.yaml"
@@ -409,7 +442,7 @@ def test_what_is_wrong_is_said_with_its_line(workshop, case):
     assert any(all(piece in error for piece in pieces) for error in blaming), caught.value
 
 
-def test_several_things_are_told_at_once_in_the_order_of_the_file(workshop):
+def test_several_problems_are_reported_at_once_in_the_order_of_the_file(workshop):
     workshop.change("routes: planner.paths", "routes: planer.paths").change("max: 30 cm", "max: 30 s")
     workshop.change("autopilot: ardupilot, at: store", "autopilot: px5, at: store")
     with pytest.raises(CollectedModelError, match="3 things are wrong with this model") as caught:
@@ -456,7 +489,7 @@ def test_a_model_without_an_allocation(workshop):
         workshop.load()
 
 
-def test_two_carried_computers_need_a_word(workshop):
+def test_two_carried_computers_need_an_allocation(workshop):
     workshop.change(
         "  networks:\n",
         "    second: {is: rpi4-cortex-a72, frequency: 1 GHz, carried_by: drone_1}\n  networks:\n",
@@ -498,7 +531,7 @@ def test_a_bomb_of_aliases_is_refused(workshop):
         workshop.load()
 
 
-def test_a_file_that_is_not_there(workshop):
+def test_a_missing_file(workshop):
     with pytest.raises(
         ModelError, match=r"there is no file '.*modle.yaml'; in that folder there is city.yaml, model.yaml"
     ):

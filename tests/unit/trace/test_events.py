@@ -19,7 +19,7 @@ class TextsOnly:
         return self.received.append if kind is Text else None
 
 
-def test_everybody_is_told_in_turn() -> None:
+def test_listeners_receive_events_in_turn() -> None:
     received: list[tuple[str, Event]] = []
     stream = Stream()
     stream.tap(lambda event: received.append(("first", event)))

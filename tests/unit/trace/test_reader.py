@@ -114,7 +114,7 @@ def test_one_may_read_some_kinds_only(tmp_path: Path) -> None:
         assert reading.complete
 
 
-def test_two_publishers_of_one_topic_are_told_apart(tmp_path: Path) -> None:
+def test_two_publishers_of_one_topic_are_distinguished(tmp_path: Path) -> None:
     path = tmp_path / "trace.mcap"
     writer = McapWriter(path, RunSetup())
     events = tuple(
@@ -158,7 +158,7 @@ def test_events_of_a_channel_that_was_introduced_in_a_damaged_part_are_missing(t
         (b"\x89MCAP0\r\n", "does not contain the set-up of its run"),
     ],
 )
-def test_what_is_no_trace_is_refused(tmp_path: Path, content: bytes, says: str) -> None:
+def test_other_files_are_refused(tmp_path: Path, content: bytes, says: str) -> None:
     path = tmp_path / "trace.mcap"
     path.write_bytes(content)
     with pytest.raises(UsageError, match=says):
@@ -170,7 +170,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         read(tmp_path / "none.mcap")
 
 
-def test_a_folder_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
+def test_a_missing_folder_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot write"):
         McapWriter(tmp_path / "none" / "trace.mcap", RunSetup())
 
