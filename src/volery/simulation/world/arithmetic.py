@@ -142,6 +142,8 @@ def clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
+# --- noise ---
+
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 _STREAM = np.uint64(0xD1342543DE82EF95)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

@@ -93,6 +93,8 @@ from volery.simulation.world.state_layout import (
     Array,
 )
 
+# --- battery ---
+
 CELL_FULL_VOLTS = 4.2
 
 
@@ -129,6 +131,8 @@ def battery_current(open_volts: float, resistance: float, power: float) -> float
         return 0.5 * open_volts / resistance
     return 2.0 * power / (open_volts + sqrt(room))
 
+
+# --- multirotor ---
 
 _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
@@ -323,8 +327,12 @@ def total_thrust(row: Array) -> float:
     return thrust
 
 
+# --- rover ---
+
 S_STEER = S_ROTORS
+"""Steering angle [rad]; skid-steered: turn rate [rad/s]."""
 S_SPEED = S_ROTORS + 1
+"""Forward speed of the wheels [m/s]."""
 _STANDING = 0.001  # [m/s] below which rolling resistance has no sign
 
 

@@ -28,6 +28,8 @@ from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.arithmetic import exponential, gaussian, logarithm, sine_cosine
 from volery.simulation.world.state_layout import P_GUST_DECAY, P_GUST_GAIN, S_GUST, U_GUST, Array
 
+# --- atmosphere ---
+
 _SEA_LEVEL_PA = 101325.0
 _SEA_LEVEL_K = 288.15
 _LAPSE = 0.0065  # [K/m]
@@ -46,6 +48,8 @@ def altitude_at(pressure: float) -> float:
     """Return the height above mean sea level [m] at a pressure [Pa]: the inverse of ``pressure_at``."""
     return _SEA_LEVEL_K / _LAPSE * (1.0 - exponential(logarithm(pressure / _SEA_LEVEL_PA) / _EXPONENT))
 
+
+# --- magnetic field ---
 
 _G_H = {
     (1, 0): (-29404.8, 0.0),
@@ -108,6 +112,8 @@ def magnetic_field(frame: LocalFrame) -> Vector:
         down -= (degree + 1) * along * value
     return north * _GAUSS, east * _GAUSS, down * _GAUSS
 
+
+# --- terrain ---
 
 _HALF_CURVATURE = 0.5 / 6_371_008.8  # of the earth's mean radius (IUGG) [1/m]
 
@@ -184,6 +190,8 @@ def ground_height(heights: Array, grid: Array, east: float, north: float) -> flo
         return level
     return _relief(heights, grid, east, north) - drop
 
+
+# --- wind ---
 
 GUST_EVERY = 10  # steps: 50 Hz
 _STREAM = 100

@@ -36,12 +36,27 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     K_YAW_SPEED,
     OFF,
 )
-from volery.simulation.autopilots.flight_stack.guidance import approach
+from volery.simulation.autopilots.flight_stack.guidance import GUIDE_S, approach
 from volery.simulation.world.arithmetic import clip
 from volery.simulation.world.state_layout import P_ROTOR_SPIN, P_ROTOR_X, P_ROTOR_Y, STEP_S, Array
 
-_PERIOD = 0.01  # [s]
 _SURE = 1.0  # [s]
+_ATTITUDE_GAIN = 4.5  # [1/s]
+_YAW_GAIN = 4.0  # [1/s]
+_TILT_BRAKE = 19.2  # [rad/s^2]: 1100 degrees
+_YAW_BRAKE = 4.7  # [rad/s^2]: 270 degrees
+_TOP_RATE = 3.84  # [rad/s]: 220 degrees
+_P = (0.11, 0.11, 0.5)
+_I = (0.11, 0.11, 0.05)
+_D = (0.0022, 0.0022, 0.0)
+_I_MOST = 0.25
+_SLOPE_FILTER = 0.2  # share of a new sample: 20 Hz
+_SPIN_ARM = 0.10
+_SPIN_MIN = 0.15
+_SPIN_MAX = 0.95
+_EXPO = 0.65
+_SPOOL_TIME = 0.5  # [s]
+_YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
 @njit(cache=False)
@@ -62,29 +77,11 @@ def detect_landing(row: Array, control: int) -> None:
     quiet = motion < 1.0 and abs(row[K_VELOCITY + 2]) < 1.0
     low = row[K_AT_LOWER_LIMIT] > 0.5 or row[K_THROTTLE] < 0.3 * row[K_HOVER_THROTTLE]
     if quiet and low:
-        row[K_LANDED_TIME] += _PERIOD
+        row[K_LANDED_TIME] += GUIDE_S
         if row[K_LANDED_TIME] >= _SURE:
             row[K_LANDED] = 1.0
     else:
         row[K_LANDED_TIME] = 0.0
-
-
-_ATTITUDE_GAIN = 4.5  # [1/s]
-_YAW_GAIN = 4.0  # [1/s]
-_TILT_BRAKE = 19.2  # [rad/s^2]: 1100 degrees
-_YAW_BRAKE = 4.7  # [rad/s^2]: 270 degrees
-_TOP_RATE = 3.84  # [rad/s]: 220 degrees
-_P = (0.11, 0.11, 0.5)
-_I = (0.11, 0.11, 0.05)
-_D = (0.0022, 0.0022, 0.0)
-_I_MOST = 0.25
-_SLOPE_FILTER = 0.2  # share of a new sample: 20 Hz
-_SPIN_ARM = 0.10
-_SPIN_MIN = 0.15
-_SPIN_MAX = 0.95
-_EXPO = 0.65
-_SPOOL_TIME = 0.5  # [s]
-_YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
 @njit(cache=False)

@@ -65,6 +65,8 @@ from volery.simulation.world.state_layout import (
 )
 from volery.simulation.world.world import STEP, Truth, World
 
+__all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
+
 _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 
 
@@ -116,9 +118,6 @@ def _compose(sources: str) -> Advance:
 
 advance_flights = _compose(digest_of([*world_sources(), *Path(__file__).parent.glob("*.py")]))
 """Advance each body to its goal step under the set-points in its row."""
-
-
-__all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +264,7 @@ class Flight:
         self._world.set_input(self._body, U_GPS_BLOCKED, float(blocked))
 
     def drift_gps(self, north: float, east: float) -> None:
-        """Fault: let the position that the receiver reports drift from now on.
+        """Inject or clear a fault: the position that the receiver reports drifts from now on.
 
         Args:
             north: Speed of the drift to the north [m/s]; 0 for both ends the drift and its offset.
@@ -276,7 +275,7 @@ class Flight:
         )
 
     def short_cells(self, cells: int) -> None:
-        """Fault: `cells` of the battery give no voltage (0: all do again). One cell always stays alive."""
+        """Inject or clear a fault: *cells* of the battery give no voltage; at least one always does."""
         self._world.set_input(self._body, P_CELLS, float(max(1, self.spec.battery.cells - cells)))
 
     def block_barometer(self, blocked: bool = True) -> None:

@@ -62,6 +62,25 @@ from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, 
 from volery.simulation.world.dynamics import write_quaternion
 from volery.simulation.world.state_layout import Array
 
+GUIDE_EVERY = 5  # grid steps
+GUIDE_S = 0.01  # guidance period [s]
+_GRAVITY = 9.80665
+_POSITION_GAIN = 1.0  # PSC_POSXY_P, PSC_POSZ_P
+_VELOCITY_GAIN = 2.0  # PSC_VELXY_P
+_VELOCITY_INTEGRAL = 1.0  # PSC_VELXY_I
+_CLIMB_GAIN = 5.0  # PSC_VELZ_P
+_CLIMB_INTEGRAL = 1.5
+_SHAPING_GAIN = 2.5  # [1/s] of target speed
+_BRAKE_SHARE = 0.5  # share of the acceleration limit with which a height is approached
+_HORIZONTAL_BRAKE_SHARE = 0.39  # the same for a horizontal point
+_LEASH = 4.0  # [m] largest horizontal distance of target and vehicle: in wind the target waits
+_HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
+_SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
+_SLEW_BRAKE = 1.6  # [rad/s^2]
+_TC = 0.15  # [s] ATC_INPUT_TC
+_LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
+_MAX_LIFT = 2.2  # in multiples of gravity
+
 
 @njit(cache=False)
 def approach(error: float, gain: float, brake: float) -> float:
@@ -99,26 +118,6 @@ def shorten(x: float, y: float, most: float) -> tuple[float, float]:
         return x, y
     scale = most / length
     return x * scale, y * scale
-
-
-GUIDE_EVERY = 5  # steps
-GUIDE_S = 0.01
-_GRAVITY = 9.80665
-_POSITION_GAIN = 1.0  # PSC_POSXY_P, PSC_POSZ_P
-_VELOCITY_GAIN = 2.0  # PSC_VELXY_P
-_VELOCITY_INTEGRAL = 1.0  # PSC_VELXY_I
-_CLIMB_GAIN = 5.0  # PSC_VELZ_P
-_CLIMB_INTEGRAL = 1.5
-_SHAPING_GAIN = 2.5  # [1/s] of target speed
-_BRAKE_SHARE = 0.5  # share of the acceleration limit with which a height is approached
-_HORIZONTAL_BRAKE_SHARE = 0.39  # the same for a horizontal point
-_LEASH = 4.0  # [m] largest horizontal distance of target and vehicle: in wind the target waits
-_HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
-_SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
-_SLEW_BRAKE = 1.6  # [rad/s^2]
-_TC = 0.15  # [s] ATC_INPUT_TC
-_LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
-_MAX_LIFT = 2.2  # in multiples of gravity
 
 
 @njit(cache=False)

@@ -32,7 +32,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     OFF,
     STEER,
 )
-from volery.simulation.autopilots.flight_stack.guidance import approach, ramp
+from volery.simulation.autopilots.flight_stack.guidance import GUIDE_S, approach, ramp
 from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, wrap_angle
 from volery.simulation.world.state_layout import (
     P_MAX_SPEED,
@@ -43,7 +43,6 @@ from volery.simulation.world.state_layout import (
     Array,
 )
 
-_PERIOD = 0.01  # [s]
 _TURN_GAIN = 1.5  # [1/s]
 _SPEED_GAIN = 0.2  # ATC_SPEED_P [1/(m/s)]
 _SPEED_INTEGRAL = 0.2  # ATC_SPEED_I
@@ -83,7 +82,7 @@ def _throttle_for(row: Array, target: float) -> float:
     if target == 0.0 and abs(miss) < 0.05:
         row[K_SPEED_INTEGRAL] = 0.0
         return 0.0
-    grown = row[K_SPEED_INTEGRAL] + _SPEED_INTEGRAL * miss * _PERIOD
+    grown = row[K_SPEED_INTEGRAL] + _SPEED_INTEGRAL * miss * GUIDE_S
     row[K_SPEED_INTEGRAL] = clip(grown, -0.3, 0.3)
     return clip(target / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
 
@@ -132,7 +131,7 @@ def guide_rover(row: Array) -> None:
         row[K_MOTORS + 1] = clip(row[C_THROTTLE], -1.0, 1.0)
     else:
         speed, rate = _along(row) if control == DRIVE else _to_point(row)
-        row[K_TARGET_VELOCITY] = ramp(row[K_TARGET_VELOCITY], speed, row[C_ACCEL] * _PERIOD)
+        row[K_TARGET_VELOCITY] = ramp(row[K_TARGET_VELOCITY], speed, row[C_ACCEL] * GUIDE_S)
         target = row[K_TARGET_VELOCITY]
         row[K_MOTORS] = _steer_for(row, rate, target)
         row[K_MOTORS + 1] = _throttle_for(row, target)

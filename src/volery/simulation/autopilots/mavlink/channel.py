@@ -13,6 +13,9 @@ from volery.links.mavlink_conventions import MessageStreams
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.state_groups import NEVER
 
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+
 WAITING = 4
 """Number of texts that wait for a ground station; older ones are lost."""
 
@@ -81,10 +84,6 @@ class StatusTextQueue:
     def _on_free(self) -> None:
         self._due = False
         self._flush()
-
-
-AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
 
 
 class MavlinkChannel:

@@ -12,6 +12,11 @@ from typing import Any
 from volery.base.time import MS, US
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
+Fields = dict[str, Any]
+
+EPOCH_US = 1_767_225_600_000_000
+"""Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
+
 LARGEST = 1e9
 FARTHEST = 1e6
 """Largest distance of a point that is accepted [m]."""
@@ -35,12 +40,6 @@ def to_int16(value: float) -> int:
 def to_uint16(value: float) -> int:
     """Return the nearest unsigned 16-bit integer."""
     return min(65_535, max(0, round(value)))
-
-
-Fields = dict[str, Any]
-
-EPOCH_US = 1_767_225_600_000_000
-"""Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
 
 
 def boot_ms(vehicle: Vehicle) -> int:

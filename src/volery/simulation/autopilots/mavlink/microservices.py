@@ -31,6 +31,8 @@ from volery.simulation.autopilots.mavlink.message_fields import finite
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
+# --- commands ---
+
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
 REQUEST_CAPABILITIES = 520
 
@@ -116,6 +118,8 @@ class CommandService:
         return kind.name if kind is not None and kind.name in self._firmware.telemetry.messages else None
 
 
+# --- parameters ---
+
 UNSOLICITED = 65535
 """Index of a PARAM_VALUE outside of a list."""
 
@@ -199,6 +203,8 @@ class ParameterService:
         if fields is not None:
             channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
 
+
+# --- missions ---
 
 MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE, CANCELLED = (
     0,
