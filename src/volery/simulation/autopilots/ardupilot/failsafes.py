@@ -149,7 +149,7 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str
         vehicle: The vehicle.
         what: Name of the failsafe in the status text.
         modes: Modes that are tried in order.
-        keeps: Status text of the option that changes nothing, or empty.
+        exception: Status text of the option that changes nothing, or empty.
     """
     manoeuvre = vehicle.manoeuvre
     mission_started = isinstance(manoeuvre, FlyMission) and manoeuvre.started

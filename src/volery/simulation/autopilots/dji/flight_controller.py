@@ -95,7 +95,7 @@ LANDING_MODES = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LAND
 class FlightController:
     """State that only this firmware keeps about a vehicle (``Vehicle.firmware_state``).
 
-    ``has_authority`` tells whether an onboard program has the SDK authority.
+    ``has_authority`` is true while an onboard program has the SDK authority.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
