@@ -65,7 +65,7 @@ def test_a_siege_ends_as_it_began(driver: str, count: int) -> None:
     finally:
         tracemalloc.stop()
     assert siege.fed == count
-    assert siege.heard > 0.5 * count
+    assert siege.received > 0.5 * count
     assert sum(siege.ended.values()) > 100  # its program was not stuck
     assert growth.early > 0
     assert growth.late - growth.early < MOST_GROWTH

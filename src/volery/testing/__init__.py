@@ -1,4 +1,4 @@
-"""Conformance suites and fakes as library code: for us, and for whoever writes a driver of his own."""
+"""Conformance suites, fault trials and fuzzing, for this project and for authors of drivers."""
 
 from __future__ import annotations
 

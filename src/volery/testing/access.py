@@ -1,7 +1,4 @@
-"""A link with a hand on it: what passes, in either direction, and who else is heard on it.
-
-How programs reach a simulated vehicle: each on a link of its own, or each as a node of one graph.
-"""
+"""Access to a vehicle under test, on links or graph nodes whose directions can be interrupted."""
 
 from __future__ import annotations
 
@@ -32,46 +29,46 @@ from volery.vehicles.driver import Driver, drivers
 
 
 class ControlledLink:
-    """Stands between a driver and its link, simulated or real. ``hears`` and ``speaks`` say what passes."""
+    """A link of a driver that can be interrupted; ``receives`` and ``sends`` enable its directions."""
 
     def __init__(self, link: Link) -> None:
         self.name = link.name
-        self.hears = True
-        self.speaks = True
+        self.receives = True
+        self.sends = True
         self._link = link
         self._others: list[Link] = []
         self._receiver: Receiver | None = None
         link.receive(self._arrived)
 
-    def cut(self) -> None:
-        """Nothing passes any more, in either direction."""
-        self.hears = self.speaks = False
+    def drop(self) -> None:
+        """Drop all frames in both directions."""
+        self.receives = self.sends = False
 
-    def mend(self) -> None:
-        """All passes again."""
-        self.hears = self.speaks = True
+    def restore(self) -> None:
+        """Restore both directions."""
+        self.receives = self.sends = True
 
     def share(self, other: Link) -> None:
-        """The same air: what is said goes to *other*, too, and what *other* says is heard here."""
+        """Connect `other` to the same medium: its frames arrive here, and frames sent here go to it, too."""
         self._others.append(other)
         other.receive(self._arrived)
 
     def send(self, frame: Frame) -> None:
-        """Send, unless it is cut."""
-        if self.speaks:
+        """Send a frame unless the direction is interrupted."""
+        if self.sends:
             for link in (self._link, *self._others):
                 link.send(frame)
 
     def receive(self, receiver: Receiver) -> None:
-        """From now on hand every frame that arrives to *receiver*, unless it is cut."""
+        """Pass every frame that arrives to `receiver` unless the direction is interrupted."""
         self._receiver = receiver
 
     def _arrived(self, frame: Frame) -> None:
-        if self.hears and self._receiver is not None:
+        if self.receives and self._receiver is not None:
             self._receiver(frame)
 
     def problem(self) -> str:
-        """What is wrong with the wire below."""
+        """Return the problem of the link below, empty for none."""
         return self._link.problem()
 
     @property
@@ -86,40 +83,40 @@ class ControlledLink:
 
 
 class LinkControl(Protocol):
-    """A hand on the wire of the first program: what passes, in either direction."""
+    """Control over the wire of the first program, in either direction."""
 
-    hears: bool
-    speaks: bool
+    receives: bool
+    sends: bool
 
-    def cut(self) -> None:
-        """Nothing passes any more."""
+    def drop(self) -> None:
+        """Drop everything."""
 
-    def mend(self) -> None:
-        """All passes again."""
+    def restore(self) -> None:
+        """Restore both directions."""
 
 
 class Access(ABC):
-    """Opens drivers. ``hand`` is on the wire of the first; ``link`` is that wire, where there is one."""
+    """Opens drivers. ``control`` is that of the first driver's wire, ``link`` the wire if it is a link."""
 
-    hand: LinkControl
+    control: LinkControl
     link: Link | None = None
     protocol = ""
 
     @abstractmethod
     def first(self) -> Driver:
-        """That of the program under test."""
+        """Return the driver of the program under test."""
 
     @abstractmethod
     def set_faults(self, faults: WireFaults) -> None:
-        """From now on this happens to what passes. Raises ``NotPossibleError`` where nothing can."""
+        """Apply faults to the wire from now on; raise ``NotPossibleError`` if it supports none."""
 
     @abstractmethod
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
-        """That of another program, beside it; and its link, where there are links."""
+        """Return the driver of another program, and its link if there is one."""
 
 
 class ByLink(Access):
-    """Over links; what *sharing* says and hears is on the first program's link, too."""
+    """Access over links; the vehicle `sharing` is on the first program's link, too."""
 
     def __init__(
         self, kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
@@ -129,21 +126,21 @@ class ByLink(Access):
         self._factory = drivers.load(wanted.vehicle.autopilot)
         self.protocol = self._factory.codec.name
         self.link = fleet.link_for(wanted)
-        self._tap = self.hand = ControlledLink(self.link)
+        self._tap = self.control = ControlledLink(self.link)
         if sharing:
             self._tap.share(fleet.link(sharing))
 
     def first(self) -> Driver:
-        """Through the hand."""
+        """Return the driver of the program under test, on the controlled link."""
         return self._open(self._tap, self._vehicle, {})
 
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
-        """On a new link."""
+        """Return the driver of another program, on a new link."""
         link = self._airfield.link(vehicle)
         return self._open(link, vehicle, options), link
 
     def set_faults(self, faults: WireFaults) -> None:
-        """On a link through bytes."""
+        """Return a driver on a link that encodes and decodes frames."""
         if not isinstance(self.link, FaultyLink):
             raise NotPossibleError("nothing can happen to values; add wire=bytes to the address")
         self.link.set_faults(faults)
@@ -155,28 +152,28 @@ class ByLink(Access):
 
 
 class _HandOnNode(GraphWire):
-    """The wire of a graph, with a hand on the part of it that leads to the node called ``held``."""
+    """The wire of a graph, with control over the messages from and to the node called ``held``."""
 
     def __init__(self, kernel: Kernel, random: Random, faults: WireFaults | None) -> None:
         super().__init__(kernel, random, faults)
-        self.hears = self.speaks = True
+        self.receives = self.sends = True
         self.held = ""
 
-    def cut(self) -> None:
-        """What is sent from now on is lost."""
-        self.hears = self.speaks = False
+    def drop(self) -> None:
+        """Drop everything that is sent from now on."""
+        self.receives = self.sends = False
 
-    def mend(self) -> None:
-        """All passes again."""
-        self.hears = self.speaks = True
+    def restore(self) -> None:
+        """Restore both directions."""
+        self.receives = self.sends = True
 
     def route(self, sender: NodeId, receiver: NodeId) -> Route:
-        """See ``GraphWire``; what the hand does not let pass is lost."""
+        """Return the route between two nodes, see ``GraphWire``; dropped messages count as lost."""
         whole = super().route(sender, receiver)
 
         def way(size: int, reliable: bool, deliver: Action, lost: Action) -> None:
-            unheard = receiver.name == self.held and not self.hears
-            if unheard or (sender.name == self.held and not self.speaks):
+            unheard = receiver.name == self.held and not self.receives
+            if unheard or (sender.name == self.held and not self.sends):
                 self._kernel.call_at(self._kernel.now() + GIVE_UP_AFTER, lost)
             else:
                 whole(size, reliable, deliver, lost)
@@ -185,7 +182,7 @@ class _HandOnNode(GraphWire):
 
 
 class ByGraph(Access):
-    """As nodes of one graph that holds the vehicles and their commanders alone."""
+    """Access as nodes of a graph that has only the vehicles and their commanders."""
 
     protocol = "a graph"
 
@@ -195,7 +192,7 @@ class ByGraph(Access):
         self._kernel = kernel
         self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
         random = stream(seed, f"wire/{self._vehicle}")
-        self._wire = self.hand = _HandOnNode(kernel, random, wanted.faults)
+        self._wire = self.control = _HandOnNode(kernel, random, wanted.faults)
         self._graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
         self._numbers = count(1)
         for vehicle in filter(None, (self._vehicle, sharing)):
@@ -208,17 +205,17 @@ class ByGraph(Access):
             )
 
     def set_faults(self, faults: WireFaults) -> None:
-        """From now on this happens to what passes, in both directions."""
+        """Apply faults to both directions from now on."""
         self._wire.set_faults(faults)
 
     def first(self) -> Driver:
-        """With the hand on its node."""
+        """Return the driver of the program under test, on the controlled node."""
         driver, name = self._commander(self._vehicle, {})
         self._wire.held = name
         return driver
 
     def another(self, vehicle: str, **options: str) -> tuple[Driver, Link | None]:
-        """As another node."""
+        """Return the driver of another program, on another node."""
         return self._commander(vehicle, options)[0], None
 
     def _commander(self, vehicle: str, options: dict[str, str]) -> tuple[Driver, str]:
@@ -232,7 +229,7 @@ class ByGraph(Access):
 def access_to(
     kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int, sharing: str = ""
 ) -> Access:
-    """The way to a vehicle that its autopilot and driver have in common: links first."""
+    """Return the access that autopilot and driver have in common, links before graphs."""
     if reached_over_links(fleet, wanted):
         return ByLink(kernel, fleet, wanted, seed, sharing)
     return ByGraph(kernel, fleet, wanted, seed, sharing)

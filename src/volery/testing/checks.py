@@ -1,4 +1,4 @@
-"""What a conformance check is: a small function with a name, a demand in words, and what it takes to run it.
+"""Conformance checks: functions with a name, a stated demand, and the circumstances that they need.
 
 ```python
 @check(needs=(Capability.TAKEOFF,), flies=True)
@@ -8,9 +8,8 @@ def takeoff(stage: Stage) -> None:
     demand(stage.drone.flying, "it returned on the ground")
 ```
 
-A check that finds fault says so by ``demand``; any other error that leaves it is a fault, too. One whose
-circumstances cannot be had here raises ``NotPossibleError``. What it returns, if anything, is noted beside
-"passed".
+A check reports a fault with ``demand``; every other exception is a fault, too. A check whose circumstances
+are not available raises ``NotPossibleError``. Its return value, if any, is reported with "passed".
 """
 
 from __future__ import annotations
@@ -28,19 +27,28 @@ Body = Callable[[Any], str | None]
 
 
 class CheckFailedError(Exception):
-    """What was demanded was not so."""
+    """A demand was not met."""
 
 
 class NotPossibleError(Exception):
-    """The circumstances of this check cannot be had on this link or with this vehicle."""
+    """The circumstances of a check are not available on this link or with this vehicle."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check. ``flies``: it arms or moves the vehicle. ``kind`` is drone, rover, or empty for both.
+    """One check.
 
-    ``lets_fall``: it ends with a vehicle on its back, and is done in simulation only. ``cold``: on one that
-    was switched on just now. ``neighbour``: a second vehicle is heard on the same link.
+    Attributes:
+        name: Name in reports.
+        group: Group that it is reported and selected with.
+        demands: What must hold.
+        body: Runs the check on a stage.
+        needs: Capabilities that the driver must have.
+        flies: It arms or moves the vehicle.
+        kind: ``drone``, ``rover``, or empty for both.
+        lets_fall: It ends with an overturned vehicle, so it runs in simulation only.
+        cold: It needs a vehicle that has just been switched on.
+        neighbour: It needs a second vehicle on the same link.
     """
 
     name: str
@@ -56,7 +64,7 @@ class Check:
 
 
 CHECKS: list[Check] = []
-"""All that have been registered; within a group in the order in which they are run."""
+"""All registered checks; within a group in the order of execution."""
 
 
 def group_of(module: str) -> str:
@@ -73,12 +81,12 @@ def check(
     cold: bool = False,
     neighbour: bool = False,
 ) -> Callable[[Body], Body]:
-    """Make a check of the function below: its name is the check's, its docstring what it demands."""
+    """Register the decorated function as a check: its name is the check's, its docstring the demand."""
 
     def register(body: Body) -> Body:
         name = body.__name__.replace("_", "-")
         group = group_of(body.__module__)
-        demands = " ".join((body.__doc__ or "").split())
+        demands = " ".join((body.__doc__ or "").split()).removeprefix("Check that ")
         CHECKS.append(Check(name, group, demands, body, needs, flies, kind, lets_fall, cold, neighbour))
         return body
 
@@ -86,25 +94,25 @@ def check(
 
 
 def demand(holds: object, otherwise: str) -> None:
-    """Raise ``CheckFailedError`` saying what was seen *otherwise*, unless it *holds*."""
+    """Raise ``CheckFailedError`` with the text `otherwise` unless `holds` is true."""
     if not holds:
         raise CheckFailedError(otherwise)
 
 
 class Caught:
-    """What ``raising`` has caught."""
+    """The exception that ``raising`` has caught."""
 
     error: VoleryError
 
     @property
     def text(self) -> str:
-        """Its words."""
+        """Text of the exception."""
         return str(self.error)
 
 
 @contextmanager
 def raising(*kinds: type[VoleryError], naming: str) -> Iterator[Caught]:
-    """Demand that the block raises one of *kinds*, and that its message says *naming*."""
+    """Demand that the block raises one of `kinds` with a message that contains `naming`."""
     expected = " or ".join(kind.__name__ for kind in kinds)
     caught = Caught()
     try:

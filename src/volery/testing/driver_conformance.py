@@ -1,4 +1,4 @@
-"""``conformance``: named checks of what a driver and its autopilot must do, over any address.
+"""Conformance of drivers: named checks of what a driver and its autopilot must do, over any address.
 
 ```python
 from volery.testing import conformance
@@ -7,8 +7,8 @@ report = conformance("sim:ardupilot")
 assert report.conforms, report.faults
 ```
 
-Whoever writes a driver of his own runs the same checks over it: register it with an entry point, or with
-``volery.vehicles.drivers.add``, and give its address.
+Authors of drivers run the same checks: register the driver with an entry point, or with
+``volery.vehicles.drivers.add``, and pass its address.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from volery.vehicles.address import Address, parse
 
 
 class Outcome(Enum):
-    """How a check ended."""
+    """Outcome of a check."""
 
     PASSED = "passed"
     LACKING = "declared missing"
@@ -39,8 +39,15 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Result:
-    """One check's. ``detail`` says why it failed or was not possible, or what was noted; ``seconds`` is how
-    long it took on the vehicle's clock.
+    """Result of one check.
+
+    Attributes:
+        check: The check's name.
+        group: The check's group.
+        demands: What must hold.
+        outcome: How it ended.
+        detail: Why it failed or was not possible, or what it returned.
+        seconds: Duration on the vehicle's clock, s.
     """
 
     check: str
@@ -52,12 +59,12 @@ class Result:
 
 
 Show = Callable[[Check, Result | None], None]
-"""Told of each check as it begins (``None``) and as it ends."""
+"""Called for each check when it begins (None) and when it ends."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What was found at an address."""
+    """Results of all checks at an address."""
 
     url: str
     seed: int
@@ -65,16 +72,16 @@ class Report:
 
     @property
     def faults(self) -> tuple[Result, ...]:
-        """Those that failed."""
+        """Results of the checks that failed."""
         return tuple(one for one in self.results if one.outcome is Outcome.FAILED)
 
     @property
     def conforms(self) -> bool:
-        """No check failed."""
+        """Whether no check failed."""
         return not self.faults
 
     def as_data(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the report as values for JSON."""
         results = [{**asdict(one), "outcome": one.outcome.value} for one in self.results]
         return {"url": self.url, "seed": self.seed, "conforms": self.conforms, "results": results}
 
@@ -89,28 +96,33 @@ def conformance(
     second: str = "",
     show: Show | None = None,
 ) -> Report:
-    """Run the checks over the vehicle at *url* and report.
+    """Run the checks on a vehicle and return their results.
 
-    *only* these checks, or groups of checks. *kind* is drone or rover. A simulated vehicle is a new one for
-    every check and flies without being asked; a real one flies only with *fly*, and one that flies must have
-    room: 60 m around home and 30 m above it. *second* is another link to the same real vehicle, for checks
-    that need another commander.
+    Args:
+        url: Address of the vehicle. A simulated vehicle is new for every check.
+        only: Names of checks or groups to run; empty for all.
+        kind: ``drone`` or ``rover``.
+        fly: Let a real vehicle arm and fly, within 60 m around home and 30 m above it.
+        second: Address of another link to the same real vehicle, for checks that need another commander.
+        seed: Seed of the simulation.
+        show: Called for each check when it begins and when it ends.
 
-    Raises ``UsageError`` for names or addresses that make no sense, ``LinkSilent`` if a real vehicle is not
-    heard.
+    Raises:
+        UsageError: a name or an address is not valid.
+        LinkSilent: no message of a real vehicle arrives.
     """
     address = parse(url)
     wanted = chosen(only, kind)
-    told = show or _tell_nobody
-    if address.carrier == "sim":
-        results = [_simulated(one, address, kind, seed, told) for one in wanted]
+    report = show or _report_nothing
+    if address.transport == "sim":
+        results = [_simulated(one, address, kind, seed, report) for one in wanted]
     else:
-        results = _real(wanted, RealStage(address, kind_of(kind), second), fly, told)
+        results = _real(wanted, RealStage(address, kind_of(kind), second), fly, report)
     return Report(url, seed, tuple(results))
 
 
 def chosen(only: Sequence[str] = (), kind: str = "drone") -> list[Check]:
-    """The checks for a *kind* of vehicle; *only* those that are named, or whose group is."""
+    """Return the checks for a kind of vehicle, or only those whose name or group is in `only`."""
     kind_of(kind)
     fitting = sorted(
         (one for one in CHECKS if one.kind in {"", kind}), key=lambda one: GROUPS.index(one.group)
@@ -123,18 +135,18 @@ def chosen(only: Sequence[str] = (), kind: str = "drone") -> list[Check]:
     return [one for one in fitting if not only or one.name in only or one.group in only]
 
 
-def _simulated(one: Check, address: Address, kind: str, seed: int, told: Show) -> Result:
-    told(one, None)
+def _simulated(one: Check, address: Address, kind: str, seed: int, report: Show) -> Result:
+    report(one, None)
     stage = SimulatedStage(address, kind_of(kind), seed, cold=one.cold, neighbour=one.neighbour)
     try:
         result = _judged(one, stage, lambda: stage.perform(lambda: _play(one, stage)))
     finally:
         stage.close()
-    told(one, result)
+    report(one, result)
     return result
 
 
-def _real(wanted: list[Check], stage: RealStage, fly: bool, told: Show) -> list[Result]:
+def _real(wanted: list[Check], stage: RealStage, fly: bool, report: Show) -> list[Result]:
     results = []
     stage.kernel.start()
     try:
@@ -142,9 +154,9 @@ def _real(wanted: list[Check], stage: RealStage, fly: bool, told: Show) -> list[
             stage.drone.wait_connected()
             try:
                 for one in wanted:
-                    told(one, None)
+                    report(one, None)
                     results.append(_on_real(one, stage, fly))
-                    told(one, results[-1])
+                    report(one, results[-1])
             except KeyboardInterrupt:
                 with suppress(VoleryError):
                     stage.rest()
@@ -170,7 +182,7 @@ def _on_real(one: Check, stage: RealStage, fly: bool) -> Result:
 
 
 class _LackingError(Exception):
-    """It has said beforehand that it cannot."""
+    """Return whether the vehicle lacks a capability that the check needs."""
 
 
 def _play(one: Check, stage: Stage) -> str | None:
@@ -199,5 +211,5 @@ def _judged(one: Check, stage: Stage, play: Callable[[], str | None]) -> Result:
     return Result(one.name, one.group, one.demands, outcome, detail, seconds)
 
 
-def _tell_nobody(one: Check, result: Result | None) -> None:
-    """Nobody watches."""
+def _report_nothing(one: Check, result: Result | None) -> None:
+    """Report nothing."""

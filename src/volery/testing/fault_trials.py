@@ -1,13 +1,10 @@
-"""The phases of a flight in which a fault can strike, each as a small program that flies it.
+"""Fault trials: one fault in one phase of a flight, the reaction of the aircraft, and the result of the call.
 
-A program calls ``strike`` when the moment has come, then goes on as if it knew nothing. Where the fault is to
-strike during a call, it is called a moment later.
-
-Trials of faults: one fault in one phase of a flight, what the aircraft did, and what the caller saw.
-
-A trial demands of every driver and autopilot: no call hangs; it ends done or with an error of this project
-that names the vehicle; what ended done was done, by the vehicle's own truth; nothing was done twice; nobody
-else's mode was fought; and the vehicle comes down in the end, by us or by whoever has it.
+Each phase is a small program, which calls ``strike`` at the time of the fault and then continues; for a fault
+during a call, ``strike`` is scheduled a moment later. A trial demands of every driver and autopilot: no call
+hangs; it succeeds or raises an error of this project that names the vehicle; success agrees with the
+vehicle's true state; nothing is done twice; modes of other commanders are not overridden; and the vehicle
+lands in the end.
 """
 
 from __future__ import annotations
@@ -37,11 +34,11 @@ Program = Callable[[Stage, Strike], None]
 
 AT_ONCE_S = 0.01
 DURING_S = 3.0
-"""After the call began."""
+"""Time after the beginning of the call, s."""
 
 
 def ground(stage: Stage, strike: Strike) -> None:
-    """Armed on the ground; then it disarms."""
+    """Arm on the ground, strike, then disarm."""
     stage.drone.wait_ready()
     stage.drone.hold()
     stage.drone.arm()
@@ -51,28 +48,28 @@ def ground(stage: Stage, strike: Strike) -> None:
 
 
 def arming(stage: Stage, strike: Strike) -> None:
-    """As the take-off begins: while its commands are on their way."""
+    """Strike at the beginning of the take-off, while its commands are in transit."""
     stage.drone.wait_ready()
     stage.later(AT_ONCE_S, strike)
     stage.drone.takeoff(15)
 
 
 def takeoff(stage: Stage, strike: Strike) -> None:
-    """During the climb."""
+    """Strike during the climb."""
     stage.drone.wait_ready()
     stage.later(2 * DURING_S, strike)
     stage.drone.takeoff(15)
 
 
 def goto(stage: Stage, strike: Strike) -> None:
-    """On the way."""
+    """Strike during goto()."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
     stage.drone.goto(stage.at(40, 10, 12))
 
 
 def hold(stage: Stage, strike: Strike) -> None:
-    """Standing in the air while the program is busy otherwise; then it goes on."""
+    """Strike while holding position, wait, then continue with goto()."""
     stage.drone.takeoff(10)
     stage.drone.hold()
     strike()
@@ -81,7 +78,7 @@ def hold(stage: Stage, strike: Strike) -> None:
 
 
 def return_home(stage: Stage, strike: Strike) -> None:
-    """As the return begins."""
+    """Strike at the beginning of return_home()."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(20, 20, 10))
     stage.later(AT_ONCE_S, strike)
@@ -89,14 +86,14 @@ def return_home(stage: Stage, strike: Strike) -> None:
 
 
 def land(stage: Stage, strike: Strike) -> None:
-    """On the way down."""
+    """Strike during the descent."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
     stage.drone.land()
 
 
 def sticks(stage: Stage, strike: Strike) -> None:
-    """Flown by hand; then it goes on by position."""
+    """Strike during manual control, then continue with goto()."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0.0, 0.0, 0.5, 0.0)
     stage.drone.altitude_hold()
@@ -119,24 +116,24 @@ PHASES: Mapping[str, Program] = {
 
 
 LONGEST: Ns = 15 * MINUTE
-"""A call that is not over by then hangs: no time-out of these short flights is longer."""
+"""Time after which a call is taken as hanging, s; the time-outs of these short flights are shorter."""
 
 WATCHED: Ns = 100 * MS
 LOST_S = 30.0
-"""Between the death of a program and the start of the next."""
+"""Time between the death of a program and the start of the next one, s."""
 DOWN_WITHIN_S = 300.0
 
 
 @dataclass
 class Seen:
-    """What the aircraft did from the fault on: its modes in order, and how often it was armed."""
+    """The aircraft's modes in order, and how often it was armed, from the fault on."""
 
     modes: list[str] = field(default_factory=list)
     armed: list[bool] = field(default_factory=list)
     states: list[VehicleState] = field(default_factory=list)
 
     def note(self, state: VehicleState) -> None:
-        """Another look."""
+        """Sample the aircraft's state."""
         self.states.append(state)
         if not self.modes or self.modes[-1] != state.mode:
             self.modes.append(state.mode)
@@ -145,15 +142,19 @@ class Seen:
 
     @property
     def armings(self) -> int:
-        """How often it went from disarmed to armed."""
+        """Number of changes from disarmed to armed."""
         return sum(later and not earlier for earlier, later in pairwise(self.armed))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One fault in one phase. ``caller``: ``done``, or the error's name, and ``said`` its words.
+    """Result of one fault in one phase.
 
-    ``aircraft``: its modes from the fault on. ``broken`` says which demand was not met; empty if all were.
+    Attributes:
+        caller: ``done``, or the name of the error of the call.
+        said: Text of that error.
+        aircraft: Modes of the aircraft from the fault on.
+        broken: The demand that was not met; empty if all were.
     """
 
     autopilot: str
@@ -167,12 +168,12 @@ class Trial:
 
 
 def try_fault(autopilot: str, fault: str, phase: str, seed: int = 1) -> Trial:
-    """One trial of a simulated *autopilot*, through bytes where it has a wire."""
+    """Run one trial of a simulated autopilot, through encoded frames if it has a link."""
     return _Trying(autopilot, fault, phase, seed).result()
 
 
 class _Trying:
-    """A trial under way."""
+    """A trial in progress."""
 
     def __init__(self, autopilot: str, fault: str, phase: str, seed: int) -> None:
         self._names = autopilot, fault, phase
@@ -190,7 +191,7 @@ class _Trying:
         self._scope = self._stage.kernel.root.child("program")
 
     def result(self) -> Trial:
-        """Fly it and judge."""
+        """Fly the phase and check the demands."""
         stage = self._stage
         stage.kernel.every(WATCHED, self._look)
         broken = ""
@@ -233,7 +234,7 @@ class _Trying:
         except Cancelled:
             self._caller = "killed"
             raise
-        except Exception as error:  # a fault of ours: it is told as such
+        except Exception as error:  # an error of volery, reported as such
             self._caller, self._said = f"a fault of volery: {type(error).__name__}", str(error)
 
     def _strike(self) -> None:
@@ -280,7 +281,7 @@ class _Trying:
             waited += 1.0
 
     def _demand_done(self) -> None:
-        """What ended done is so, by the vehicle's own truth."""
+        """Demand that a completed operation is complete by the vehicle's true state."""
         state, phase = self._seen.states[-1], self._names[2]
         if phase == "ground":
             demand(not state.armed, "disarm() returned, and it is armed")
@@ -300,7 +301,7 @@ class _Trying:
             self._demand_not_fought()
 
     def _demand_not_fought(self) -> None:
-        """Once the other station's mode was seen in the air, ours never follows while it is armed."""
+        """Demand that no own mode follows the other station's in flight while the vehicle is armed."""
         start = self._after.modes[0]
         theirs = next(
             (mode for mode in self._after.modes[1:] if mode in self._stage.driver.landing_modes), ""

@@ -65,9 +65,9 @@ class _StageLinks:
     def cut(self, vehicle: str, active: bool) -> None:
         """See ``volery.run.assembly.faults.LinkControl``."""
         if active:
-            self.stage.tap.cut()
+            self.stage.link_control.drop()
         else:
-            self.stage.tap.mend()
+            self.stage.link_control.restore()
 
     def set_faults(self, vehicle: str, faults: WireFaults) -> None:
         """See ``volery.run.assembly.faults.LinkControl``."""
@@ -79,14 +79,14 @@ def strike(fault: Fault | None, stage: SimulatedStage) -> None:
     if fault is None:
         return
     if isinstance(fault, ProgramKilled):  # as a killed process: the link is silent
-        stage.tap.cut()
+        stage.link_control.drop()
         return
     if isinstance(fault, OtherStation):
         other = stage.other()
         if stage.driver.telemetry.flying:
-            other.lands_it()
+            other.land()
         else:
-            other.disarms_it()
+            other.disarm()
         return
     if isinstance(fault, VehicleFault):
         fault = replace(fault, vehicle=stage.name_of_vehicle)

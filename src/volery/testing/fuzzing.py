@@ -1,7 +1,7 @@
-"""Hostile bytes: frames spoiled in every way that noise, bugs or malice might, from a seeded stream.
+"""Fuzzing of drivers with mutated frames from a seeded stream, as noise, bugs or malice might produce them.
 
-Most have a right checksum nevertheless: what only noise has spoiled never gets past a parser. ``fuzz``
-hands them to a driver whose program goes on flying; nothing but errors of this project may come of it.
+Most mutated frames have a correct checksum, since parsers drop the others. ``fuzz`` passes them to a driver
+while a program flies with it; only errors of this project may be raised.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from volery.vehicles import Drone
 from volery.vehicles.driver import drivers
 
 Seal = Callable[[bytearray], bytes]
-"""Makes the checksum of a frame right again, whatever else is wrong with it."""
+"""Returns a frame with a correct checksum."""
 
 AWKWARD = (0x00, 0x01, 0x7F, 0x80, 0xFE, 0xFF, 0x99, 0xFD)
 AWKWARD_FLOATS = tuple(
     struct.pack("<f", value) for value in (float("nan"), float("inf"), float("-inf"), 3.4e38, -0.0, 1e-42)
 )
 PAYLOAD = {"MAVLink": HEADER.size, "pprzlink": 6}
-"""Where in a frame the payload begins."""
+"""Offset of the payload in a frame, by protocol."""
 ENDS = {"MAVLink": CHECKSUM.size, "pprzlink": 2}
 SENDER = {"MAVLink": 5, "pprzlink": 2}
-"""Where the sender's system id stands."""
+"""Offset of the sender's system id in a frame, by protocol."""
 
 
 def seal_mavlink(frame: bytearray) -> bytes:
-    """With the length byte and the checksum that its bytes call for."""
+    """Return the frame with a matching length byte and checksum."""
     if len(frame) < HEADER.size + CHECKSUM.size:
         return bytes(frame)
     body = frame[: -CHECKSUM.size]
@@ -50,7 +50,7 @@ def seal_mavlink(frame: bytearray) -> bytes:
 
 
 def seal_pprzlink(frame: bytearray) -> bytes:
-    """With the length byte and the checksum that its bytes call for."""
+    """Return the frame with a matching length byte and checksum."""
     body = frame[:-2]
     if len(body) < PAYLOAD["pprzlink"]:
         return bytes(frame)
@@ -62,7 +62,7 @@ SEALS: Mapping[str, Seal] = {"MAVLink": seal_mavlink, "pprzlink": seal_pprzlink}
 
 
 class Mutator:
-    """An endless stream of spoiled frames made of *frames* of one protocol (``MAVLink``, ``pprzlink``)."""
+    """An endless stream of mutations of `frames` of one protocol (``MAVLink``, ``pprzlink``)."""
 
     def __init__(self, protocol: str, frames: Sequence[bytes], random: Random) -> None:
         self._frames = [bytearray(frame) for frame in frames]
@@ -149,7 +149,7 @@ class Mutator:
         return self._seal(frame)
 
     def _another_kind(self, frame: bytearray) -> bytes:
-        """The payload of one message under the name of another."""
+        """Return the payload of one message under the id of another."""
         other = self._random.choice(self._frames)
         return self._seal(other[: self._payload] + frame[self._payload :])
 
@@ -164,23 +164,23 @@ class Mutator:
 
 
 class FuzzTarget(CodedLink):
-    """A link on which nobody listens, and everything arrives."""
+    """A link without a peer, whose incoming bytes are fed by the fuzzer."""
 
     def _transmit(self, data: bytes) -> None:
-        """Nobody is there."""
+        """Drop the bytes."""
 
 
 @dataclass
 class Siege:
-    """What came of it. ``heard`` counts whole frames; ``ended`` how each operation ended, by name."""
+    """Result of fuzzing: ``received`` counts complete frames, ``ended`` outcomes of operations by name."""
 
     fed: int = 0
-    heard: int = 0
+    received: int = 0
     ended: dict[str, int] = field(default_factory=dict)
 
 
 AT_ONCE = 20
-"""Frames between two looks at the clock: a hundred milliseconds of a busy link."""
+"""Frames per step of virtual time: 100 ms of a busy link."""
 PASSES = 100 * MS
 
 
@@ -192,10 +192,10 @@ def fuzz(
     seed: int = 1,
     after: Callable[[int], None] = lambda fed: None,
 ) -> Siege:
-    """Hand *count* frames, made of *frames*, to *driver*, while a program flies by what they say.
+    """Pass mutated frames to a driver while a program flies with it.
 
-    *after* is told how many have been fed, now and then. Any exception that is none of this project's, in the
-    parser, in the driver or in the program's calls, leaves it.
+    Exceptions that are not errors of this project, in the parser, the driver or the program's calls, are
+    raised.
     """
     kernel = VirtualKernel()
     factory = drivers.load(driver)
@@ -218,14 +218,14 @@ def fuzz(
         after(result.fed)
         if result.fed >= count:
             break
-    result.heard = link.statistics.frames
+    result.received = link.statistics.frames
     drone.close()
     kernel.close()
     return result
 
 
 def _arrive(link: FuzzTarget, data: bytes, random: Random) -> None:
-    """In portions that know nothing of frames."""
+    """Yield the bytes in portions of random size."""
     place = 0
     while place < len(data):
         size = random.randint(1, 400)
@@ -234,7 +234,7 @@ def _arrive(link: FuzzTarget, data: bytes, random: Random) -> None:
 
 
 def _fly_on(kernel: VirtualKernel, drone: Drone, result: Siege) -> None:
-    """One operation after the other, for ever; what is refused is tried again."""
+    """Run operations one after the other without end; those that fail are repeated."""
     tries: tuple[Callable[[], object], ...] = (
         lambda: drone.wait_ready(within=2.0),
         drone.arm,

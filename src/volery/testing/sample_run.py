@@ -1,8 +1,7 @@
-"""A made-up delivery, event by event: for those who build or test what reads traces.
+"""Synthetic events of a delivery, for tests of what reads traces.
 
-Nothing is simulated. Vehicles move along straight lines, components compute by the clock, parcels go from
-hand to hand; yet every kind of event occurs and every figure is plausible. The same arguments give the same
-events.
+Nothing is simulated: vehicles move along straight lines and components compute periodically. Every kind of
+event occurs and every figure is plausible. The same arguments give the same events.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ _DEADLINE = 100 * MS
 
 
 class _Leg(NamedTuple):
-    """From here a vehicle goes to (x, y, z) at *speed* m/s, then waits *rest* seconds."""
+    """A leg of a vehicle: to (x, y, z), m, at `speed` m/s, then a rest of `rest` s."""
 
     x: float
     y: float
@@ -106,7 +105,7 @@ _LAWS = (
 
 
 def sample_setup(seed: int = 7, onboard_mhz: float = 1500.0) -> RunSetup:
-    """The set-up of the made-up run."""
+    """Return the set-up of the synthetic run."""
     return RunSetup(
         system="hospital-delivery",
         fidelity="code",
@@ -142,7 +141,7 @@ def _looping(name: str, kind: str, processor: str, priority: int) -> ComponentSe
 
 
 def sample_scenery() -> Scenery:
-    """The map of the made-up run."""
+    """Return the map of the synthetic run."""
     ports = (Place("port_north", *_PORT_NORTH, "port"), Place("port_south", *_PORT_SOUTH, "port"))
     hospitals = tuple(Place(name, *where, "hospital") for name, where in _HOSPITALS.items())
     return Scenery(
@@ -169,7 +168,7 @@ def sample_scenery() -> Scenery:
 
 
 def sample_events(seed: int = 7, seconds: float = 300.0, onboard_mhz: float = 1500.0) -> Iterator[Event]:
-    """The made-up run, in the order in which it would have been told."""
+    """Yield the events of the synthetic run in the order of recording."""
     random = stream(seed, "sample run")
     journeys = {name: _journey(name) for name in _ROUTES}
     stories = sorted(_story(journeys["drone_1"]), key=_told_at)
@@ -198,7 +197,7 @@ def _told_at(event: Event) -> Ns:
 
 
 def _journey(name: str) -> list[tuple[Ns, float, float, float]]:
-    """When a vehicle is where: the corners of its way through time and space."""
+    """Return times and positions of a vehicle at the corners of its path."""
     (x, y, z), legs = _ROUTES[name]
     at = _STARTS[name]
     corners = [(0, x, y, z), (from_seconds(at), x, y, z)]
@@ -249,7 +248,7 @@ def _state(name: str, journey: list[tuple[Ns, float, float, float]], now: Ns, of
 
 
 def _loop(component: str, processor: str, now: Ns, work: Ns, core: int = 0) -> Iterator[Event]:
-    """One activation of a 10 Hz loop: its code, two ROS calls, and the slice in which they were executed."""
+    """Yield one activation of a 10 Hz loop: its code, two ROS calls, and the slice that executes them."""
     calls = 350 * US
     yield Charge(now, component, processor, "code", work, 0, 0.0)
     yield Charge(now, component, processor, "ros:publish", calls, 40 * US, 0.0)
@@ -285,7 +284,7 @@ _PARCEL_STEPS = (
 
 
 def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
-    """What happens once: orders, parcels, vehicle operations, words."""
+    """Yield the events that occur once: orders, parcels, vehicle operations, texts."""
     for number, delay in enumerate((1.0, 12.0, 40.0), start=1):
         at = from_seconds(delay)
         yield Call(at, at + 30 * MS, "requesters", "central", "order", "ok")

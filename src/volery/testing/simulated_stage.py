@@ -1,4 +1,4 @@
-"""A stage of its own for each check: a new vehicle in a new world, in virtual time."""
+"""The simulated stage: a new vehicle in a new world for each check, in virtual time."""
 
 from __future__ import annotations
 
@@ -26,38 +26,36 @@ from volery.vehicles.address import Address
 from volery.vehicles.driver import Driver
 
 HUNG_AFTER: Ns = 30 * MINUTE
-"""A check that is not over after so much simulated time hangs."""
+"""Simulated time after which a check is taken as hanging, ns."""
 
 THROTTLE, MODE_SWITCH = 2, 4
-"""Channels of a transmitter, from 0."""
+"""RC channels of a transmitter, from 0."""
 SWITCH_AWAY, THROTTLE_DOWN = 1000, 1100
-"""Pulses: the switch out of the place in which programs may fly, the stick nearly down."""
+"""Pulses, us: mode switch to a mode without program control, throttle nearly down."""
 
 AWAY_DEG = 0.0005
-"""How far east of the vehicle its neighbour stands: about 40 m."""
+"""Distance of the neighbour east of the vehicle, degrees of longitude: about 40 m."""
 
 
 class SafetyPilot(Commander):
-    """Where all programs share one node, the other party is the pilot: he takes the vehicle by his mode
-    switch and brings it down by his throttle.
-    """
+    """The other commander where all programs share one node: the pilot, who uses mode switch and throttle."""
 
     def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: Autopilot) -> None:
         super().__init__(kernel, driver, protocol="a graph")
         self._channels = autopilot.vehicle.rc.transmitter
 
-    def lands_it(self) -> None:
-        """By hand."""
+    def land(self) -> None:
+        """Land by RC channels."""
         self._channels[MODE_SWITCH] = SWITCH_AWAY
         self._channels[THROTTLE] = THROTTLE_DOWN
 
     def sender_to(self, place: Position) -> Callable[[], None]:
-        """Raises ``NotPossibleError``: set-points of all nodes are one stream to the vehicle's."""
+        """Raise ``NotPossibleError``: the set-points of all nodes are one stream to the vehicle."""
         raise NotPossibleError(f"programs share one node, which cannot tell who sent it to {place}")
 
 
 class SimulatedStage(Stage):
-    """See ``Stage``. ``events`` is all that was recorded."""
+    """See ``Stage``. ``events`` has all recorded events."""
 
     def __init__(
         self,
@@ -84,11 +82,11 @@ class SimulatedStage(Stage):
 
     @property
     def name_of_vehicle(self) -> str:
-        """As the simulation calls it."""
+        """Name of the vehicle in the simulation."""
         return self._wanted.vehicle.name
 
     def perform(self, body: Callable[[], str | None]) -> str | None:
-        """Run *body* as a task: returns and raises what it does; ``TimeoutError`` if it hangs."""
+        """Run `body` as a task; return its result or raise its exception, ``TimeoutError`` if it hangs."""
         outcome: list[str | Exception | None] = []
 
         def flow() -> None:
@@ -108,12 +106,12 @@ class SimulatedStage(Stage):
         return found
 
     @property
-    def tap(self) -> LinkControl:
-        """The hand on the wire."""
-        return self._access.hand
+    def link_control(self) -> LinkControl:
+        """Control over the wire of the program under test."""
+        return self._access.control
 
     def set_faults(self, faults: WireFaults) -> None:
-        """From now on this happens to what passes on the wire of the program under test."""
+        """Apply faults to the wire of the program under test from now on."""
         self._access.set_faults(faults)
 
     def _commander(self) -> Commander:
@@ -124,11 +122,11 @@ class SimulatedStage(Stage):
         return Commander(self.kernel, driver, link, self._access.protocol)
 
     def another_program(self) -> Any:
-        """On a new link, or as another node."""
+        """Return the vehicle for another program, on a new link or as another node."""
         return self._program()
 
     def of_system(self, system: int) -> Any:
-        """Raises ``NotPossibleError`` for drivers that do not ask for a system id."""
+        """Return the vehicle of another system id; ``NotPossibleError`` for drivers without system ids."""
         try:
             return self._program(system=str(system))
         except UsageError as error:
@@ -140,12 +138,12 @@ class SimulatedStage(Stage):
 
     @property
     def flight(self) -> Flight:
-        """The body and its sensors."""
+        """Simulated body and sensors of the vehicle."""
         return self.fleet.flights[self.name_of_vehicle]
 
     @property
     def neighbour(self) -> Any:
-        """On a link of its own, or as a node of its own."""
+        """Return another commander, on a link or node of its own."""
         if not self._neighbour:
             raise NotPossibleError("it is alone")
         driver, _ = self._access.another(self._neighbour)
@@ -153,7 +151,7 @@ class SimulatedStage(Stage):
         return self._kind(self.kernel, self._neighbour, driver)
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Close drivers and kernel."""
         self.rest()
         self.drone.close()
         self.kernel.close()

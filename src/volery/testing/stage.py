@@ -1,9 +1,7 @@
-"""What a check plays on: one vehicle behind a link that can be cut, and whoever else has a hand in it.
+"""Stages of conformance checks: one vehicle behind a link that can be interrupted, and other commanders.
 
-A simulated stage is new for every check and lives in virtual time. A real one is the same aircraft for all
-checks, in real time; what nobody can do to a real aircraft from here raises ``NotPossibleError``.
-
-The one stage of a real vehicle, in real time, for all checks.
+A simulated stage is new for every check and uses virtual time. A real stage is the same aircraft for all
+checks, in real time; actions that are impossible with a real aircraft raise ``NotPossibleError``.
 """
 
 from __future__ import annotations
@@ -34,14 +32,14 @@ from volery.vehicles.driver import Driver, drivers
 from volery.vehicles.executor import StepExecutor
 from volery.vehicles.telemetry import Telemetry
 
-HEARD_WITHIN_S = 10.0
+FIRST_MESSAGE_S = 10.0
 
 STATION, CONSOLE = 255, 190
-"""Ids that ground stations go by on MAVLink."""
+"""Usual system and component id of a ground station on MAVLink."""
 
 
 class Commander:
-    """Somebody else with a link of his own: another ground station. He does not ask whose vehicle it is."""
+    """Another ground station with a link of its own, which commands the vehicle at any time."""
 
     def __init__(self, kernel: Kernel, driver: Driver, link: Link | None = None, protocol: str = "") -> None:
         self._driver = driver
@@ -49,25 +47,25 @@ class Commander:
         self._executor = StepExecutor(kernel, driver)
         self.seen: Telemetry = driver.telemetry
 
-    def waits_until_heard(self) -> None:
-        """As anybody who has just switched on."""
-        heard = self._executor.wait(lambda: self.seen.last_message_ns >= 0, from_seconds(HEARD_WITHIN_S))
-        demand(heard, f"on a second link nothing was heard within {HEARD_WITHIN_S:g} s")
+    def wait_for_message(self) -> None:
+        """Wait for the first message of the vehicle."""
+        received = self._executor.wait(lambda: self.seen.last_message_ns >= 0, from_seconds(FIRST_MESSAGE_S))
+        demand(received, f"no message arrived on a second link within {FIRST_MESSAGE_S:g} s")
 
-    def lands_it(self) -> None:
-        """Have it land."""
+    def land(self) -> None:
+        """Command the vehicle to land."""
         self._executor.execute("land", lambda: self._driver.land(300 * S))
 
     def sender_to(self, place: Position) -> Callable[[], None]:
-        """What has it go to *place*. ``NotPossibleError`` where nobody else can."""
+        """Return what sends the vehicle to `place`; ``NotPossibleError`` if another commander cannot."""
         return lambda: self._executor.execute("go", lambda: self._driver.goto(place, None, 300 * S))
 
-    def disarms_it(self) -> None:
-        """Stop its motors, wherever it is."""
+    def disarm(self) -> None:
+        """Disarm the vehicle by force, also in flight."""
         self._executor.execute("disarm", lambda: self._driver.disarm(True))
 
-    def moves_home(self, place: Position) -> None:
-        """Have it return to *place* (AMSL) from now on. ``NotPossibleError`` if nobody can ask for that."""
+    def set_home(self, place: Position) -> None:
+        """Set the vehicle's home to `place` (AMSL); ``NotPossibleError`` if the protocol cannot."""
         if self._protocol != "MAVLink" or self._link is None:
             raise NotPossibleError(f"home cannot be moved over {self._protocol}")
         fields = {
@@ -81,12 +79,12 @@ class Commander:
         self._link.send(Frame("COMMAND_INT", fields, STATION, CONSOLE))
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the drivers."""
         self._driver.close()
 
 
 class Stage(ABC):
-    """What a check is given. ``drone`` is the vehicle, heard of and at rest on the ground."""
+    """What a check acts on: a connected vehicle at rest on the ground, time, and other commanders."""
 
     drone: Any
     """A ``Drone``, or a ``Rover`` for checks of rovers."""
@@ -98,19 +96,19 @@ class Stage(ABC):
 
     @property
     def name(self) -> str:
-        """The vehicle's."""
+        """Name of the vehicle."""
         return str(self.drone.name)
 
     # -- time and place
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass."""
+        """Block the check for `seconds`."""
         sleep(self.kernel, from_seconds(seconds))
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Do it in so many seconds, beside what the check does. Its refusals are nobody's concern."""
+        """Execute `action` after `seconds` in a task of its own; its errors are ignored."""
         self.kernel.spawn(
-            partial(self._after, seconds, action), "somebody else", ExecutionContext("somebody else")
+            partial(self._after, seconds, action), "another commander", ExecutionContext("another commander")
         )
 
     def _after(self, seconds: float, action: Callable[[], None]) -> None:
@@ -121,7 +119,7 @@ class Stage(ABC):
             return
 
     def at(self, north: float, east: float, height: float = 10.0, *, amsl: bool = False) -> Position:
-        """So many metres from home, and above it; stated above home or AMSL."""
+        """Return the position at an offset, m, from home; its altitude is above home or AMSL."""
         home = self.drone.home
         frame = LocalFrame(home.latitude, home.longitude, home.altitude.metres)
         latitude, longitude, _ = frame.from_enu((east, north, 0.0))
@@ -129,13 +127,13 @@ class Stage(ABC):
         return Position(latitude, longitude, altitude)
 
     def offset(self, start: Position, end: Position) -> tuple[float, float, float]:
-        """Metres north, east and up from *start* to *end*, both AMSL."""
+        """Return the offset from `start` to `end`, both AMSL, in m north, east and up."""
         frame = LocalFrame(start.latitude, start.longitude, start.altitude.metres)
         east, north, up = frame.to_enu(end.latitude, end.longitude, end.altitude.metres)
         return north, east, up
 
     def until(self, holds: Callable[[], object], within: float, otherwise: str) -> None:
-        """Wait until it *holds*; broken *otherwise*."""
+        """Wait until `holds` is true; raise ``CheckFailedError`` with `otherwise` after `within` s."""
         waited = 0.0
         while not holds():
             demand(waited < within, otherwise)
@@ -143,7 +141,7 @@ class Stage(ABC):
             waited += 0.2
 
     def until_down(self, within: float) -> None:
-        """Have it land; if somebody else has it, wait until he has brought it down."""
+        """Land the vehicle; if another commander controls it, wait until it has been landed."""
         try:
             self.drone.land()
         except VehicleError:
@@ -154,49 +152,49 @@ class Stage(ABC):
 
     @property
     @abstractmethod
-    def tap(self) -> LinkControl:
-        """The hand on the wire."""
+    def link_control(self) -> LinkControl:
+        """Control over the wire of the program under test."""
 
     def other(self) -> Commander:
-        """A second commander, who hears the vehicle. Raises ``NotPossibleError`` where there can be none."""
+        """Return a connected second commander; ``NotPossibleError`` if there can be none."""
         commander = self._commander()
         self._others.append(commander)
-        commander.waits_until_heard()
+        commander.wait_for_message()
         return commander
 
     @abstractmethod
     def _commander(self) -> Commander:
-        """On a link of his own."""
+        """Return another commander on a link of its own."""
 
     @abstractmethod
     def of_system(self, system: int) -> Any:
-        """The vehicle of another system id, as a program sees it that looks for it here."""
+        """Return the vehicle of another system id on this link, as a program sees it."""
 
     @abstractmethod
     def another_program(self) -> Any:
-        """The same vehicle as a program sees it that starts now, on a link of its own."""
+        """Return the same vehicle for a program that starts now, on a link of its own."""
 
     # -- what only a simulation can do
 
     @property
     @abstractmethod
     def flight(self) -> Flight:
-        """The simulated vehicle itself, to break something of it."""
+        """The simulated vehicle, for faults of the aircraft."""
 
     @property
     @abstractmethod
     def neighbour(self) -> Any:
-        """A second vehicle that is heard on the same link, as its own program sees it."""
+        """Return a second vehicle on the same link, as its own program sees it."""
 
     def rest(self) -> None:
-        """After a check: the wire is mended, others hang up, the vehicle comes down."""
+        """Restore the stage after a check: link restored, other commanders closed, vehicle landed."""
         for other in self._others:
             other.close()
         self._others.clear()
 
     @abstractmethod
     def close(self) -> None:
-        """Hang up."""
+        """Close the drivers."""
 
 
 def kind_of(name: str) -> type[Vehicle]:
@@ -208,7 +206,7 @@ def kind_of(name: str) -> type[Vehicle]:
 
 
 class RealStage(Stage):
-    """See ``Stage``. *second* is the address of another link to the same vehicle, for other commanders."""
+    """See ``Stage``. `second` is the address of another link to the same vehicle, for other commanders."""
 
     def __init__(self, address: Address, kind: type[Vehicle], second: str) -> None:
         super().__init__()
@@ -217,23 +215,23 @@ class RealStage(Stage):
         self._second = parse(second) if second else None
         if self._second is not None and self._second.driver != address.driver:
             raise UsageError(f"{second} is not a second link to {address}: it names another driver")
-        self._tap, self.driver = self._open(address)
+        self._link_control, self.driver = self._open(address)
         self.drone = kind(self.kernel, address.driver, self.driver)
 
     def _open(self, address: Address, **more: str) -> tuple[ControlledLink, Driver]:
-        if address.carrier in (EMBEDDED, *GRAPHS):
+        if address.transport in (EMBEDDED, *GRAPHS):
             raise CapabilityError(f"{address}: the checks reach real vehicles over bytes only")
         factory = drivers.load(address.driver)
         if factory.on_link is None:
             raise UsageError(f"{address}: {address.driver} is reached over a graph, not over bytes")
-        tap = ControlledLink(open_link(self.kernel, address, factory.codec))
+        link_control = ControlledLink(open_link(self.kernel, address, factory.codec))
         options = {name: value for name, value in address.options.items() if name != "baud"} | more
-        return tap, factory.on_link(self.kernel, tap, address.driver, options)
+        return link_control, factory.on_link(self.kernel, link_control, address.driver, options)
 
     @property
-    def tap(self) -> ControlledLink:
-        """The hand on our end of the link: the vehicle's end is as it is."""
-        return self._tap
+    def link_control(self) -> ControlledLink:
+        """Control over this end of the link; the vehicle's end cannot be controlled."""
+        return self._link_control
 
     def _at_second(self, **more: str) -> tuple[ControlledLink, Driver]:
         if self._second is None:
@@ -241,15 +239,15 @@ class RealStage(Stage):
         return self._open(self._second, **more)
 
     def _commander(self) -> Commander:
-        tap, driver = self._at_second()
-        return Commander(self.kernel, driver, tap, drivers.load(self._address.driver).codec.name)
+        link_control, driver = self._at_second()
+        return Commander(self.kernel, driver, link_control, drivers.load(self._address.driver).codec.name)
 
     def another_program(self) -> Any:
-        """On the second link."""
+        """Return the vehicle for another program, on the second link."""
         return self._kind(self.kernel, self._address.driver, self._at_second()[1])
 
     def of_system(self, system: int) -> Any:
-        """On the second link. Raises ``NotPossibleError`` for drivers that do not ask for a system id."""
+        """Return the vehicle of another system id; ``NotPossibleError`` for drivers without system ids."""
         try:
             driver = self._at_second(system=str(system))[1]
         except UsageError as error:
@@ -258,21 +256,21 @@ class RealStage(Stage):
 
     @property
     def flight(self) -> Flight:
-        """Nobody can break a real one from here."""
+        """Raise ``NotPossibleError``: a real aircraft has no faults on command."""
         raise NotPossibleError("only a simulated vehicle can be broken from here")
 
     @property
     def neighbour(self) -> Any:
-        """Nobody knows of one."""
+        """Raise ``NotPossibleError``: the address of a second vehicle is not known."""
         raise NotPossibleError("needs a second vehicle on the same link")
 
     def rest(self) -> None:
-        """The wire is mended and the vehicle brought down, unless somebody else has it."""
-        self._tap.mend()
+        """Restore the link and land the vehicle, unless another commander controls it."""
+        self._link_control.restore()
         super().rest()
         self.drone.come_to_rest()
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the drivers."""
         self.drone.close()
         self.kernel.close()

@@ -9,8 +9,8 @@ with kernel.adopt("checks"):
             check(site)
 ```
 
-A check that finds fault raises ``CheckFailedError``. Where graphs differ on purpose, ``Traits`` says how, and the
-check demands what the trait promises.
+A check that finds a fault raises ``CheckFailedError``. ``Traits`` states the intended differences of graphs,
+and checks demand what the traits state.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = [
 
 @contextmanager
 def no_fault(name: str) -> Iterator[list[str]]:
-    """Collect what the block finds fault with, in words."""
+    """Collect the descriptions of the faults that the block finds."""
     faults: list[str] = []
     try:
         yield faults
@@ -43,7 +43,7 @@ def no_fault(name: str) -> Iterator[list[str]]:
 
 
 def run_checks(graph: RosGraph, traits: Traits) -> dict[str, str]:
-    """All checks on one graph, within a task: what each finds fault with, in words, empty for none."""
+    """Run all checks on one graph, within a task; return their faults by name, empty for none."""
     found = {}
     for name, body in CHECKS.items():
         with no_fault(name) as faults, Site(graph, name, traits) as site:

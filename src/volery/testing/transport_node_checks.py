@@ -1,7 +1,4 @@
-"""What names, nodes and groups must do on any graph.
-
-What services, parameters and timers must do on any graph.
-"""
+"""Checks of names, nodes, callback groups, services, parameters and timers on any graph."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ TRIGGER = "std_srvs/srv/Trigger"
 
 @check
 def names_resolve(site: Site) -> None:
-    """Relative, private, absolute and remapped names become what ROS says."""
+    """Check that relative, private, absolute and remapped names are resolved by ROS's rules."""
     node = site.node("node", "/deep", remaps={"in": "/elsewhere", "~mine": "yours"})
     space = f"{site.space}/deep"
     demand(node.name == f"{space}/node", f"its name is {node.name}")
@@ -43,20 +40,20 @@ def names_resolve(site: Site) -> None:
 
 @check
 def a_remapping_reaches_the_graph(site: Site) -> None:
-    """What is remapped in one node is heard where it was remapped to."""
+    """Check that messages of a remapped topic arrive under its new name."""
     speaker, listener = site.node("speaker", remaps={"out": "line"}), site.node("listener")
-    heard: list[str] = []
-    listener.subscribe("line", STRING, lambda one: heard.append(one.data))
+    received: list[str] = []
+    listener.subscribe("line", STRING, lambda one: received.append(one.data))
     publisher = speaker.advertise("out", STRING)
     demand(publisher.topic == f"{site.space}/line", f"its topic is {publisher.topic}")
     site.until(speaker, publisher.subscribers, "it connects")
     publisher.publish(new(STRING, data="x"))
-    site.spin_until(listener, lambda: heard, "the message arrives")
+    site.spin_until(listener, lambda: received, "the message arrives")
 
 
 @check
 def a_name_is_taken(site: Site) -> None:
-    """A second node of a name is a ``UsageError`` that names it; the first goes on; anonymous ones differ."""
+    """Check that a taken name is a ``UsageError`` naming it, and that anonymous names differ."""
     first = site.node("node")
     with raising(UsageError, naming=first.name):
         site.node("node")
@@ -69,7 +66,7 @@ def a_name_is_taken(site: Site) -> None:
 
 @check
 def the_graph_shows_who_is_there(site: Site) -> None:
-    """Nodes, topics with their types and users, and services appear, and go when their node does."""
+    """Check that nodes, topics with types and users, and services appear, and leave with their node."""
     one, two = site.node("one"), site.node("two")
     topic = one.advertise("chat", STRING).topic
     two.subscribe("chat", STRING, lambda message: None)
@@ -102,7 +99,7 @@ def the_graph_shows_who_is_there(site: Site) -> None:
 
 @check
 def a_closed_node_says_so(site: Site) -> None:
-    """Whatever is asked of a node that has left is a ``UsageError`` that says so; closing twice is fine."""
+    """Check that calls of a closed node are a ``UsageError`` that says so, except ``close``."""
     node = site.node("node")
     publisher = node.advertise("chat", STRING)
     node.close()
@@ -126,7 +123,7 @@ def a_closed_node_says_so(site: Site) -> None:
 
 @check
 def spinning_ends_with_the_node(site: Site) -> None:
-    """Who spins a node returns when it is closed."""
+    """Check that ``spin`` returns when the node is closed."""
     node, other = site.node("node"), site.node("other")
     ended: list[bool] = []
 
@@ -143,7 +140,7 @@ def spinning_ends_with_the_node(site: Site) -> None:
 
 @check
 def spin_once_waits_no_longer(site: Site) -> None:
-    """Without work ``spin_once`` says so when its time is over; 0 does not wait at all."""
+    """Check that ``spin_once`` without callbacks returns False after its time; 0 does not wait."""
     node = site.node("node")
     demand(not node.spin_once(0), "there was work at once")
     start = node.now()
@@ -153,13 +150,13 @@ def spin_once_waits_no_longer(site: Site) -> None:
 
 @check
 def a_callback_that_raises(site: Site) -> None:
-    """What a callback raises comes out of ``spin_once``; the next message is heard."""
+    """Check that an exception of a callback is raised by ``spin_once``, and the next message arrives."""
     speaker, listener = site.node("speaker"), site.node("listener")
-    heard: list[str] = []
+    received: list[str] = []
 
     def take(message: object) -> None:
-        heard.append(message.data)  # type: ignore[attr-defined]
-        if len(heard) == 1:
+        received.append(message.data)  # type: ignore[attr-defined]
+        if len(received) == 1:
             raise ValueError("first")
 
     listener.subscribe("chat", STRING, take)
@@ -169,39 +166,39 @@ def a_callback_that_raises(site: Site) -> None:
     publisher.publish(new(STRING, data="b"))
     raised = ""
     try:
-        site.spin_until(listener, lambda: len(heard) == 1, "the first arrives")
+        site.spin_until(listener, lambda: len(received) == 1, "the first arrives")
     except ValueError as error:
         raised = str(error)
     demand(raised == "first", "it did not come out of spin_once")
-    site.spin_until(listener, lambda: heard == ["a", "b"], f"the second arrives, heard {heard}")
+    site.spin_until(listener, lambda: received == ["a", "b"], f"the second arrives, received {received}")
 
 
 @check
 def groups_are_spun_apart(site: Site) -> None:
-    """A callback of another group waits for that group; one with ``start`` waits for nobody."""
+    """Check that a callback of another group waits for that group; with ``start`` it does not wait."""
     speaker, listener = site.node("speaker"), site.node("listener")
-    heard: list[str] = []
+    received: list[str] = []
     started: list[Work] = []
     apart, eager = listener.group(), listener.group(started.append)
-    listener.subscribe("chat", STRING, lambda one: heard.append("own"))
-    listener.subscribe("chat", STRING, lambda one: heard.append("apart"), group=apart)
-    listener.subscribe("chat", STRING, lambda one: heard.append("eager"), group=eager)
+    listener.subscribe("chat", STRING, lambda one: received.append("own"))
+    listener.subscribe("chat", STRING, lambda one: received.append("apart"), group=apart)
+    listener.subscribe("chat", STRING, lambda one: received.append("eager"), group=eager)
     publisher = speaker.advertise("chat", STRING)
     site.until(speaker, publisher.subscribers, "it connects")
     speaker.sleep(200 * MS)
     publisher.publish(new(STRING))
-    site.until(speaker, lambda: started, "the eager group is told")
-    demand(listener.spin_once(LIMIT) and heard == ["own"], f"its own group ran {heard}")
-    demand(apart.spin_once(LIMIT) and heard == ["own", "apart"], f"the other group ran {heard}")
+    site.until(speaker, lambda: started, "the eager group is started")
+    demand(listener.spin_once(LIMIT) and received == ["own"], f"its own group ran {received}")
+    demand(apart.spin_once(LIMIT) and received == ["own", "apart"], f"the other group ran {received}")
     started[0].run()
-    demand(heard == ["own", "apart", "eager"], f"the eager work ran {heard}")
+    demand(received == ["own", "apart", "eager"], f"the eager work ran {received}")
     with raising(UsageError, naming="another node"):
         speaker.subscribe("chat", STRING, lambda one: None, group=apart)
 
 
 @check
 def time_goes_on(site: Site) -> None:
-    """ROS time is the graph's epoch and the kernel's time; it does not go back."""
+    """Check that ROS time is the sum of the graph's epoch and the kernel's time, and never goes back."""
     node = site.node("node")
     before = site.graph.epoch + site.kernel.now()
     now = node.now()
@@ -213,13 +210,13 @@ SET_BOOL = "std_srvs/srv/SetBool"
 
 
 def answered(success: bool, text: str = "") -> Any:
-    """A response of SetBool."""
+    """Return a response of SetBool."""
     return service(SET_BOOL).response(success=success, message=text)
 
 
 @check
 def a_service_answers(site: Site) -> None:
-    """A call comes back with what the handler returned for that request."""
+    """Check that a call returns what the handler returned for its request."""
     server, caller = site.spinning(site.node("server")), site.node("caller")
     server.serve("switch", SET_BOOL, lambda asked: answered(asked.data, f"was {asked.data}"))
     client = caller.client("switch", SET_BOOL)
@@ -233,7 +230,7 @@ def a_service_answers(site: Site) -> None:
 
 @check
 def a_node_serves_itself(site: Site) -> None:
-    """A node that another task spins can call its own service."""
+    """Check that a node that another task spins can call its own service."""
     node = site.spinning(site.node("node"))
     node.serve("~switch", SET_BOOL, lambda asked: answered(True))
     client = node.client("~switch", SET_BOOL)
@@ -242,8 +239,8 @@ def a_node_serves_itself(site: Site) -> None:
 
 
 @check
-def nobody_serves_it(site: Site) -> None:
-    """Calling what nobody serves is a ``ServiceError`` at once; waiting for it ends in time."""
+def an_unserved_service(site: Site) -> None:
+    """Check that calling an unserved service is a ``ServiceError`` at once, and waiting ends in time."""
     caller = site.node("caller")
     client = caller.client("nowhere", TRIGGER)
     with raising(ServiceError, naming="nowhere"):
@@ -255,7 +252,7 @@ def nobody_serves_it(site: Site) -> None:
 
 @check
 def a_handler_that_raises(site: Site) -> None:
-    """What a handler raises comes out where its node spins; the caller gets a ``ServiceError``."""
+    """Check that an exception of a handler is raised by its spin, and the caller gets a ``ServiceError``."""
     server, caller = site.node("server"), site.node("caller")
 
     def handle(asked: Any) -> Any:
@@ -275,14 +272,14 @@ def a_handler_that_raises(site: Site) -> None:
     demand(client.wait(LIMIT), "the service is not found")
     with raising(ServiceError, naming="broken") as caught:
         client.call(request(TRIGGER), S)
-    if site.traits.tells_failure:
-        demand("no such thing" in caught.text, f"the caller is not told why: {caught.text}")
+    if site.traits.reports_failure:
+        demand("no such thing" in caught.text, f"the caller gets no reason: {caught.text}")
     site.until(caller, lambda: raised == ["no such thing"], "the error comes out of spin")
 
 
 @check
 def a_handler_that_returns_nonsense(site: Site) -> None:
-    """A handler that returns no response is a ``UsageError`` of its node, naming the service."""
+    """Check that a handler that returns no response is a ``UsageError`` of its node, naming the service."""
     server, caller = site.node("server"), site.node("caller")
     server.serve("odd", TRIGGER, lambda asked: "yes")
     raised: list[str] = []
@@ -303,7 +300,7 @@ def a_handler_that_returns_nonsense(site: Site) -> None:
 
 @check
 def no_answer_in_time(site: Site) -> None:
-    """A server that does not spin: ``ServiceError`` when the time is over."""
+    """Check that a call to a server that does not spin is a ``ServiceError`` after its time."""
     server, caller = site.node("server"), site.node("caller")
     server.serve("slow", TRIGGER, lambda asked: service(TRIGGER).response(success=True))
     client = caller.client("slow", TRIGGER)
@@ -316,7 +313,7 @@ def no_answer_in_time(site: Site) -> None:
 
 @check
 def a_server_that_leaves(site: Site) -> None:
-    """A caller whose server closes gets a ``ServiceError``; then the service is not ready."""
+    """Check that a call whose server closes is a ``ServiceError``, and the service is not ready then."""
     server, caller = site.node("server"), site.node("caller")
     served = server.serve("leaving", TRIGGER, lambda asked: service(TRIGGER).response())
     client = caller.client("leaving", TRIGGER)
@@ -334,7 +331,7 @@ def a_server_that_leaves(site: Site) -> None:
 
 @check
 def a_service_is_served_once(site: Site) -> None:
-    """Serving what another node serves is a ``UsageError`` that names it."""
+    """Check that serving a service of another node is a ``UsageError`` that names the node."""
     one, two = site.node("one"), site.node("two")
     one.serve("switch", TRIGGER, lambda asked: service(TRIGGER).response())
     demand(two.wait_for_service("switch", LIMIT), "the service is not found")
@@ -344,7 +341,7 @@ def a_service_is_served_once(site: Site) -> None:
 
 @check
 def a_request_of_another_type(site: Site) -> None:
-    """Calling with something else than the service's request is a ``UsageError``; so is an unknown type."""
+    """Check that a request of another type is a ``UsageError``, and an unknown service type, too."""
     node = site.node("node")
     client = node.client("switch", SET_BOOL)
     with raising(UsageError, naming="SetBool"):
@@ -355,7 +352,7 @@ def a_request_of_another_type(site: Site) -> None:
 
 @check
 def parameters_of_a_node(site: Site) -> None:
-    """Private parameters are set, read, found, replaced and removed."""
+    """Check that private parameters are set, read, found, replaced and removed."""
     node = site.node("node")
     values: dict[str, Any] = {"flag": True, "count": 3, "gain": 0.5, "text": "ü", "list": [1.5, 2.5]}
     for name, value in values.items():
@@ -372,7 +369,7 @@ def parameters_of_a_node(site: Site) -> None:
 
 @check
 def a_namespace_of_parameters(site: Site) -> None:
-    """A ``dict`` is a namespace: it sets and reads what is below it."""
+    """Check that a ``dict`` sets and reads a namespace of parameters."""
     node = site.node("node")
     node.set_parameter("~gains", {"p": 1.5, "roll": {"d": 0.25}})
     demand(node.get_parameter("~gains/roll/d") == 0.25, "a value below is not found")
@@ -385,7 +382,7 @@ def a_namespace_of_parameters(site: Site) -> None:
 
 @check
 def a_parameter_that_is_not_there(site: Site) -> None:
-    """Reading or removing it is a ``UsageError`` that names it; a default is taken instead, even ``None``."""
+    """Check that a missing parameter is a ``UsageError`` naming it, unless a default is given, even None."""
     node = site.node("node")
     with raising(UsageError, naming="nothing"):
         node.get_parameter("~nothing")
@@ -397,7 +394,7 @@ def a_parameter_that_is_not_there(site: Site) -> None:
 
 @check
 def a_parameter_of_another_node(site: Site) -> None:
-    """A node reads and sets another's parameters by their absolute names."""
+    """Check that a node reads and sets another node's parameters by their absolute names."""
     one, two = site.spinning(site.node("one")), site.node("two")
     one.set_parameter("~rate", 10)
     site.until(two, lambda: two.get_parameter(f"{one.name}/rate", 0) == 10, "the other node reads it")
@@ -407,7 +404,7 @@ def a_parameter_of_another_node(site: Site) -> None:
 
 @check
 def a_parameter_outside_of_nodes(site: Site) -> None:
-    """A relative name is below the namespace, for all nodes (in ROS 2: a ``UsageError`` that says why)."""
+    """Check that relative parameters are shared by a namespace (in ROS 2: a ``UsageError`` that says why)."""
     one, two = site.node("one"), site.node("two")
     if not site.traits.global_parameters:
         with raising(UsageError, naming="belong to nodes"):
@@ -420,7 +417,7 @@ def a_parameter_outside_of_nodes(site: Site) -> None:
 
 @check
 def a_timer_fires(site: Site) -> None:
-    """A timer calls back each period, not at once, and no more when it was cancelled."""
+    """Check that a timer calls back every period, not at once, and not after ``cancel``."""
     node = site.node("node")
     ticks: list[int] = []
     start = node.now()
@@ -434,7 +431,7 @@ def a_timer_fires(site: Site) -> None:
 
 @check
 def a_rate_keeps_a_loop(site: Site) -> None:
-    """A loop with a rate takes its period for each turn; ``sleep`` takes as long as it says."""
+    """Check that a loop with a rate takes its period per turn, and ``sleep`` its duration."""
     node = site.node("node")
     rate = node.rate(50 * MS)
     start = node.now()

@@ -1,4 +1,4 @@
-"""Where one check of a transport happens, and how a check is made of a function."""
+"""The site of one transport check, and the registration of checks."""
 
 from __future__ import annotations
 
@@ -13,23 +13,26 @@ from volery.ros.graph.interface import Node, RosGraph
 from volery.testing.checks import demand
 
 LIMIT: Ns = 10 * S
-"""How long a check waits for what must come; real ROS takes a moment to find its peers."""
+"""Longest wait for something that must happen, ns; discovery takes time on real ROS."""
 QUIET: Ns = 300 * MS
-"""How long it listens for what must not come."""
+"""Time of waiting for something that must not happen, ns."""
 
 
 @dataclass(frozen=True)
 class Traits:
-    """What kind of graph it is.
+    """Intended differences of graphs.
 
-    ``qos``: it keeps apart publishers and subscriptions whose QoS does not fit. ``tells_failure``: the caller
-    of a service hears at once that its handler raised or its server left (ROS 2 has no word for it: it hears
-    nothing). ``global_parameters``: there are parameters outside of nodes. ``keeps_depth``: a latched
-    publisher keeps as many messages as its depth says, not just one. ``carries``: whether it carries a type.
+    Attributes:
+        qos: Publishers and subscriptions of incompatible QoS are not connected.
+        reports_failure: The caller of a service is notified at once if its handler raised or its server left;
+            ROS 2 cannot report that.
+        global_parameters: There are parameters outside of nodes.
+        keeps_depth: A latched publisher keeps as many messages as its depth, not only one.
+        carries: Whether the graph carries a type, by its name.
     """
 
     qos: bool = True
-    tells_failure: bool = True
+    reports_failure: bool = True
     global_parameters: bool = True
     keeps_depth: bool = True
     carries: Callable[[str], bool] = lambda name: True
@@ -37,11 +40,11 @@ class Traits:
 
 EMBEDDED = Traits()
 ROS1 = Traits(qos=False, keeps_depth=False)
-ROS2 = Traits(tells_failure=False, global_parameters=False)
+ROS2 = Traits(reports_failure=False, global_parameters=False)
 
 
 class Site:
-    """Where one check happens: nodes of its own under names of its own, gone when it is over."""
+    """Site of one check: nodes in a namespace of their own, closed at its end."""
 
     def __init__(self, graph: RosGraph, check: str, traits: Traits = EMBEDDED) -> None:
         self.graph, self.kernel, self.traits = graph, graph.kernel, traits
@@ -58,32 +61,32 @@ class Site:
             node.close()
 
     def node(self, name: str, namespace: str = "", **options: object) -> Node:
-        """A node below the check's own namespace."""
+        """Return a new node below the check's namespace."""
         made = self.graph.node(name, f"{self.space}{namespace}", **options)  # type: ignore[arg-type]
         self._nodes.append(made)
         return made
 
     def spinning(self, node: Node) -> Node:
-        """The same node, spun by a task beside the check."""
+        """Spin a node in a task of its own; return the node."""
         self.kernel.spawn(node.spin, f"spins {node.name}", ExecutionContext(node.name))
         return node
 
     def until(self, node: Node, holds: Callable[[], object], what: str, within: Ns = LIMIT) -> None:
-        """Demand that *holds* comes true."""
+        """Demand that `holds` becomes true."""
         end = self.kernel.now() + within
         while not holds():
             demand(self.kernel.now() < end, f"not within {within / S:g} s: {what}")
             node.sleep(5 * MS)
 
     def spin_until(self, node: Node, holds: Callable[[], object], what: str, within: Ns = LIMIT) -> None:
-        """Demand that *holds* comes true while *node* spins."""
+        """Demand that `holds` becomes true while `node` is spun."""
         end = self.kernel.now() + within
         while not holds():
             demand(self.kernel.now() < end, f"not within {within / S:g} s: {what}")
             node.spin_once(50 * MS)
 
     def listen(self, node: Node, duration: Ns = QUIET) -> None:
-        """Spin *node* for a while."""
+        """Spin `node` for `duration` ns."""
         end = self.kernel.now() + duration
         while self.kernel.now() < end:
             node.spin_once(20 * MS)
@@ -91,10 +94,10 @@ class Site:
 
 Body = Callable[[Site], None]
 CHECKS: dict[str, Body] = {}
-"""By name, in the order in which they are run."""
+"""All checks by name, in the order of execution."""
 
 
 def check(body: Body) -> Body:
-    """Make a check of the function: its name is the check's, its docstring what it demands."""
+    """Register a function as a check: its name is the check's, its docstring the demand."""
     CHECKS[body.__name__.replace("_", "-")] = body
     return body

@@ -142,12 +142,12 @@ def run(*arguments: str) -> Any:
 
 
 def test_the_command_line_says_what_was_found(tmp_path: Path) -> None:
-    good = run("sim:ardupilot", "--only", "heard,goto", "--out", str(tmp_path))
+    good = run("sim:ardupilot", "--only", "identification,goto", "--out", str(tmp_path))
     assert good.exit_code == 0
     assert "2 passed" in good.output
     kept = json.loads((tmp_path / "conformance.json").read_text(encoding="utf-8"))
     assert kept["conforms"]
-    assert [one["check"] for one in kept["results"]] == ["heard", "goto"]
+    assert [one["check"] for one in kept["results"]] == ["identification", "goto"]
     bad = run("sim:cheat-claims", "--only", "goto")
     assert bad.exit_code == 1
     assert "1 failed" in bad.output

@@ -1,4 +1,4 @@
-"""The checks themselves, one module for each group; importing them registers them."""
+"""Conformance checks of drivers, one module per group; importing a module registers its checks."""
 
 from volery.testing.checks import group_of
 from volery.testing.driver_checks import (
@@ -23,4 +23,4 @@ GROUPS = tuple(
         rover_checks,
     )
 )
-"""In the order in which they are run: from harmless to daring."""
+"""Groups in the order of execution, from harmless to risky."""

@@ -1,4 +1,4 @@
-"""In the air, with a position: the operations, and what "arrived" means."""
+"""Checks of operations in flight with a position estimate, and of arrival."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ UP = (Capability.TAKEOFF,)
 GO = (Capability.TAKEOFF, Capability.GOTO)
 
 TAKEOFF_SHORT_M = 1.5
-"""How far below its height a take-off may end; PX4's ends about a metre short."""
+"""Distance below its height at which a take-off may end, m; PX4's ends about 1 m short."""
 NEAR_M, NEAR_UP_M = 1.0, 1.0
-"""At the return of goto(), by the autopilot's own estimate; of consumer sensors the height wanders by 0.5."""
+"""Tolerances at the return of goto(), m, by the autopilot's estimate; sensors drift 0.5 m in height."""
 STANDING_M_S = 0.7
 HOME_NEAR_M = 3.0
 
 
 def demand_there(stage: Stage, goal: Position, across: float = NEAR_M, up: float = NEAR_UP_M) -> None:
-    """By its own estimate it is where it should be."""
+    """Demand that the vehicle is at `goal` by its own estimate."""
     north, east, _ = stage.offset(goal, stage.drone.position)
     high = stage.drone.altitude.metres - _above_home(stage, goal)
     off = hypot(north, east)
@@ -38,7 +38,7 @@ def _above_home(stage: Stage, goal: Position) -> float:
 
 
 def demand_standing(stage: Stage) -> None:
-    """By its own estimate it does not move."""
+    """Demand that the vehicle does not move by its own estimate."""
     velocity = stage.drone.velocity
     speed = hypot(*velocity)
     demand(speed <= STANDING_M_S, f"it still moves at {speed:.1f} m/s")
@@ -46,7 +46,7 @@ def demand_standing(stage: Stage) -> None:
 
 @check(needs=UP, flies=True)
 def takeoff(stage: Stage) -> None:
-    """takeoff(10) from the ground, disarmed, returns in the air 10 m above home, at most 1.5 m short."""
+    """Check that takeoff(10) of a disarmed vehicle returns 10 m above home, at most 1.5 m short."""
     stage.drone.takeoff(10)
     height = stage.drone.altitude.metres
     demand(stage.drone.flying and stage.drone.armed, "it does not fly")
@@ -55,7 +55,7 @@ def takeoff(stage: Stage) -> None:
 
 @check(needs=UP, flies=True)
 def takeoff_in_the_air(stage: Stage) -> None:
-    """A take-off of one that flies is refused, and it flies on."""
+    """Check that a take-off of a flying vehicle is refused and the vehicle flies on."""
     stage.drone.takeoff(10)
     with raising(Refused, naming=stage.name):
         stage.drone.takeoff(15)
@@ -64,7 +64,7 @@ def takeoff_in_the_air(stage: Stage) -> None:
 
 @check(needs=GO, flies=True)
 def goto(stage: Stage) -> None:
-    """goto() returns at the goal by the autopilot's own estimate, standing; and it stays there."""
+    """Check that goto() returns at the goal by the autopilot's estimate, at rest, and stays there."""
     stage.drone.takeoff(10)
     goal = stage.at(30, 20, 12)
     stage.drone.goto(goal)
@@ -76,7 +76,7 @@ def goto(stage: Stage) -> None:
 
 @check(needs=GO, flies=True)
 def altitude_frames(stage: Stage) -> None:
-    """The same height said above home and AMSL is the same height."""
+    """Check that the same height above home and AMSL is the same height."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(15, 0, 14))
     first = stage.drone.position.altitude.metres
@@ -90,7 +90,7 @@ def altitude_frames(stage: Stage) -> None:
 
 @check(needs=(*GO, Capability.SPEED), flies=True)
 def speed(stage: Stage) -> str:
-    """goto(goal, speed=3) flies at 3 m/s over ground, not faster than by a quarter."""
+    """Check that goto(goal, speed=3) flies at 3 m/s over ground, at most a quarter faster."""
     stage.drone.takeoff(10)
     seen, fastest = stage.drone.telemetry, [0.0]
 
@@ -106,7 +106,7 @@ def speed(stage: Stage) -> str:
 
 @check(needs=GO, flies=True)
 def goto_again(stage: Stage) -> None:
-    """The same goal again is no error and takes no time to speak of."""
+    """Check that a goto() to the current position is no error and returns at once."""
     stage.drone.takeoff(10)
     goal = stage.at(20, 0)
     stage.drone.goto(goal)
@@ -118,7 +118,7 @@ def goto_again(stage: Stage) -> None:
 
 @check(needs=(*UP, Capability.HOLD, Capability.VELOCITY), flies=True)
 def hold(stage: Stage) -> str:
-    """hold() at 4 m/s returns standing, and it stays there."""
+    """Check that hold() at 4 m/s returns at rest, and stays there."""
     stage.drone.takeoff(10)
     stage.drone.set_velocity(north=4.0, lasting=20.0)
     stage.sleep(4)
@@ -133,7 +133,7 @@ def hold(stage: Stage) -> str:
 
 @check(needs=(*UP, Capability.VELOCITY), flies=True)
 def velocity(stage: Stage) -> str:
-    """set_velocity() returns under way; it flies so for as long as was said, then it stops."""
+    """Check that set_velocity() returns in motion, flies for the given time, then stops."""
     stage.drone.takeoff(10)
     start = stage.drone.position
     stage.drone.set_velocity(north=3.0, lasting=6.0)
@@ -149,7 +149,7 @@ def velocity(stage: Stage) -> str:
 
 @check(needs=(*UP, Capability.VELOCITY), flies=True)
 def climbing(stage: Stage) -> None:
-    """set_velocity(up=1) climbs; its sign is that of this project: up is positive."""
+    """Check that set_velocity(up=1) climbs: up is positive."""
     stage.drone.takeoff(10)
     before = stage.drone.altitude.metres
     stage.drone.set_velocity(up=1.0, lasting=5.0)
@@ -160,7 +160,7 @@ def climbing(stage: Stage) -> None:
 
 @check(needs=(*UP, Capability.HEADING), flies=True)
 def heading(stage: Stage) -> None:
-    """set_heading() turns clockwise from north, the short way, and stays in place."""
+    """Check that set_heading() turns clockwise from north, by the smaller angle, and stays in place."""
     stage.drone.takeoff(10)
     here = stage.drone.position
     for degrees in (90.0, 200.0, 350.0):
@@ -173,7 +173,7 @@ def heading(stage: Stage) -> None:
 
 @check(needs=(*GO, Capability.RETURN_HOME), flies=True)
 def return_home(stage: Stage) -> str:
-    """return_home() lands near home and returns disarmed."""
+    """Check that return_home() lands near home and returns disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(25, -10))
     home = stage.drone.home
@@ -183,7 +183,7 @@ def return_home(stage: Stage) -> str:
 
 @check(needs=(*GO, Capability.LAND), flies=True)
 def land(stage: Stage) -> str:
-    """land() comes down here and returns disarmed."""
+    """Check that land() lands at the current position and returns disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(10, 10))
     here = stage.drone.position
@@ -202,9 +202,7 @@ def _demand_down(stage: Stage, place: Position) -> str:
 
 @check(needs=(*GO, Capability.LAND, Capability.RETURN_HOME), flies=True)
 def home_change(stage: Stage) -> str:
-    """It lands elsewhere and takes off anew: whatever is home then, heights count from it and it is where
-    return_home() goes.
-    """
+    """Check that after a landing elsewhere and a new take-off, heights and return_home() use one home."""
     stage.drone.takeoff(10)
     first = stage.drone.home
     stage.drone.goto(stage.at(30, 0))
@@ -223,7 +221,7 @@ def home_change(stage: Stage) -> str:
 
 @check(needs=UP, flies=True)
 def disarming_in_the_air(stage: Stage) -> str:
-    """disarm() without force of one that flies is refused, and it flies on."""
+    """Check that disarm() without force of a flying vehicle is refused and the vehicle flies on."""
     stage.drone.takeoff(10)
     with raising(Refused, naming=stage.name) as caught:
         stage.drone.disarm()
@@ -233,7 +231,7 @@ def disarming_in_the_air(stage: Stage) -> str:
 
 @check(needs=UP, flies=True)
 def two_flows_of_control(stage: Stage) -> None:
-    """Of two tasks that command one vehicle at a time, the second is told so, and the first goes on."""
+    """Check that of two tasks that command one vehicle the second gets an error, the first continues."""
     stage.drone.wait_ready()  # first: until it is ready the other one could not even begin
     stage.later(1.0, lambda: stage.drone.takeoff(10))
     stage.until(lambda: stage.drone.armed, 60.0, "the first task never got it armed")
@@ -245,7 +243,7 @@ def two_flows_of_control(stage: Stage) -> None:
 
 @check(needs=(*GO, Capability.LAND), flies=True)
 def safety_comes_first(stage: Stage) -> str:
-    """land() of another task ends goto(), which says so; it is not an error to land."""
+    """Check that land() of another task aborts goto() with an error, and succeeds itself."""
     stage.drone.takeoff(10)
     stage.later(3.0, stage.drone.land)
     with raising(VehicleError, UsageError, naming=stage.name) as caught:
@@ -256,7 +254,7 @@ def safety_comes_first(stage: Stage) -> str:
 
 @check(needs=UP, flies=True)
 def the_end_of_a_program(stage: Stage) -> str:
-    """come_to_rest() of one in the air lands it and says so."""
+    """Check that come_to_rest() of a flying vehicle lands it and reports so."""
     stage.drone.takeoff(10)
     words = str(stage.drone.come_to_rest())
     demand(not stage.drone.armed, f"it {words}, but is armed")

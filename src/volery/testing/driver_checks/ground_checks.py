@@ -1,4 +1,4 @@
-"""On the ground: what is known before anything moves, and what is refused."""
+"""Checks on the ground: what is known before the vehicle moves, and what is refused."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SAYS_WITHIN_S = 15.0
 
 
 @check(kind="")
-def heard(stage: Stage) -> str:
-    """Once heard, it says what it is, which autopilot flies it and in which mode."""
+def identification(stage: Stage) -> str:
+    """Check that a connected vehicle reports its kind, autopilot and mode."""
     seen = stage.drone.telemetry
     stage.until(
         lambda: seen.mode and seen.autopilot, 5.0, f"mode {seen.mode!r}, autopilot {seen.autopilot!r}"
@@ -28,7 +28,7 @@ def heard(stage: Stage) -> str:
 
 @check(kind="")
 def capabilities(stage: Stage) -> str:
-    """What it can is known before arming, and asking for what it cannot changes nothing."""
+    """Check that capabilities are known before arming, and requests of missing ones change nothing."""
     can = stage.drone.capabilities
     demand(can, "it states no capabilities")
     demand(not stage.drone.armed, "it is armed already")
@@ -59,7 +59,7 @@ def _asking(stage: Stage) -> dict[Capability, Callable[[], None]]:
 
 @check(kind="")
 def readiness(stage: Stage) -> str:
-    """wait_ready() returns when it could arm and go by position: then position and home are known."""
+    """Check that wait_ready() returns when the vehicle can arm and navigate: position and home are known."""
     stage.drone.wait_ready()
     seen = stage.drone.telemetry
     demand(seen.ready or seen.armed, "it returned although the vehicle is not ready")
@@ -71,7 +71,7 @@ def readiness(stage: Stage) -> str:
 
 @check(kind="", cold=True)
 def readiness_after_switching_on(stage: Stage) -> str:
-    """From switching on, wait_ready() waits until it has a position; it does not return before."""
+    """Check that wait_ready() of a vehicle just switched on does not return before it has a position."""
     began = stage.kernel.now()
     stage.drone.wait_ready()
     demand(stage.drone.telemetry.position is not None, "it returned without a position")
@@ -80,7 +80,7 @@ def readiness_after_switching_on(stage: Stage) -> str:
 
 @check(kind="", cold=True)
 def readiness_in_time(stage: Stage) -> None:
-    """wait_ready(within=2) of one that was switched on just now raises NotArrived after 2 s."""
+    """Check that wait_ready(within=2) of a vehicle just switched on raises NotArrived after 2 s."""
     began = stage.kernel.now()
     with raising(NotArrived, naming=stage.name):
         stage.drone.wait_ready(within=2)
@@ -89,11 +89,12 @@ def readiness_in_time(stage: Stage) -> None:
 
 @check(kind="", flies=True, cold=True)
 def arming_refused(stage: Stage) -> str:
-    """One that cannot be armed yet is not: the call is refused in the autopilot's own words. Where the driver
-    can do what lacks by itself, the call returns armed.
+    """Check that arming too early is refused with the autopilot's text.
+
+    A driver that provides by itself what is missing returns armed instead.
     """
     if stage.drone.telemetry.armable:
-        raise NotPossibleError("it can be armed as soon as it is heard")
+        raise NotPossibleError("it can be armed from its first message on")
     try:
         with raising(Refused, NotArrived, naming=stage.name) as caught:
             stage.drone.arm()
@@ -106,7 +107,7 @@ def arming_refused(stage: Stage) -> str:
 
 @check(kind="", flies=True)
 def arming(stage: Stage) -> None:
-    """arm() returns armed, disarm() disarmed; doing it twice is no error."""
+    """Check that arm() returns armed, disarm() disarmed, and that repeating them is no error."""
     stage.drone.wait_ready()
     stage.drone.hold()  # a rover that is armed in a pilot's mode is the pilot's
     for _ in range(2):
@@ -119,7 +120,7 @@ def arming(stage: Stage) -> None:
 
 @check(needs=(Capability.GOTO,))
 def goto_on_the_ground(stage: Stage) -> None:
-    """goto() before a take-off is refused, and nothing moves."""
+    """Check that goto() before a take-off is refused and nothing moves."""
     stage.drone.wait_ready()
     with raising(Refused, naming=stage.name):
         stage.drone.goto(stage.at(20, 0))
@@ -128,7 +129,7 @@ def goto_on_the_ground(stage: Stage) -> None:
 
 @check()
 def land_on_the_ground(stage: Stage) -> None:
-    """land() of one that stands there disarmed returns at once."""
+    """Check that land() of a disarmed vehicle on the ground returns at once."""
     stage.drone.wait_ready()
     began = stage.kernel.now()
     stage.drone.land()
@@ -138,9 +139,7 @@ def land_on_the_ground(stage: Stage) -> None:
 
 @check()
 def numbers_that_are_none(stage: Stage) -> None:
-    """Heights, speeds, velocities, headings and sticks that are no numbers or out of range never leave the
-    program.
-    """
+    """Check that arguments which are not finite or out of range are refused before anything is sent."""
     stage.drone.wait_ready()
     drone, refused = stage.drone, (UsageError, CapabilityError, VehicleError)
     for height in (nan, inf, -5.0, 0.0):
@@ -159,7 +158,7 @@ def numbers_that_are_none(stage: Stage) -> None:
 
 @check(needs=(Capability.TAKEOFF,))
 def too_high(stage: Stage) -> None:
-    """A take-off above the stated limits is refused before anything is armed."""
+    """Check that a take-off above the given limits is refused before the vehicle is armed."""
     stage.drone.wait_ready()
     with raising(VehicleError, naming=stage.name):
         stage.drone.takeoff(stage.drone.limits.highest + 1.0)
@@ -168,7 +167,7 @@ def too_high(stage: Stage) -> None:
 
 @check(flies=True, needs=(Capability.TAKEOFF, Capability.GOTO))
 def altitudes_that_it_cannot_fly(stage: Stage) -> str:
-    """An ellipsoidal altitude is a CapabilityError; one above ground is, too, or it is flown to."""
+    """Check that an ellipsoidal altitude is a CapabilityError; one above ground is, too, or is flown to."""
     stage.drone.takeoff(10)
     home = stage.drone.home
     with raising(CapabilityError, naming=stage.name):
@@ -184,7 +183,7 @@ def altitudes_that_it_cannot_fly(stage: Stage) -> str:
 
 @check(kind="")
 def what_if_silent(stage: Stage) -> str:
-    """Connected, it says in one line what the aircraft will do if its commander falls silent."""
+    """Check that a connected driver states in one line the vehicle's reaction to the loss of its link."""
     stage.until(stage.driver.on_link_loss, SAYS_WITHIN_S, "it never says")
     words = stage.driver.on_link_loss()
     demand("\n" not in words, f"more than one line: {words!r}")
@@ -193,7 +192,7 @@ def what_if_silent(stage: Stage) -> str:
 
 @check(kind="")
 def battery(stage: Stage) -> str:
-    """What it says of its battery is plausible: a share from 0 to 1, volts above 0, or not measured."""
+    """Check that battery figures are plausible: a share from 0 to 1, volts above 0, or not measured."""
     stage.sleep(3.0)
     found = stage.drone.battery
     share, volts = found.remaining, found.volts

@@ -1,4 +1,4 @@
-"""The wire: cut for a moment, cut for long, dead in one direction; and programs that die."""
+"""Checks of the link: interrupted briefly, for long or in one direction; and of programs that die."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ NOTICED_S = to_seconds(LINK_TIMEOUT) + 1.5
 
 @check(needs=GO, flies=True)
 def link_cut_for_a_moment(stage: Stage) -> str:
-    """A link that is cut for half a second in flight is as if nothing had happened."""
+    """Check that an interruption of the link for 0.5 s in flight has no effect."""
     stage.drone.takeoff(10)
-    stage.later(2.0, stage.tap.cut)
-    stage.later(2.5, stage.tap.mend)
+    stage.later(2.0, stage.link_control.drop)
+    stage.later(2.5, stage.link_control.restore)
     stage.drone.goto(stage.at(30, 0))
     return f"in {stage.drone.mode}"
 
 
 @check(needs=GO, flies=True)
 def link_cut_for_two_seconds(stage: Stage) -> str:
-    """A link that is cut for 2 s in flight: goto() arrives, or says that the autopilot has taken over; it is
-    never lost and never a hang.
+    """Check that goto() survives an interruption of the link for 2 s.
+
+    It arrives, or reports that the autopilot has taken over; it neither reports a lost link nor hangs.
     """
     stage.drone.takeoff(10)
-    stage.later(2.0, stage.tap.cut)
-    stage.later(4.0, stage.tap.mend)
+    stage.later(2.0, stage.link_control.drop)
+    stage.later(4.0, stage.link_control.restore)
     try:
         stage.drone.goto(stage.at(30, 0))
     except VehicleError as error:
@@ -43,19 +44,20 @@ def link_cut_for_two_seconds(stage: Stage) -> str:
 
 @check(needs=GO, flies=True)
 def link_lost(stage: Stage) -> str:
-    """A link that is cut for 10 s ends goto() with LinkLost, 5 s after the last word; when it is back, the
-    vehicle is heard again and can be brought down, or is left to whoever has it.
+    """Check that an interruption of the link for 10 s ends goto() with LinkLost, 5 s after the last message.
+
+    When the link is back, the vehicle can be landed, or is left to the commander that controls it.
     """
     stage.drone.takeoff(10)
     cut = stage.kernel.now() + round(2e9)
-    stage.later(2.0, stage.tap.cut)
-    stage.later(12.0, stage.tap.mend)
+    stage.later(2.0, stage.link_control.drop)
+    stage.later(12.0, stage.link_control.restore)
     with raising(LinkLost, naming=stage.name):
         stage.drone.goto(stage.at(60, 0), speed=2.0 if Capability.SPEED in stage.drone.capabilities else None)
     after = to_seconds(stage.kernel.now() - cut)
     demand(after < NOTICED_S, f"it was noticed after {after:.1f} s")
     seen = stage.drone.telemetry
-    stage.until(lambda: stage.kernel.now() - seen.last_message_ns < 1e9, 20.0, "it was not heard again")
+    stage.until(lambda: stage.kernel.now() - seen.last_message_ns < 1e9, 20.0, "no message arrived again")
     stage.sleep(2)
     words = str(stage.drone.come_to_rest())
     if stage.drone.armed:
@@ -64,26 +66,25 @@ def link_lost(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def commands_that_nobody_hears(stage: Stage) -> str:
-    """What we say is lost while what it says arrives: goto() ends with an error within its time, and never
-    claims to have arrived.
-    """
+def lost_commands(stage: Stage) -> str:
+    """Check that goto() ends with an error within its time while only the vehicle's frames arrive."""
     stage.drone.takeoff(10)
-    stage.tap.speaks = False
+    stage.link_control.sends = False
     began = stage.kernel.now()
     try:
         with raising(VoleryError, naming=stage.name) as caught:
             stage.drone.goto(stage.at(30, 0))
         demand(to_seconds(stage.kernel.now() - began) < 120.0, "it took longer than two minutes")
     finally:
-        stage.tap.mend()
+        stage.link_control.restore()
     return type(caught.error).__name__
 
 
 @check(needs=(Capability.TAKEOFF,), flies=True)
 def commander_silence(stage: Stage) -> str:
-    """The program dies in flight: within 20 s the vehicle neither falls nor flees, and one that starts then
-    hears it and brings it down, or leaves it to whoever has it.
+    """Check that a vehicle whose program dies in flight neither falls nor flies away within 20 s.
+
+    A program that starts then lands the vehicle, or leaves it to the commander that controls it.
     """
     stage.drone.takeoff(10)
     here = stage.drone.position

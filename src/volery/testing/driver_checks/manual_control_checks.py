@@ -1,4 +1,4 @@
-"""The manual side: sticks, with and without satellites."""
+"""Checks of manual control, with and without satellites."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def fly_by_hand(
     roll: float = 0.0,
     until: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Hold the sticks so for *seconds*, or *until*, as a joystick's loop does: ten samples a second."""
+    """Send manual control samples at 10 Hz for `seconds` s, or until `until` holds."""
     for _ in range(round(seconds / BETWEEN_S)):
         stage.drone.manual_control(pitch, roll, throttle, 0.0)
         stage.sleep(BETWEEN_S)
@@ -34,15 +34,15 @@ def fly_by_hand(
 
 @check(needs=STICKS)
 def sticks_out_of_range(stage: Stage) -> None:
-    """Sticks beyond -1..1, a throttle beyond 0..1: the call says which one."""
+    """Check that controls beyond -1..1 and a throttle beyond 0..1 are refused by name."""
     for sticks, which in (((2, 0, 0.5, 0), "pitch"), ((0, -2, 0.5, 0), "roll"), ((0, 0, 1.1, 0), "throttle")):
         with raising(UsageError, naming=which):
             stage.drone.manual_control(*sticks)
 
 
 @check(needs=(*STICKS, *UP), flies=True)
-def sticks_that_nobody_holds(stage: Stage) -> None:
-    """altitude_hold() in the air is refused while no stick sample is newer than a second."""
+def stale_controls(stage: Stage) -> None:
+    """Check that altitude_hold() in flight is refused while no control sample is newer than 1 s."""
     stage.drone.takeoff(10)
     with raising(Refused, UsageError, VehicleError, naming=stage.name):
         stage.drone.altitude_hold()
@@ -52,7 +52,7 @@ def sticks_that_nobody_holds(stage: Stage) -> None:
 
 @check(needs=(*STICKS, *UP), flies=True)
 def altitude_hold(stage: Stage) -> str:
-    """altitude_hold() returns in its mode; a throttle of 0.5 keeps the height, 0.8 climbs, 0.2 sinks."""
+    """Check that in altitude_hold() a throttle of 0.5 keeps the height, 0.8 climbs, 0.2 descends."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0, 0, 0.5, 0)
     stage.drone.altitude_hold()
@@ -72,7 +72,7 @@ def altitude_hold(stage: Stage) -> str:
 
 @check(needs=(*STICKS, *UP), flies=True)
 def pitching_forward(stage: Stage) -> None:
-    """Pitch +0.3 flies forward, roll +0.3 to the right: the signs are this project's."""
+    """Check that pitch +0.3 flies forward and roll +0.3 to the right."""
     stage.drone.takeoff(10)
     if Capability.HEADING in stage.drone.capabilities:
         stage.drone.set_heading(0)
@@ -91,7 +91,7 @@ def pitching_forward(stage: Stage) -> None:
 
 @check(needs=(*STABILIZED, *UP), flies=True)
 def stabilize(stage: Stage) -> str:
-    """stabilize() returns in its mode, sticks held; it is flown on by hand and handed back by goto()."""
+    """Check that stabilize() returns in its mode, is flown manually, and goto() regains control."""
     stage.drone.takeoff(20)
     stage.drone.manual_control(0, 0, 0.5, 0)
     stage.drone.stabilize()
@@ -105,7 +105,7 @@ def stabilize(stage: Stage) -> str:
 
 @check(needs=(*STICKS, *UP, Capability.GOTO), flies=True)
 def with_and_without_a_position(stage: Stage) -> None:
-    """In flight one changes from positions to sticks and back; positions work as before."""
+    """Check that control changes in flight from positions to manual and back."""
     stage.drone.takeoff(10)
     for north in (15, 0):
         stage.drone.manual_control(0, 0, 0.5, 0)
@@ -116,17 +116,13 @@ def with_and_without_a_position(stage: Stage) -> None:
 
 @check(needs=(*STICKS, Capability.LAND), flies=True)
 def altitude_hold_without_satellites(stage: Stage) -> str:
-    """With no satellites in view altitude_hold() arms it on the ground; it is flown up by hand and land()
-    brings it down.
-    """
+    """Check that without satellites altitude_hold() arms; the vehicle climbs manually and land() lands it."""
     return _without_satellites(stage, stage.drone.altitude_hold)
 
 
 @check(needs=(*STABILIZED, Capability.LAND), flies=True)
 def stabilize_without_satellites(stage: Stage) -> str:
-    """With no satellites in view stabilize() arms it on the ground; it is flown up by hand and land() brings
-    it down.
-    """
+    """Check that without satellites stabilize() arms; the vehicle climbs manually and land() lands it."""
     return _without_satellites(stage, stage.drone.stabilize)
 
 
@@ -150,8 +146,9 @@ def _without_satellites(stage: Stage, mode: Callable[[], None]) -> str:
 
 @check(needs=(*STICKS, *UP, Capability.GOTO), flies=True)
 def satellites_lost_in_flight(stage: Stage) -> str:
-    """Without satellites in flight goto() ends with a VehicleError or arrives late, never in silence; sticks
-    and land() still work.
+    """Check that without satellites in flight goto() ends with a VehicleError or arrives late.
+
+    Manual control and land() still work.
     """
     stage.drone.takeoff(10)
     stage.flight.block_gps()

@@ -1,4 +1,4 @@
-"""Missions that the autopilot flies by itself."""
+"""Checks of missions that the autopilot flies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MISSION = (Capability.MISSION,)
 
 @check(needs=MISSION, flies=True)
 def mission(stage: Stage) -> None:
-    """A mission is uploaded, started, flown over its points and landed; start_mission() returns disarmed."""
+    """Check that a mission is uploaded, started, flown and landed; start_mission() returns disarmed."""
     stage.drone.wait_ready()
     goal = stage.at(25, 10, 12)
     reached: list[bool] = []
@@ -42,7 +42,7 @@ def mission(stage: Stage) -> None:
 
 @check(needs=MISSION, flies=True)
 def mission_that_returns(stage: Stage) -> None:
-    """A mission that ends with the way home ends there, disarmed."""
+    """Check that a mission that ends with a return home ends there, disarmed."""
     stage.drone.wait_ready()
     stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(15, 0)), ReturnHome()])
     home = stage.drone.home
@@ -54,7 +54,7 @@ def mission_that_returns(stage: Stage) -> None:
 
 @check(needs=(*MISSION, Capability.GOTO), flies=True)
 def mission_that_ends_in_the_air(stage: Stage) -> None:
-    """After a mission whose last item is a point, the program has it again: goto() and land() work."""
+    """Check that goto() and land() work after a mission whose last item is a waypoint."""
     stage.drone.wait_ready()
     last = stage.at(15, 5)
     stage.drone.upload_mission([TakeOff(10), Waypoint(last)])
@@ -68,7 +68,7 @@ def mission_that_ends_in_the_air(stage: Stage) -> None:
 
 @check(needs=MISSION)
 def missions_that_make_no_sense(stage: Stage) -> None:
-    """An empty mission, and one that leaves the stated limits, are refused before anything is sent."""
+    """Check that an empty mission and one outside the limits are refused before anything is sent."""
     stage.drone.wait_ready()
     with raising(UsageError, naming=stage.name):
         stage.drone.upload_mission([])

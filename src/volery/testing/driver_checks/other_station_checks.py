@@ -1,4 +1,4 @@
-"""Somebody else: another station that changes the mode or stops the motors, another vehicle on the air."""
+"""Checks with another ground station, which commands the vehicle, or another vehicle on the link."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ GO = (Capability.TAKEOFF, Capability.GOTO)
 
 @check(needs=(*GO, Capability.LAND), flies=True)
 def mode_change_by_another(stage: Stage) -> str:
-    """Another station has it land: goto() ends with Overridden, nothing we do fights it, it comes down."""
+    """Check that goto() ends with Overridden when another station lands it, which is not resisted."""
     other = stage.other()
     stage.drone.takeoff(10)
-    stage.later(3.0, other.lands_it)
+    stage.later(3.0, other.land)
     with raising(Overridden, Failsafe, naming=stage.name) as caught:
         stage.drone.goto(stage.at(60, 0), speed=_slow(stage))
     theirs = stage.drone.mode
@@ -36,8 +36,10 @@ def _slow(stage: Stage) -> float | None:
 
 @check(needs=GO, flies=True)
 def sent_elsewhere_by_another(stage: Stage) -> str:
-    """Another station sends it elsewhere, in the same mode: goto() ends with Overridden where the autopilot
-    tells its target, else in time with NotArrived; it is not sent back.
+    """Check that goto() ends with an error when another station sends the vehicle elsewhere in the same mode.
+
+    The error is Overridden if the autopilot reports its target, else NotArrived in time; the target is not
+    restored.
     """
     other = stage.other()
     stage.drone.takeoff(10)
@@ -56,12 +58,10 @@ def sent_elsewhere_by_another(stage: Stage) -> str:
 
 @check(needs=(*GO, Capability.LAND), flies=True)
 def mode_change_while_idle(stage: Stage) -> None:
-    """Another station has it land while the program does nothing: its next goto() says so and fights
-    nothing.
-    """
+    """Check that goto() after a landing by another station reports that and does not resist."""
     other = stage.other()
     stage.drone.takeoff(15)
-    stage.later(0.0, other.lands_it)
+    stage.later(0.0, other.land)
     stage.sleep(4)
     with raising(Overridden, naming=stage.name):
         stage.drone.goto(stage.at(10, 0))
@@ -70,17 +70,15 @@ def mode_change_while_idle(stage: Stage) -> None:
 
 @check(needs=(Capability.TAKEOFF, Capability.LAND), flies=True)
 def mode_change_during_takeoff(stage: Stage) -> str:
-    """Another station has it land while it takes off: takeoff() ends with a VehicleError, and it is not
-    started over in the air.
-    """
+    """Check that takeoff() ends with a VehicleError when another station lands the vehicle."""
     other = stage.other()
     stage.drone.wait_ready()
 
-    def lands_it_in_the_air() -> None:
+    def land_in_the_air() -> None:
         stage.until(lambda: other.seen.flying and other.seen.above_home > 3.0, 60.0, "it never rose")
-        other.lands_it()
+        other.land()
 
-    stage.later(0.0, lands_it_in_the_air)
+    stage.later(0.0, land_in_the_air)
     with raising(VehicleError, naming=stage.name) as caught:
         stage.drone.takeoff(20)
     stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
@@ -89,10 +87,10 @@ def mode_change_during_takeoff(stage: Stage) -> str:
 
 @check(needs=GO, flies=True, lets_fall=True)
 def disarmed_midway(stage: Stage) -> str:
-    """Another station stops the motors in flight: goto() ends with Overridden, and is not resumed."""
+    """Check that goto() ends with Overridden when another station stops the motors, and is not resumed."""
     other = stage.other()
     stage.drone.takeoff(5)
-    stage.later(2.0, other.disarms_it)
+    stage.later(2.0, other.disarm)
     with raising(Overridden, Failsafe, naming=stage.name) as caught:
         stage.drone.goto(stage.at(60, 0, 5), speed=_slow(stage))
     stage.sleep(5)
@@ -102,15 +100,15 @@ def disarmed_midway(stage: Stage) -> str:
 
 @check(needs=(Capability.TAKEOFF,), flies=True)
 def disarmed_before_lift_off(stage: Stage) -> str:
-    """Another station disarms it before it lifts off: the take-off is started over, or ends saying so."""
+    """Check that a take-off disarmed by another station is repeated, or ends with an error that says so."""
     other = stage.other()
     stage.drone.wait_ready()
 
-    def disarms_it_once_armed() -> None:
+    def disarm_once_armed() -> None:
         stage.until(lambda: other.seen.armed, 60.0, "it was never armed")
-        other.disarms_it()
+        other.disarm()
 
-    stage.later(0.0, disarms_it_once_armed)
+    stage.later(0.0, disarm_once_armed)
     try:
         stage.drone.takeoff(10)
     except VehicleError as error:
@@ -122,7 +120,7 @@ def disarmed_before_lift_off(stage: Stage) -> str:
 
 @check(needs=(Capability.TAKEOFF,), flies=True, neighbour=True)
 def another_vehicle_on_the_air(stage: Stage) -> None:
-    """A second vehicle is heard and hears on the same link: only the one that is meant arms and flies."""
+    """Check that only the addressed vehicle arms and flies when a second one is on the same link."""
     neighbour = stage.neighbour
     neighbour.wait_connected()
     stage.drone.takeoff(10)
@@ -134,7 +132,7 @@ def another_vehicle_on_the_air(stage: Stage) -> None:
 
 @check(kind="")
 def wrong_system_id(stage: Stage) -> str:
-    """A driver that was told of another system id hears nobody, and says so."""
+    """Check that a driver for a system id without a vehicle reports that no message arrives."""
     stranger = stage.of_system(77)
     try:
         with raising(LinkSilent, LinkGarbled, naming=stage.name) as caught:
@@ -146,11 +144,11 @@ def wrong_system_id(stage: Stage) -> str:
 
 @check(needs=GO, flies=True)
 def home_moved_by_another(stage: Stage) -> str:
-    """Another station moves home by 20 m: the program sees it, and return_home() goes there."""
+    """Check that a home set by another station 20 m away is reported, and return_home() goes there."""
     other = stage.other()
     stage.drone.takeoff(10)
     there = stage.at(20, 0, 0.0, amsl=True)
-    other.moves_home(there)
+    other.set_home(there)
 
     def moved() -> bool:
         north, east, _ = stage.offset(there, stage.drone.home)

@@ -1,4 +1,4 @@
-"""What a rover must do."""
+"""Checks of rovers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NEAR_M = 3.0
 
 @check(kind="rover", needs=(Capability.GOTO,), flies=True)
 def drive(stage: Stage) -> None:
-    """drive() arms it, returns at the goal by the autopilot's own estimate, standing."""
+    """Check that drive() arms the rover and returns at the goal by the autopilot's estimate, at rest."""
     stage.drone.wait_ready()
     goal = stage.at(25, 10, 0.0)
     stage.drone.drive(goal)
@@ -26,7 +26,7 @@ def drive(stage: Stage) -> None:
 
 @check(kind="rover", needs=(Capability.GOTO, Capability.RETURN_HOME), flies=True)
 def drive_home(stage: Stage) -> None:
-    """return_home() stops near home."""
+    """Check that return_home() stops near home."""
     stage.drone.wait_ready()
     stage.drone.drive(stage.at(25, 0, 0.0))
     stage.drone.return_home()
@@ -36,7 +36,7 @@ def drive_home(stage: Stage) -> None:
 
 @check(kind="rover", needs=(Capability.MANUAL_CONTROL,), flies=True)
 def drive_by_hand(stage: Stage) -> None:
-    """By manual(), armed, the throttle drives; a control out of range is refused."""
+    """Check that in manual(), armed, the throttle drives, and a control out of range is refused."""
     stage.drone.wait_ready()
     stage.drone.manual_control(0.0, 0.0)
     stage.drone.manual()
@@ -53,7 +53,7 @@ def drive_by_hand(stage: Stage) -> None:
 
 @check(kind="rover", needs=(Capability.GOTO,), flies=True)
 def rest(stage: Stage) -> str:
-    """come_to_rest() stops and disarms it."""
+    """Check that come_to_rest() stops and disarms the rover."""
     stage.drone.wait_ready()
     stage.drone.drive(stage.at(10, 0, 0.0))
     words = str(stage.drone.come_to_rest())

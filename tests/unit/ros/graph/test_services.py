@@ -63,7 +63,7 @@ def test_the_handler_gets_a_copy(rig: Any) -> None:
     assert len(given) == 1
 
 
-def test_nobody_serves_it(rig: Any) -> None:
+def test_an_unserved_service(rig: Any) -> None:
     def client() -> None:
         node = rig.graph.node("client")
         node.serve("switch", SET_BOOL, lambda request: answer())
