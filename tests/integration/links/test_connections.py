@@ -221,7 +221,7 @@ def test_links_from_addresses(bench: Bench) -> None:
     port = free_port()
     joined: list[str] = []
     server = bench.add(
-        listen(bench.kernel, parse_listen(f"tcp://{HERE}:{port}"), joined=lambda: joined.append("one"))
+        listen(bench.kernel, parse_listen(f"tcp://{HERE}:{port}"), on_connect=lambda: joined.append("one"))
     )
     client = bench.add(open_link(bench.kernel, parse(f"ardupilot+tcp://{HERE}:{port}")))
     bench.until(lambda: joined)

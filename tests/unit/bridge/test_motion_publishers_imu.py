@@ -32,12 +32,12 @@ SI = {"xacc": 0.980665, "yacc": 1.96133, "zacc": -9.80665, "xgyro": 0.01, "ygyro
 )
 def test_a_measurement(aviary: Any, name: str, fields: dict[str, float]) -> None:
     aviary.connect()
-    felt, fields_heard = aviary.listen("imu/data_raw", IMU), aviary.listen("imu/mag", FIELD)
+    felt, magnetic = aviary.listen("imu/data_raw", IMU), aviary.listen("imu/mag", FIELD)
     together = aviary.listen("imu/data", IMU)
     aviary.emit(name, **fields)
     aviary.emit("ATTITUDE", rollspeed=0.5)
     aviary.run(200 * MS)
-    [raw], [field], [data] = felt, fields_heard, together
+    [raw], [field], [data] = felt, magnetic, together
     assert xyz(raw.linear_acceleration) == pytest.approx((0.980665, -1.96133, 9.80665), rel=1e-6)
     assert xyz(raw.angular_velocity) == pytest.approx((0.01, -0.02, -0.03))
     assert raw.orientation_covariance[0] == -1.0  # there is none

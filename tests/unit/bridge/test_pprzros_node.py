@@ -32,8 +32,8 @@ class Aviary:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
         link, self.aircraft = in_process_pair(self.kernel, MS, "craft", PPRZLINK)
-        self.told: list[Frame] = []
-        self.aircraft.receive(self.told.append)
+        self.sent: list[Frame] = []
+        self.aircraft.receive(self.sent.append)
         self.received: list[Any] = []
         self.graph = EmbeddedGraph(self.kernel)
         serve_pprzros(self.graph, link, "craft_1", ExecutionContext("pprzros"))
@@ -76,12 +76,12 @@ def test_what_the_aircraft_says_is_published() -> None:
     assert to_frame(message).fields == {"md5sum": (1, 2, 3)}
 
 
-def test_what_is_published_is_told_to_the_aircraft() -> None:
+def test_published_messages_are_sent_to_the_aircraft() -> None:
     aviary = Aviary()
     aviary.kernel.run(S)
     aviary.publish(to_message(SETPOINT, 0))
     aviary.kernel.run(2 * S)
-    assert aviary.told == [PPRZLINK.quantised(SETPOINT)]
+    assert aviary.sent == [PPRZLINK.quantised(SETPOINT)]
 
 
 @pytest.mark.parametrize(
@@ -100,6 +100,6 @@ def test_what_makes_no_sense_is_dropped_with_a_warning(message: Any, says: str) 
     aviary.publish(message)
     aviary.publish(to_message(SETPOINT, 0))
     aviary.kernel.run(2 * S)
-    assert len(aviary.told) == 1
+    assert len(aviary.sent) == 1
     (warning,) = [event for event in aviary.events if isinstance(event, Text)]
     assert warning.text.startswith("pprzros/from_ros: message dropped: ")

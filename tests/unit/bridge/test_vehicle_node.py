@@ -203,7 +203,7 @@ def test_other_stations_on_the_link_are_not_the_vehicle(aviary: Any) -> None:
 
 def test_streams_are_asked_for_until_they_come(aviary: Any) -> None:
     aviary.run(2 * S)
-    assert {frame.name for frame in aviary.sent} == {"HEARTBEAT"}  # to nobody in particular
+    assert {frame.name for frame in aviary.sent} == {"HEARTBEAT"}  # without an addressee
     aviary.heartbeat()
     aviary.run(1200 * MS)
     asked = {

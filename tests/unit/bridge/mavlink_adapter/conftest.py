@@ -110,7 +110,7 @@ class Flown:
 
     @property
     def texts(self) -> list[str]:
-        """What was told in words: those of the adapter."""
+        """Texts of the warnings of the adapter."""
         return [event.text for event in self.events if isinstance(event, Text) and event.severity <= 4]
 
     @property

@@ -53,7 +53,7 @@ def test_telemetry_is_what_the_autopilot_says(ready: Any) -> None:
     assert last("local_position/pose").pose.position.z == pytest.approx(0.0, abs=0.5)
     assert last("vfr_hud").altitude == pytest.approx(900.0, abs=3.0)  # above the sea
     assert isnan(last("vfr_hud").airspeed)
-    assert last("imu/data").angular_velocity_covariance[0] == -1.0  # not told
+    assert last("imu/data").angular_velocity_covariance[0] == -1.0  # unknown
 
 
 def test_it_is_armed_flown_to_set_points_and_landed(ready: Any) -> None:
@@ -76,7 +76,7 @@ def test_it_is_armed_flown_to_set_points_and_landed(ready: Any) -> None:
         ready.publish("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/Twist", linear={"y": 2.0})
         ready.run(0.1)
     assert ready.last("local_position/velocity_local").twist.linear.y == pytest.approx(2.0, abs=0.4)
-    ready.run(6.0)  # nobody says it any more
+    ready.run(6.0)  # the set-point has expired
     assert ready.last("local_position/velocity_local").twist.linear.y == pytest.approx(0.0, abs=0.4)
     assert ready.last("state").mode == HOVERS[kind_of(ready)]
     assert ready.last("state").guided
@@ -120,10 +120,10 @@ def test_refusals_have_a_reason(ready: Any) -> None:
     kind = kind_of(ready)
     assert ready.command("cmd/command", "CommandLong", command=181) == (False, 3)
     ready.run(0.3)
-    told = ready.last("statustext/recv")
-    assert told.text == ready.texts[-1]  # whole, however long
-    assert told.severity == 4
-    assert "no command DO_SET_RELAY here; there is" in told.text
+    warning = ready.last("statustext/recv")
+    assert warning.text == ready.texts[-1]  # whole, however long
+    assert warning.severity == 4
+    assert "no command DO_SET_RELAY here; there is" in warning.text
     assert ready.command("cmd/takeoff", "CommandTOL", altitude=-1.0) == (False, 2)
     assert "give metres above home, above 0" in ready.texts[-1]
     assert ready.command("cmd/arming", "CommandBool", value=False) == (True, 0)  # it is
@@ -254,7 +254,7 @@ def test_messages_are_sent_only_while_telemetry_arrives(flown: Any) -> None:
     made.run(0.5)
     assert made.frames == []
     made.run(4.0)
-    assert {frame.name for frame in made.frames} == {"HEARTBEAT"}  # nobody has asked for more
+    assert {frame.name for frame in made.frames} == {"HEARTBEAT"}  # nothing else was requested
     made.send("REQUEST_DATA_STREAM", req_stream_id=0, req_message_rate=10, start_stop=1)
     made.run(4.0)
     assert not made.messages_of("GLOBAL_POSITION_INT")  # it does not know where it is

@@ -1,4 +1,4 @@
-"""Telemetry as frames, set-points and sticks as what a drone is told: each without anybody flying."""
+"""Telemetry encoded as MAVLink messages; set-points and manual control decoded, without a flight."""
 
 from __future__ import annotations
 
@@ -95,10 +95,10 @@ def test_only_new_content_is_encoded_again(bird: Bird, seen: Telemetry) -> None:
     for name in ("HEARTBEAT", "GLOBAL_POSITION_INT", "ATTITUDE", "HOME_POSITION"):
         assert bird.encoded(name) is not None
         assert bird.encoded(name) is None
-        assert bird.encoder.encode(name) is not None  # whoever asks is told
+        assert bird.encoder.encode(name) is not None  # an explicit request
     bird.update(at=6 * S)
     assert bird.encoded("HEARTBEAT") is not None
-    assert bird.encoded("GLOBAL_POSITION_INT") is None  # of that nothing was heard
+    assert bird.encoded("GLOBAL_POSITION_INT") is None  # its content is unchanged
     here = seen.position
     assert here is not None
     bird.update(position=Position(here.latitude, here.longitude, here.altitude))
@@ -114,7 +114,7 @@ def test_only_new_content_is_encoded_again(bird: Bird, seen: Telemetry) -> None:
         ({"mode": "P_GPS", "autopilot": "DJI M600"}, 255, 6, 1, 3),
         ({"mode": "P_GPS by RC", "autopilot": "DJI M600"}, 255, 6, 1, 3),
         ({"mode": "MODE_35", "autopilot": "DJI M600"}, 255, 35, 1, 3),
-        ({"mode": "LAND", "autopilot": "somebody's"}, 0, 9, 1, 3),
+        ({"mode": "LAND", "autopilot": "unknown"}, 0, 9, 1, 3),
     ],
 )
 def test_the_heartbeat_identifies_autopilot_and_mode(
