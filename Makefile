@@ -15,15 +15,16 @@ demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by sid
 test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
 	@status=0; \
 	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration" || status=1; \
-	$(BIN)/pytest -n auto --dist loadfile --durations=5 -m integration --ignore tests/integration/transports || status=1; \
+	$(BIN)/pytest -n 4 --dist loadfile --durations=5 -m integration --ignore tests/integration/transports || status=1; \
 	$(BIN)/pytest --durations=5 tests/integration/transports || status=1; \
 	exit $$status
 
-check: $(VENV)/dev.stamp ## style, types, the direction of imports, and generated pages that are up to date
+check: $(VENV)/dev.stamp ## style, types, layers, circles, words, and whether generated pages are up to date
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	PYTHONPATH=src $(BIN)/lint-imports
+	$(BIN)/python scripts/check_sources.py
 	$(BIN)/python scripts/generate_docs.py --check
 
 bench: $(VENV)/bench.stamp ## every figure that the README and the docs claim
