@@ -59,7 +59,7 @@ LISTENER = """
 import rospy
 from std_msgs.msg import String
 rospy.init_node("listener")
-rospy.Subscriber("words", String, lambda heard: None)
+rospy.Subscriber("words", String, lambda message: None)
 rospy.spin()
 """
 MODEL = """

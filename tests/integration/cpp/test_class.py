@@ -118,7 +118,7 @@ def test_the_same_seed_gives_the_same_trace(run_model, tmp_path):
 
 
 @pytest.mark.usefixtures("llvm")
-def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
+def test_code_is_counted_where_the_core_is_known(run_model):
     outcome = run_model(MODEL, "adder.cpp", fidelity="code", lister=LISTER, caller=CALLER)
     assert outcome.run.completed, outcome.run.record.outcome
     counted = dict.fromkeys(("one", "other"), 0)
@@ -131,7 +131,7 @@ def test_what_it_computes_is_counted_where_its_core_is_known(run_model):
 
 
 @pytest.mark.usefixtures("llvm")
-def test_what_it_costs_is_learnt_from_a_run(run_model, tmp_path, monkeypatch):
+def test_costs_are_profiled_in_a_run(run_model, tmp_path, monkeypatch):
     """From then on the costs are those of what ran; the rest is charged as before."""
     monkeypatch.setenv("VOLERY_CACHE", str(tmp_path / "cache"))
     guessed = run_model(MODEL, "adder.cpp", fidelity="code", out="guessed", lister=LISTER, caller=CALLER)
@@ -155,7 +155,7 @@ def _counted(outcome, component):
     return sum(one.caller for one in charged)
 
 
-def test_there_is_nothing_to_learn_of_python(tmp_path):
+def test_a_model_without_cpp_cannot_be_profiled(tmp_path):
     for name in ("adder.cpp", "lister.py", "caller.py"):
         (tmp_path / name).touch()
     (tmp_path / "model.yaml").write_text(MODEL.replace("language: c++", "language: python"), encoding="utf-8")

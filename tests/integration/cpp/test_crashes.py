@@ -58,7 +58,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize("how", WAYS)
-def test_the_component_is_named_and_the_trace_is_whole(run_model, monkeypatch, how):
+def test_a_crash_names_the_component_and_leaves_a_complete_trace(run_model, monkeypatch, how):
     monkeypatch.setattr(simulate, "PATIENCE_S", 1.0)
     outcome = run_model(MODEL.format(how=how), "crash.cpp", other=OTHER)
     assert isinstance(outcome.run.error, ComponentError)
@@ -74,13 +74,13 @@ def test_the_component_is_named_and_the_trace_is_whole(run_model, monkeypatch, h
     assert (outcome.run.folder / "report.html").exists()
 
 
-def test_one_that_does_not_crash_prints_into_the_trace(run_model):
+def test_printed_text_goes_into_the_trace(run_model):
     outcome = run_model(MODEL.format(how="not"), "crash.cpp", other=OTHER)
     assert outcome.run.ok
     assert ("crash", "and now: not") in [(one.source, one.text) for one in outcome.of(Text)]
 
 
-def test_a_compilers_error_is_told_with_its_place(run_model, tmp_path):
+def test_a_compiler_error_names_the_source_line(run_model, tmp_path):
     (tmp_path / "crash.cpp").write_text("#include <ros/ros.h>\nint main() {\n    ros::AsyncSpinner(2);\n}\n")
     with pytest.raises(ModelError) as caught:
         run_model(MODEL.format(how="not"), other=OTHER)

@@ -29,7 +29,7 @@ def test_the_same_mission_twice(tmp_path):
         assert cost.ros_calls["publish"] > 0
 
 
-def test_what_is_commanded_by_messages_alone_is_brought_down_at_the_end(tmp_path):
+def test_a_vehicle_commanded_by_messages_is_landed_at_the_end(tmp_path):
     early = ["application.by_hand.active.start=0 s", "run.duration=10 s"]
     run = simulate(EXAMPLE, Options("times", out=tmp_path), overrides=early)
     assert run.completed

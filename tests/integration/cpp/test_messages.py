@@ -74,7 +74,7 @@ def echo(tmp_path: Path) -> Any:
     return made.echo
 
 
-def test_bytes_come_back_as_they_went(echo):
+def test_messages_are_encoded_and_decoded_unchanged(echo):
     for name in TYPES:
         message = _filled(_ours(name), 1)
         data = messages.to_cdr(message)

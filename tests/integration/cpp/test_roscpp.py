@@ -56,7 +56,7 @@ def test_two_nodes_talk(run_model):
     assert ("keeper", "gps at 43.5, status -1") in said
     assert ("keeper", "/robot/keeper has arrived") in said
     [stopped] = [text for source, text in said if source == "plant" and text.startswith("stopped after")]
-    assert not [text for _, text in said if "nobody serves" in text]
+    assert not [text for _, text in said if "no server of" in text]
 
     marks = [one for one in outcome.of(Published) if one.topic == "/robot/marks"]
     assert len(marks) == int(stopped.split()[2])

@@ -24,7 +24,7 @@ def _supervised(work: Any, show: Any = None) -> tuple[Any, list[tuple[str, str]]
     return run_supervised(work, show, Supervision(build_framework(), {}, 5.0), salvage), mourned
 
 
-def test_what_the_run_comes_to_arrives():
+def test_the_result_of_the_run_is_returned():
     shown: list[Any] = []
 
     def work(show: Any) -> Any:
@@ -37,8 +37,8 @@ def test_what_the_run_comes_to_arrives():
     assert not mourned
 
 
-@pytest.mark.parametrize("error", [UsageError("no such thing"), LinkSilent("nobody there")])
-def test_what_it_raises_is_raised(error):
+@pytest.mark.parametrize("error", [UsageError("no such thing"), LinkSilent("no reply")])
+def test_an_error_of_the_run_is_raised(error):
     def work(show: Any) -> Any:
         raise error
 
@@ -54,7 +54,7 @@ def test_what_it_raises_is_raised(error):
         (lambda: os.kill(os.getpid(), signal.SIGSEGV), "SIGSEGV"),  # not a component's doing
     ],
 )
-def test_a_process_that_dies_is_mourned(end, said):
+def test_a_process_that_dies_is_reported(end, said):
     _, mourned = _supervised(lambda show: end())
     [(blamed, error)] = mourned
     assert blamed == "run"

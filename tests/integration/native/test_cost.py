@@ -71,7 +71,7 @@ void count() {
 """
 
 
-def test_wrong_predictions_are_as_many_as_the_way_was_taken(tmp_path):
+def test_mispredictions_are_charged_to_their_edge(tmp_path):
     """Costs of a run where a branch seldom goes the other way hold for one where it does so often."""
     file = tmp_path / "choice.cpp"
     file.write_text(CHOICE, encoding="utf-8")
@@ -122,17 +122,19 @@ def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
 
 def test_the_command_gives_time_and_energy(source):
     done = CliRunner().invoke(app, ["cost", str(source), "--on", "rpi4-cortex-a72@600MHz", "--json"])
-    told = json.loads(done.stdout)
+    report = json.loads(done.stdout)
     assert done.exit_code == 0
-    assert told["time_s"] == pytest.approx(told["cycles"] / 600e6)
-    assert told["energy_j"] > 0.0
-    assert told["provenance"] == "estimated"
+    assert report["time_s"] == pytest.approx(report["cycles"] / 600e6)
+    assert report["energy_j"] > 0.0
+    assert report["provenance"] == "estimated"
 
 
 def test_a_compiler_error_is_the_compilers(tmp_path):
     wrong = tmp_path / "wrong.cpp"
-    wrong.write_text("int main() { return nobody; }", encoding="utf-8")
-    with pytest.raises(CompilerError, match=r"wrong.cpp:1:21: error: use of undeclared identifier 'nobody'"):
+    wrong.write_text("int main() { return undeclared; }", encoding="utf-8")
+    with pytest.raises(
+        CompilerError, match=r"wrong.cpp:1:21: error: use of undeclared identifier 'undeclared'"
+    ):
         compile_program([wrong], load_catalogue().processor("rpi4-cortex-a72").core_law())
 
 
@@ -144,13 +146,13 @@ def test_a_compiler_error_is_the_compilers(tmp_path):
         ("work(x)", "no number"),
     ],
 )
-def test_a_wrong_entry_is_told(source, entry, said):
+def test_a_wrong_entry_is_an_error(source, entry, said):
     program = compile_program([source], load_catalogue().processor("rpi4-cortex-a72").core_law())
     with pytest.raises(UsageError, match=said):
         estimate_program(program, Invocation(entry))
 
 
-def test_a_crash_is_told(tmp_path):
+def test_a_crash_is_an_error(tmp_path):
     crashing = tmp_path / "crash.cpp"
     crashing.write_text("int main() { volatile int *p = nullptr; return *p; }", encoding="utf-8")
     with pytest.raises(UsageError, match=r"SIGSEGV|SIGILL|SIGTRAP"):

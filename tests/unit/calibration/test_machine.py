@@ -21,7 +21,7 @@ def test_a_machine_is_named_after_its_processor(tmp_path: Path) -> None:
     assert this_machine("desk", cpuinfo(tmp_path)).name == "desk"
 
 
-def test_no_linux_is_said(tmp_path: Path) -> None:
+def test_without_linux_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="calibrating needs Linux"):
         this_machine(cpuinfo=tmp_path / "nowhere")
 
@@ -29,7 +29,7 @@ def test_no_linux_is_said(tmp_path: Path) -> None:
 MACHINE = Machine("m", "a machine", 2, 2600.0)
 
 
-def test_where_the_frequency_cannot_be_set_it_is_as_it_is(tmp_path: Path) -> None:
+def test_a_frequency_that_cannot_be_set_is_kept(tmp_path: Path) -> None:
     with at_frequency(MACHINE, None, tmp_path) as mhz:
         assert mhz == 2600.0
     with at_frequency(MACHINE, 2601.0, tmp_path) as mhz:
@@ -39,7 +39,7 @@ def test_where_the_frequency_cannot_be_set_it_is_as_it_is(tmp_path: Path) -> Non
         pass
 
 
-def test_it_is_set_on_all_cores_and_set_back(tmp_path: Path) -> None:
+def test_the_frequency_is_set_on_all_cores_and_restored(tmp_path: Path) -> None:
     limits = {}
     for number in range(2):
         folder = tmp_path / f"cpu{number}" / "cpufreq"

@@ -37,7 +37,7 @@ class Given:
         thing.run()
 
 
-class House:
+class Bench:
     """A kernel with two processors, and what it recorded."""
 
     def __init__(self):
@@ -54,7 +54,9 @@ class House:
 
     def run(self, until=S):
         for instance, thing in self.things.values():
-            start(instance, Given(thing), {}, self.kernel.root, lambda *told: self.failures.append(told))
+            start(
+                instance, Given(thing), {}, self.kernel.root, lambda *failure: self.failures.append(failure)
+            )
         self.kernel.run(until)
 
     def of(self, kind):
@@ -97,15 +99,15 @@ def free(**operations):
 def test_nested_calls_over_two_processors_under_preemption():
     """a (onboard) computes 4, calls b (ground): 3, which calls c (onboard): 2; b 1 more, a 1 more.
 
-    A trip takes 3 ms. On board somebody urgent takes 2..5, on the ground somebody urgent takes 11..13.
+    A trip takes 3 ms. On board an urgent task takes 2..5, on the ground an urgent task takes 11..13.
     """
-    house = House()
-    kernel = house.kernel
-    c = house.instance("c", Doing(kernel, []), Allocation(house.onboard), free(work=2), ("work",))
-    to_c = Port(kernel, "b", c, house.travel(3 * MS), house.travel(3 * MS))
-    b = house.instance("b", Doing(kernel, [to_c.work, 1]), Allocation(house.ground), free(work=3), ("work",))
-    to_b = Port(kernel, "a", b, house.travel(3 * MS), house.travel(3 * MS))
-    house.instance("a", Doing(kernel, [4, to_b.work, 1]), Allocation(house.onboard, priority=1), free())
+    bench = Bench()
+    kernel = bench.kernel
+    c = bench.instance("c", Doing(kernel, []), Allocation(bench.onboard), free(work=2), ("work",))
+    to_c = Port(kernel, "b", c, bench.travel(3 * MS), bench.travel(3 * MS))
+    b = bench.instance("b", Doing(kernel, [to_c.work, 1]), Allocation(bench.ground), free(work=3), ("work",))
+    to_b = Port(kernel, "a", b, bench.travel(3 * MS), bench.travel(3 * MS))
+    bench.instance("a", Doing(kernel, [4, to_b.work, 1]), Allocation(bench.onboard, priority=1), free())
 
     def urgent(processor, at, amount):
         def body():
@@ -114,25 +116,25 @@ def test_nested_calls_over_two_processors_under_preemption():
 
         kernel.spawn(body, "urgent", ExecutionContext("urgent", processor, 9))
 
-    urgent(house.onboard, 2, 3)
-    urgent(house.ground, 11, 2)
-    house.run()
+    urgent(bench.onboard, 2, 3)
+    urgent(bench.ground, 11, 2)
+    bench.run()
     # a computes 0..2, is preempted 2..5, computes 5..7; trip 7..10; b computes 10..11, 13..15; trip 15..18;
     # c computes 18..20; trip 20..23; b computes 23..24; trip 24..27; a computes 27..28
-    assert house.busy("onboard") == [(0, 2, "a"), (2, 5, "urgent"), (5, 7, "a"), (18, 20, "c"), (27, 28, "a")]
-    assert house.busy("ground") == [(10, 11, "b"), (11, 13, "urgent"), (13, 15, "b"), (23, 24, "b")]
+    assert bench.busy("onboard") == [(0, 2, "a"), (2, 5, "urgent"), (5, 7, "a"), (18, 20, "c"), (27, 28, "a")]
+    assert bench.busy("ground") == [(10, 11, "b"), (11, 13, "urgent"), (13, 15, "b"), (23, 24, "b")]
     calls = [
-        (call.start / MS, call.end / MS, call.caller, call.callee, call.outcome) for call in house.of(Call)
+        (call.start / MS, call.end / MS, call.caller, call.callee, call.outcome) for call in bench.of(Call)
     ]
     assert calls == [(15, 23, "b", "c", "ok"), (7, 27, "a", "b", "ok")]
-    charges = [(charge.component, charge.kind, charge.caller / MS) for charge in house.of(Charge)]
+    charges = [(charge.component, charge.kind, charge.caller / MS) for charge in bench.of(Charge)]
     assert charges == [("b", "operation:work", 3), ("c", "operation:work", 2)]
 
 
-def test_one_visitor_at_a_time_the_urgent_first():
-    house = House()
-    kernel = house.kernel
-    shared = house.instance("shared", Doing(kernel, []), Allocation(house.ground), free(work=10), ("work",))
+def test_one_caller_at_a_time_by_priority():
+    bench = Bench()
+    kernel = bench.kernel
+    shared = bench.instance("shared", Doing(kernel, []), Allocation(bench.ground), free(work=10), ("work",))
     ends = []
 
     def caller(name, priority, at):
@@ -145,18 +147,18 @@ def test_one_visitor_at_a_time_the_urgent_first():
                 lambda: ends.append((name, kernel.now() / MS)),
             ],
         )
-        house.instance(name, doing, Allocation(None, priority=priority), free())
+        bench.instance(name, doing, Allocation(None, priority=priority), free())
 
     caller("first", 1, 1)
     caller("second", 1, 2)
     caller("urgent", 5, 3)
-    house.run()
+    bench.run()
     assert ends == [("first", 11), ("urgent", 21), ("second", 31)]
 
 
-def test_a_visitor_has_the_callers_priority_unless_the_callee_states_its_own():
-    house = House()
-    kernel = house.kernel
+def test_a_call_has_the_callers_priority_unless_the_callee_states_one():
+    bench = Bench()
+    kernel = bench.kernel
     seen = {}
 
     class Looking:
@@ -169,15 +171,15 @@ def test_a_visitor_has_the_callers_priority_unless_the_callee_states_its_own():
         def run(self):
             pass
 
-    passive = house.instance("passive", Looking("passive"), Allocation(house.ground), free(look=0), ("look",))
-    active = house.instance(
-        "active", Looking("active"), Allocation(house.ground, priority=3), free(look=0), ("look",)
+    passive = bench.instance("passive", Looking("passive"), Allocation(bench.ground), free(look=0), ("look",))
+    active = bench.instance(
+        "active", Looking("active"), Allocation(bench.ground, priority=3), free(look=0), ("look",)
     )
     ports = [Port(kernel, "caller", callee, None, None) for callee in (passive, active)]
-    house.instance(
-        "caller", Doing(kernel, [port.look for port in ports]), Allocation(house.ground, priority=8), free()
+    bench.instance(
+        "caller", Doing(kernel, [port.look for port in ports]), Allocation(bench.ground, priority=8), free()
     )
-    house.run()
+    bench.run()
     assert seen == {"passive": 8, "active": 3}
 
 
@@ -194,29 +196,29 @@ class Keeper:
 
 @pytest.mark.parametrize("far", [True, False])
 def test_arguments_and_results_are_copied_between_processors_only(far):
-    house = House()
+    bench = Bench()
     keeper = Keeper()
-    kept = house.instance("keeper", keeper, Allocation(house.ground), free(keep=0), ("keep",))
-    port = Port(house.kernel, "caller", kept, None, None)
+    kept = bench.instance("keeper", keeper, Allocation(bench.ground), free(keep=0), ("keep",))
+    port = Port(bench.kernel, "caller", kept, None, None)
     mine = {"list": [1]}
     returned = []
-    place = house.onboard if far else house.ground
-    house.instance(
+    place = bench.onboard if far else bench.ground
+    bench.instance(
         "caller",
-        Doing(house.kernel, [lambda: returned.append(port.keep(mine))]),
+        Doing(bench.kernel, [lambda: returned.append(port.keep(mine))]),
         Allocation(place, priority=0),
         free(),
     )
-    house.run()
+    bench.run()
     assert keeper.kept == mine == returned[0]
     assert (keeper.kept is mine) is not far
     assert (returned[0] is keeper.kept) is not far
 
 
-def test_what_cannot_be_copied_cannot_go_to_another_processor():
-    house = House()
-    kernel = house.kernel
-    keeper = house.instance("keeper", Keeper(), Allocation(house.ground), free(keep=0), ("keep",))
+def test_a_value_that_cannot_be_copied_cannot_be_sent_to_another_processor():
+    bench = Bench()
+    kernel = bench.kernel
+    keeper = bench.instance("keeper", Keeper(), Allocation(bench.ground), free(keep=0), ("keep",))
     port = Port(kernel, "caller", keeper, None, None)
     said = []
 
@@ -227,8 +229,8 @@ def test_what_cannot_be_copied_cannot_go_to_another_processor():
             said.append(str(error))
 
     steps = [lambda: attempt(threading.Lock()), lambda: attempt(port)]
-    house.instance("caller", Doing(kernel, steps), Allocation(house.onboard, priority=0), free())
-    house.run()
+    bench.instance("caller", Doing(kernel, steps), Allocation(bench.onboard, priority=0), free())
+    bench.run()
     assert said[0].startswith(
         "the arguments of keeper.keep cannot be copied to another processor: cannot pickle"
     )
@@ -252,13 +254,13 @@ class Faulty:
         self.kernel.park(None, "for ever")
 
 
-def test_what_a_callee_raises_names_it_and_leaves_it_usable():
-    house = House()
-    kernel = house.kernel
-    faulty = house.instance("faulty", Faulty(kernel), Allocation(house.ground), free(boom=0), ("boom",))
+def test_an_error_of_a_callee_names_it_and_leaves_it_usable():
+    bench = Bench()
+    kernel = bench.kernel
+    faulty = bench.instance("faulty", Faulty(kernel), Allocation(bench.ground), free(boom=0), ("boom",))
     middle_port = Port(kernel, "middle", faulty, None, None)
-    middle = house.instance(
-        "middle", Faulty(kernel, middle_port), Allocation(house.ground), free(pass_on=0), ("pass_on",)
+    middle = bench.instance(
+        "middle", Faulty(kernel, middle_port), Allocation(bench.ground), free(pass_on=0), ("pass_on",)
     )
     port = Port(kernel, "caller", middle, None, None)
     caught = []
@@ -269,36 +271,36 @@ def test_what_a_callee_raises_names_it_and_leaves_it_usable():
         except Exception as error:
             caught.append(error)
 
-    house.instance("caller", Doing(kernel, [attempt, attempt]), Allocation(house.onboard, priority=0), free())
-    house.run()
+    bench.instance("caller", Doing(kernel, [attempt, attempt]), Allocation(bench.onboard, priority=0), free())
+    bench.run()
     assert [type(error) for error in caught] == [ComponentError, ComponentError]
     assert caught[0].component == "faulty"
     assert "boom raised ValueError: no such parcel (test_ports.py:" in str(caught[0])
     assert isinstance(caught[0].__cause__, ValueError)
-    assert [failure.who for failure in house.of(Failure)] == ["faulty", "faulty"]
-    assert house.failures == []
-    assert house.busy("ground") == [(0, 2, "faulty"), (2, 4, "faulty")]  # what it computed before is paid
-    assert {call.outcome for call in house.of(Call)} == {"ComponentError"}
+    assert [failure.who for failure in bench.of(Failure)] == ["faulty", "faulty"]
+    assert bench.failures == []
+    assert bench.busy("ground") == [(0, 2, "faulty"), (2, 4, "faulty")]  # what it computed before is paid
+    assert {call.outcome for call in bench.of(Call)} == {"ComponentError"}
 
 
-def test_an_error_nobody_catches_ends_the_caller_and_is_reported():
-    house = House()
-    faulty = house.instance("faulty", Faulty(house.kernel), Allocation(house.ground), free(boom=0), ("boom",))
-    port = Port(house.kernel, "caller", faulty, None, None)
-    house.instance("caller", Doing(house.kernel, [port.boom]), Allocation(house.onboard, priority=0), free())
-    house.run()
-    [(who, error)] = house.failures
+def test_an_uncaught_error_ends_the_caller_and_is_reported():
+    bench = Bench()
+    faulty = bench.instance("faulty", Faulty(bench.kernel), Allocation(bench.ground), free(boom=0), ("boom",))
+    port = Port(bench.kernel, "caller", faulty, None, None)
+    bench.instance("caller", Doing(bench.kernel, [port.boom]), Allocation(bench.onboard, priority=0), free())
+    bench.run()
+    [(who, error)] = bench.failures
     assert who == "caller"
     assert error.component == "faulty"
-    assert [failure.who for failure in house.of(Failure)] == ["faulty", "caller"]
+    assert [failure.who for failure in bench.of(Failure)] == ["faulty", "caller"]
 
 
 def test_cancellation_passes_through_except_exception_and_frees_the_callee():
-    house = House()
-    kernel = house.kernel
+    bench = Bench()
+    kernel = bench.kernel
     seen = []
     faulty = Faulty(kernel)
-    callee = house.instance("callee", faulty, Allocation(house.ground), free(wait=0), ("wait",))
+    callee = bench.instance("callee", faulty, Allocation(bench.ground), free(wait=0), ("wait",))
     port = Port(kernel, "caller", callee, None, None)
 
     def body():
@@ -311,27 +313,27 @@ def test_cancellation_passes_through_except_exception_and_frees_the_callee():
             seen.append("cancelled")
             raise
 
-    house.instance("caller", Doing(kernel, [body]), Allocation(house.onboard, priority=0), free())
+    bench.instance("caller", Doing(kernel, [body]), Allocation(bench.onboard, priority=0), free())
     kernel.call_at(5 * MS, lambda: kernel.cancel(kernel.root, "enough"))
-    house.run()
+    bench.run()
     assert kernel.close() == []
     assert seen == ["cancelled"]
     assert callee._lock.owner is None
 
 
 def test_a_missing_figure_is_an_error_before_anything_starts():
-    house = House()
-    instance = house.instance("planner", Keeper(), Allocation(house.ground), StatedPricing({}), ("keep",))
+    bench = Bench()
+    instance = bench.instance("planner", Keeper(), Allocation(bench.ground), StatedPricing({}), ("keep",))
     with pytest.raises(EstimateError, match="planner: no time is stated for its operation 'keep'"):
-        start(instance, Given(Keeper()), {}, house.kernel.root, print)
-    active = house.instance("loop", Keeper(), Allocation(house.ground, priority=1), StatedPricing({}))
+        start(instance, Given(Keeper()), {}, bench.kernel.root, print)
+    active = bench.instance("loop", Keeper(), Allocation(bench.ground, priority=1), StatedPricing({}))
     with pytest.raises(EstimateError, match="loop: it is active, but no time is stated for an activation"):
-        start(active, Given(Keeper()), {}, house.kernel.root, print)
+        start(active, Given(Keeper()), {}, bench.kernel.root, print)
 
 
 def test_an_activation_is_charged_at_each_release():
-    house = House()
-    kernel = house.kernel
+    bench = Bench()
+    kernel = bench.kernel
 
     class Loop:
         def run(self):
@@ -340,15 +342,15 @@ def test_an_activation_is_charged_at_each_release():
                 rate.sleep()
 
     pricing = StatedPricing({}, Cost(7 * MS, 0.002))
-    house.instance("loop", Loop(), Allocation(house.onboard, priority=1), pricing)
-    house.run(250 * MS)
-    assert house.busy("onboard") == [(0, 7, "loop"), (107, 114, "loop"), (207, 214, "loop")]
-    assert [(charge.kind, charge.energy) for charge in house.of(Charge)] == [("activation", 0.002)] * 3
+    bench.instance("loop", Loop(), Allocation(bench.onboard, priority=1), pricing)
+    bench.run(250 * MS)
+    assert bench.busy("onboard") == [(0, 7, "loop"), (107, 114, "loop"), (207, 214, "loop")]
+    assert [(charge.kind, charge.energy) for charge in bench.of(Charge)] == [("activation", 0.002)] * 3
 
 
 def test_calls_wait_for_the_constructor():
-    house = House()
-    kernel = house.kernel
+    bench = Bench()
+    kernel = bench.kernel
     log = []
 
     class Slow(Given):
@@ -356,42 +358,42 @@ def test_calls_wait_for_the_constructor():
             waiting.sleep(kernel, 50 * MS)
             return Keeper()
 
-    slow = Instance(kernel, "slow", Allocation(house.ground), free(keep=0), ("keep",))
+    slow = Instance(kernel, "slow", Allocation(bench.ground), free(keep=0), ("keep",))
     port = Port(kernel, "caller", slow, None, None)
-    house.instance(
+    bench.instance(
         "caller",
         Doing(kernel, [lambda: log.append((port.keep(1), kernel.now() / MS))]),
         Allocation(None, priority=0),
     )
-    house.things["slow"] = (slow, None)
+    bench.things["slow"] = (slow, None)
     start(slow, Slow(None), {}, kernel.root, print)
-    del house.things["slow"]
-    house.run()
+    del bench.things["slow"]
+    bench.run()
     assert log == [(1, 50)]
 
 
-def test_calling_what_could_not_be_constructed_names_it():
-    house = House()
-    kernel = house.kernel
+def test_a_call_of_a_component_without_an_object_names_it():
+    bench = Bench()
+    kernel = bench.kernel
 
     class Broken(Given):
         def make(self, given):
             raise RuntimeError("no camera")
 
-    told = []
-    broken = Instance(kernel, "broken", Allocation(house.ground), free(keep=0), ("keep",))
-    start(broken, Broken(None), {}, kernel.root, lambda *args: told.append(args))
+    failures = []
+    broken = Instance(kernel, "broken", Allocation(bench.ground), free(keep=0), ("keep",))
+    start(broken, Broken(None), {}, kernel.root, lambda *args: failures.append(args))
     port = Port(kernel, "caller", broken, None, None)
-    house.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Allocation(None, priority=0))
-    house.run()
-    assert "its constructor raised RuntimeError: no camera" in str(told[0][1])
-    assert str(house.failures[0][1]) == "broken: cannot be called: its constructor has failed"
+    bench.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Allocation(None, priority=0))
+    bench.run()
+    assert "its constructor raised RuntimeError: no camera" in str(failures[0][1])
+    assert str(bench.failures[0][1]) == "broken: cannot be called: its constructor has failed"
 
 
 def test_an_unknown_operation_lists_the_valid_ones():
-    house = House()
-    keeper = house.instance("keeper", Keeper(), Allocation(), free(keep=0), ("keep",))
-    port = Port(house.kernel, "caller", keeper, None, None)
+    bench = Bench()
+    keeper = bench.instance("keeper", Keeper(), Allocation(), free(keep=0), ("keep",))
+    port = Port(bench.kernel, "caller", keeper, None, None)
     with pytest.raises(
         AttributeError, match="keeper provides no operation 'kepp' \\(did you mean 'keep'\\?\\): keep"
     ):
@@ -401,13 +403,13 @@ def test_an_unknown_operation_lists_the_valid_ones():
 
 
 def test_a_port_list_is_read_by_index_and_by_name():
-    house = House()
+    bench = Bench()
     ports = PortList(
         [
             Port(
-                house.kernel,
+                bench.kernel,
                 "caller",
-                house.instance(name, Keeper(), Allocation(), None, ("keep",)),
+                bench.instance(name, Keeper(), Allocation(), None, ("keep",)),
                 None,
                 None,
             )
@@ -421,18 +423,18 @@ def test_a_port_list_is_read_by_index_and_by_name():
         ports["twoo"]
 
 
-def test_the_network_is_given_the_size_of_what_travels():
-    house = House()
+def test_the_network_receives_the_size_of_arguments_and_result():
+    bench = Bench()
     sizes = []
-    keeper = house.instance("keeper", Keeper(), Allocation(house.ground), free(keep=0), ("keep",))
-    port = Port(house.kernel, "caller", keeper, sizes.append, sizes.append)
-    house.instance(
+    keeper = bench.instance("keeper", Keeper(), Allocation(bench.ground), free(keep=0), ("keep",))
+    port = Port(bench.kernel, "caller", keeper, sizes.append, sizes.append)
+    bench.instance(
         "caller",
-        Doing(house.kernel, [lambda: port.keep("äb")]),
-        Allocation(house.onboard, priority=0),
+        Doing(bench.kernel, [lambda: port.keep("äb")]),
+        Allocation(bench.onboard, priority=0),
         free(),
     )
-    house.run()
+    bench.run()
     text = 4 + 3
     assert sizes == [HEADER_BYTES + 4 + (4 + text) + 4, HEADER_BYTES + text]
 
@@ -461,9 +463,9 @@ def test_sizes(value, size):
     assert size_of(value) == size
 
 
-def test_on_the_wall_clock_calls_are_the_same():
+def test_calls_work_on_the_wall_clock():
     """Threads instead of greenlets; nothing waits, so nothing takes time here."""
-    events, told = [], []
+    events, results = [], []
     kernel = WallKernel(record=events.append)
     keeper = Keeper()
     callee = Instance(kernel, "keeper", Allocation(), FREE, ("keep",))
@@ -473,7 +475,7 @@ def test_on_the_wall_clock_calls_are_the_same():
 
     class Body:
         def run(self):
-            told.append(port.keep("parcel"))
+            results.append(port.keep("parcel"))
             try:
                 broken.boom()
             finally:
@@ -488,6 +490,6 @@ def test_on_the_wall_clock_calls_are_the_same():
         start(instance, Given(thing), {}, kernel.root, lambda *failed: failures.append(failed))
     kernel.run(60 * S)
     assert kernel.close() == []
-    assert told == ["parcel"] == [keeper.kept]
+    assert results == ["parcel"] == [keeper.kept]
     calls = [(event.callee, event.outcome) for event in events if isinstance(event, Call)]
     assert calls == [("keeper", "ok"), ("faulty", "ComponentError")]

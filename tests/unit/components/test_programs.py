@@ -47,7 +47,7 @@ class Desk:
         operations = given.pop("operations", ())
         instance = Instance(self.kernel, name, given.pop("seat", self.seat), operations=operations)
         program = load_program(self.loader, name, path, class_name)
-        start(instance, program, given, self.kernel.root, lambda *told: self.failures.append(told))
+        start(instance, program, given, self.kernel.root, lambda *failure: self.failures.append(failure))
         return instance
 
     def of(self, kind):
@@ -238,7 +238,7 @@ def test_a_script_has_no_ports(desk):
             program.check(given, operations, active)
 
 
-def test_what_a_component_raises_is_reported_with_its_place(desk):
+def test_an_error_is_reported_with_its_source_line(desk):
     path = desk.write("bad.py", "class Bad:\n    def run(self):\n        raise KeyError('parcel')\n")
     desk.start(path, "Bad", "bad")
     desk.kernel.run(S)
@@ -248,7 +248,7 @@ def test_what_a_component_raises_is_reported_with_its_place(desk):
     assert [failure.who for failure in desk.of(Failure)] == ["bad"]
 
 
-def test_services_find_the_run_and_the_component(desk):
+def test_api_calls_find_the_run_and_the_component(desk):
     path = desk.write(
         "user.py",
         """
@@ -271,7 +271,7 @@ def test_services_find_the_run_and_the_component(desk):
     assert charges == [("stated", 75, 0.0), ("stated", 10, 0.5)]
 
 
-def test_services_outside_of_a_run_say_so():
+def test_api_calls_outside_a_run_are_refused():
     with pytest.raises(UsageError, match="works in a component or a mission of a run only"):
         component_api.note("parcel", "p-1", "ordered")
 
@@ -296,7 +296,7 @@ def test_counted_code_is_charged_and_takes_its_time(tmp_path):
     )
     instance = Instance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), read_steps=steps.take)
     program = load_program(loader, "loop", path, "Loop")
-    start(instance, program, {}, desk.kernel.root, lambda *told: desk.failures.append(told))
+    start(instance, program, {}, desk.kernel.root, lambda *failure: desk.failures.append(failure))
     desk.kernel.run(10 * S)
     instance.flush_charges()
     slices = desk.of(Slice)
@@ -333,7 +333,7 @@ def test_functions_and_classes_of_a_file(desk):
         load_function(desk.loader, path, "missions")
 
 
-def test_what_is_printed_is_a_line_of_the_trace_and_leaves_the_output_alone(desk, capsys):
+def test_printed_text_goes_to_the_trace_and_not_to_standard_output(desk, capsys):
     path = desk.write(
         "user.py",
         """
@@ -397,7 +397,7 @@ def test_packages_import_as_they_do_elsewhere(desk):
         ("import nowhere_to_be_found", "No module named 'nowhere_to_be_found'"),
     ],
 )
-def test_imports_that_fail_say_why(desk, line, words):
+def test_failed_imports_state_the_reason(desk, line, words):
     desk.write("pkg/__init__.py", "")
     path = desk.write("user.py", f"{line}\nclass User: pass\n")
     with pytest.raises(ComponentError, match=words):

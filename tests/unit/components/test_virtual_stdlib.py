@@ -18,7 +18,7 @@ from volery.trace.events import Activation, Failure
 
 @pytest.fixture
 def run(tmp_path):
-    """``run(body, seed, names)``: what the bodies of ``run`` methods told, one component for each name."""
+    """Return a function that runs bodies of ``run`` methods, one component a name, and returns their reports."""
 
     def running(body, seed=1, names=("user",), seconds=60):
         path = tmp_path / "user.py"
@@ -26,10 +26,10 @@ def run(tmp_path):
             "import datetime, queue, random, threading, time\nfrom log import tell\n\n"
             "class User:\n    def run(self):\n" + textwrap.indent(textwrap.dedent(body), " " * 8)
         )
-        events, told = [], []
+        events, reported = [], []
         kernel = VirtualKernel(events.append)
         log = ModuleType("log")
-        log.tell = told.append
+        log.tell = reported.append
         loader = Loader({**virtual_modules(kernel, seed), "log": log})
         for name in names:
             instance = Instance(kernel, name, Allocation(priority=0))
@@ -38,13 +38,13 @@ def run(tmp_path):
         assert kernel.close() == []
         running.events = events
         assert [event.what for event in events if isinstance(event, Failure)] == []
-        return told
+        return reported
 
     return running
 
 
-def test_time_is_the_runs(run):
-    told = run(
+def test_time_is_that_of_the_run(run):
+    reported = run(
         """
         tell((time.monotonic(), time.perf_counter_ns(), time.time()))
         time.sleep(2.5)
@@ -53,14 +53,14 @@ def test_time_is_the_runs(run):
         tell(time.gmtime(0).tm_year)
         """
     )
-    assert told[0] == (0.0, 0, EPOCH / S)
-    assert told[1] == (2.5, 2_500_000_000, EPOCH + 2_500_000_000)
-    assert told[2:] == ["2023-11-14 22:13:22", 1970]
+    assert reported[0] == (0.0, 0, EPOCH / S)
+    assert reported[1] == (2.5, 2_500_000_000, EPOCH + 2_500_000_000)
+    assert reported[2:] == ["2023-11-14 22:13:22", 1970]
     assert [event.released for event in run.events if isinstance(event, Activation)] == [0, 2500 * MS]
 
 
-def test_datetime_is_the_runs(run):
-    told = run(
+def test_datetime_is_that_of_the_run(run):
+    reported = run(
         """
         now = datetime.datetime.now()
         time.sleep(90)
@@ -71,10 +71,10 @@ def test_datetime_is_the_runs(run):
         """,
         seconds=100,
     )
-    assert told == ["0:01:30", "2023-11-14T22:14:50+00:00", "2023-11-14", True]
+    assert reported == ["0:01:30", "2023-11-14T22:14:50+00:00", "2023-11-14", True]
 
 
-def test_chance_follows_the_seed_and_the_component(run):
+def test_random_numbers_follow_the_seed_and_the_component(run):
     body = (
         "tell((random.random(), random.randint(1, 9), random.Random().random(), random.Random(3).random()))\n"
     )
@@ -85,13 +85,13 @@ def test_chance_follows_the_seed_and_the_component(run):
     assert len({draws[3] for draws in first + other}) == 1
 
 
-def test_a_component_more_does_not_change_what_others_draw(run):
+def test_another_component_does_not_change_random_numbers(run):
     body = "tell(random.random())\n"
     assert run(body, names=("one",))[0] == run(body, names=("zero", "one"))[1]
 
 
-def test_queues_hand_over_and_time_out(run):
-    told = run(
+def test_queues_pass_items_and_time_out(run):
+    reported = run(
         """
         line = queue.Queue(maxsize=2)
 
@@ -127,13 +127,13 @@ def test_queues_hand_over_and_time_out(run):
         tell([urgent.get(), urgent.get(), stack.get(), stack.get()])
         """
     )
-    assert [entry for entry in told[:4] if entry[0] == "put"] == [("put", 0, 0.0), ("put", 1, 0.0)]
-    assert [entry[1] for entry in told[:8] if entry[0] == "got"] == [0, 1, 2, 3]
-    assert told[8:] == [(4.0, True, 0), "empty", True, "full", [1, 2, 2, 1]]
+    assert [entry for entry in reported[:4] if entry[0] == "put"] == [("put", 0, 0.0), ("put", 1, 0.0)]
+    assert [entry[1] for entry in reported[:8] if entry[0] == "got"] == [0, 1, 2, 3]
+    assert reported[8:] == [(4.0, True, 0), "empty", True, "full", [1, 2, 2, 1]]
 
 
-def test_threads_are_flows_of_their_component(run):
-    told = run(
+def test_threads_are_tasks_of_their_component(run):
+    reported = run(
         """
         class Worker(threading.Thread):
             def run(self):
@@ -153,11 +153,11 @@ def test_threads_are_flows_of_their_component(run):
         threading.Timer(3, tell, args=("later",)).start()
         """
     )
-    assert told == [(True, "w"), (True, 1.0), ("worker", 2.0), (False, 2.0), "later"]
+    assert reported == [(True, "w"), (True, 1.0), ("worker", 2.0), (False, 2.0), "later"]
 
 
 def test_locks_events_semaphores_and_conditions(run):
-    told = run(
+    reported = run(
         """
         lock, again, ready = threading.Lock(), threading.RLock(), threading.Event()
         slots, condition, items = threading.Semaphore(1), threading.Condition(), []
@@ -191,7 +191,7 @@ def test_locks_events_semaphores_and_conditions(run):
             tell(str(error))
         """
     )
-    assert told == [
+    assert reported == [
         (False, False, True),
         ("other has it", 1.5),
         False,
@@ -205,7 +205,7 @@ def test_locks_events_semaphores_and_conditions(run):
 
 
 def test_the_end_of_a_run_unwinds_threads_that_hold_and_wait(run):
-    told = run(
+    reported = run(
         """
         lock, condition = threading.Lock(), threading.Condition()
 
@@ -221,11 +221,11 @@ def test_the_end_of_a_run_unwinds_threads_that_hold_and_wait(run):
             time.sleep(1000)
         """
     )
-    assert told == ["unwound"]
+    assert reported == ["unwound"]
 
 
-def test_what_is_not_there_says_so(run):
-    told = run(
+def test_a_missing_name_states_the_reason(run):
+    reported = run(
         """
         try:
             threading.Barrier(2)
@@ -233,10 +233,10 @@ def test_what_is_not_there_says_so(run):
             tell(str(error))
         """
     )
-    assert told[0].startswith("threading.Barrier is not available in the files of components")
+    assert reported[0].startswith("threading.Barrier is not available in the files of components")
 
 
-def test_what_a_thread_raises_is_a_failure_of_the_component(tmp_path):
+def test_an_error_of_a_thread_is_a_failure_of_the_component(tmp_path):
     path = tmp_path / "user.py"
     path.write_text(
         "import threading\nclass User:\n    def run(self):\n"
@@ -247,6 +247,6 @@ def test_what_a_thread_raises_is_a_failure_of_the_component(tmp_path):
     kernel = VirtualKernel()
     instance = Instance(kernel, "user", Allocation(priority=0))
     program = load_program(Loader(virtual_modules(kernel, 1)), "user", path, "User")
-    start(instance, program, {}, kernel.root, lambda *told: failed.append(told))
+    start(instance, program, {}, kernel.root, lambda *failure: failed.append(failure))
     kernel.run(S)
     assert str(failed[0][1]) == "user: thread w raised KeyError: 'x' (user.py:6)"

@@ -101,7 +101,7 @@ def test_energies_scale_with_the_voltage_squared() -> None:
     assert math.isclose(scale_energy(3e-3, (ARM, 1500), (ARM, 600), law), 3e-3 * (0.80 / 0.88) ** 2)
 
 
-def test_counted_code_says_how_good_it_is() -> None:
+def test_counted_code_states_its_error() -> None:
     law = load_catalogue().processor(ARM).code_law()
     assert math.isclose(law.ns_per_step(1500), 6.1 / STEPS_PER_NS)
     assert math.isclose(law.ns_per_step(600), 2.5 * law.ns_per_step(1500))
@@ -113,7 +113,7 @@ def test_counted_code_says_how_good_it_is() -> None:
     assert "estimated within 35%" in warning
 
 
-def test_a_measured_slowdown_is_nothing_to_warn_of() -> None:
+def test_a_measured_slowdown_has_no_warning() -> None:
     law = load_catalogue().processor(ARM).code_law()
     measured = law.slowdown.model_copy(update={"provenance": "measured", "error": None})
     law = law.model_copy(update={"slowdown": measured})
@@ -166,6 +166,6 @@ def test_a_catalogue_of_ones_own_adds_processors_and_laws(tmp_path: Path) -> Non
     assert "my-computer" not in load_catalogue().processors
 
 
-def test_a_catalogue_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_catalogue_is_named(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"nowhere\.yaml: this catalogue cannot be read"):
         load_catalogue(tmp_path / "nowhere.yaml")

@@ -9,14 +9,14 @@ MINE = """
 processors:
   mine:
     description: a computer
-    source: nobody
+    source: none
     cores: 1
     least_mhz: 100
     greatest_mhz: 200
 """
 
 
-def test_an_unknown_core_names_those_there_are():
+def test_an_unknown_core_lists_the_known_ones():
     with pytest.raises(EstimateError, match=r"did you mean 'rpi4-cortex-a72'.*intel-i5-3470"):
         load_catalogue().processor("rpi4-cortex-a73")
 
@@ -31,7 +31,7 @@ def test_a_processor_may_have_no_figures_of_compiled_code():
         parse_catalogue(MINE).processor("mine").core_law()
 
 
-def test_a_wrong_figure_is_told():
+def test_a_wrong_figure_is_an_error():
     with pytest.raises(ModelError, match=r"mine\.core_model\.isa: Field required"):
         parse_catalogue(MINE + "    core_model: {cpu: x86-64}\n", "mine.yaml")
 

@@ -94,7 +94,7 @@ def test_out_of_range_it_extrapolates_and_warns() -> None:
     assert law(INTEL).price("init", 0, 3600).flags == (warning,)
 
 
-def test_where_a_line_goes_below_zero_there_is_no_estimate() -> None:
+def test_a_negative_estimate_is_an_error() -> None:
     with pytest.raises(EstimateError, match=r"negative time for 'sleep' at 2500 MHz.*600 to 1500 MHz"):
         law(ARM).price("sleep", 100_000, 2500)
 
@@ -152,12 +152,12 @@ def measured_law(client: str) -> RosLaw:
     return parse_catalogue(MEASURED).processor("here").ros_law(client)
 
 
-def test_a_part_that_the_caller_was_measured_to_spend_is_the_callers() -> None:
+def test_a_measured_part_of_the_caller_takes_precedence() -> None:
     price = measured_law("rospy").price("publish", 3, 2600)
     assert (price.caller, price.background) == (50000 + 3 * 20000, 40000 + 3 * 40000)
 
 
-def test_what_happens_beside_the_calls_is_background_where_there_are_figures() -> None:
+def test_background_events_are_charged_where_there_are_figures() -> None:
     law = measured_law("rospy")
     assert law.price("receive", 0, 2600) == Price(0, 150000)
     assert law.price("wait", 1e6, 2600) == Price(0, 600000)
@@ -172,15 +172,15 @@ def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
     assert "extrapolated" in warning
 
 
-def test_a_client_without_a_law_of_its_own_is_told_how_to_get_one() -> None:
+def test_a_client_without_a_law_gets_a_hint() -> None:
     with pytest.raises(EstimateError, match="volery calibrate ros --client rclpy"):
         measured_law("rclpy")
 
 
-def test_publishing_again_costs_the_same_where_a_law_does_not_tell_it_apart() -> None:
+def test_a_warm_publish_costs_the_same_without_a_separate_figure() -> None:
     paper, mine = law(INTEL), measured_law("rospy")
     assert paper.price("publish_next", 3, 3000) == paper.price("publish", 3, 3000)
     assert mine.price("publish_next", 3, 2600) == mine.price("publish", 3, 2600)
-    told = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
-    apart = parse_catalogue(told).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
+    text = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
+    apart = parse_catalogue(text).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
     assert (apart.caller, apart.background) == (7000, 0)

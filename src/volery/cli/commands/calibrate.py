@@ -20,8 +20,7 @@ from volery.cli.options import CATALOGUE, CatalogueFile, EntryName, Frequency
 if TYPE_CHECKING:
     from volery.calibration.python.operation_costs import Calibration
     from volery.calibration.ros.call_costs import CallCost
-    from volery.cost.code_laws import CoreLaw
-    from volery.cost.python_operations import OperationTable
+    from volery.cost import CoreLaw, OperationTable
 
 commands = Commands(
     "Cost of computing", group="calibrate", summary="Measure the cost of computing on this machine."
@@ -210,7 +209,7 @@ def python(
 
 
 def _operation_table(found: Calibration) -> Table:
-    from volery.cost.python_operations import OPERATIONS, operation_table
+    from volery.cost import OPERATIONS, operation_table
 
     shipped = operation_table().nanoseconds
     title = "Cost of CPython's operations on this machine"

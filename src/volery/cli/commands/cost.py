@@ -19,9 +19,8 @@ from volery.cli.options import Allocation, Model, Overrides, Scenario, Seed
 
 if TYPE_CHECKING:
     from volery.calibration.component_profile import ComponentProfile
-    from volery.cost.catalogue import Catalogue
-    from volery.cost.code_laws import CoreLaw
-    from volery.cost.native.program_estimate import ProgramEstimate, SourceLineCost
+    from volery.cost import Catalogue, CoreLaw
+    from volery.cost.native import ProgramEstimate, SourceLineCost
 
 commands = Commands("Cost of computing")
 
@@ -72,10 +71,8 @@ def cost(
     lines, and what is left out. Needs LLVM (Debian: clang-19 and llvm-19).
     """
     require_extra("simulation", "estimates")
-    from volery.cost.catalogue import load_catalogue
-    from volery.cost.native.compilation import compile_program
-    from volery.cost.native.instrumented_run import Invocation
-    from volery.cost.native.program_estimate import estimate_program
+    from volery.cost import load_catalogue
+    from volery.cost.native import Invocation, compile_program, estimate_program
 
     known = load_catalogue(*([catalogue] if catalogue else []))
     law, mhz = _core_law(known, on)

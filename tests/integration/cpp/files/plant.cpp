@@ -11,7 +11,7 @@
 static geometry_msgs::Twist command;
 static bool stopped = false;
 
-void hear(const geometry_msgs::Twist& heard) { command = heard; }
+void onCommand(const geometry_msgs::Twist& message) { command = message; }
 
 bool stop(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
     stopped = true;
@@ -21,7 +21,7 @@ bool stop(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
 int main(int argc, char** argv) {
     ros::init(argc, argv, "plant");
     ros::NodeHandle node;
-    auto commands = node.subscribe("cmd_vel", 1, hear);
+    auto commands = node.subscribe("cmd_vel", 1, onCommand);
     auto poses = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("poseupdate", 10);
     auto fixes = node.advertise<sensor_msgs::NavSatFix>("fix", 10);
     auto words = node.advertise<std_msgs::String>("words", 10, true);

@@ -48,11 +48,11 @@ public:
     bool done() const { return done_; }
 
 private:
-    void pose(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& heard) {
+    void pose(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& message) {
         if (!enabled_) return;
-        double const dt = last_.isZero() ? 0.0 : (heard->header.stamp - last_).toSec();
-        last_ = heard->header.stamp;
-        double const ex = goal_x_ - heard->pose.pose.position.x, ey = goal_y_ - heard->pose.pose.position.y;
+        double const dt = last_.isZero() ? 0.0 : (message->header.stamp - last_).toSec();
+        last_ = message->header.stamp;
+        double const ex = goal_x_ - message->pose.pose.position.x, ey = goal_y_ - message->pose.pose.position.y;
         geometry_msgs::Twist command;
         command.linear.x = std::max(-1.0, std::min(1.0, x_.step(ex, dt)));
         command.linear.y = std::max(-1.0, std::min(1.0, y_.step(ey, dt)));
@@ -64,8 +64,8 @@ private:
         errors_.publish(errors);
         if (std::abs(ex) < tolerance_ && std::abs(ey) < tolerance_) done_ = true;
     }
-    void fix(const sensor_msgs::NavSatFixConstPtr& heard, const std::string& source) {
-        ROS_INFO_STREAM_ONCE(source << " at " << heard->latitude << ", status " << int(heard->status.status));
+    void fix(const sensor_msgs::NavSatFixConstPtr& message, const std::string& source) {
+        ROS_INFO_STREAM_ONCE(source << " at " << message->latitude << ", status " << int(message->status.status));
     }
     bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
         enabled_ = request.data;
@@ -102,5 +102,5 @@ int main(int argc, char** argv) {
     ROS_WARN("%s has arrived", ros::this_node::getName().c_str());
     std_srvs::Empty empty;
     ros::ServiceClient stop = node.serviceClient<std_srvs::Empty>("stop");
-    if (!stop.waitForExistence(ros::Duration(1.0)) || !stop.call(empty)) ROS_ERROR("nobody serves %s", stop.getService().c_str());
+    if (!stop.waitForExistence(ros::Duration(1.0)) || !stop.call(empty)) ROS_ERROR("no server of %s", stop.getService().c_str());
 }

@@ -1,4 +1,4 @@
-"""Accesses that the first cache did not serve: told by the code, found again in the machine code."""
+"""Accesses that the first cache did not serve: recorded by the code, assigned to the machine code."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ end:
 """
 
 
-def test_every_access_is_told_before_it_is_made() -> None:
+def test_every_access_is_recorded_before_it_is_made() -> None:
     lines = TEXT.splitlines(keepends=True)
     said = [
         line.strip()
@@ -46,7 +46,7 @@ def test_every_access_is_told_before_it_is_made() -> None:
     ]
 
 
-def test_what_counts_as_an_access() -> None:
+def test_loads_and_stores_are_accesses() -> None:
     assert access_counts(TEXT) == [4, 1]
     assert not is_access("  call void @store(ptr %p)")
 
@@ -68,18 +68,18 @@ f:                                      # @f
 def test_accesses_fall_on_loads_and_stores_at_their_place_in_the_block() -> None:
     made = machine_blocks(ASSEMBLY)
     machine = MachineCode([BasicBlock("f", "entry", True)], made)
-    encoded = instruction_tables(
+    tables = instruction_tables(
         made, load_catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"})
     )
-    told = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
-    late = cache_misses(reconstruct_path(machine, BlockTrace([0], accesses={0: told})), encoded, [4])
-    assert late.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
+    recorded = [Access(0, False, 1, False), Access(2, False, 2, True), Access(3, True, 3, False)]
+    misses = cache_misses(reconstruct_path(machine, BlockTrace([0], accesses={0: recorded})), tables, [4])
+    assert misses.tolist() == [[0, 1, 1, 0], [0, 3, 2, 1], [1, 5, 3, 0]]
 
 
-def test_nothing_is_late_where_nothing_was_told() -> None:
+def test_no_misses_without_recorded_accesses() -> None:
     made = machine_blocks(ASSEMBLY)
     machine = MachineCode([BasicBlock("f", "entry", True)], made)
-    encoded = instruction_tables(
+    tables = instruction_tables(
         made, load_catalogue().processor("intel-i5-3470").core_law(), frozenset({"f"})
     )
-    assert cache_misses(reconstruct_path(machine, BlockTrace([0])), encoded, [4]).shape == (0, 4)
+    assert cache_misses(reconstruct_path(machine, BlockTrace([0])), tables, [4]).shape == (0, 4)

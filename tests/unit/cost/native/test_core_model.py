@@ -39,11 +39,11 @@ def mispredicted(taken: list[int]) -> float:
     return float(wrong.sum()) / len(taken)
 
 
-def test_what_depends_takes_its_latency():
+def test_dependent_operations_take_their_latency():
     assert cycles("addsd xmm0, xmm1") == pytest.approx(LAW.operations["fp_add"].latency, rel=0.05)
 
 
-def test_what_does_not_depend_takes_its_share_of_the_pipes():
+def test_independent_operations_take_the_throughput_of_the_pipes():
     adds = [f"paddd xmm{number}, xmm8" for number in range(6)]
     assert cycles(*adds) == pytest.approx(6 / LAW.operations["vector"].per_cycle, rel=0.05)
 
@@ -52,7 +52,7 @@ def test_nothing_is_faster_than_the_front_end():
     assert cycles(*["nop "] * 12) == pytest.approx(12 / LAW.width, rel=0.05)
 
 
-def test_a_load_of_what_was_just_stored_waits_for_it():
+def test_a_load_after_a_store_to_the_same_address_is_forwarded():
     through = cycles("addsd xmm0, xmm1", "movsd qword ptr [rsp + 8], xmm0", "movsd xmm0, qword ptr [rsp + 8]")
     elsewhere = cycles(
         "addsd xmm0, xmm1", "movsd qword ptr [rsp + 8], xmm0", "movsd xmm0, qword ptr [rsp + 16]"
@@ -61,7 +61,7 @@ def test_a_load_of_what_was_just_stored_waits_for_it():
     assert elsewhere < through / 2
 
 
-def test_branches_that_repeat_are_foreseen_and_random_ones_are_not():
+def test_repeating_branches_are_predicted_and_random_ones_are_not():
     random = [int(one) for one in np.random.default_rng(1).integers(0, 2, 4000)]
     assert mispredicted([number % 2 for number in range(4000)]) < 0.02
     assert mispredicted([int(number % 7 == 0) for number in range(4000)]) < 0.05
@@ -82,7 +82,7 @@ MEMORY = (200.0, 16.0)
 """Cycles of its latency, and of a line."""
 
 
-def test_a_load_that_another_needs_takes_the_latency_of_what_serves_it():
+def test_dependent_loads_take_the_latency_of_their_level():
     assert LAW.memory is not None
     second, third = (one.latency for one in LAW.memory.caches[1:])
     assert late(CHAIN, level=1) == pytest.approx(second, rel=0.02)
@@ -91,16 +91,16 @@ def test_a_load_that_another_needs_takes_the_latency_of_what_serves_it():
     assert late(CHAIN, level=3, memory=MEMORY) == pytest.approx(MEMORY[0], rel=0.02)
 
 
-def test_loads_that_do_not_need_each_other_wait_for_memory_together():
+def test_independent_loads_overlap_in_memory():
     assert late("mov rax, qword ptr [rbx]", level=3, memory=MEMORY) == pytest.approx(MEMORY[1], rel=0.1)
 
 
-def test_what_is_fetched_ahead_takes_what_a_line_takes():
+def test_prefetched_lines_take_the_time_of_a_line():
     assert late(CHAIN, level=3, ahead=1, memory=MEMORY) == pytest.approx(MEMORY[1], rel=0.1)
     assert late(CHAIN, *["add rax, 1"] * 40, level=3, ahead=1, memory=MEMORY) == pytest.approx(
         cycles(CHAIN, *["add rax, 1"] * 40), rel=0.05
     )
 
 
-def test_nobody_waits_for_a_store():
+def test_a_store_miss_delays_no_instruction():
     assert late("mov qword ptr [rbx], rax", level=3, memory=MEMORY) == cycles("mov qword ptr [rbx], rax")

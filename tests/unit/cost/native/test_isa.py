@@ -29,7 +29,7 @@ def read(text: str) -> Instruction:
     return made[0].instructions[0]
 
 
-def test_pieces_end_in_calls_branches_jumps_and_returns():
+def test_machine_blocks_end_in_calls_branches_jumps_and_returns():
     found = machine_blocks(X86)
     assert [(piece.end, piece.target) for piece in found] == [
         (End.CALL, "sin"),
@@ -92,7 +92,7 @@ def test_a64(text, operation, reads, writes):
     assert (found.operation, set(found.reads), set(found.writes)) == (operation, reads, writes)
 
 
-def test_a64_moves_two_registers_and_steps_its_address():
+def test_a64_load_pair_with_address_write_back():
     found = isa_aarch64.effect(read("ldp x0, x1, [x2], #16"))
     assert (found.load, set(found.writes), found.bumps, found.memory.size) == (
         "load",
@@ -109,7 +109,7 @@ def test_every_operation_has_figures_on_every_core():
     assert all(set(law.operations) == set(OPERATION_CLASSES) for law in known)
 
 
-def test_instructions_that_align_a_loop_are_run_through():
+def test_padding_before_a_loop_is_executed():
     begin = "f:  // @f\n// %bb.0:  // %entry\n\tnop\n\tnop\n\tb.eq\t.LBB0_1\n"
     text = begin + "\t.p2align\t4, , 8\n.LBB0_1:  // %exit\n\tret\n"
     assert [len(piece.instructions) for piece in machine_blocks(text, bytes_each=4)] == [3, 1, 1]

@@ -43,7 +43,7 @@ def test_blocks_are_found_in_order_with_and_without_labels():
     ]
 
 
-def test_a_counter_comes_after_what_must_stand_first_in_a_block():
+def test_a_counter_follows_phi_instructions():
     lines = with_counters(TEXT).splitlines()
     landing = lines.index("          cleanup, !dbg !3")
     assert lines[landing + 1].startswith("  %volery.seen.2 = load i64")
@@ -62,7 +62,7 @@ def test_a_trace_calls_with_the_number_of_each_block():
     ]
 
 
-def test_retargeted_code_leans_towards_no_processor():
+def test_retargeted_code_has_no_processor_attributes():
     text = retarget(TEXT, "aarch64-unknown-linux-gnu", "e-m:e-i8:8:32")
     assert 'target triple = "aarch64-unknown-linux-gnu"' in text
     assert 'target datalayout = "e-m:e-i8:8:32"' in text
@@ -70,7 +70,7 @@ def test_retargeted_code_leans_towards_no_processor():
     assert "{ }" not in text  # a group of attributes may not be empty
 
 
-def test_a_trace_tells_the_value_of_each_switch():
+def test_a_trace_records_the_value_of_each_switch():
     text = """\
 define void @choose(i8 %small, i32 %word, i64 %"large one") {
 entry:
@@ -86,7 +86,7 @@ end:
 }
 """
     lines = with_trace_calls(text).splitlines()
-    for switch, told in (
+    for switch, calls in (
         (
             "  switch i8 %small, label %next [",
             ["zext i8 %small to i32", "@volery_switch(i32 %volery.switch."],
@@ -98,10 +98,10 @@ end:
         ),
     ):
         at = lines.index(switch)
-        assert [text in line for text, line in zip(told, lines[at - 2 : at], strict=True)] == [True, True]
+        assert [text in line for text, line in zip(calls, lines[at - 2 : at], strict=True)] == [True, True]
 
 
-def test_ways_with_a_block_of_their_own_are_known_with_where_they_come_from():
+def test_critical_edges_are_found_with_their_source_block():
     text = """\
 define void @choose(i1 %one) {
 entry:

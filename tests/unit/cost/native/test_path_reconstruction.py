@@ -34,7 +34,7 @@ BLOCKS = [
 LEAF, ENTRY, BODY, EXIT = range(4)
 
 
-def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
+def test_calls_loops_and_unnamed_blocks_are_followed():
     machine = MachineCode(BLOCKS, machine_blocks(TEXT))
     walked = reconstruct_path(machine, BlockTrace([ENTRY, BODY, LEAF, BODY, LEAF, EXIT]))
     names = [machine.machine_blocks[number].instructions[0].mnemonic for number in walked.blocks]
@@ -45,7 +45,7 @@ def test_the_walk_goes_through_calls_loops_and_blocks_without_a_name():
     assert walked.lost == 0
 
 
-def test_what_the_code_generator_left_out_is_skipped():
+def test_blocks_without_machine_code_are_skipped():
     blocks = [*BLOCKS, BasicBlock("step", "merged")]
     walked = reconstruct_path(
         MachineCode(blocks, machine_blocks(TEXT)), BlockTrace([ENTRY, 4, BODY, LEAF, EXIT])
@@ -53,7 +53,7 @@ def test_what_the_code_generator_left_out_is_skipped():
     assert walked.owners == [ENTRY, BODY, LEAF, BODY, BODY, EXIT]
 
 
-def test_a_window_that_begins_in_the_middle_is_taken_up():
+def test_a_window_may_begin_inside_a_function():
     walked = reconstruct_path(MachineCode(BLOCKS, machine_blocks(TEXT)), BlockTrace([LEAF, BODY, LEAF, EXIT]))
     assert walked.owners[:2] == [LEAF, BODY]
 
@@ -130,7 +130,7 @@ scan:                                   // @scan
     ("value", "to", "compared"),
     [(9, 1, 2), (10, 1, 2), (11, 2, 2), (32, 1, 2), (65, 2, 3), (123, 1, 3)],
 )
-def test_the_value_of_a_switch_decides_where_blocks_do_not(value: int, to: int, compared: int):
+def test_the_value_of_a_switch_decides_between_equal_ways(value: int, to: int, compared: int):
     machine = MachineCode(
         [BasicBlock("scan", "entry", True), BasicBlock("scan", "blank"), BasicBlock("scan", "other")],
         machine_blocks(SWITCH, 4),
@@ -139,7 +139,7 @@ def test_the_value_of_a_switch_decides_where_blocks_do_not(value: int, to: int, 
     assert walked.owners == [0] * compared + [to]
 
 
-def test_a_wait_belongs_to_the_way_that_was_taken():
+def test_a_stall_is_charged_to_the_edge_that_was_taken():
     """Of the block that stands between the loop and its exit there is nothing in the machine code."""
     blocks = [*BLOCKS, BasicBlock("step", "body.exit_crit_edge")]
     walked = reconstruct_path(

@@ -37,7 +37,7 @@ def test_conditions(condition: str, less: bool, same: bool, more: bool) -> None:
     assert found == [[less], [same], [more]]
 
 
-def test_what_was_taken_away_before_is_reckoned_with() -> None:
+def test_an_earlier_subtraction_is_tracked() -> None:
     assert taken(8, "sub\tw9, w8, #9", "cmp\tw9, #2", "b.lo\tthere", "cmp\tw8, #8", "b.eq\tthere") == [
         False,
         True,
@@ -54,14 +54,14 @@ def test_a_smaller_register_is_a_part_of_it() -> None:
     assert taken(-1, "cmp\teax, 5", "jb\tthere") == [False]
 
 
-def test_what_does_not_depend_on_it_is_not_known() -> None:
+def test_a_branch_that_does_not_depend_on_the_value_is_unknown() -> None:
     assert taken(5, "cmp\tw8, #5", "b.eq\tthere", "cmp\tx1, #5", "b.eq\tthere") == [True, None]
     assert taken(5, "cmp\tw8, w9", "b.eq\tthere") == [None]
     assert taken(5, "cmp\tw8, #5", "ccmp\tx10, #0, #4, ls", "b.ne\tthere") == [None]
     assert taken(5, "cmp\tw8, #5", "b.eq\tthere", "mov\tw8, #3", "cmp\tw8, #5", "b.eq\tthere") == [True, None]
 
 
-def test_a_chain_comes_by_a_comparison_once() -> None:
+def test_a_chain_passes_a_comparison_once() -> None:
     """Who comes by twice is in a loop, and the value another one."""
     (piece,) = machine_blocks("scan: # @scan\n# %bb.0: # %entry\n\tcmp\tw8, #5\n\tb.eq\tthere\n")
     switch = SwitchResolver(5)

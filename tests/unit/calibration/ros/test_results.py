@@ -64,7 +64,7 @@ def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
     assert "1300 to 2600 MHz" in entry.ros["roscpp"].validity
 
 
-def test_rospys_callbacks_pay_for_their_messages(tmp_path: Path) -> None:
+def test_messages_are_charged_to_callbacks_of_rospy(tmp_path: Path) -> None:
     write_entry(tmp_path / "all.yaml", MACHINE, law("rospy", spins=False))
     prices = load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
     callback = prices("spin_once", 0)
@@ -72,7 +72,7 @@ def test_rospys_callbacks_pay_for_their_messages(tmp_path: Path) -> None:
     assert prices("receive") == (0, 0, ())
 
 
-def test_what_else_the_file_says_stays(tmp_path: Path) -> None:
+def test_other_entries_of_the_file_are_kept(tmp_path: Path) -> None:
     file = tmp_path / "all.yaml"
     write_entry(file, MACHINE, law("roscpp"))
     file.write_text("# mine\n" + file.read_text())
@@ -89,7 +89,7 @@ def test_a_file_that_is_no_catalogue_is_not_touched(tmp_path: Path) -> None:
     assert file.read_text() == "dear: reader\n"
 
 
-def test_in_words_and_as_a_picture() -> None:
+def test_formatted_costs_and_plot() -> None:
     found = call_costs([Probe().round() for _ in range(3)])
     assert format_line(found["publish"].whole, "publish") == "75.0 + 18.0 n"
     assert format_line(found["sleep"].whole, "sleep") == "14.0 + 1.050 ms"

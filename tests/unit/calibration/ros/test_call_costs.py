@@ -44,7 +44,7 @@ def test_the_same_rounds_give_the_same_figures() -> None:
     assert call_costs(rounds) == call_costs(rounds)
 
 
-def test_one_wild_round_does_not_move_a_median() -> None:
+def test_an_outlier_does_not_move_a_median() -> None:
     rounds = [Probe().round() for _ in range(4)]
     wild = tuple(one._replace(process_ns=one.process_ns * 7) for one in Probe().round())
     assert call_costs([*rounds, wild])["publish"].whole.constant == pytest.approx(PUBLISH, rel=1e-3)
@@ -76,7 +76,7 @@ def test_lines(points: dict[float, list[float]], line: tuple[float, float]) -> N
     assert fit(points) == pytest.approx(line)
 
 
-def test_what_a_probe_prints_is_read() -> None:
+def test_the_output_of_a_probe_is_parsed() -> None:
     sample = Probe().round()[0]
     lines = ["[INFO] something of ROS", json.dumps(sample._asdict())]
     assert read_round(lines) == (sample,)
@@ -86,7 +86,7 @@ def test_what_a_probe_prints_is_read() -> None:
         read_round(["{half"])
 
 
-def test_what_takes_next_to_nothing_is_judged_by_what_is_negligible() -> None:
+def test_tiny_costs_are_judged_by_the_negligible_time() -> None:
     rounds = [Probe(seed, noise=0.2).round() for seed in range(6)]
     shy = call_costs(rounds)["service_client"]
     assert shy.typical < 60_000.0

@@ -32,7 +32,7 @@ def pursued(stage: Stage, plan: Plan, notebook: CampaignLog) -> list[Progress]:
     return shown
 
 
-def test_it_stops_as_soon_as_all_is_tight(tmp_path: Path) -> None:
+def test_a_campaign_stops_when_all_figures_are_precise(tmp_path: Path) -> None:
     notebook = CampaignLog(tmp_path / "rounds", HERE)
     shown = pursued(Stage(), Plan(least=4, most=9), notebook)
     assert len(notebook.rounds) == 4
@@ -40,14 +40,14 @@ def test_it_stops_as_soon_as_all_is_tight(tmp_path: Path) -> None:
     assert shown[-1].loose == ()
 
 
-def test_it_gives_up_after_enough_and_names_what_is_loose(tmp_path: Path) -> None:
+def test_a_campaign_ends_after_the_most_rounds_and_names_uncertain_figures(tmp_path: Path) -> None:
     notebook = CampaignLog(tmp_path / "rounds", HERE)
     shown = pursued(Stage(noise=0.5), Plan(least=3, most=5, within=0.01), notebook)
     assert len(notebook.rounds) == 5
     assert "publish" in {cost.call for cost in shown[-1].loose}
 
 
-def test_what_was_measured_before_it_was_broken_off_is_kept(tmp_path: Path) -> None:
+def test_rounds_of_an_interrupted_campaign_are_kept(tmp_path: Path) -> None:
     file = tmp_path / "deeper" / "rounds"
     with pytest.raises(KeyboardInterrupt):
         pursued(Stage(breaks_after=2), Plan(least=4), CampaignLog(file, HERE))
@@ -61,7 +61,7 @@ def test_what_was_measured_before_it_was_broken_off_is_kept(tmp_path: Path) -> N
     assert not file.exists()
 
 
-def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
+def test_an_incomplete_line_is_dropped(tmp_path: Path) -> None:
     file = tmp_path / "rounds"
     pursued(Stage(), Plan(least=3), CampaignLog(file, HERE))
     file.write_text(file.read_text()[:-20])

@@ -21,7 +21,7 @@ from volery.cost.python_operations import OPERATIONS, operation_table
 HERE = Machine("bench", "A Processor", 4, 2600.0)
 
 
-def test_costs_are_found_again_from_the_times_they_make():
+def test_costs_are_recovered_from_times():
     random = np.random.default_rng(3)
     counts = random.integers(0, 5, (60, 12)).astype(float)
     costs = random.uniform(1.0, 50.0, 12)
@@ -58,14 +58,14 @@ def test_pieces_are_counted_the_same_each_time():
         assert one.counted_ns(operation_table().nanoseconds) == one.counted_ns(operation_table().nanoseconds)
 
 
-def test_only_what_is_not_known_well_enough_is_timed_more_than_the_least():
+def test_only_uncertain_pieces_are_timed_in_further_rounds():
     text = "def prepare(seed):\n    return seed\ndef run(state):\n    return sum(range(2000))\n"
     steady, loose = timed_program("steady", text), timed_program("loose", text)
     steady.nanoseconds += [100.0] * 40
     loose.nanoseconds += [1.0, 1e6] * 100
-    told = []
-    measure([steady, loose], Rounds(2, 5, 0.5), lambda done, most, pieces: told.append((done, pieces)))
-    assert told == [(0, 2), (1, 2), (2, 1), (3, 1), (4, 1)]
+    shown = []
+    measure([steady, loose], Rounds(2, 5, 0.5), lambda done, most, pieces: shown.append((done, pieces)))
+    assert shown == [(0, 2), (1, 2), (2, 1), (3, 1), (4, 1)]
 
 
 def test_an_entry_that_was_written_is_a_law_of_the_catalogue(tmp_path):

@@ -66,14 +66,14 @@ def test_the_glue_constructs_from_ports_and_serves_operations():
         ("int[][]", [[1], [], [2, 3]]),
     ],
 )
-def test_values_cross_the_border_unchanged(written, value):
+def test_values_are_encoded_and_decoded_unchanged(written, value):
     kind = cpp_type(written, "here")
     out = Writer()
     kind.write(out, value)
     assert kind.read(Reader(out.done())) == value
 
 
-def test_a_type_that_c_plus_plus_has_not_is_named_with_its_place():
+def test_a_type_without_a_cpp_counterpart_is_named_with_its_place():
     with pytest.raises(ModelError, match=r"interfaces\.Shop\.order\.returns.*no 'Receipt'.*Position"):
         operation("Shop", Signature("order", (), "Receipt"))
 
@@ -100,7 +100,7 @@ def test_a_folder_without_sources(tmp_path):
         find_sources(tmp_path)
 
 
-def test_a_class_that_is_nowhere(tmp_path, monkeypatch):
+def test_a_class_that_no_file_defines(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "a.cpp").write_text("struct Other {};")
     component = build.CppComponent("Thing", tmp_path / "a.cpp", "Thing")
@@ -118,7 +118,7 @@ def _report(line: str) -> Crash | None:
         os.close(ours)
 
 
-def test_a_crash_in_words():
+def test_description_of_a_crash():
     crash = _report("pilot\t11\t(nil)\t12 34 \tterminating \n")
     assert crash is not None
     assert str(crash.error()) == "pilot: segmentation fault at address 0; it said: terminating"
@@ -128,7 +128,7 @@ def test_a_crash_in_words():
     assert _report("") is None
 
 
-def test_a_meter_gives_what_is_new():
+def test_a_meter_returns_the_steps_since_the_last_reading():
     counters = (ctypes.c_uint64 * 2)(5, 0)
     meter = StepMeter()
     assert meter() == 0

@@ -52,7 +52,7 @@ def test_a_script_is_started_as_roslaunch_would(tmp_path: Path) -> None:
     )
 
 
-def test_what_is_no_node_cannot_be_measured(tmp_path: Path) -> None:
+def test_a_component_that_is_not_a_node_cannot_be_measured(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"model\.yaml:6.*other is python.*rospy and roscpp"):
         node_programs(load(nodes(tmp_path, language="python"), vocabulary()))
     with pytest.raises(ModelError, match="other is a class"):
@@ -85,7 +85,7 @@ def test_one_run_has_no_spread() -> None:
     assert replace(NODE, runs_s=(0.1,)).spread_s == 0.0
 
 
-def test_runs_are_put_beside_estimates() -> None:
+def test_runs_are_compared_with_estimates() -> None:
     [one] = compare_nodes({"n": "rospy"}, {"n": ESTIMATE}, [{"n": S // 10}, {"n": S // 5}])
     assert one.runs_s == (0.1, 0.2)
     assert one.as_data()["measured_s"] == pytest.approx(0.15)
@@ -102,7 +102,7 @@ def test_a_process_is_read_from_outside() -> None:
     assert before <= taken <= time.process_time_ns()
 
 
-def test_the_meter_imports_what_is_no_part_of_the_node() -> None:
+def test_the_meter_imports_the_modules_of_the_script() -> None:
     source = """
 import math, numpy
 import rospy
