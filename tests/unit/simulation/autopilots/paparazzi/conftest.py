@@ -26,7 +26,7 @@ AIRCRAFT = 7
 
 
 class Craft:
-    """One rotorcraft with accurate sensors, booted unless ``warm=False``, and the messages that the ground received."""
+    """One rotorcraft with accurate sensors, booted unless ``warm=False``, and the messages that it sent."""
 
     def __init__(
         self,
