@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from volery.base.errors import CapabilityError, LinkError
+from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.position import Position
 from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Codec
+from volery.links.link import Codec, Link, ReceiveStatistics
 from volery.links.mavlink_codec import MAVLINK
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -221,6 +221,13 @@ class DriverFactory:
     on_graph: Opener | None = None
     namespace: str = "/{name}"
     graph_names: str = "mavros"
+
+
+def link_error(link: Link, wrong: str) -> LinkError:
+    """Return the error for a link: garbled if bytes arrived without a single frame, else silent."""
+    statistics = getattr(link, "statistics", None)
+    garbled = isinstance(statistics, ReceiveStatistics) and statistics.octets > 0 and not statistics.frames
+    return LinkGarbled(wrong) if garbled else LinkSilent(wrong)
 
 
 drivers: Registry[DriverFactory] = Registry("volery.drivers", "driver")

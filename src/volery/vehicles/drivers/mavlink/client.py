@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Frame, Link, ReceiveStatistics
+from volery.links.link import Frame, Link
 from volery.links.mavlink_conventions import from_bytewise
 from volery.links.mavlink_messages import constant, entry_name, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
+from volery.vehicles.driver import link_error
 from volery.vehicles.drivers.mavlink.backend import FORCE, GROUND_SPEED, UNCHANGED, Ack, Item
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.telemetry import Answer, Telemetry
@@ -456,13 +457,6 @@ def parameter_value(fields: Mapping[str, Any], bytewise: bool) -> float:
     """Return the value in a PARAM_VALUE; *bytewise*: integers lie in the bytes of the float, as in PX4."""
     value: float = fields["param_value"]
     return from_bytewise(fields["param_type"], value) if bytewise else value
-
-
-def link_error(link: Link, wrong: str) -> LinkError:
-    """Return the error for a link: garbled if bytes arrived without a single frame, else silent."""
-    statistics = getattr(link, "statistics", None)
-    received = isinstance(statistics, ReceiveStatistics) and statistics.octets > 0
-    return LinkGarbled(wrong) if received and not statistics.frames else LinkSilent(wrong)
 
 
 def _for_us(fields: Mapping[str, Any]) -> bool:

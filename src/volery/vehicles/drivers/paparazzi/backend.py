@@ -10,16 +10,16 @@ from collections.abc import Mapping
 from math import radians
 from typing import Any, NamedTuple
 
-from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
+from volery.base.errors import CapabilityError, LinkError, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.link import Frame, Link, ReceiveStatistics
+from volery.links.link import Frame, Link
 from volery.links.paparazzi_aircraft import PaparazziAircraft, Setting
 from volery.links.pprzlink_codec import TO_GROUND
 from volery.links.pprzlink_messages import TELEMETRY, entry_value, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import records_texts, system_option
-from volery.vehicles.driver import ManualControl
+from volery.vehicles.driver import ManualControl, link_error
 from volery.vehicles.drivers.paparazzi.decoder import PaparazziDecoder
 from volery.vehicles.drivers.paparazzi.modes import AUTO2, GUIDED, KILL_THROTTLE, MODE, NUMBERS, STATUS
 from volery.vehicles.drivers.setpoint_repeater import SetpointRepeater
@@ -224,9 +224,7 @@ class PaparazziBackend:
             return CapabilityError(self._wrong_setting)
         wrong = self._link.problem()
         if wrong:
-            statistics = getattr(self._link, "statistics", None)
-            received = isinstance(statistics, ReceiveStatistics) and statistics.octets > 0
-            return LinkGarbled(wrong) if received and not statistics.frames else LinkSilent(wrong)
+            return link_error(self._link, wrong)
         if self.telemetry.last_message_ns >= 0:
             return None
         if self._other_system:
