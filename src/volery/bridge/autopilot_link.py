@@ -1,7 +1,8 @@
 """The MAVLink side of a vehicle node: one autopilot behind a link, and requests for its telemetry streams.
 
 A request right after boot may be lost although it is acknowledged, so missing streams are requested once a
-second. ArduPilot is asked for streams (REQUEST_DATA_STREAM), PX4, which has none, for single messages.
+second. Streams (REQUEST_DATA_STREAM) are requested from ArduPilot, single messages from PX4, which has no
+streams.
 """
 
 from __future__ import annotations

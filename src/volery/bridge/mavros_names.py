@@ -1,4 +1,4 @@
-"""MAVROS's names.
+"""The naming scheme of MAVROS.
 
 Differences from MAVROS: publishers are reliable, as in ROS 1; the node sends with the system id of a ground
 station, which is the only one from which ArduPilot accepts manual control; the node requests the streams that

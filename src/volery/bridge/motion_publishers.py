@@ -257,8 +257,8 @@ class PosePublisher:
             self._publish("global_position/raw/satellites", seen)
         speed, course = fields["vel"], fields["cog"]
         if self._wanted("global_position/raw/gps_vel") and _UNKNOWN_U16 not in (speed, course):
-            course_angle = radians(course / 100.0)
-            ned = (speed / 100.0 * cos(course_angle), speed / 100.0 * sin(course_angle), 0.0)
+            heading = radians(course / 100.0)
+            ned = (speed / 100.0 * cos(heading), speed / 100.0 * sin(heading), 0.0)
             twist = new(_TWIST, header=stamped(at, MAP))
             twist.twist.linear = _vector(*frames.ned_to_enu(ned))
             self._publish("global_position/raw/gps_vel", twist)
@@ -287,7 +287,7 @@ class PosePublisher:
         self._publish("global_position/local", self._odometry(place, velocity, at))
 
     def _odometry(self, place: frames.Vector, velocity: frames.Vector, at: Ns) -> Any:
-        """Return an odometry; velocity is ENU in ``global_position/local`` and FLU in ``odom`` (as MAVROS)."""
+        """Return an odometry; *velocity* is ENU in ``global_position/local``, FLU in ``odom``."""
         odometry = new(_ODOMETRY, header=stamped(at, MAP), child_frame_id=BODY)
         odometry.pose.pose.position = _point(*place)
         odometry.twist.twist.linear = _vector(*velocity)

@@ -1,4 +1,4 @@
-"""roscopter's names: its topics and services with the same names, types and units.
+"""The naming scheme of roscopter: its topics and services with the same types and units.
 
 Differences from roscopter: the node waits for frames instead of polling a thousand times a second; ``rc`` is
 also published from RC_CHANNELS, and ``raw_imu`` from SCALED_IMU and HIGHRES_IMU, where the autopilot sends
@@ -126,7 +126,7 @@ class RoscopterInterface:
         accepted, result = self._commands.send_command(ARM_DISARM, arm)
         if not accepted:
             what = "arm" if arm else "disarm"
-            self._warn(f"{what}: the autopilot says {entry_name('MAV_RESULT', result)}")
+            self._warn(f"{what}: the autopilot answers {entry_name('MAV_RESULT', result)}")
         return service(EMPTY).response()
 
 

@@ -79,7 +79,7 @@ class PaparazziAircraft:
     farthest: float | None = None
 
     def setting(self, name: str) -> Setting:
-        """Return the setting with this name or variable; raise ``UsageError`` listing similar ones otherwise."""
+        """Return the setting with this name or variable; raise ``UsageError`` if there is none."""
         for one in self.settings:
             if name in (one.name, one.variable):
                 return one

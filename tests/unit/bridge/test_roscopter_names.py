@@ -142,7 +142,7 @@ def test_a_refusal_is_a_warning(roscopter: Any) -> None:
     roscopter.connect()
     roscopter.answers["COMMAND_LONG"] = lambda fields: roscopter.emit("COMMAND_ACK", command=400, result=4)
     empty(roscopter, "arm")
-    assert [event.text for event in roscopter.of_texts()] == ["arm: the autopilot says FAILED"]
+    assert [event.text for event in roscopter.of_texts()] == ["arm: the autopilot answers FAILED"]
 
 
 def test_it_asks_for_all_streams_until_they_come(roscopter: Any) -> None:

@@ -297,12 +297,12 @@ class LifecycleNode(Node, ManagedEntity):
     # -- services
 
     def _handle_change(self, request: Any, response: Any) -> Any:
-        asked = request.transition
+        requested = request.transition
         found = next(
             (
                 one
                 for one in self._available()
-                if (one.label == asked.label if asked.label else one.number == asked.id)
+                if (one.label == requested.label if requested.label else one.number == requested.id)
             ),
             None,
         )

@@ -210,9 +210,9 @@ class DeclaredParameters:
         if kind is None and given is not None and not described.dynamic_typing:
             kind = Parameter(name, value=default if default is not None else given).type_
         described.name, described.type = name, int(kind or 0)
-        # An integer in a launch file is a double where a double was declared.
-        integer = isinstance(given, int) and not isinstance(given, bool)
-        fitting = float(given) if kind is Parameter.Type.DOUBLE and integer else given
+        fitting = given
+        if kind is Parameter.Type.DOUBLE and isinstance(given, int) and not isinstance(given, bool):
+            fitting = float(given)  # a launch file may give an integer where a double was declared
         parameter = Parameter(name, kind if given is not None else None, fitting)
         refusal = self._refusal([parameter])
         if refusal.startswith("Wrong parameter type"):
