@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from native import ACTIVATIONS, JUDGING, KERNELS, costs_of, wanted
-from volery.calibration.machine import this_machine
+from volery.calibration.host_machine import this_machine
 from volery.calibration.processor.core_fit import core_law
 from volery.calibration.processor.microbenchmarks import isa, measure
 from volery.cost.code_laws import CoreLaw

@@ -23,7 +23,7 @@ from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
 
-from volery.calibration.machine import this_machine
+from volery.calibration.host_machine import this_machine
 from volery.calibration.processor.core_fit import core_law
 from volery.calibration.processor.microbenchmarks import isa, measure
 from volery.cost import load_catalogue

@@ -25,12 +25,17 @@ from typing import TypeVar
 from rich.console import Console
 
 from volery.base.errors import UsageError
-from volery.calibration.machine import put_law, this_machine
+from volery.calibration.host_machine import put_law, this_machine
 from volery.calibration.ros.call_costs import CallCost, Round, call_costs
 from volery.calibration.ros.campaign import Conditions, Plan
+from volery.calibration.ros.campaign_results import format_line, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, check_client, own_master, probe_setup
-from volery.calibration.ros.results import format_line, ros_law, write_entry
-from volery.calibration.validation.comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
+from volery.calibration.validation.node_comparison import (
+    NodeComparison,
+    compare,
+    estimate_nodes,
+    prepare_nodes,
+)
 from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
 from volery.cli.commands.validate import comparison_tables
 from volery.cost import load_catalogue

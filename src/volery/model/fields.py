@@ -436,9 +436,13 @@ class Entry:
         return self.default is MISSING and not self.others
 
 
-@cache
 def entries(cls: Any) -> tuple[Entry, ...]:
     """Return the declared fields of a dataclass."""
+    return _entries(cls)
+
+
+@cache
+def _entries(cls: Any) -> tuple[Entry, ...]:
     hints = get_type_hints(cls, include_extras=True)
     found = []
     for one in fields(cls):

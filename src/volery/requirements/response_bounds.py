@@ -259,7 +259,10 @@ class Demands:
 
     def activation(self, event: Activation) -> None:
         """Add an activation that ended: what was executed since the one before belongs to it."""
-        self._releases.setdefault(event.component, _Releases()).add(event)
+        releases = self._releases.get(event.component)
+        if releases is None:
+            releases = self._releases[event.component] = _Releases()
+        releases.add(event)
         for work in self._work.get(event.component, {}).values():
             work.ended()
 

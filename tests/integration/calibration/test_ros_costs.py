@@ -14,12 +14,12 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.time import S
-from volery.calibration.machine import Machine
+from volery.calibration.host_machine import Machine
 from volery.calibration.ros.call_costs import CallCost, call_costs
 from volery.calibration.ros.campaign import Conditions
+from volery.calibration.ros.campaign_results import ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, own_master, probe_setup
-from volery.calibration.ros.results import ros_law, write_entry
-from volery.calibration.validation.comparison import prepare_nodes
+from volery.calibration.validation.node_comparison import prepare_nodes
 from volery.calibration.validation.node_processes import measurement_session
 from volery.cli.main import app
 from volery.cost import load_catalogue

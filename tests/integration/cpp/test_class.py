@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.calibration.component_profile import profile_components
-from volery.calibration.machine import Machine, put_law
+from volery.calibration.host_machine import Machine, put_law
 from volery.cost import load_catalogue
 from volery.model.reader import load
 from volery.run.assembly.vocabulary import vocabulary

@@ -34,7 +34,7 @@ def flown(delivery):
             fleets.append(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "Airfield", Kept)
+        patch.setattr(simulation, "SimulatedFleet", Kept)
         run = simulate(delivery, Options(fidelity="code", seed=7), scenario="pocket")
     (fleet,) = fleets
     return run.record, {name: flight.truth() for name, flight in fleet.flights.items()}

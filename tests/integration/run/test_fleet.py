@@ -136,7 +136,7 @@ def test_each_has_a_system_id_of_its_own() -> None:
         (
             {"a": "ardupilot+udp://:45123", "b": "px4+udp://:45123"},
             UsageError,
-            r"a and b are behind the same udp address; .*\?system=1",
+            r"a and b share one udp address; .*\?system=1",
         ),
         (
             {"a": "ardupilot+udp://:45123?system=2", "b": "px4+udp://:45123?system=2"},
@@ -148,7 +148,11 @@ def test_each_has_a_system_id_of_its_own() -> None:
             UsageError,
             "one link carries one protocol, not MAVLink or pprzlink",
         ),
-        ({"a": "sim:ardupilot?system=3", "b": "sim:ardupilot?system=3"}, UsageError, "one of its own"),
+        (
+            {"a": "sim:ardupilot?system=3", "b": "sim:ardupilot?system=3"},
+            UsageError,
+            "each vehicle needs its own",
+        ),
         ({"a": "sim:ardupilot?system=0"}, UsageError, "no system id from 1 to 250"),
     ],
 )
@@ -160,7 +164,7 @@ def test_fleets_that_make_no_sense(urls: dict[str, str], error: type[Exception],
 def test_a_vehicle_that_is_not_in_it(pair: Fleet) -> None:
     with pytest.raises(UsageError, match=r"no vehicle 'lft' in the fleet .did you mean 'left'"):
         pair["lft"]
-    with pytest.raises(UsageError, match="a fleet needs at least one vehicle"):
+    with pytest.raises(UsageError, match="a fleet of no vehicles"):
         Fleet({})
 
 

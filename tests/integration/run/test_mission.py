@@ -96,7 +96,7 @@ def test_a_link_that_drops_for_good_is_the_end_of_a_mission_and_names_the_drone(
     assert run.record.outcome.status == "failed"
     assert "ardupilot" in run.record.outcome.reason
     assert isinstance(run.error, LinkLost)
-    assert any("nobody knows" in failure.what for failure in run.record.failures)
+    assert any("it is unknown whether" in failure.what for failure in run.record.failures)
 
 
 def round_the_yard(rover: Rover) -> None:

@@ -18,7 +18,7 @@ from volery.trace.events import Activation, Failure
 
 @pytest.fixture
 def run(tmp_path):
-    """Return a function that runs bodies of ``run`` methods, one component a name, and returns their reports."""
+    """Return a function that runs bodies of ``run`` methods, one component a name, and returns reports."""
 
     def running(body, seed=1, names=("user",), seconds=60):
         path = tmp_path / "user.py"

@@ -1,7 +1,7 @@
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
-from volery.calibration.machine import Machine, put_law
+from volery.calibration.host_machine import Machine, put_law
 from volery.cost import load_catalogue
 from volery.cost.catalogue import parse_catalogue
 

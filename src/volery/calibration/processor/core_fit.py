@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import ceil
 
-from volery.calibration.machine import Machine
+from volery.calibration.host_machine import Machine
 from volery.calibration.processor.microbenchmarks import (
     BEHIND,
     CHAIN,

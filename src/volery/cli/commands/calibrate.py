@@ -66,7 +66,7 @@ def ros(
     the measurements; the same command continues from there. Exit status: 0 if every figure is as certain as
     required, 2 for bad input, 1 otherwise.
     """
-    from volery.calibration.machine import at_frequency, this_machine
+    from volery.calibration.host_machine import at_frequency, this_machine
     from volery.calibration.ros.call_costs import call_costs
     from volery.calibration.ros.campaign import (
         LEAST_ROUNDS,
@@ -77,8 +77,8 @@ def ros(
         uncertain_costs,
     )
     from volery.calibration.ros.campaign import Progress as Rounds
+    from volery.calibration.ros.campaign_results import plot_svg, ros_law, write_entry
     from volery.calibration.ros.probe_environment import check_client, probe_setup
-    from volery.calibration.ros.results import plot_svg, ros_law, write_entry
 
     check_client(client, python)  # before any file is made
     plan = Plan(*rounds, within / 100.0)
@@ -133,7 +133,7 @@ def ros(
 
 
 def _call_table(found: Mapping[str, CallCost], title: str) -> Table:
-    from volery.calibration.ros.results import format_line
+    from volery.calibration.ros.campaign_results import format_line
 
     shown = make_table(title=title)
     for heading in ("call", "process µs", "caller µs", "certain to", "quartiles", "residual"):
@@ -175,7 +175,7 @@ def python(
     robot's own computer to replace the estimated factor. Exit status: 0 if every time is as certain as
     required, 2 for bad input, 1 otherwise.
     """
-    from volery.calibration.machine import at_frequency, put_law, this_machine
+    from volery.calibration.host_machine import at_frequency, put_law, this_machine
     from volery.calibration.python.operation_costs import calibrate
     from volery.calibration.python.timed_code import Rounds
 
@@ -260,7 +260,7 @@ def processor(output: Output, out: CatalogueFile = CATALOGUE, name: EntryName = 
     measurements; the same command continues from there. Exit status: 0 if every figure is certain, 2 for bad
     input, 1 otherwise.
     """
-    from volery.calibration.machine import put_law, this_machine
+    from volery.calibration.host_machine import put_law, this_machine
     from volery.calibration.processor.core_fit import core_law
     from volery.calibration.processor.microbenchmarks import isa, measure, noisy_snippets
 

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 
 from rich.text import Text
 
+from volery.base.extras import install_command
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
 
@@ -80,18 +81,23 @@ def _core(name: str, enables: str) -> Part:
     return Part(name, distribution(name), enables, f"pip install {name}", needed=True)
 
 
+def _optional(name: str, extra: str, enables: str) -> Part:
+    return Part(name, distribution(name), enables, install_command(extra))
+
+
 PARTS: tuple[Part, ...] = (
     Part("Python 3.11 or newer", _python, "everything", "apt install python3", needed=True),
-    _core("greenlet", "component code that blocks, in virtual time"),
-    _core("numpy", "arrays of the world's state"),
-    _core("numba", "the compiled world: physics and inner control loops"),
+    _core("greenlet", "code that blocks, in virtual time"),
+    _core("numpy", "arrays"),
     _core("pymavlink", "MAVLink: ArduPilot, PX4 and ground stations"),
     _core("pyserial", "radios and cables to real vehicles"),
-    _core("rosbags", "ROS message types without ROS"),
     _core("mcap", "traces that Foxglove opens"),
-    _core("pydantic", "models and run records"),
-    _core("ruamel.yaml", "models with line numbers"),
-    _core("jinja2", "reports"),
+    _core("pydantic", "run records and cost laws"),
+    _core("shapely", "geofences"),
+    _optional("numba", "simulation", "simulated vehicles, and the cost of C++ code on another processor"),
+    _optional("ruamel.yaml", "model", "models and catalogues of processors"),
+    _optional("rosbags", "ros", "ROS messages and bags, also without ROS"),
+    _optional("jinja2", "report", "HTML reports"),
     Part("mavsdk", distribution("mavsdk"), "to fly `volery serve` with MAVSDK", "pip install 'mavsdk>=3,<4'"),
     Part("MAVProxy", distribution("MAVProxy"), "to fly `volery serve` by typing", "pip install MAVProxy"),
     Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),

@@ -20,7 +20,7 @@ from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Allocation, Fidelity, Model, Overrides, Scenario
 
 if TYPE_CHECKING:
-    from volery.calibration.validation.comparison import NodeComparison, ShowRun
+    from volery.calibration.validation.node_comparison import NodeComparison, ShowRun
     from volery.model.system import System
 
 commands = Commands("Cost of computing")
@@ -46,7 +46,7 @@ def validate(
     bad input; 1 otherwise.
     """
     require_extra("simulation", "estimates")
-    from volery.calibration.validation.comparison import (
+    from volery.calibration.validation.node_comparison import (
         compare,
         estimate_nodes,
         measure_runs,

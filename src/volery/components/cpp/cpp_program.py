@@ -21,7 +21,7 @@ from volery.components.cpp.framework import (
 )
 from volery.components.cpp.framework_calls import ConnectedPort, request_handlers
 from volery.components.ports import PortList
-from volery.components.virtual_stdlib.environment import INFO
+from volery.components.virtual_stdlib.process_environment import INFO
 from volery.kernel.api import Kernel
 from volery.ros.client_libraries.abi_codec import Reader, RequestHandlers, Writer
 from volery.trace.events import Text

@@ -10,8 +10,8 @@ from __future__ import annotations
 from types import ModuleType
 
 from volery.base.time import Ns, S
-from volery.components.virtual_stdlib import environment, synchronization
-from volery.components.virtual_stdlib.environment import make_module
+from volery.components.virtual_stdlib import process_environment, synchronization
+from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel.api import Kernel
 
 EPOCH: Ns = 1_700_000_000 * S
@@ -32,10 +32,10 @@ def virtual_modules(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, M
     refused = {name: make_module(name, {}) for name in REFUSED}
     return {
         **refused,
-        "builtins": environment.builtins_module(kernel),
-        "time": environment.time_module(kernel, epoch),
-        "datetime": environment.datetime_module(kernel, epoch),
-        "random": environment.random_module(kernel, seed),
+        "builtins": process_environment.builtins_module(kernel),
+        "time": process_environment.time_module(kernel, epoch),
+        "datetime": process_environment.datetime_module(kernel, epoch),
+        "random": process_environment.random_module(kernel, seed),
         "queue": synchronization.queue_module(kernel),
         "threading": synchronization.threading_module(kernel),
     }

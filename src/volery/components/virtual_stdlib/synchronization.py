@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.components.component_api import component_of
-from volery.components.virtual_stdlib.environment import make_module
+from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task

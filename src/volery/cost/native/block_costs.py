@@ -16,12 +16,12 @@ import numpy as np
 
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model
-from volery.cost.native.assembly import End
 from volery.cost.native.cache_misses import cache_misses
 from volery.cost.native.compilation import Program, compile_program
 from volery.cost.native.instruction_tables import InstructionTables, instruction_tables
 from volery.cost.native.instrumented_run import BlockTrace
 from volery.cost.native.llvm_ir import access_counts
+from volery.cost.native.machine_code import End
 from volery.cost.native.path_reconstruction import ExecutedPath, MachineCode, reconstruct_path
 from volery.cost.pricing import STEPS_PER_CYCLE
 

@@ -17,8 +17,8 @@ from tempfile import TemporaryDirectory
 
 from volery.base.errors import UsageError
 from volery.cost.code_laws import CoreLaw
-from volery.cost.native.assembly import MachineBlock, machine_blocks
 from volery.cost.native.llvm_ir import BasicBlock, basic_blocks, retarget, with_counters, with_trace_calls
+from volery.cost.native.machine_code import MachineBlock, machine_blocks
 
 VERSIONS = ("-19", "-18", "-17", "")
 """Suffixes of LLVM's programs in the order of preference; Debian 12 and the tests use 19."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model, isa_aarch64, isa_x86_64
-from volery.cost.native.assembly import OPERATION_CLASSES, Effect, End, Instruction, MachineBlock
 from volery.cost.native.branch_prediction import history_lengths
+from volery.cost.native.machine_code import OPERATION_CLASSES, Effect, End, Instruction, MachineBlock
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from volery.cost.native.assembly import Effect, Instruction, MemoryOperand
+from volery.cost.native.machine_code import Effect, Instruction, MemoryOperand
 
 FLAGS = "flags"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from volery.cost.native.assembly import NO_MEMORY, Effect, Instruction, MemoryOperand
+from volery.cost.native.machine_code import NO_MEMORY, Effect, Instruction, MemoryOperand
 
 FLAGS = "flags"
 

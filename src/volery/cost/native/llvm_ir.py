@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from volery.cost.native.assembly import split_operands
+from volery.cost.native.machine_code import split_operands
 
 COUNTERS = "volery_counters"
 LENGTH = "volery_counters_length"

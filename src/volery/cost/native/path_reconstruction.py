@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from volery.cost.native.assembly import End, MachineBlock
 from volery.cost.native.instrumented_run import Access, BlockTrace
 from volery.cost.native.llvm_ir import BasicBlock
+from volery.cost.native.machine_code import End, MachineBlock
 from volery.cost.native.switch_resolution import SwitchResolver
 
 _LOOK_AHEAD = 6

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from volery.cost.native.assembly import MachineBlock
 from volery.cost.native.block_costs import BlockCosts, blocks_of, save_costs, traced_costs
 from volery.cost.native.compilation import Program
 from volery.cost.native.instrumented_run import (
@@ -21,6 +20,7 @@ from volery.cost.native.instrumented_run import (
     trace_blocks,
 )
 from volery.cost.native.llvm_ir import critical_edges
+from volery.cost.native.machine_code import MachineBlock
 from volery.cost.native.path_reconstruction import MachineCode
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from operator import eq, ge, gt, le, lt, ne
 from typing import NamedTuple
 
-from volery.cost.native.assembly import Instruction, MachineBlock
+from volery.cost.native.machine_code import Instruction, MachineBlock
 
 _REGISTER = re.compile(
     r"([wx])(\d+)$|(r)(\d+)([dwb]?)$|([re]?)([a-d]x|[sd]i|[sb]p)$|([a-d])l$|([sd]i|[sb]p)l$"

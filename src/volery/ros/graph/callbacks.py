@@ -51,15 +51,17 @@ class CallbackGroup:
 
     def add(self, work: Work) -> None:
         """Add a callback that has become ready. Never blocks."""
+        kernel = self._node.kernel
         if self._start is not None:
-            kernel = self._node.kernel
             if kernel.current() is None:
                 self._start(work)
             else:
                 kernel.call_at(kernel.now(), partial(self._start, work))
             return
-        self._ready.append(work)
-        self.wake()
+        with kernel.guard:
+            self._ready.append(work)
+            for task in self._waiting:
+                kernel.wake(task)
         if self.on_ready is not None:
             self.on_ready()
 
@@ -75,7 +77,7 @@ class CallbackGroup:
         return work
 
     def wake(self) -> None:
-        """Wake the waiting tasks: a callback is ready, or the node has been closed."""
+        """Wake the waiting tasks: the node has been closed."""
         kernel = self._node.kernel
         with kernel.guard:
             for task in self._waiting:

@@ -40,6 +40,7 @@ from volery.model.faults import (
 )
 from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
 from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
+from volery.simulation.autopilots.firmware import firmwares
 from volery.trace.events import Text
 
 WARNING = 4
@@ -100,8 +101,9 @@ def with_faulty_links(environment: Environment) -> frozenset[str]:
     autopilots = {vehicle.name: vehicle.autopilot for vehicle in environment.vehicles}
     for fault in environment.faults:
         if isinstance(fault, LinkCut | LinkDegraded):
-            if autopilots[fault.vehicle] == "dji":
-                what = f"a simulated dji has no link; {fault.vehicle} is reached over a graph"
+            firmware = firmwares.load(autopilots[fault.vehicle])
+            if firmware.codec is None:
+                what = f"a simulated {firmware.name} has no link; {fault.vehicle} is reached over a graph"
                 raise ModelError(what, f"environment.faults.{fault.name}.vehicle", fault.where)
             found.add(fault.vehicle)
     return frozenset(found)

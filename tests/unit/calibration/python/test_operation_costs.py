@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.calibration.machine import Machine, put_law
+from volery.calibration.host_machine import Machine, put_law
 from volery.calibration.python.operation_costs import evaluate, fit_costs
 from volery.calibration.python.timed_code import (
     Rounds,

@@ -7,8 +7,8 @@ import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
-from volery.calibration.validation.comparison import NodeComparison, NodeEstimate, compare, compare_nodes
 from volery.calibration.validation.meters.rospy import imported
+from volery.calibration.validation.node_comparison import NodeComparison, NodeEstimate, compare, compare_nodes
 from volery.calibration.validation.node_processes import node_programs, process_cpu
 from volery.model.reader import load
 from volery.run.assembly.vocabulary import vocabulary

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from volery.cost import load_catalogue
-from volery.cost.native.assembly import machine_blocks
 from volery.cost.native.cache_misses import cache_misses
 from volery.cost.native.instruction_tables import instruction_tables
 from volery.cost.native.instrumented_run import Access, BlockTrace
 from volery.cost.native.llvm_ir import BasicBlock, access_counts, is_access, with_access_calls
+from volery.cost.native.machine_code import machine_blocks
 from volery.cost.native.path_reconstruction import MachineCode, reconstruct_path
 
 TEXT = """\

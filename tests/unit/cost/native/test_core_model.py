@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from volery.cost import load_catalogue
-from volery.cost.native.assembly import End, Instruction, MachineBlock
 from volery.cost.native.block_costs import ExecutionSequence, execute
 from volery.cost.native.instruction_tables import instruction_tables
+from volery.cost.native.machine_code import End, Instruction, MachineBlock
 
 LAW = load_catalogue().processor("intel-i5-3470").core_law()
 REPEATS = 400

@@ -2,7 +2,7 @@ import pytest
 
 from volery.cost import load_catalogue
 from volery.cost.native import isa_aarch64, isa_x86_64
-from volery.cost.native.assembly import OPERATION_CLASSES, End, Instruction, machine_blocks
+from volery.cost.native.machine_code import OPERATION_CLASSES, End, Instruction, machine_blocks
 
 X86 = """\
 \t.file\t1 "/src" "step.cpp"

@@ -1,8 +1,8 @@
 import pytest
 
-from volery.cost.native.assembly import machine_blocks
 from volery.cost.native.instrumented_run import BlockTrace
 from volery.cost.native.llvm_ir import BasicBlock
+from volery.cost.native.machine_code import machine_blocks
 from volery.cost.native.path_reconstruction import MachineCode, reconstruct_path
 
 # a loop whose exit edge has a block of its own, and a callee

@@ -2,7 +2,7 @@
 
 import pytest
 
-from volery.cost.native.assembly import machine_blocks
+from volery.cost.native.machine_code import machine_blocks
 from volery.cost.native.switch_resolution import SwitchResolver
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibration.machine import Machine, at_frequency, this_machine
+from volery.calibration.host_machine import Machine, at_frequency, this_machine
 
 INTEL = "model name\t: Intel(R) Core(TM) i5-3470 CPU @ 3.20GHz\ncpu MHz\t\t: 1599.998\n" * 2
 

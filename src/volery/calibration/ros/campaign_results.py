@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 from statistics import median
 
-from volery.calibration.machine import Machine, put_law
+from volery.calibration.host_machine import Machine, put_law
 from volery.calibration.ros.call_costs import CallCost, CostLine
 from volery.calibration.ros.campaign import Conditions
 from volery.cost import CallFigures, Line, RosLaw, line_through, read_catalogue

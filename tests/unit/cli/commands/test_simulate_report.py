@@ -1,0 +1,77 @@
+"""`volery report` on run folders, whole and cut short."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.cli.main import app
+from volery.requirements.accounts import Accounts
+from volery.requirements.record import write_record
+from volery.ros.messages.store import definition
+from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
+from volery.trace.attachments import scenery_to_json
+from volery.trace.mcap_writer import Attachment, McapWriter
+
+
+def make_run(folder, megahertz=1500.0):
+    """A run folder as a run leaves it."""
+    folder.mkdir()
+    setup = sample_setup(onboard_mhz=megahertz)
+    attached = [Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))]
+    writer, accounts = McapWriter(folder / "trace.mcap", setup, attached, definition), Accounts(setup)
+    for event in sample_events(seconds=20.0, onboard_mhz=megahertz):
+        writer(event)
+        accounts(event)
+    writer.close()
+    write_record(accounts.record("completed"), folder)
+    return folder
+
+
+def report(*arguments):
+    return CliRunner().invoke(app, ["report", *map(str, arguments)])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return make_run(tmp_path / "fast")
+
+
+def test_it_writes_the_document_and_shows_the_tables(folder):
+    result = report(folder)
+    assert result.exit_code == 0, result.output
+    assert (folder / "report.html").exists()
+    assert "hospital-delivery" in result.stdout
+    assert "report.html" in result.stderr
+
+
+def test_several_are_compared(folder, tmp_path):
+    slow = make_run(tmp_path / "slow", 600.0)
+    result = report(folder, slow)
+    assert result.exit_code == 0, result.output
+    assert "fast" in result.stdout
+    assert "slow" in result.stdout
+
+
+def test_json_is_the_record_and_nothing_else(folder, tmp_path):
+    assert json.loads(report(folder, "--json").stdout)["system"] == "hospital-delivery"
+    slow = make_run(tmp_path / "slow", 600.0)
+    both = json.loads(report(folder, slow, "--json").stdout)
+    assert [one["allocation"] for one in both] == ["fast", "slow"]
+
+
+def test_a_run_that_was_killed_is_recovered(folder):
+    (folder / "run.json").unlink()
+    trace = folder / "trace.mcap"
+    trace.write_bytes(trace.read_bytes()[:-4000])
+    result = report(folder, "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["outcome"]["status"] == "unfinished"
+    assert (folder / "report.html").exists()
+
+
+def test_something_else_is_refused(tmp_path):
+    (tmp_path / "trace.mcap").write_bytes(b"no trace at all")
+    result = report(tmp_path)
+    assert result.exit_code == 2
+    assert result.output.startswith("volery: ")

@@ -1,0 +1,226 @@
+"""The command line: exit statuses, messages, JSON; nothing that flies."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.base.errors import (
+    CapabilityError,
+    ComponentError,
+    EstimateError,
+    LinkSilent,
+    ModelError,
+    Refused,
+    UsageError,
+)
+from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
+from volery.cli.commands.demo import example
+from volery.cli.commands.doctor import PARTS, Part, doctor, module, program
+from volery.cli.console import Output
+from volery.cli.main import app
+from volery.cli.outcome import next_folder
+
+
+def run(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+def text(result) -> str:
+    """All that was said, without the folding of the terminal."""
+    return " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (ModelError("x"), BAD_INPUT),
+        (UsageError("x"), BAD_INPUT),
+        (EstimateError("x"), BAD_INPUT),
+        (CapabilityError("x"), BAD_INPUT),
+        (LinkSilent("x"), FAILED),
+        (Refused("drone_1", "arm", "x"), FAILED),
+        (ComponentError("central", "x"), FAILED),
+        (KeyboardInterrupt(), FAILED),
+        (ZeroDivisionError("x"), FAILED),
+    ],
+)
+def test_what_a_command_raises_becomes_a_status_and_a_message(error, status, capsys):
+    def command() -> int:
+        raise error
+
+    assert exit_status(Output(quiet=True), command) == status
+    said = capsys.readouterr()
+    assert said.err.startswith("volery: ")
+    assert "Traceback" not in said.err
+    assert not said.out
+
+
+def test_debug_shows_where(capsys):
+    assert exit_status(Output(debug=True), lambda: 1 // 0) == FAILED
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_help_is_quick_to_import():
+    """The commands import what they call when they are called."""
+    heavy = ("numba", "jinja2", "pydantic", "pymavlink", "rosbags", "shapely", "numpy", "matplotlib")
+    script = f"import sys, volery.cli.main; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "arguments", [("nonsense",), ("simulate",), ("simulate", "x", "--nonsense"), ("fly", "x.py")]
+)
+def test_wrong_words_are_bad_input(arguments):
+    assert run(*arguments).exit_code == BAD_INPUT
+
+
+def test_version():
+    assert run("--version").output.startswith("volery")
+
+
+def test_a_missing_model_is_bad_input(tmp_path):
+    result = run("model", "check", str(tmp_path / "nothing.yaml"))
+    assert result.exit_code == BAD_INPUT
+    assert "there is no file" in text(result)
+
+
+def test_a_spoilt_model_is_reported_with_its_line(tmp_path):
+    folder = tmp_path / "model"
+    assert run("new", str(folder)).exit_code == OK
+    file = folder / "model.yaml"
+    file.write_text(file.read_text().replace("carried_by: drone_1", "carried_by: drone_7"))
+    result = run("model", "check", str(folder))
+    line = next(n for n, line in enumerate(file.read_text().splitlines(), 1) if "drone_7" in line)
+    assert result.exit_code == BAD_INPUT
+    assert f"model.yaml:{line}: platform.processors.onboard.carried_by: no vehicle named 'drone_7'" in text(
+        result
+    )
+
+
+def test_a_right_model_is_shown(tmp_path):
+    result = run("model", "check", str(example("starter")))
+    assert result.exit_code == OK
+    assert "field-patrol is a valid model allocations: fast and slow scenarios: windy" in text(result)
+    assert "ready for fidelity times" in text(result)
+    assert "ready for fidelity code" in text(result)
+
+
+def test_a_check_can_be_asked_for_as_json(tmp_path):
+    result = run(
+        "model",
+        "check",
+        str(example("starter")),
+        "--json",
+        "--set",
+        "platform.processors.onboard.frequency=1 GHz",
+    )
+    found = json.loads(result.stdout)
+    assert found["allocations"] == ["fast", "slow"]
+    assert found["missing"] == {"times": [], "code": []}
+
+
+def test_an_option_that_is_wrong_is_named():
+    result = run(
+        "model", "check", str(example("starter")), "--set", "platform.processors.onboard.frequency=9 GHz"
+    )
+    assert result.exit_code == BAD_INPUT
+    assert "--set platform.processors.onboard.frequency=9 GHz: " in text(result)
+
+
+def test_quiet_says_nothing():
+    result = run("model", "check", str(example("starter")), "--quiet")
+    assert (result.exit_code, result.output) == (OK, "")
+
+
+def test_the_schema_is_printed_whole():
+    assert json.loads(run("model", "schema").stdout)["title"] == "volery system model"
+
+
+def test_the_observables_are_listed():
+    assert "<vehicle>.landing_offset" in text(run("model", "observables"))
+    quantities = json.loads(run("model", "observables", "--json").stdout)
+    assert {"subject", "quantity", "unit", "description"} == set(quantities[0])
+
+
+def test_new_does_not_write_over_anything(tmp_path):
+    (tmp_path / "mine.txt").touch()
+    result = run("new", str(tmp_path))
+    assert result.exit_code == BAD_INPUT
+    assert "is not an empty folder" in text(result)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--fidelity", "firmware"), "not there yet"),
+        (("--fidelity", "guess"), "no fidelity 'guess'"),
+        (("--speed", "fast"), "--speed fast: give max, or simulated seconds per second"),
+        (("--speed", "0"), "--speed 0"),
+        (("--allocation", "quick"), "no allocation named 'quick'"),
+        (("--scenario", "storm"), "no scenario named 'storm'"),
+        (("--set", "nonsense"), "a path and a value are expected"),
+        (("--out", "/dev/null/x"), "cannot write"),
+    ],
+)
+def test_simulate_refuses_what_makes_no_sense(arguments, complaint):
+    result = run("simulate", str(example("starter")), *arguments)
+    assert result.exit_code == BAD_INPUT, result.output
+    assert complaint in text(result)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("pixhawk",), "autopilot named 'pixhawk'"),
+        (("--speed", "0"), "--speed 0"),
+        (("--home", "1,2"), "home='1,2' should be 3 numbers"),
+        (("--home", "100,2,3"), "latitude 100.0 is off the globe"),
+        (("--kind", "boat"), "kind='boat'"),
+        (("--listen", "serial:///dev/x"), "one listens at tcp://HOST:PORT"),
+    ],
+)
+def test_serve_refuses_what_makes_no_sense(arguments, complaint):
+    result = run("serve", *arguments)
+    assert result.exit_code == BAD_INPUT, result.output
+    assert complaint in text(result)
+
+
+def test_report_of_a_folder_without_a_run(tmp_path):
+    assert run("report", str(tmp_path)).exit_code == BAD_INPUT
+
+
+def test_run_folders_are_counted_up(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert next_folder("my model/x") == Path("runs/my-model-x-1")
+    Path("runs/a-2").mkdir(parents=True)
+    Path("runs/a-b-9").mkdir()
+    assert next_folder("a") == Path("runs/a-3")
+    assert next_folder("...") == Path("runs/run-1")
+
+
+def test_an_example_that_is_not_there():
+    with pytest.raises(UsageError, match="no example 'nothing'"):
+        example("nothing")
+
+
+def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
+    assert doctor(Output()) == OK
+    assert "every necessary part is installed" in capsys.readouterr().out
+    assert all(part.get for part in PARTS)
+    assert module("no_such_module_anywhere")() == ""
+    assert program("no-such-program-anywhere", "sh")().endswith("sh")
+
+
+def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
+    lost = Part("gyro", lambda: "", "everything", "pip install gyro", needed=True)
+    monkeypatch.setattr("volery.cli.commands.doctor.PARTS", (lost,))
+    assert doctor(Output()) == FAILED
+    said = capsys.readouterr().out
+    assert "pip install gyro" in said
+    assert "missing: gyro" in said
