@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from volery.base.time import S
-from volery.report.document import recover
+from volery.report.html_report import recover
 from volery.trace.events import VehicleState
 from volery.trace.reader import read
 

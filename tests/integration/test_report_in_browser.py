@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigs.requirements import lacking
-from volery.report.document import write_comparison, write_report
+from volery.report.html_report import write_comparison, write_report
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup

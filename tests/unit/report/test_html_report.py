@@ -11,7 +11,7 @@ from rich.console import Console, RenderableType
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.report.document import compare, gather, recover, render, write_comparison, write_report
+from volery.report.html_report import compare, gather, recover, render, write_comparison, write_report
 from volery.report.terminal import comparison_table, cost_table, short_comparison, summary_table
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record

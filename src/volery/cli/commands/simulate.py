@@ -77,7 +77,7 @@ def report(
 
     Also writes the report of a run that was killed.
     """
-    from volery.report.document import recover
+    from volery.report.html_report import recover
     from volery.report.terminal import comparison_table, summary_table
 
     found = [recover(folder) for folder in folders]
