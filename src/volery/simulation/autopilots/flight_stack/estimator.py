@@ -124,7 +124,9 @@ def _correct_attitude(row: Array, north: float, east: float, down: float, share:
 
     Args:
         row: State row.
-        north: Rotation about north [rad]; likewise ``east`` and ``down``.
+        north: Rotation about north [rad].
+        east: Rotation about east [rad].
+        down: Rotation about down [rad].
         share: Share of the rotation that is attributed to the bias [1/s].
     """
     x = row[W_DCM] * north + row[W_DCM + 3] * east + row[W_DCM + 6] * down
