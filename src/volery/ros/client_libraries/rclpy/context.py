@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.waiting import Signal, current_task
 from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, ignore_end
-from volery.ros.client_libraries.rclpy.errors import NameValidationException, NotInitializedException
+from volery.ros.client_libraries.rclpy.exceptions import NameValidationException, NotInitializedException
 from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
 

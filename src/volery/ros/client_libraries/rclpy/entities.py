@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.waiting import Signal
 from volery.ros.client_libraries.rclpy.context import Context
-from volery.ros.client_libraries.rclpy.errors import InvalidHandle
+from volery.ros.client_libraries.rclpy.exceptions import InvalidHandle
 from volery.ros.client_libraries.rclpy.executors import CallbackGroup, CallbackQueue, Executor, Future
 from volery.ros.client_libraries.rclpy.qos import graph_qos
 from volery.ros.graph import Node as GraphNode

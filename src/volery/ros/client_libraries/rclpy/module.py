@@ -12,14 +12,14 @@ from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, 
 from volery.ros.client_libraries.rclpy import (
     action,
     entities,
-    errors,
+    exceptions,
     executors,
     lifecycle,
     logging,
-    parameters,
+    node_parameters,
     qos,
+    ros_time,
 )
-from volery.ros.client_libraries.rclpy import time as times
 from volery.ros.client_libraries.rclpy.context import Context, Contexts
 from volery.ros.client_libraries.rclpy.executors import Executor, Future
 from volery.ros.client_libraries.rclpy.node import Node
@@ -40,7 +40,7 @@ def modules(
     contexts = Contexts(graph, launched, nodes, at_end)
     bound = _bound_classes(contexts)
     parts = _submodules(bound)
-    names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": parameters.Parameter}
+    names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": node_parameters.Parameter}
     found = {f"rclpy.{part}": library_module(f"rclpy.{part}", inside) for part, inside in parts.items()}
     rclpy = library_module("rclpy", {**names, **{part: found[f"rclpy.{part}"] for part in parts}})
     return {**messages.modules(), "rclpy": rclpy, **found}
@@ -52,8 +52,8 @@ def _bound_classes(contexts: Contexts) -> dict[str, Any]:
         executors.MultiThreadedExecutor,
         executors.SingleThreadedExecutor,
         logging.Logger,
-        times.Clock,
-        times.ROSClock,
+        ros_time.Clock,
+        ros_time.ROSClock,
     )
     bound: dict[str, Any] = {
         kind.__name__: type(kind.__name__, (kind,), {"contexts": contexts}) for kind in kinds
@@ -68,7 +68,7 @@ def _bound_classes(contexts: Contexts) -> dict[str, Any]:
 
 def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the content of each submodule."""
-    duration = {"Duration": times.Duration, "Infinite": times.Infinite}
+    duration = {"Duration": ros_time.Duration, "Infinite": ros_time.Infinite}
     return {
         "action": action.ACTION,
         "callback_groups": {
@@ -80,17 +80,17 @@ def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             )
         },
         "client": {"Client": entities.Client},
-        "clock": {"ClockType": times.ClockType, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
+        "clock": {"ClockType": ros_time.ClockType, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
         "context": {"Context": Context},
         "duration": duration,
-        "exceptions": errors.EXCEPTIONS,
+        "exceptions": exceptions.EXCEPTIONS,
         "executors": {
             "Executor": Executor,
-            "ExternalShutdownException": errors.ExternalShutdownException,
+            "ExternalShutdownException": exceptions.ExternalShutdownException,
             "MultiThreadedExecutor": bound["MultiThreadedExecutor"],
-            "ShutdownException": errors.ShutdownException,
+            "ShutdownException": exceptions.ShutdownException,
             "SingleThreadedExecutor": bound["SingleThreadedExecutor"],
-            "TimeoutException": errors.TimeoutException,
+            "TimeoutException": exceptions.TimeoutException,
         },
         "lifecycle": {
             **lifecycle.LIFECYCLE,
@@ -99,14 +99,14 @@ def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         },
         "logging": {"LoggingSeverity": logging.LoggingSeverity, **logging.functions(bound["Logger"])},
         "node": {"Node": bound["Node"]},
-        "parameter": {"Parameter": parameters.Parameter},
+        "parameter": {"Parameter": node_parameters.Parameter},
         "publisher": {"Publisher": entities.Publisher},
         "qos": {**qos.QOS, **duration},
         "service": {"Service": entities.Service},
         "subscription": {"Subscription": entities.Subscription},
         "task": {"Future": executors.Future, "Task": executors.Task},
-        "time": {"Time": times.Time, "Duration": times.Duration, "ClockType": times.ClockType},
-        "timer": {"Rate": times.Rate, "Timer": entities.Timer},
+        "time": {"Time": ros_time.Time, "Duration": ros_time.Duration, "ClockType": ros_time.ClockType},
+        "timer": {"Rate": ros_time.Rate, "Timer": entities.Timer},
     }
 
 
@@ -117,7 +117,7 @@ def _functions(contexts: Contexts, bound: Mapping[str, Any]) -> dict[str, Callab
         context = contexts.current()
         if context.executor is None:
             if not context.running:
-                raise errors.NotInitializedException()
+                raise exceptions.NotInitializedException()
             context.executor = bound["SingleThreadedExecutor"]()
         used: Executor = context.executor
         return used

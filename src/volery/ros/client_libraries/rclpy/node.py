@@ -25,13 +25,13 @@ from volery.ros.client_libraries.rclpy.executors import (
     Task,
 )
 from volery.ros.client_libraries.rclpy.logging import Logger
-from volery.ros.client_libraries.rclpy.parameters import (
+from volery.ros.client_libraries.rclpy.node_parameters import (
     DeclaredParameters,
     NodeParameters,
     Parameter,
     serve_parameters,
 )
-from volery.ros.client_libraries.rclpy.time import Clock, ClockType, Rate
+from volery.ros.client_libraries.rclpy.ros_time import Clock, ClockType, Rate
 from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS, Work
 
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)

@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import Any
 
 from volery.base.errors import UsageError
-from volery.ros.client_libraries.rclpy.time import Duration
+from volery.ros.client_libraries.rclpy.ros_time import Duration
 from volery.ros.graph import QoS
 from volery.ros.graph.interface import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE
 

@@ -13,10 +13,9 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.ros import messages
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, library_module
-from volery.ros.client_libraries.rospy import services, time, topics
+from volery.ros.client_libraries.rospy import entities, ros_time
 from volery.ros.client_libraries.rospy.logging import LEVELS, loggers
 from volery.ros.client_libraries.rospy.session import EXCEPTIONS, Sessions
-from volery.ros.client_libraries.rospy.topics import AnyMsg
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 
 _NO_DEFAULT = object()
@@ -91,13 +90,13 @@ FUNCTIONS = (
 
 
 _BOUND = (
-    topics.Publisher,
-    topics.Subscriber,
-    services.Service,
-    services.ServiceProxy,
-    time.Rate,
-    time.Timer,
-    time.Time,
+    entities.Publisher,
+    entities.Subscriber,
+    entities.Service,
+    entities.ServiceProxy,
+    ros_time.Rate,
+    ros_time.Timer,
+    ros_time.Time,
 )
 
 
@@ -119,14 +118,14 @@ def modules(
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
         names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})
-    names["Duration"] = time.Duration
-    names["TimerEvent"] = time.TimerEvent
+    names["Duration"] = ros_time.Duration
+    names["TimerEvent"] = ros_time.TimerEvent
     names["Header"] = messages.message_class("std_msgs/msg/Header")
     names["Message"] = messages.Message
-    names["AnyMsg"] = AnyMsg
+    names["AnyMsg"] = entities.AnyMsg
     parts: dict[str, Mapping[str, Any]] = {
         "exceptions": EXCEPTIONS,
-        "msg": {"AnyMsg": AnyMsg},
+        "msg": {"AnyMsg": entities.AnyMsg},
         "numpy_msg": {"numpy_msg": numpy_msg},
         "rostime": {one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
     }
@@ -187,21 +186,21 @@ def spin(sessions: Sessions) -> None:
 
 def sleep(sessions: Sessions, duration: Any) -> None:
     """Block for a number of seconds or a ``Duration``."""
-    time.sleep(sessions.initialised(), duration)
+    ros_time.sleep(sessions.initialised(), duration)
 
 
 def _within(timeout: Any) -> int | None:
-    return None if timeout is None else time.as_ns(timeout)
+    return None if timeout is None else ros_time.as_ns(timeout)
 
 
 def wait_for_message(sessions: Sessions, topic: str, topic_type: Any, timeout: Any = None) -> Any:
     """Return the next message of a topic."""
-    return topics.wait_for_message(sessions.joined(), topic, topic_type, _within(timeout))
+    return entities.wait_for_message(sessions.joined(), topic, topic_type, _within(timeout))
 
 
 def wait_for_service(sessions: Sessions, service: str, timeout: Any = None) -> None:
     """Block until a service is available."""
-    services.wait_for_service(sessions.joined(), service, _within(timeout))
+    entities.wait_for_service(sessions.joined(), service, _within(timeout))
 
 
 def get_name(sessions: Sessions) -> str:
@@ -219,9 +218,9 @@ def get_time(sessions: Sessions) -> float:
     return float(get_rostime(sessions).to_sec())
 
 
-def get_rostime(sessions: Sessions) -> time.Time:
+def get_rostime(sessions: Sessions) -> ros_time.Time:
     """Return ROS time."""
-    return time.Time(0, sessions.now())
+    return ros_time.Time(0, sessions.now())
 
 
 def resolve_name(sessions: Sessions, name: str) -> str:
