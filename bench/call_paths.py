@@ -6,9 +6,9 @@ Two paths are measured, each as a user's program takes it:
   on the embedded graph; with both components on a processor (priced) and on none (unpriced).
 * goto: ``Drone.goto`` on ``sim:ardupilot`` to the first frame that is handed to the link.
 
-Calls of Python functions of volery are counted with ``sys.setprofile``. Times are medians over repetitions that
-are not traced; with ``--against`` the least median of three alternating processes each, since other programs may
-run on this machine. Only the public interface is used, so that the same file measures any checkout:
+Calls of Python functions of volery are counted with ``sys.setprofile``. Times are medians over repetitions
+that are not traced; with ``--against`` the least median of three alternating processes each, since other
+programs may run on this machine. Only the public interface is used, so the same file measures any checkout:
 
     python bench/call_paths.py [--against /path/to/another/checkout/src] [--list publish]
 """

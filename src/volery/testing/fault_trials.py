@@ -62,7 +62,7 @@ def takeoff(stage: Stage, strike: Strike) -> None:
 
 
 def goto(stage: Stage, strike: Strike) -> None:
-    """Strike during goto()."""
+    """Strike on the way to a position."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
     stage.drone.goto(stage.at(40, 10, 12))
@@ -78,7 +78,7 @@ def hold(stage: Stage, strike: Strike) -> None:
 
 
 def return_home(stage: Stage, strike: Strike) -> None:
-    """Strike at the beginning of return_home()."""
+    """Strike at the beginning of the return home."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(20, 20, 10))
     stage.later(AT_ONCE_S, strike)

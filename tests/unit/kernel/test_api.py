@@ -68,7 +68,7 @@ def test_the_run_ends_when_nothing_is_left_to_happen(kernel: Kernel, spawn: Spaw
     kernel.run(10**18)  # for ever, if it did not
 
 
-def test_house_code_must_not_block(kernel: Kernel) -> None:
+def test_a_framework_callback_must_not_block(kernel: Kernel) -> None:
     problems: list[str] = []
 
     def action() -> None:
@@ -83,7 +83,7 @@ def test_house_code_must_not_block(kernel: Kernel) -> None:
     assert "godot" in problems[1]
 
 
-def test_current_is_the_task_that_runs_and_nobody_in_house_code(kernel: Kernel, spawn: Spawn) -> None:
+def test_current_is_the_running_task_and_none_in_framework_callbacks(kernel: Kernel, spawn: Spawn) -> None:
     seen: list[object] = []
     looked = Event(kernel, "house code looked")
 
@@ -131,7 +131,9 @@ def test_what_escapes_from_a_task_is_raised_by_run_as_it_is(kernel: Kernel, spaw
     assert caught.value is fault
 
 
-def test_what_escapes_from_house_code_is_raised_by_run_which_can_go_on(kernel: Kernel, spawn: Spawn) -> None:
+def test_exceptions_of_framework_callbacks_are_raised_by_run_which_can_continue(
+    kernel: Kernel, spawn: Spawn
+) -> None:
     seen: list[str] = []
     flag = Event(kernel, "flag")
 
@@ -162,7 +164,7 @@ def test_run_from_inside_is_refused(kernel: Kernel, spawn: Spawn) -> None:
     assert "from inside" in seen[0]
 
 
-def test_park_says_whether_it_was_woken(kernel: Kernel, spawn: Spawn) -> None:
+def test_park_returns_whether_the_task_was_woken(kernel: Kernel, spawn: Spawn) -> None:
     said: list[bool] = []
     parked = Event(kernel, "parked")
 

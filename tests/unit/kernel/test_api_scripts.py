@@ -70,7 +70,7 @@ def test_after_a_script_a_run_goes_on(kernel: Kernel, spawn: Spawn) -> None:
         sleep(kernel, MS)
 
 
-def test_a_script_gets_what_escapes_from_house_code(kernel: Kernel) -> None:
+def test_a_script_gets_exceptions_of_framework_callbacks(kernel: Kernel) -> None:
     never = Event(kernel, "never")
 
     def crash() -> None:

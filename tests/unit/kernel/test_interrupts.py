@@ -78,7 +78,7 @@ def test_tasks_that_hand_over_directly_are_interrupted_too(virtual: VirtualKerne
     assert virtual.close() == []
 
 
-def test_user_code_in_an_endless_loop_is_interrupted_on_the_spot(
+def test_component_code_in_an_endless_loop_is_interrupted_at_once(
     virtual: VirtualKernel, spawn: Spawn
 ) -> None:
     seen: list[str] = []
@@ -102,7 +102,7 @@ def test_user_code_in_an_endless_loop_is_interrupted_on_the_spot(
     assert seen[1:] == ["the others live on"]
 
 
-def test_user_code_cannot_swallow_an_interrupt(virtual: VirtualKernel, spawn: Spawn) -> None:
+def test_component_code_cannot_swallow_an_interrupt(virtual: VirtualKernel, spawn: Spawn) -> None:
     seen: list[str] = []
 
     def body() -> None:

@@ -45,7 +45,7 @@ def test_the_more_urgent_preempts_at_once(virtual: VirtualKernel, slices: Slices
     ]
 
 
-def test_equals_do_not_preempt_and_who_was_preempted_keeps_its_turn(
+def test_equals_do_not_preempt_and_a_preempted_job_keeps_its_turn(
     virtual: VirtualKernel, slices: Slices
 ) -> None:
     core = Processor(virtual, "cpu")
@@ -61,7 +61,9 @@ def test_equals_do_not_preempt_and_who_was_preempted_keeps_its_turn(
     ]
 
 
-def test_who_is_done_at_the_instant_of_its_preemption_is_done(virtual: VirtualKernel, slices: Slices) -> None:
+def test_a_job_that_ends_at_the_instant_of_its_preemption_is_complete(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
     core = Processor(virtual, "cpu")
     done: list[int] = []
 
@@ -107,7 +109,7 @@ def test_round_robin_takes_turns_of_a_quantum(virtual: VirtualKernel, slices: Sl
     ]
 
 
-def test_round_robin_lets_one_go_on_whom_nobody_waits_for(virtual: VirtualKernel, slices: Slices) -> None:
+def test_round_robin_continues_a_job_for_which_no_other_waits(virtual: VirtualKernel, slices: Slices) -> None:
     core = Processor(virtual, "cpu", scheduler="round-robin", quantum=4 * MS)
     compute(virtual, core, "a", at=0, ms=20)
     compute(virtual, core, "b", at=10, ms=1)
@@ -202,7 +204,7 @@ def test_a_passive_component_computes_at_its_callers_priority(virtual: VirtualKe
     assert slices() == [(0, 4, "cpu.0", "passive"), (4, 6, "cpu.0", "middle")]
 
 
-def test_background_computing_contends_and_nobody_waits_for_it(
+def test_background_computing_contends_without_blocking_a_task(
     virtual: VirtualKernel, slices: Slices
 ) -> None:
     core = Processor(virtual, "cpu")
@@ -220,7 +222,7 @@ def test_background_computing_contends_and_nobody_waits_for_it(
     ]
 
 
-def test_the_background_of_a_place_is_one_thread(virtual: VirtualKernel, slices: Slices) -> None:
+def test_the_background_of_a_context_is_one_thread(virtual: VirtualKernel, slices: Slices) -> None:
     cores = Processor(virtual, "cpu", cores=2)
     node = ExecutionContext("node", cores)
     for when in (0, 0, 3, 10):
@@ -329,7 +331,7 @@ def test_a_processor_that_cannot_be_is_refused(
         Processor(virtual, "cpu", **wrong)
 
 
-def test_who_preempted_whom_is_told(virtual: VirtualKernel, events: list[Event]) -> None:
+def test_preemptions_are_recorded_with_both_jobs(virtual: VirtualKernel, events: list[Event]) -> None:
     core = Processor(virtual, "cpu")
     compute(virtual, core, "low", at=0, ms=10, priority=1)
     compute(virtual, core, "high", at=4, ms=3, priority=2)

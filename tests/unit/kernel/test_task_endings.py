@@ -205,7 +205,7 @@ def test_close_without_a_run_begins_nothing(kernel: Kernel, spawn: Spawn) -> Non
     assert seen == []
 
 
-def test_close_names_who_would_not_go(kernel: Kernel, spawn: Spawn) -> None:
+def test_close_names_the_tasks_that_did_not_end(kernel: Kernel, spawn: Spawn) -> None:
     begun = Event(kernel, "begun")
     tries: list[int] = []
 
@@ -282,7 +282,7 @@ def test_a_lock_passes_on_when_its_owner_is_ended(kernel: Kernel, spawn: Spawn) 
     assert lock.owner is None
 
 
-def test_a_lock_forgets_who_is_ended_while_waiting_for_it(kernel: Kernel, spawn: Spawn) -> None:
+def test_a_task_cancelled_while_waiting_for_a_lock_is_removed(kernel: Kernel, spawn: Spawn) -> None:
     scope = kernel.root.child("components")
     lock = Lock(kernel, "lock")
     held, queued = Event(kernel, "held"), Event(kernel, "queued")

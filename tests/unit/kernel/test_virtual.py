@@ -88,7 +88,7 @@ def test_a_lone_task_leaps_but_not_over_an_action_nor_over_the_end(
     assert seen[-1] == 40
 
 
-def test_a_deadlock_names_who_waits_for_what(virtual: VirtualKernel, spawn: Spawn) -> None:
+def test_a_deadlock_names_the_waiting_tasks_and_their_reasons(virtual: VirtualKernel, spawn: Spawn) -> None:
     queue: Queue[int] = Queue(virtual, "orders")
     flag = Event(virtual, "godot")
     spawn(queue.get, "clerk")
@@ -348,7 +348,7 @@ class Still:
         return self.time
 
 
-def test_the_watchdog_accuses_who_does_not_move_and_nobody_else() -> None:
+def test_the_watchdog_reports_only_the_task_that_does_not_block() -> None:
     kernel, accused = Still(), Accused()
     dog = Watchdog(kernel, accused, patience_s=10.0)
     a, b = (Task(name, ExecutionContext(name), Scope("run")) for name in "ab")

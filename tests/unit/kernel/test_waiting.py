@@ -63,7 +63,7 @@ def test_a_signal_looks_before_it_waits_and_a_last_time_when_time_is_up(
     assert seen == [(True, 0), (False, 5), (True, 10)]
 
 
-def test_only_those_whose_predicate_holds_are_woken(virtual: VirtualKernel, spawn: Spawn) -> None:
+def test_only_tasks_whose_predicate_holds_are_woken(virtual: VirtualKernel, spawn: Spawn) -> None:
     changed = Signal(virtual, "level")
     level = [0]
     looks: list[int] = []
@@ -113,7 +113,7 @@ def test_a_predicate_that_raises_raises_where_the_wait_is(kernel: Kernel, spawn:
     assert seen == ["raised here"]
 
 
-def test_a_signal_forgets_who_no_longer_waits(virtual: VirtualKernel, spawn: Spawn) -> None:
+def test_a_signal_keeps_no_task_that_no_longer_waits(virtual: VirtualKernel, spawn: Spawn) -> None:
     changed = Signal(virtual, "level")
     woken: list[int] = []
 
@@ -162,7 +162,7 @@ def test_a_queue_is_first_in_first_out(kernel: Kernel, spawn: Spawn) -> None:
     assert got == list(range(10))
 
 
-def test_a_full_queue_forgets_the_oldest_and_says_so(kernel: Kernel, spawn: Spawn) -> None:
+def test_a_full_queue_drops_the_oldest_and_reports_it(kernel: Kernel, spawn: Spawn) -> None:
     queue: Queue[int] = Queue(kernel, "queue", depth=2)
     assert [queue.put(i) for i in range(4)] == [True, True, False, False]
     assert len(queue) == 2
@@ -179,7 +179,7 @@ def test_a_queue_times_out_with_nothing(kernel: Kernel, spawn: Spawn) -> None:
     assert got == [None]
 
 
-def test_one_item_goes_to_one_of_those_who_wait(virtual: VirtualKernel, spawn: Spawn) -> None:
+def test_one_item_goes_to_one_of_the_waiting_tasks(virtual: VirtualKernel, spawn: Spawn) -> None:
     queue: Queue[str] = Queue(virtual, "queue")
     got: list[tuple[str, str | None]] = []
     for name in "ab":
@@ -273,7 +273,7 @@ def computing(virtual: VirtualKernel, loads: list[int], wait: Callable[[], objec
     return body
 
 
-def test_an_activation_runs_from_its_release_to_the_next_wait_of_the_users(
+def test_an_activation_lasts_from_its_release_to_the_next_wait_of_component_code(
     virtual: VirtualKernel, core: Processor, activations: Activations
 ) -> None:
     place = ExecutionContext("loop", core, deadline=50 * MS)
@@ -283,7 +283,7 @@ def test_an_activation_runs_from_its_release_to_the_next_wait_of_the_users(
     assert activations() == [(0, 10, "loop", 50), (110, 130, "loop", 160), (230, 230, "loop", 280)]
 
 
-def test_an_activation_without_a_deadline_says_so(virtual: VirtualKernel, events: list[Recorded]) -> None:
+def test_an_activation_without_a_deadline(virtual: VirtualKernel, events: list[Recorded]) -> None:
     virtual.spawn(lambda: sleep(virtual, MS), "loop", ExecutionContext("loop"))
     virtual.run(S)
     assert events == [Activation(0, 0, "loop", NONE), Activation(MS, MS, "loop", NONE)]
@@ -362,7 +362,7 @@ def test_a_message_releases_and_one_that_is_there_already_does_not_end_the_activ
     ]  # fmt: skip
 
 
-def test_waits_of_the_house_end_no_activation(
+def test_waits_of_the_framework_end_no_activation(
     virtual: VirtualKernel, core: Processor, activations: Activations
 ) -> None:
     radio = Network(virtual, "radio", bandwidth_bit_s=8000, latency=2 * MS, loss=0.0, stream=Random(1))
@@ -412,7 +412,7 @@ def test_each_release_can_be_charged(
 # -- places
 
 
-def test_at_pays_before_it_goes_and_before_it_leaves(
+def test_a_context_is_entered_and_left_after_pending_time_is_spent(
     virtual: VirtualKernel, core: Processor, slices: Callable[[], list[tuple[float, float, str, str]]]
 ) -> None:
     other = Processor(virtual, "other")
@@ -435,7 +435,9 @@ def test_at_pays_before_it_goes_and_before_it_leaves(
     assert slices() == [(0, 3, "core.0", "caller"), (3, 8, "other.0", "callee"), (8, 10, "core.0", "caller")]
 
 
-def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, core: Processor) -> None:
+def test_an_exception_that_leaves_a_context_spends_its_time_too(
+    virtual: VirtualKernel, core: Processor
+) -> None:
     left: list[int] = []
 
     def visit(task: Task) -> None:
@@ -456,7 +458,7 @@ def test_an_error_that_leaves_a_place_has_been_paid_too(virtual: VirtualKernel, 
     assert left == [5 * MS]
 
 
-def test_a_task_that_is_ended_at_a_place_owes_nothing(virtual: VirtualKernel, core: Processor) -> None:
+def test_a_task_cancelled_in_a_context_has_no_pending_time(virtual: VirtualKernel, core: Processor) -> None:
     scope = virtual.root.child("components")
     meter = iter([0, 100 * MS, 0])
     place = ExecutionContext("callee", core, meter=lambda: next(meter, 0))

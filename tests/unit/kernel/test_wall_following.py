@@ -8,7 +8,7 @@ from volery.kernel.waiting import Rate, sleep
 from volery.kernel.wall import FollowingKernel
 
 
-def test_time_stands_still_until_it_is_told() -> None:
+def test_time_stands_still_until_it_is_advanced() -> None:
     kernel = FollowingKernel()
     happened: list[str] = []
     asleep, house, over = threading.Event(), threading.Event(), threading.Event()

@@ -107,7 +107,7 @@ def test_the_same_report_twice() -> None:
     assert first != conformance("sim:ardupilot", only=["goto", "hold"], seed=4)
 
 
-def test_each_check_says_what_it_demands() -> None:
+def test_each_check_states_its_demand() -> None:
     checks = [*chosen(), *chosen(kind="rover")]
     names = [one.name for one in chosen()]
     assert len(set(names)) == len(names)
@@ -141,7 +141,7 @@ def run(*arguments: str) -> Any:
     return CliRunner().invoke(app, ["conformance", *arguments])
 
 
-def test_the_command_line_says_what_was_found(tmp_path: Path) -> None:
+def test_the_command_line_reports_the_results(tmp_path: Path) -> None:
     good = run("sim:ardupilot", "--only", "identification,goto", "--out", str(tmp_path))
     assert good.exit_code == 0
     assert "2 passed" in good.output

@@ -46,7 +46,7 @@ def demand_standing(stage: Stage) -> None:
 
 @check(needs=UP, flies=True)
 def takeoff(stage: Stage) -> None:
-    """Check that takeoff(10) of a disarmed vehicle returns 10 m above home, at most 1.5 m short."""
+    """Check that a take-off to 10 m of a disarmed vehicle ends 10 m above home, at most 1.5 m short."""
     stage.drone.takeoff(10)
     height = stage.drone.altitude.metres
     demand(stage.drone.flying and stage.drone.armed, "it does not fly")
@@ -64,7 +64,7 @@ def takeoff_in_the_air(stage: Stage) -> None:
 
 @check(needs=GO, flies=True)
 def goto(stage: Stage) -> None:
-    """Check that goto() returns at the goal by the autopilot's estimate, at rest, and stays there."""
+    """Check that a goto returns at the goal by the autopilot's estimate, at rest, and stays there."""
     stage.drone.takeoff(10)
     goal = stage.at(30, 20, 12)
     stage.drone.goto(goal)
@@ -118,7 +118,7 @@ def goto_again(stage: Stage) -> None:
 
 @check(needs=(*UP, Capability.HOLD, Capability.VELOCITY), flies=True)
 def hold(stage: Stage) -> str:
-    """Check that hold() at 4 m/s returns at rest, and stays there."""
+    """Check that a hold at 4 m/s returns at rest, and stays there."""
     stage.drone.takeoff(10)
     stage.drone.set_velocity(north=4.0, lasting=20.0)
     stage.sleep(4)
@@ -173,7 +173,7 @@ def heading(stage: Stage) -> None:
 
 @check(needs=(*GO, Capability.RETURN_HOME), flies=True)
 def return_home(stage: Stage) -> str:
-    """Check that return_home() lands near home and returns disarmed."""
+    """Check that the vehicle returns home, lands near it and is disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(25, -10))
     home = stage.drone.home
@@ -183,7 +183,7 @@ def return_home(stage: Stage) -> str:
 
 @check(needs=(*GO, Capability.LAND), flies=True)
 def land(stage: Stage) -> str:
-    """Check that land() lands at the current position and returns disarmed."""
+    """Check that the vehicle lands at its current position and is disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(10, 10))
     here = stage.drone.position

@@ -52,7 +52,7 @@ def stale_controls(stage: Stage) -> None:
 
 @check(needs=(*STICKS, *UP), flies=True)
 def altitude_hold(stage: Stage) -> str:
-    """Check that in altitude_hold() a throttle of 0.5 keeps the height, 0.8 climbs, 0.2 descends."""
+    """Check that in altitude hold a throttle of 0.5 keeps the height, 0.8 climbs, 0.2 descends."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0, 0, 0.5, 0)
     stage.drone.altitude_hold()
@@ -91,7 +91,7 @@ def pitching_forward(stage: Stage) -> None:
 
 @check(needs=(*STABILIZED, *UP), flies=True)
 def stabilize(stage: Stage) -> str:
-    """Check that stabilize() returns in its mode, is flown manually, and goto() regains control."""
+    """Check that stabilize mode is entered and flown manually, and that goto() regains control."""
     stage.drone.takeoff(20)
     stage.drone.manual_control(0, 0, 0.5, 0)
     stage.drone.stabilize()

@@ -14,7 +14,7 @@ NEAR_M = 3.0
 
 @check(kind="rover", needs=(Capability.GOTO,), flies=True)
 def drive(stage: Stage) -> None:
-    """Check that drive() arms the rover and returns at the goal by the autopilot's estimate, at rest."""
+    """Check that a rover is armed, drives and stops at the goal by the autopilot's estimate, at rest."""
     stage.drone.wait_ready()
     goal = stage.at(25, 10, 0.0)
     stage.drone.drive(goal)

@@ -76,7 +76,7 @@ def test_a_service_is_answered_in_no_time() -> None:
     assert took == [0]
 
 
-def test_an_unrecorded_graph_says_nothing_and_asks_for_no_price_of_what_nobody_executes() -> None:
+def test_an_unrecorded_graph_records_nothing_and_needs_no_prices_without_a_processor() -> None:
     asked: list[str] = []
 
     def tariff(node: Any) -> Any:

@@ -130,7 +130,7 @@ def test_timers_call_back_when_spun(rig: Any) -> None:
     assert fired == [100 * MS, 200 * MS, 300 * MS]
 
 
-def test_a_timer_leaves_out_periods_that_nobody_spun(rig: Any) -> None:
+def test_a_timer_skips_periods_in_which_its_group_was_not_spun(rig: Any) -> None:
     fired: list[int] = []
 
     def loop() -> None:
@@ -187,7 +187,7 @@ def test_polling_belongs_to_the_loop(rig: Any) -> None:
     ]
 
 
-def test_who_spins_a_node_returns_when_it_is_closed(rig: Any) -> None:
+def test_spin_returns_when_the_node_is_closed(rig: Any) -> None:
     ended: list[int] = []
 
     def loop() -> None:

@@ -45,7 +45,7 @@ def test_every_call_into_ros_is_priced(rig: Any) -> None:
     assert [event.kind for event in rig.of(Charge)] == [f"ros:{call}" for _, call, _ in rig.asked]
 
 
-def test_the_caller_pays_before_anything_is_visible(rig: Any) -> None:
+def test_the_callers_part_is_executed_before_anything_is_visible(rig: Any) -> None:
     rig.prices["publish"] = type("P", (), {"caller": 40 * US, "background": 100 * US})()
     seen: list[NodeId] = []
 
@@ -86,14 +86,14 @@ def test_the_cost_of_a_sleep_is_spent_during_it(rig: Any) -> None:
     assert [(event.start, event.end) for event in rig.of(Slice)] == [(0, 2 * MS)]
 
 
-def test_house_code_pays_in_the_background(rig: Any) -> None:
+def test_calls_of_framework_callbacks_execute_in_the_background(rig: Any) -> None:
     rig.prices["init"] = type("P", (), {"caller": 5 * US, "background": 1 * US})()
     rig.graph.node("n", context=ExecutionContext("n", rig.processor))
     rig.kernel.run(MS)
     assert [(event.start, event.end) for event in rig.of(Slice)] == [(0, 6 * US)]
 
 
-def test_a_passive_callee_pays_where_it_computes(rig: Any) -> None:
+def test_a_passive_callee_is_charged_in_its_own_context(rig: Any) -> None:
     """Whoever calls a publisher from another place pays the caller's part there."""
     rig.prices["publish"] = type("P", (), {"caller": 10 * US, "background": 3 * US})()
     node = rig.graph.node("callee", context=ExecutionContext("callee", rig.processor, priority=None))
@@ -108,7 +108,7 @@ def test_a_passive_callee_pays_where_it_computes(rig: Any) -> None:
 
 
 @pytest.mark.parametrize("recorded", [True, False])
-def test_nobody_listening_costs_no_carrying(rig: Any, recorded: bool) -> None:
+def test_without_subscribers_nothing_is_carried(rig: Any, recorded: bool) -> None:
     graph = rig.new_graph(records=lambda topic: recorded)
 
     def talker() -> None:
@@ -119,7 +119,7 @@ def test_nobody_listening_costs_no_carrying(rig: Any, recorded: bool) -> None:
     assert len(rig.of(Published)) == recorded
 
 
-def test_what_happens_beside_the_calls_is_borne_in_the_background(rig: Any) -> None:
+def test_costs_beside_the_calls_are_charged_in_the_background(rig: Any) -> None:
     prices = {"receive": 30 * US, "connect": 400 * US, "accept": 300 * US}
     rig.prices.update({what: Price(0, price) for what, price in prices.items()})
 
@@ -143,7 +143,7 @@ def test_what_happens_beside_the_calls_is_borne_in_the_background(rig: Any) -> N
     ]
 
 
-def test_a_node_pays_for_the_time_in_which_it_does_not_sleep(rig: Any) -> None:
+def test_a_node_is_charged_for_the_time_in_which_it_does_not_sleep(rig: Any) -> None:
     def price(node: NodeId, call: str, x: float) -> Price:
         return Price(0, round(2 * x)) if call in ("wait", "sleep") else Price(0, 0)
 
@@ -161,7 +161,7 @@ def test_a_node_pays_for_the_time_in_which_it_does_not_sleep(rig: Any) -> None:
     assert paid == [(0, "ros:sleep", 5 * MS), (3 * S, "ros:wait", 1 * MS), (4 * S, "ros:wait", 2 * MS)]
 
 
-def test_who_publishes_again_at_once_finds_the_library_awake(rig: Any) -> None:
+def test_a_second_publish_within_a_millisecond_is_priced_as_publish_next(rig: Any) -> None:
     def talker() -> None:
         publisher = rig.graph.node("talker").advertise("chat", STRING)
         for pause in (0, 100 * MS, 0):

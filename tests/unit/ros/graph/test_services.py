@@ -85,7 +85,7 @@ def test_no_answer_in_time(rig: Any) -> None:
     assert [event.outcome for event in rig.of(Call)] == ["ServiceError"]
 
 
-def test_a_handler_that_raises_tells_the_caller_and_the_server(rig: Any) -> None:
+def test_an_exception_of_a_handler_reaches_the_caller_and_the_server(rig: Any) -> None:
     def handler(request: Any) -> Any:
         raise RuntimeError("jammed")
 
@@ -116,7 +116,7 @@ def test_a_handler_must_return_a_response(rig: Any) -> None:
     rig.run(server, client)
 
 
-def test_a_server_that_leaves_while_it_owes_an_answer(rig: Any) -> None:
+def test_a_server_that_leaves_before_it_has_answered(rig: Any) -> None:
     def server() -> None:
         node = rig.graph.node("server")
         node.serve("switch", SET_BOOL, lambda request: answer())

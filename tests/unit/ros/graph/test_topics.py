@@ -133,7 +133,7 @@ def late(rig: Any, offered: QoS, wanted: QoS) -> list[str]:
     return heard
 
 
-def test_latched_messages_reach_who_comes_late(rig: Any) -> None:
+def test_latched_messages_reach_late_subscribers(rig: Any) -> None:
     assert late(rig, LATCHED, QoS(durability=TRANSIENT_LOCAL)) == ["c", "d"]
 
 
@@ -142,11 +142,11 @@ def test_transient_local_keeps_as_many_as_its_depth(rig: Any) -> None:
     assert late(rig, offered, QoS(durability=BEST_AVAILABLE)) == ["b", "c", "d"]
 
 
-def test_a_subscription_takes_what_is_offered_unless_it_says_otherwise(rig: Any) -> None:
+def test_a_subscription_accepts_every_qos_by_default(rig: Any) -> None:
     assert late(rig, LATCHED, AS_OFFERED) == ["c", "d"]
 
 
-def test_a_volatile_subscriber_hears_only_what_follows(rig: Any) -> None:
+def test_a_volatile_subscriber_receives_only_later_messages(rig: Any) -> None:
     assert late(rig, LATCHED, QoS()) == ["d"]
 
 
@@ -157,7 +157,9 @@ def test_a_volatile_subscriber_hears_only_what_follows(rig: Any) -> None:
         (QoS(), QoS(durability=TRANSIENT_LOCAL), "transient local is wanted"),
     ],
 )
-def test_incompatible_qos_does_not_connect_and_says_so(rig: Any, offered: QoS, wanted: QoS, why: str) -> None:
+def test_incompatible_qos_is_not_connected_but_reported(
+    rig: Any, offered: QoS, wanted: QoS, why: str
+) -> None:
     assert late(rig, offered, wanted) == []
     [warning] = rig.of(Text)
     assert "/chat" in warning.text
@@ -258,7 +260,7 @@ def test_a_thousand_topics(rig: Any) -> None:
     assert len(rig.graph.topics()) == count
 
 
-def test_the_clock_ticks_while_somebody_listens(rig: Any) -> None:
+def test_the_clock_is_published_while_it_has_subscribers(rig: Any) -> None:
     ticks: list[int] = []
 
     def listener() -> None:

@@ -76,7 +76,7 @@ def test_a_rosbag_2_whose_writer_was_killed(tmp_path: Path) -> None:
     assert (bag.complete, len(list(bag.messages()))) == (False, 20)
 
 
-def test_types_that_nobody_knows_are_learnt(tmp_path: Path) -> None:
+def test_unknown_types_are_defined_from_the_recording(tmp_path: Path) -> None:
     from rosbags.rosbag1 import Writer
 
     path = tmp_path / "odd.bag"
@@ -107,7 +107,7 @@ def test_what_is_no_recording(tmp_path: Path, name: str, content: bytes | None, 
         open_bag(path)
 
 
-def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot be written"):
         create_bag(tmp_path / "nowhere/flight.bag")
 

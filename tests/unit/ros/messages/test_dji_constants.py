@@ -71,7 +71,7 @@ def test_an_anomaly_is_one_bit_each() -> None:
     assert sorted(bits) == [1 << place for place in range(13)]
 
 
-def test_every_response_says_yes_or_no_or_carries_a_value() -> None:
+def test_every_response_has_a_success_flag_or_a_value() -> None:
     for name in service_types():
         if name.startswith(("dji_sdk/", "dji_osdk_ros/")):
             assert service(name).response.__match_args__, name

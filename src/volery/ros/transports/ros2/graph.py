@@ -176,7 +176,7 @@ class Ros2Library:
                     continue  # the next look has the node's name
                 self._warned.add(name)
                 by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
-                listed = "; ".join(f"{kind} of {', '.join(users)}" for kind, users in sorted(by_type.items()))
+                listed = "; ".join(f"{kind} of {', '.join(who)}" for kind, who in sorted(by_type.items()))
                 self.say(
                     f"{name} carries several types, and nodes with different types are not connected: {listed}"
                 )
