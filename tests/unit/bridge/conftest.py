@@ -18,7 +18,7 @@ from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import Text
 
 
-class Aviary:
+class BridgeRig:
     """A vehicle node with a scripted autopilot behind it and a user's node in front."""
 
     def __init__(self, geoid: float = 0.0, **options: Any) -> None:
@@ -111,23 +111,23 @@ class Aviary:
 
 
 @pytest.fixture
-def aviary() -> Aviary:
-    return Aviary()
+def rig() -> BridgeRig:
+    return BridgeRig()
 
 
 @pytest.fixture
-def raised_aviary() -> Aviary:
+def raised_rig() -> BridgeRig:
     """Where the geoid is 47 m above the ellipsoid."""
-    return Aviary(47.0)
+    return BridgeRig(47.0)
 
 
 @pytest.fixture
-def roscopter() -> Aviary:
+def roscopter() -> BridgeRig:
     """Under roscopter's names, frames as they arrive, sticks taken."""
-    return Aviary(names=ROSCOPTER, period=None, control=True)
+    return BridgeRig(names=ROSCOPTER, period=None, control=True)
 
 
 @pytest.fixture
-def aviary_of() -> type[Aviary]:
+def rig_of() -> type[BridgeRig]:
     """One with options of its vehicle node."""
-    return Aviary
+    return BridgeRig

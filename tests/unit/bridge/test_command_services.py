@@ -10,8 +10,8 @@ from volery.trace.events import Text
 LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
 
 
-def acknowledge(aviary: Any, result: int = 0) -> None:
-    aviary.answers["COMMAND_LONG"] = lambda fields: aviary.emit(
+def acknowledge(rig: Any, result: int = 0) -> None:
+    rig.answers["COMMAND_LONG"] = lambda fields: rig.emit(
         "COMMAND_ACK", command=fields["command"], result=result
     )
 
@@ -32,45 +32,45 @@ def parameters(fields: dict[str, Any]) -> list[float]:
     ],
 )
 def test_a_command_is_answered_with_its_acknowledgement(
-    aviary: Any, service: str, kind: str, request_fields: dict[str, Any], command: int, expected: list[float]
+    rig: Any, service: str, kind: str, request_fields: dict[str, Any], command: int, expected: list[float]
 ) -> None:
-    aviary.connect()
-    acknowledge(aviary)
-    answer = aviary.call(service, f"mavros_msgs/{kind}", **request_fields)
+    rig.connect()
+    acknowledge(rig)
+    answer = rig.call(service, f"mavros_msgs/{kind}", **request_fields)
     assert (answer.success, answer.result) == (True, 0)
-    [sent] = [fields for fields in aviary.asked("COMMAND_LONG") if fields["command"] == command]
+    [sent] = [fields for fields in rig.asked("COMMAND_LONG") if fields["command"] == command]
     assert parameters(sent) == expected
     assert (sent["target_system"], sent["target_component"]) == (1, 1)
 
 
-def test_a_refusal_carries_the_result(aviary: Any) -> None:
-    aviary.connect()
-    acknowledge(aviary, result=4)
-    answer = aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
+def test_a_refusal_carries_the_result(rig: Any) -> None:
+    rig.connect()
+    acknowledge(rig, result=4)
+    answer = rig.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
     assert (answer.success, answer.result) == (False, 4)
 
 
-def test_without_an_acknowledgement_it_fails_after_five_seconds(aviary: Any) -> None:
-    aviary.connect()
-    start = aviary.kernel.now()
-    answer = aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
+def test_without_an_acknowledgement_it_fails_after_five_seconds(rig: Any) -> None:
+    rig.connect()
+    start = rig.kernel.now()
+    answer = rig.call("cmd/arming", "mavros_msgs/CommandBool", value=True)
     assert not answer.success
-    assert 5000 * MS <= aviary.kernel.now() - start <= 5200 * MS
-    assert any("command 400: no acknowledgement within 5 s" in event.text for event in aviary.of_texts())
+    assert 5000 * MS <= rig.kernel.now() - start <= 5200 * MS
+    assert any("command 400: no acknowledgement within 5 s" in event.text for event in rig.of_texts())
 
 
-def test_in_progress_is_not_the_end(aviary: Any) -> None:
-    aviary.connect()
+def test_in_progress_is_not_the_end(rig: Any) -> None:
+    rig.connect()
 
     def slowly(fields: dict[str, Any]) -> None:
         if fields["command"] == 400:
-            aviary.emit("COMMAND_ACK", command=511, result=4)  # of another command
-            aviary.emit("COMMAND_ACK", command=400, result=5)
-            later = aviary.kernel.now() + 3000 * MS
-            aviary.kernel.call_at(later, lambda: aviary.emit("COMMAND_ACK", command=400, result=0))
+            rig.emit("COMMAND_ACK", command=511, result=4)  # of another command
+            rig.emit("COMMAND_ACK", command=400, result=5)
+            later = rig.kernel.now() + 3000 * MS
+            rig.kernel.call_at(later, lambda: rig.emit("COMMAND_ACK", command=400, result=0))
 
-    aviary.answers["COMMAND_LONG"] = slowly
-    assert aviary.call("cmd/arming", "mavros_msgs/CommandBool", value=True).success
+    rig.answers["COMMAND_LONG"] = slowly
+    assert rig.call("cmd/arming", "mavros_msgs/CommandBool", value=True).success
 
 
 @pytest.mark.parametrize(
@@ -83,48 +83,48 @@ def test_in_progress_is_not_the_end(aviary: Any) -> None:
         ({"base_mode": 80}, True, 80, 0),
     ],
 )
-def test_set_mode(aviary: Any, request_fields: dict[str, Any], sent: bool, base: int, custom: int) -> None:
-    aviary.connect()
-    assert aviary.call("set_mode", "mavros_msgs/SetMode", **request_fields).mode_sent == sent
-    [fields] = aviary.asked("SET_MODE")
+def test_set_mode(rig: Any, request_fields: dict[str, Any], sent: bool, base: int, custom: int) -> None:
+    rig.connect()
+    assert rig.call("set_mode", "mavros_msgs/SetMode", **request_fields).mode_sent == sent
+    [fields] = rig.asked("SET_MODE")
     assert (fields["target_system"], fields["base_mode"], fields["custom_mode"]) == (1, base, custom)
 
 
-def test_an_unknown_mode_is_not_sent(aviary: Any) -> None:
-    aviary.connect()
-    assert not aviary.call("set_mode", "mavros_msgs/SetMode", custom_mode="GUIDE").mode_sent
-    assert aviary.asked("SET_MODE") == []
-    assert any("did you mean 'GUIDED'" in event.text for event in aviary.of_texts())
+def test_an_unknown_mode_is_not_sent(rig: Any) -> None:
+    rig.connect()
+    assert not rig.call("set_mode", "mavros_msgs/SetMode", custom_mode="GUIDE").mode_sent
+    assert rig.asked("SET_MODE") == []
+    assert any("did you mean 'GUIDED'" in event.text for event in rig.of_texts())
 
 
-def test_command_int_and_stream_rate_are_sent_and_not_waited_for(aviary: Any) -> None:
-    aviary.connect()
+def test_command_int_and_stream_rate_are_sent_and_not_waited_for(rig: Any) -> None:
+    rig.connect()
     fields = {"frame": 6, "command": 192, "x": 470000000, "y": -80000000, "z": 20.0, "param1": -1.0}
-    assert aviary.call("cmd/command_int", "mavros_msgs/CommandInt", **fields).success
-    [sent] = aviary.asked("COMMAND_INT")
+    assert rig.call("cmd/command_int", "mavros_msgs/CommandInt", **fields).success
+    [sent] = rig.asked("COMMAND_INT")
     assert {name: sent[name] for name in fields} == fields
-    aviary.sent.clear()
-    aviary.call("set_stream_rate", "mavros_msgs/StreamRate", stream_id=10, message_rate=25, on_off=True)
+    rig.sent.clear()
+    rig.call("set_stream_rate", "mavros_msgs/StreamRate", stream_id=10, message_rate=25, on_off=True)
     assert {"req_stream_id": 10, "req_message_rate": 25, "start_stop": 1} in [
         {key: one[key] for key in ("req_stream_id", "req_message_rate", "start_stop")}
-        for one in aviary.asked("REQUEST_DATA_STREAM")
+        for one in rig.asked("REQUEST_DATA_STREAM")
     ]
 
 
-def test_message_intervals_are_microseconds(aviary: Any) -> None:
-    aviary.connect()
-    acknowledge(aviary)
+def test_message_intervals_are_microseconds(rig: Any) -> None:
+    rig.connect()
+    acknowledge(rig)
     for rate, interval in ((50.0, 20_000.0), (0.0, 0.0), (-1.0, -1.0)):
-        aviary.sent.clear()
-        assert aviary.call(
+        rig.sent.clear()
+        assert rig.call(
             "set_message_interval", "mavros_msgs/MessageInterval", message_id=30, message_rate=rate
         ).success
-        assert [30.0, interval] in [parameters(one)[:2] for one in aviary.asked("COMMAND_LONG")]
+        assert [30.0, interval] in [parameters(one)[:2] for one in rig.asked("COMMAND_LONG")]
 
 
-def only(aviary: Any, name: str) -> dict[str, Any]:
-    aviary.run(100 * MS)
-    [fields] = aviary.asked(name)
+def only(rig: Any, name: str) -> dict[str, Any]:
+    rig.run(100 * MS)
+    [fields] = rig.asked(name)
     return fields
 
 
@@ -132,9 +132,9 @@ def vector(x: float, y: float, z: float) -> dict[str, float]:
     return {"x": x, "y": y, "z": z}
 
 
-def test_a_global_set_point(aviary: Any) -> None:
-    aviary.connect()
-    aviary.publish(
+def test_a_global_set_point(rig: Any) -> None:
+    rig.connect()
+    rig.publish(
         "setpoint_raw/global",
         "mavros_msgs/GlobalPositionTarget",
         coordinate_frame=5,
@@ -146,7 +146,7 @@ def test_a_global_set_point(aviary: Any) -> None:
         yaw=0.0,
         yaw_rate=0.5,
     )
-    sent = only(aviary, GLOBAL)
+    sent = only(rig, GLOBAL)
     assert (sent["coordinate_frame"], sent["type_mask"]) == (5, 3576)
     assert (sent["lat_int"], sent["lon_int"], sent["alt"]) == (473977418, 85455939, 500.0)
     assert (sent["vx"], sent["vy"], sent["vz"]) == (2.0, 1.0, -3.0)
@@ -164,109 +164,109 @@ def test_a_global_set_point(aviary: Any) -> None:
     ],
 )
 def test_a_local_set_point_is_turned_by_its_frame(
-    aviary: Any, frame: int, position: tuple[float, float, float], yaw: float
+    rig: Any, frame: int, position: tuple[float, float, float], yaw: float
 ) -> None:
-    aviary.connect()
-    aviary.publish(
+    rig.connect()
+    rig.publish(
         "setpoint_raw/local",
         "mavros_msgs/PositionTarget",
         coordinate_frame=frame,
         position=vector(1.0, 2.0, 3.0),
     )
-    sent = only(aviary, LOCAL)
+    sent = only(rig, LOCAL)
     assert (sent["x"], sent["y"], sent["z"]) == position
     assert sent["yaw"] == pytest.approx(yaw)
     assert sent["coordinate_frame"] == frame
 
 
-def test_a_position_above_the_ellipsoid_becomes_amsl(raised_aviary: Any) -> None:
-    aviary = raised_aviary
-    aviary.connect()
+def test_a_position_above_the_ellipsoid_becomes_amsl(raised_rig: Any) -> None:
+    rig = raised_rig
+    rig.connect()
     pose = {"position": {"latitude": 47.0, "longitude": 8.0, "altitude": 547.0}}
-    aviary.publish("setpoint_position/global", "geographic_msgs/GeoPoseStamped", pose=pose)
-    sent = only(aviary, GLOBAL)
+    rig.publish("setpoint_position/global", "geographic_msgs/GeoPoseStamped", pose=pose)
+    sent = only(rig, GLOBAL)
     assert (sent["alt"], sent["coordinate_frame"], sent["type_mask"]) == (500.0, 5, 0x9F8)
     assert sent["yaw"] == pytest.approx(pi / 2)
 
 
-def test_a_local_position(aviary: Any) -> None:
-    aviary.connect()
-    aviary.publish(
+def test_a_local_position(rig: Any) -> None:
+    rig.connect()
+    rig.publish(
         "setpoint_position/local", "geometry_msgs/PoseStamped", pose={"position": vector(1.0, 2.0, 3.0)}
     )
-    sent = only(aviary, LOCAL)
+    sent = only(rig, LOCAL)
     assert (sent["x"], sent["y"], sent["z"], sent["type_mask"]) == (2.0, 1.0, -3.0, 0x9F8)
 
 
-def test_a_velocity(aviary: Any) -> None:
-    aviary.connect()
+def test_a_velocity(rig: Any) -> None:
+    rig.connect()
     twist = {"linear": vector(1.0, 2.0, 0.5), "angular": vector(0.0, 0.0, 0.25)}
-    aviary.publish("setpoint_velocity/cmd_vel", "geometry_msgs/TwistStamped", twist=twist)
-    sent = only(aviary, LOCAL)
+    rig.publish("setpoint_velocity/cmd_vel", "geometry_msgs/TwistStamped", twist=twist)
+    sent = only(rig, LOCAL)
     assert (sent["vx"], sent["vy"], sent["vz"], sent["yaw_rate"]) == (2.0, 1.0, -0.5, -0.25)
     assert (sent["coordinate_frame"], sent["type_mask"]) == (1, 0x5C7)
 
 
-def test_sticks(aviary: Any) -> None:
-    aviary.connect()
+def test_sticks(rig: Any) -> None:
+    rig.connect()
     channels = [1500, 1400, 1600, 0, *[65535] * 14]
-    aviary.publish("rc/override", "mavros_msgs/OverrideRCIn", channels=channels)
-    aviary.publish(
+    rig.publish("rc/override", "mavros_msgs/OverrideRCIn", channels=channels)
+    rig.publish(
         "manual_control/send", "mavros_msgs/ManualControl", x=100.0, y=-200.4, z=500.0, r=0.0, buttons=3
     )
-    sent = only(aviary, "RC_CHANNELS_OVERRIDE")
+    sent = only(rig, "RC_CHANNELS_OVERRIDE")
     assert [sent[f"chan{number}_raw"] for number in range(1, 19)] == channels
-    assert aviary.sent[-1].system == 255  # the only one from which ArduPilot takes sticks
-    sent = only(aviary, "MANUAL_CONTROL")
+    assert rig.sent[-1].system == 255  # the only one from which ArduPilot takes sticks
+    sent = only(rig, "MANUAL_CONTROL")
     assert (sent["x"], sent["y"], sent["z"], sent["buttons"], sent["target"]) == (100, -200, 500, 3, 1)
 
 
-def test_a_set_point_that_makes_no_sense_is_dropped_with_a_warning(aviary: Any) -> None:
-    aviary.connect()
-    aviary.publish("setpoint_raw/global", "mavros_msgs/GlobalPositionTarget", latitude=nan)
-    aviary.publish("manual_control/send", "mavros_msgs/ManualControl", x=1e6)
-    aviary.run(100 * MS)
-    assert aviary.asked(GLOBAL, "MANUAL_CONTROL") == []
-    warned = [event.text.partition(":")[0] for event in aviary.of_texts()]
+def test_a_set_point_that_makes_no_sense_is_dropped_with_a_warning(rig: Any) -> None:
+    rig.connect()
+    rig.publish("setpoint_raw/global", "mavros_msgs/GlobalPositionTarget", latitude=nan)
+    rig.publish("manual_control/send", "mavros_msgs/ManualControl", x=1e6)
+    rig.run(100 * MS)
+    assert rig.asked(GLOBAL, "MANUAL_CONTROL") == []
+    warned = [event.text.partition(":")[0] for event in rig.of_texts()]
     assert warned == ["/drone_1/setpoint_raw/global", "/drone_1/manual_control/send"]
 
 
-def test_parameters_are_read_and_set_by_their_type(aviary: Any) -> None:
-    aviary.connect()
+def test_parameters_are_read_and_set_by_their_type(rig: Any) -> None:
+    rig.connect()
     values = {"RTL_ALT": (1500.0, 6), "GUID_TIMEOUT": (3.0, 9)}
 
     def publish(name: str) -> None:
         value, kind = values[name]
-        aviary.emit("PARAM_VALUE", param_id="OTHER", param_value=9.0, param_type=9)
-        aviary.emit("PARAM_VALUE", param_id=name, param_value=value, param_type=kind)
+        rig.emit("PARAM_VALUE", param_id="OTHER", param_value=9.0, param_type=9)
+        rig.emit("PARAM_VALUE", param_id=name, param_value=value, param_type=kind)
 
     def store(fields: dict[str, Any]) -> None:
         values[fields["param_id"]] = (fields["param_value"], fields["param_type"])
         publish(fields["param_id"])
 
-    aviary.answers["PARAM_REQUEST_READ"] = lambda fields: (
+    rig.answers["PARAM_REQUEST_READ"] = lambda fields: (
         publish(fields["param_id"]) if fields["param_id"] in values else None
     )
-    aviary.answers["PARAM_SET"] = store
-    answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id="RTL_ALT")
+    rig.answers["PARAM_SET"] = store
+    answer = rig.call("param/get", "mavros_msgs/ParamGet", param_id="RTL_ALT")
     assert (answer.success, answer.value.integer, answer.value.real) == (True, 1500, 0.0)
-    answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id="GUID_TIMEOUT")
+    answer = rig.call("param/get", "mavros_msgs/ParamGet", param_id="GUID_TIMEOUT")
     assert (answer.success, answer.value.integer, answer.value.real) == (True, 0, 3.0)
-    answer = aviary.call("param/set", "mavros_msgs/ParamSet", param_id="RTL_ALT", value={"integer": 2000})
+    answer = rig.call("param/set", "mavros_msgs/ParamSet", param_id="RTL_ALT", value={"integer": 2000})
     assert (answer.success, answer.value.integer) == (True, 2000)
-    answer = aviary.call("param/set", "mavros_msgs/ParamSet", param_id="GUID_TIMEOUT", value={"real": 0.5})
+    answer = rig.call("param/set", "mavros_msgs/ParamSet", param_id="GUID_TIMEOUT", value={"real": 0.5})
     assert (answer.success, answer.value.real) == (True, 0.5)
     assert values == {"RTL_ALT": (2000.0, 6), "GUID_TIMEOUT": (0.5, 9)}
-    assert not aviary.call("param/get", "mavros_msgs/ParamGet", param_id="NO_SUCH").success
-    assert not aviary.call("param/set", "mavros_msgs/ParamSet", param_id="NO_SUCH").success
+    assert not rig.call("param/get", "mavros_msgs/ParamGet", param_id="NO_SUCH").success
+    assert not rig.call("param/set", "mavros_msgs/ParamSet", param_id="NO_SUCH").success
 
 
 def waypoint(**fields: Any) -> Any:
     return messages.new("mavros_msgs/Waypoint", **fields)
 
 
-def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
-    aviary.connect()
+def test_a_mission_is_pushed_pulled_and_cleared(rig: Any) -> None:
+    rig.connect()
     stored: list[dict[str, Any]] = []
     expected = 0
 
@@ -274,22 +274,20 @@ def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
         nonlocal expected
         expected = fields["count"]
         stored.clear()
-        aviary.emit("MISSION_REQUEST", seq=0)
+        rig.emit("MISSION_REQUEST", seq=0)
 
     def item(fields: dict[str, Any]) -> None:
         stored.append(fields)
         if len(stored) < expected:
-            aviary.emit("MISSION_REQUEST_INT", seq=len(stored))
+            rig.emit("MISSION_REQUEST_INT", seq=len(stored))
         else:
-            aviary.emit("MISSION_ACK", type=0)
+            rig.emit("MISSION_ACK", type=0)
 
-    aviary.answers["MISSION_COUNT"] = count
-    aviary.answers["MISSION_ITEM_INT"] = item
-    aviary.answers["MISSION_REQUEST_LIST"] = lambda fields: aviary.emit("MISSION_COUNT", count=len(stored))
-    aviary.answers["MISSION_REQUEST_INT"] = lambda fields: aviary.emit(
-        "MISSION_ITEM_INT", **stored[fields["seq"]]
-    )
-    aviary.answers["MISSION_CLEAR_ALL"] = lambda fields: aviary.emit("MISSION_ACK", type=0)
+    rig.answers["MISSION_COUNT"] = count
+    rig.answers["MISSION_ITEM_INT"] = item
+    rig.answers["MISSION_REQUEST_LIST"] = lambda fields: rig.emit("MISSION_COUNT", count=len(stored))
+    rig.answers["MISSION_REQUEST_INT"] = lambda fields: rig.emit("MISSION_ITEM_INT", **stored[fields["seq"]])
+    rig.answers["MISSION_CLEAR_ALL"] = lambda fields: rig.emit("MISSION_ACK", type=0)
     route = [
         waypoint(frame=3, command=22, z_alt=10.0, is_current=True),
         waypoint(
@@ -303,44 +301,42 @@ def test_a_mission_is_pushed_pulled_and_cleared(aviary: Any) -> None:
         ),
         waypoint(frame=1, command=16, x_lat=12.5, y_long=-2.25, z_alt=-5.0),
     ]
-    shown = aviary.listen("mission/waypoints", "mavros_msgs/WaypointList")
-    pushed = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=route)
+    shown = rig.listen("mission/waypoints", "mavros_msgs/WaypointList")
+    pushed = rig.call("mission/push", "mavros_msgs/WaypointPush", waypoints=route)
     assert (pushed.success, pushed.wp_transfered) == (True, 3)
     assert [(one["seq"], one["x"], one["y"], one["z"]) for one in stored] == [
         (0, 0, 0, 10.0),
         (1, 473977418, -85455939, 20.0),
         (2, 125000, -22500, -5.0),
     ]
-    pulled = aviary.call("mission/pull", "mavros_msgs/WaypointPull")
+    pulled = rig.call("mission/pull", "mavros_msgs/WaypointPull")
     assert (pulled.success, pulled.wp_received) == (True, 3)
     assert [message.waypoints for message in shown] == [route, route]
-    assert aviary.call("mission/clear", "mavros_msgs/WaypointClear").success
+    assert rig.call("mission/clear", "mavros_msgs/WaypointClear").success
 
 
-def test_a_mission_that_is_refused_or_not_answered(aviary: Any) -> None:
-    aviary.connect()
-    aviary.answers["MISSION_COUNT"] = lambda fields: aviary.emit("MISSION_ACK", type=4)
-    refused = aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()])
+def test_a_mission_that_is_refused_or_not_answered(rig: Any) -> None:
+    rig.connect()
+    rig.answers["MISSION_COUNT"] = lambda fields: rig.emit("MISSION_ACK", type=4)
+    refused = rig.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()])
     assert (refused.success, refused.wp_transfered) == (False, 0)
     for empty in ({}, {"waypoints": [waypoint()], "start_index": 1}):
-        assert not aviary.call("mission/push", "mavros_msgs/WaypointPush", **empty).success
-    del aviary.answers["MISSION_COUNT"]
-    assert not aviary.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()]).success
-    assert not aviary.call("mission/pull", "mavros_msgs/WaypointPull").success
-    assert not aviary.call("mission/clear", "mavros_msgs/WaypointClear").success
-    assert len(aviary.asked("MISSION_REQUEST_LIST")) == 3
+        assert not rig.call("mission/push", "mavros_msgs/WaypointPush", **empty).success
+    del rig.answers["MISSION_COUNT"]
+    assert not rig.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()]).success
+    assert not rig.call("mission/pull", "mavros_msgs/WaypointPull").success
+    assert not rig.call("mission/clear", "mavros_msgs/WaypointClear").success
+    assert len(rig.asked("MISSION_REQUEST_LIST")) == 3
 
 
-def test_the_current_waypoint(aviary: Any) -> None:
-    aviary.connect()
-    aviary.answers["MISSION_SET_CURRENT"] = lambda fields: aviary.emit(
-        "MISSION_CURRENT", seq=min(fields["seq"], 3)
-    )
-    assert aviary.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=2).success
-    assert not aviary.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=7).success
+def test_the_current_waypoint(rig: Any) -> None:
+    rig.connect()
+    rig.answers["MISSION_SET_CURRENT"] = lambda fields: rig.emit("MISSION_CURRENT", seq=min(fields["seq"], 3))
+    assert rig.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=2).success
+    assert not rig.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=7).success
 
 
-def test_warnings_are_of_the_nodes_component(aviary: Any) -> None:
-    aviary.connect()
-    aviary.call("set_mode", "mavros_msgs/SetMode", custom_mode="NONSENSE")
-    assert {event.source for event in aviary.events if isinstance(event, Text)} == {"mavros"}
+def test_warnings_are_of_the_nodes_component(rig: Any) -> None:
+    rig.connect()
+    rig.call("set_mode", "mavros_msgs/SetMode", custom_mode="NONSENSE")
+    assert {event.source for event in rig.events if isinstance(event, Text)} == {"mavros"}

@@ -16,7 +16,7 @@ KEPT: dict[str, tuple[int, float]] = {
 }
 
 
-def serve(aviary: Any, bytewise: bool = False, lost: Callable[[str], bool] = lambda name: False) -> None:
+def serve(rig: Any, bytewise: bool = False, lost: Callable[[str], bool] = lambda name: False) -> None:
     """Answer as an autopilot that keeps ``KEPT``; *lost*: what gets lost when all are listed."""
     names = list(KEPT)
 
@@ -24,7 +24,7 @@ def serve(aviary: Any, bytewise: bool = False, lost: Callable[[str], bool] = lam
         kind, value = KEPT[name]
         written = to_bytewise(kind, value) if bytewise else value
         about = {"param_index": names.index(name), "param_count": len(names), "param_type": kind}
-        aviary.emit("PARAM_VALUE", param_id=name, param_value=written, **about)
+        rig.emit("PARAM_VALUE", param_id=name, param_value=written, **about)
 
     def listed(fields: dict[str, Any]) -> None:
         for name in names:
@@ -37,71 +37,71 @@ def serve(aviary: Any, bytewise: bool = False, lost: Callable[[str], bool] = lam
             publish(name)
 
     def written(fields: dict[str, Any]) -> None:
-        aviary.emit("PARAM_VALUE", **{key: fields[key] for key in ("param_id", "param_value", "param_type")})
+        rig.emit("PARAM_VALUE", **{key: fields[key] for key in ("param_id", "param_value", "param_type")})
 
-    aviary.answers.update({"PARAM_REQUEST_LIST": listed, "PARAM_REQUEST_READ": read, "PARAM_SET": written})
+    rig.answers.update({"PARAM_REQUEST_LIST": listed, "PARAM_REQUEST_READ": read, "PARAM_SET": written})
 
 
 @pytest.mark.parametrize("autopilot", [3, 12])
 @pytest.mark.parametrize(("name", "integer", "real"), [("SYSID", -3, 0.0), ("RTL_ALT", 0, 15.5)])
-def test_one_is_read(aviary: Any, autopilot: int, name: str, integer: int, real: float) -> None:
+def test_one_is_read(rig: Any, autopilot: int, name: str, integer: int, real: float) -> None:
     """PX4 puts whole numbers into the bytes of the float."""
-    aviary.heartbeat(autopilot=autopilot)
-    aviary.run(S)
-    serve(aviary, bytewise=autopilot == 12)
-    answer = aviary.call("param/get", "mavros_msgs/ParamGet", param_id=name)
+    rig.heartbeat(autopilot=autopilot)
+    rig.run(S)
+    serve(rig, bytewise=autopilot == 12)
+    answer = rig.call("param/get", "mavros_msgs/ParamGet", param_id=name)
     assert (answer.success, answer.value.integer, answer.value.real) == (True, integer, real)
 
 
 @pytest.mark.parametrize(("autopilot", "sent"), [(3, 7.0), (12, to_bytewise(INT32, 7.0))])
-def test_one_is_set(aviary: Any, autopilot: int, sent: float) -> None:
-    aviary.heartbeat(autopilot=autopilot)
-    aviary.run(S)
-    serve(aviary, bytewise=autopilot == 12)
-    answer = aviary.call(
+def test_one_is_set(rig: Any, autopilot: int, sent: float) -> None:
+    rig.heartbeat(autopilot=autopilot)
+    rig.run(S)
+    serve(rig, bytewise=autopilot == 12)
+    answer = rig.call(
         "param/set", "mavros_msgs/ParamSet", param_id="SYSID", value={"integer": 7, "real": 0.0}
     )
     assert (answer.success, answer.value.integer) == (True, 7)
-    [asked] = aviary.asked("PARAM_SET")
+    [asked] = rig.asked("PARAM_SET")
     assert (asked["param_id"], asked["param_value"], asked["param_type"]) == ("SYSID", sent, INT32)
 
 
-def test_all_are_pulled_and_those_that_were_changed_are_pushed(aviary: Any) -> None:
-    aviary.connect()
-    serve(aviary, lost=lambda name: name == "RTL_ALT")  # asked for once more by its index
-    received = aviary.listen("param/param_value", "mavros_msgs/Param")
-    answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
+def test_all_are_pulled_and_those_that_were_changed_are_pushed(rig: Any) -> None:
+    rig.connect()
+    serve(rig, lost=lambda name: name == "RTL_ALT")  # asked for once more by its index
+    received = rig.listen("param/param_value", "mavros_msgs/Param")
+    answer = rig.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (True, 3)
     assert {message.param_id for message in received} == set(KEPT)
-    got = aviary.user.get_parameter("/drone_1/param")
+    got = rig.user.get_parameter("/drone_1/param")
     assert got == {"ARMING_CHECK": 1, "RTL_ALT": 15.5, "SYSID": -3}
-    aviary.user.set_parameter("/drone_1/param/RTL_ALT", 20.0)
-    answer = aviary.call("param/push", "mavros_msgs/ParamPush")
+    rig.user.set_parameter("/drone_1/param/RTL_ALT", 20.0)
+    answer = rig.call("param/push", "mavros_msgs/ParamPush")
     assert (answer.success, answer.param_transfered) == (True, 1)
-    assert [(one["param_id"], one["param_value"]) for one in aviary.asked("PARAM_SET")] == [("RTL_ALT", 20.0)]
+    assert [(one["param_id"], one["param_value"]) for one in rig.asked("PARAM_SET")] == [("RTL_ALT", 20.0)]
 
 
-def test_what_is_known_is_not_asked_for_again(aviary: Any) -> None:
-    aviary.connect()
-    serve(aviary)
-    aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
-    aviary.sent.clear()
-    answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=False)
+def test_what_is_known_is_not_asked_for_again(rig: Any) -> None:
+    rig.connect()
+    serve(rig)
+    rig.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
+    rig.sent.clear()
+    answer = rig.call("param/pull", "mavros_msgs/ParamPull", force_pull=False)
     assert (answer.success, answer.param_received) == (True, 3)
-    assert aviary.asked("PARAM_REQUEST_LIST") == []
+    assert rig.asked("PARAM_REQUEST_LIST") == []
 
 
-def test_no_answer_is_no_success(aviary: Any) -> None:
-    aviary.connect()
-    answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
+def test_no_answer_is_no_success(rig: Any) -> None:
+    rig.connect()
+    answer = rig.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (False, 0)
 
 
-def test_what_is_never_answered_does_not_hold_up_for_long(aviary: Any) -> None:
-    aviary.connect()
-    serve(aviary, lost=lambda name: name != "SYSID")
-    del aviary.answers["PARAM_REQUEST_READ"]
-    start = aviary.kernel.now()
-    answer = aviary.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
+def test_what_is_never_answered_does_not_hold_up_for_long(rig: Any) -> None:
+    rig.connect()
+    serve(rig, lost=lambda name: name != "SYSID")
+    del rig.answers["PARAM_REQUEST_READ"]
+    start = rig.kernel.now()
+    answer = rig.call("param/pull", "mavros_msgs/ParamPull", force_pull=True)
     assert (answer.success, answer.param_received) == (False, 1)
-    assert aviary.kernel.now() - start < 6 * S
+    assert rig.kernel.now() - start < 6 * S

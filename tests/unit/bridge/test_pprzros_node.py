@@ -25,7 +25,7 @@ SETPOINT = Frame(
 ALIVE = Frame("ALIVE", {"md5sum": (1, 2, 3)}, 7, 1)
 
 
-class Aviary:
+class BridgeRig:
     """An aircraft, its node, and a node that listens and speaks."""
 
     def __init__(self) -> None:
@@ -67,21 +67,21 @@ def test_what_a_message_says() -> None:
 
 
 def test_what_the_aircraft_says_is_published() -> None:
-    aviary = Aviary()
-    aviary.kernel.run(S)
-    aviary.aircraft.send(ALIVE)
-    aviary.kernel.run(2 * S)
-    (message,) = aviary.received
+    rig = BridgeRig()
+    rig.kernel.run(S)
+    rig.aircraft.send(ALIVE)
+    rig.kernel.run(2 * S)
+    (message,) = rig.received
     assert (message.msg_name, message.sender_id, message.comp_id) == ("ALIVE", 7, 1)
     assert to_frame(message).fields == {"md5sum": (1, 2, 3)}
 
 
 def test_published_messages_are_sent_to_the_aircraft() -> None:
-    aviary = Aviary()
-    aviary.kernel.run(S)
-    aviary.publish(to_message(SETPOINT, 0))
-    aviary.kernel.run(2 * S)
-    assert aviary.sent == [PPRZLINK.quantised(SETPOINT)]
+    rig = BridgeRig()
+    rig.kernel.run(S)
+    rig.publish(to_message(SETPOINT, 0))
+    rig.kernel.run(2 * S)
+    assert rig.sent == [PPRZLINK.quantised(SETPOINT)]
 
 
 @pytest.mark.parametrize(
@@ -95,11 +95,11 @@ def test_published_messages_are_sent_to_the_aircraft() -> None:
 def test_what_makes_no_sense_is_dropped_with_a_warning(message: Any, says: str) -> None:
     with pytest.raises(UsageError, match=says):
         to_frame(message)
-    aviary = Aviary()
-    aviary.kernel.run(S)
-    aviary.publish(message)
-    aviary.publish(to_message(SETPOINT, 0))
-    aviary.kernel.run(2 * S)
-    assert len(aviary.sent) == 1
-    (warning,) = [event for event in aviary.events if isinstance(event, Text)]
+    rig = BridgeRig()
+    rig.kernel.run(S)
+    rig.publish(message)
+    rig.publish(to_message(SETPOINT, 0))
+    rig.kernel.run(2 * S)
+    assert len(rig.sent) == 1
+    (warning,) = [event for event in rig.events if isinstance(event, Text)]
     assert warning.text.startswith("pprzros/from_ros: message dropped: ")

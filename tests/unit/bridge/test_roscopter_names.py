@@ -13,8 +13,8 @@ RC = "roscopter/RC"
 BOOTED = 12_000_000
 
 
-def empty(aviary: Any, service: str) -> None:
-    aviary.call(service, "std_srvs/Empty")
+def empty(rig: Any, service: str) -> None:
+    rig.call(service, "std_srvs/Empty")
 
 
 def test_the_types_are_those_of_the_real_one() -> None:
@@ -120,12 +120,12 @@ def test_a_channel_that_is_none_is_dropped_with_a_warning(roscopter: Any) -> Non
     assert warning.text.startswith("/drone_1/send_rc: message dropped")
 
 
-def test_without_leave_it_takes_no_sticks(aviary_of: Any) -> None:
-    aviary = aviary_of(names=ROSCOPTER, period=None)
-    aviary.connect()
-    aviary.publish("send_rc", RC, channel=[1500] * 8)
-    aviary.run(S)
-    assert aviary.asked("RC_CHANNELS_OVERRIDE") == []
+def test_without_leave_it_takes_no_sticks(rig_of: Any) -> None:
+    rig = rig_of(names=ROSCOPTER, period=None)
+    rig.connect()
+    rig.publish("send_rc", RC, channel=[1500] * 8)
+    rig.run(S)
+    assert rig.asked("RC_CHANNELS_OVERRIDE") == []
 
 
 @pytest.mark.parametrize(("service", "wanted"), [("arm", 1.0), ("disarm", 0.0)])
@@ -168,14 +168,14 @@ def test_a_px4_is_asked_for_messages(roscopter: Any) -> None:
     assert set(asked.values()) == {100_000.0}
 
 
-def test_one_of_several_autopilots_on_a_link_is_selected(aviary_of: Any) -> None:
-    aviary = aviary_of(names=ROSCOPTER, period=None, vehicle=7)
-    received = aviary.listen("state", "roscopter/State")
-    aviary.heartbeat()  # of system 1
-    aviary.run(S)
+def test_one_of_several_autopilots_on_a_link_is_selected(rig_of: Any) -> None:
+    rig = rig_of(names=ROSCOPTER, period=None, vehicle=7)
+    received = rig.listen("state", "roscopter/State")
+    rig.heartbeat()  # of system 1
+    rig.run(S)
     assert received == []
-    assert aviary.node.summary == ""
-    aviary.emit_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
-    aviary.run(S)
+    assert rig.node.summary == ""
+    rig.emit_as(7, "HEARTBEAT", type=2, autopilot=3, base_mode=209, custom_mode=4)
+    rig.run(S)
     assert [message.mode for message in received] == ["GUIDED"]
-    assert aviary.node.summary == "ArduPilot (system 7): GUIDED, armed"
+    assert rig.node.summary == "ArduPilot (system 7): GUIDED, armed"

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.time import MS, S
 
-from .conftest import Aviary
+from .conftest import BridgeRig
 
 OK, WARN, ERROR, STALE = range(4)
 WELL = {
@@ -27,9 +27,9 @@ WELL = {
 
 
 @pytest.fixture
-def received(aviary: Aviary) -> list[Any]:
+def received(rig: BridgeRig) -> list[Any]:
     messages: list[Any] = []
-    aviary.user.subscribe("/diagnostics", "diagnostic_msgs/DiagnosticArray", messages.append)
+    rig.user.subscribe("/diagnostics", "diagnostic_msgs/DiagnosticArray", messages.append)
     return messages
 
 
@@ -42,8 +42,8 @@ def values(received: list[Any], name: str) -> dict[str, str]:
     return {one.key: one.value for one in status.values}
 
 
-def test_missing_data_is_stale(aviary: Aviary, received: list[Any]) -> None:
-    aviary.connect()
+def test_missing_data_is_stale(rig: BridgeRig, received: list[Any]) -> None:
+    rig.connect()
     found = last(received)
     assert found["FCU connection"] == (OK, "connected")
     assert found["Heartbeat"] == (OK, "Normal")
@@ -51,11 +51,11 @@ def test_missing_data_is_stale(aviary: Aviary, received: list[Any]) -> None:
     assert found["GPS"] == (STALE, "no GPS_RAW_INT yet")
 
 
-def test_a_healthy_vehicle(aviary: Aviary, received: list[Any]) -> None:
-    aviary.connect()
-    aviary.emit("SYS_STATUS", **WELL)
-    aviary.emit("GPS_RAW_INT", fix_type=3, satellites_visible=11, eph=80)
-    aviary.connect()
+def test_a_healthy_vehicle(rig: BridgeRig, received: list[Any]) -> None:
+    rig.connect()
+    rig.emit("SYS_STATUS", **WELL)
+    rig.emit("GPS_RAW_INT", fix_type=3, satellites_visible=11, eph=80)
+    rig.connect()
     assert {level for level, _ in last(received).values()} == {OK}
     assert values(received, "Battery") == {"Voltage": "12.60", "Current": "15.0", "Remaining": "87"}
     assert values(received, "GPS")["Satellites visible"] == "11"
@@ -63,14 +63,14 @@ def test_a_healthy_vehicle(aviary: Aviary, received: list[Any]) -> None:
     assert values(received, "Heartbeat")["Mode"] == "STABILIZE"
 
 
-def test_problems_are_reported(aviary: Aviary, received: list[Any]) -> None:
-    aviary.connect()
+def test_problems_are_reported(rig: BridgeRig, received: list[Any]) -> None:
+    rig.connect()
     ill = {**WELL, "onboard_control_sensors_health": 0x0F, "battery_remaining": 12}
-    aviary.emit("SYS_STATUS", **ill)
-    aviary.emit("GPS_RAW_INT", fix_type=1, satellites_visible=4, eph=65535)
-    aviary.run(200 * MS)
-    aviary.heartbeat(system_status=5)
-    aviary.run(200 * MS)
+    rig.emit("SYS_STATUS", **ill)
+    rig.emit("GPS_RAW_INT", fix_type=1, satellites_visible=4, eph=65535)
+    rig.run(200 * MS)
+    rig.heartbeat(system_status=5)
+    rig.run(200 * MS)
     found = last(received)
     assert found["System"] == (ERROR, "sensors are not well: 0x00000020")
     assert found["Battery"] == (WARN, "below 20 %")
@@ -78,7 +78,7 @@ def test_problems_are_reported(aviary: Aviary, received: list[Any]) -> None:
     assert found["Heartbeat"] == (ERROR, "critical")
 
 
-def test_an_autopilot_that_stops_sending(aviary: Aviary, received: list[Any]) -> None:
-    aviary.connect()
-    aviary.run(12 * S)
+def test_an_autopilot_that_stops_sending(rig: BridgeRig, received: list[Any]) -> None:
+    rig.connect()
+    rig.run(12 * S)
     assert last(received) == {"FCU connection": (ERROR, "not connected")}

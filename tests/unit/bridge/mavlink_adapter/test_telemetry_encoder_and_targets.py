@@ -30,12 +30,12 @@ HOME = Position(46.0, -103.0, AMSL(900.0))
 FRAME = LocalFrame(46.0, -103.0, 900.0)
 
 
-class Bird:
+class FakeDriver:
     """What a driver encoded of itself; nothing is known at first."""
 
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
-        self.telemetry = Telemetry(self.kernel, "bird")
+        self.telemetry = Telemetry(self.kernel, "driver")
         self.offboard_mode = "GUIDED"
         self.encoder = TelemetryEncoder(self.kernel, self)  # type: ignore[arg-type]  # no driver: it commands nothing
 
@@ -54,55 +54,55 @@ class Bird:
 
 
 @pytest.fixture
-def bird() -> Bird:
-    return Bird()
+def driver() -> FakeDriver:
+    return FakeDriver()
 
 
 @pytest.fixture
-def seen(bird: Bird) -> Telemetry:
+def seen(driver: FakeDriver) -> Telemetry:
     """10 m north, 4 m up, looking east."""
     latitude, longitude, _ = FRAME.from_enu((0.0, 10.0, 0.0))
-    bird.update(home=HOME, position=Position(latitude, longitude, AMSL(904.0)), above_home=4.0)
-    bird.telemetry.attitude = Attitude(0.0, 0.0, 90.0)
-    return bird.telemetry
+    driver.update(home=HOME, position=Position(latitude, longitude, AMSL(904.0)), above_home=4.0)
+    driver.telemetry.attitude = Attitude(0.0, 0.0, 90.0)
+    return driver.telemetry
 
 
-def test_nothing_is_encoded_of_an_unknown_vehicle(bird: Bird) -> None:
-    assert [name for name in bird.encoder.messages if bird.encoded(name) is not None] == []
+def test_nothing_is_encoded_of_an_unknown_vehicle(driver: FakeDriver) -> None:
+    assert [name for name in driver.encoder.messages if driver.encoded(name) is not None] == []
 
 
-def test_unknown_values_are_omitted_or_marked(bird: Bird) -> None:
-    bird.update(mode="NAV")
-    found = {name for name in bird.encoder.messages if bird.encoded(name) is not None}
+def test_unknown_values_are_omitted_or_marked(driver: FakeDriver) -> None:
+    driver.update(mode="NAV")
+    found = {name for name in driver.encoder.messages if driver.encoded(name) is not None}
     assert found == {"HEARTBEAT", "EXTENDED_SYS_STATE"}
-    bird.update(battery=Battery(nan, 12.25, nan), position=HOME)
-    status = bird.encoded("SYS_STATUS")
+    driver.update(battery=Battery(nan, 12.25, nan), position=HOME)
+    status = driver.encoded("SYS_STATUS")
     known = (status["voltage_battery"], status["current_battery"], status["battery_remaining"])
     assert known == (12_250, -1, -1)
-    fix = bird.encoded("GPS_RAW_INT")
+    fix = driver.encoded("GPS_RAW_INT")
     assert (fix["fix_type"], fix["satellites_visible"], fix["eph"], fix["vel"]) == (0, 255, 65_535, 65_535)
-    assert bird.encoded("GLOBAL_POSITION_INT") is None  # how fast, how high?
-    bird.update(velocity=Velocity(1.0, 2.0, -3.0), above_home=0.0)
-    place = bird.encoded("GLOBAL_POSITION_INT")
+    assert driver.encoded("GLOBAL_POSITION_INT") is None  # how fast, how high?
+    driver.update(velocity=Velocity(1.0, 2.0, -3.0), above_home=0.0)
+    place = driver.encoded("GLOBAL_POSITION_INT")
     assert (place["alt"], place["vx"], place["vy"], place["vz"]) == (900_000, 100, 200, 300)
     assert place["hdg"] == 65_535
-    assert bird.encoded("LOCAL_POSITION_NED") is None  # about where?
-    assert bird.encoded("VFR_HUD") is None
+    assert driver.encoded("LOCAL_POSITION_NED") is None  # about where?
+    assert driver.encoded("VFR_HUD") is None
 
 
-def test_only_new_content_is_encoded_again(bird: Bird, seen: Telemetry) -> None:
-    bird.update(mode="NAV", velocity=Velocity(0.0, 0.0, 0.0))
+def test_only_new_content_is_encoded_again(driver: FakeDriver, seen: Telemetry) -> None:
+    driver.update(mode="NAV", velocity=Velocity(0.0, 0.0, 0.0))
     for name in ("HEARTBEAT", "GLOBAL_POSITION_INT", "ATTITUDE", "HOME_POSITION"):
-        assert bird.encoded(name) is not None
-        assert bird.encoded(name) is None
-        assert bird.encoder.encode(name) is not None  # an explicit request
-    bird.update(at=6 * S)
-    assert bird.encoded("HEARTBEAT") is not None
-    assert bird.encoded("GLOBAL_POSITION_INT") is None  # its content is unchanged
+        assert driver.encoded(name) is not None
+        assert driver.encoded(name) is None
+        assert driver.encoder.encode(name) is not None  # an explicit request
+    driver.update(at=6 * S)
+    assert driver.encoded("HEARTBEAT") is not None
+    assert driver.encoded("GLOBAL_POSITION_INT") is None  # its content is unchanged
     here = seen.position
     assert here is not None
-    bird.update(position=Position(here.latitude, here.longitude, here.altitude))
-    assert bird.encoded("GLOBAL_POSITION_INT") is not None  # it encoded that it is still there
+    driver.update(position=Position(here.latitude, here.longitude, here.altitude))
+    assert driver.encoded("GLOBAL_POSITION_INT") is not None  # it encoded that it is still there
 
 
 @pytest.mark.parametrize(
@@ -118,10 +118,10 @@ def test_only_new_content_is_encoded_again(bird: Bird, seen: Telemetry) -> None:
     ],
 )
 def test_the_heartbeat_identifies_autopilot_and_mode(
-    bird: Bird, facts: dict[str, Any], autopilot: int, mode: int, base: int, status: int
+    driver: FakeDriver, facts: dict[str, Any], autopilot: int, mode: int, base: int, status: int
 ) -> None:
-    bird.update(**facts)
-    beat = bird.encoded("HEARTBEAT")
+    driver.update(**facts)
+    beat = driver.encoded("HEARTBEAT")
     found = (beat["autopilot"], beat["type"], beat["custom_mode"], beat["base_mode"], beat["system_status"])
     assert found == (autopilot, 2, mode, base, status)
 
@@ -130,31 +130,31 @@ def test_the_heartbeat_identifies_autopilot_and_mode(
     ("fix", "kind"),
     [("no_fix", 1), ("3d", 3), ("rtk", 5), ("gps health 3", 1), ("gps health 5", 3), ("?", 0)],
 )
-def test_fix_types(bird: Bird, fix: str, kind: int) -> None:
-    bird.update(fix=fix, position=HOME, satellites=9)
-    found = bird.encoded("GPS_RAW_INT")
+def test_fix_types(driver: FakeDriver, fix: str, kind: int) -> None:
+    driver.update(fix=fix, position=HOME, satellites=9)
+    found = driver.encoded("GPS_RAW_INT")
     assert (found["fix_type"], found["satellites_visible"]) == (kind, 9)
 
 
-def test_places_about_home(bird: Bird, seen: Telemetry) -> None:
-    bird.update(velocity=Velocity(1.0, 2.0, 3.0))
-    local = bird.encoded("LOCAL_POSITION_NED")
+def test_places_about_home(driver: FakeDriver, seen: Telemetry) -> None:
+    driver.update(velocity=Velocity(1.0, 2.0, 3.0))
+    local = driver.encoded("LOCAL_POSITION_NED")
     assert (local["x"], local["y"], local["z"]) == pytest.approx((10.0, 0.0, -4.0), abs=1e-3)
     assert (local["vx"], local["vy"], local["vz"]) == (1.0, 2.0, -3.0)
-    home = bird.encoded("HOME_POSITION")
+    home = driver.encoded("HOME_POSITION")
     assert (home["latitude"], home["altitude"], home["x"]) == (460_000_000, 900_000, 0.0)
     assert isnan(home["approach_x"])
-    assert bird.encoded("GPS_GLOBAL_ORIGIN")["longitude"] == -1_030_000_000
-    turned = bird.encoded("ATTITUDE")
+    assert driver.encoded("GPS_GLOBAL_ORIGIN")["longitude"] == -1_030_000_000
+    turned = driver.encoded("ATTITUDE")
     assert turned["yaw"] == pytest.approx(pi / 2)
     assert isnan(turned["rollspeed"])
 
 
-def test_items_of_a_mission(bird: Bird) -> None:
-    bird.update(mission_item=3, mission_reached=2)
-    assert bird.encoded("MISSION_CURRENT")["seq"] == 3
-    assert bird.encoded("MISSION_ITEM_REACHED")["seq"] == 2
-    assert bird.encoded("MISSION_ITEM_REACHED") is None
+def test_items_of_a_mission(driver: FakeDriver) -> None:
+    driver.update(mission_item=3, mission_reached=2)
+    assert driver.encoded("MISSION_CURRENT")["seq"] == 3
+    assert driver.encoded("MISSION_ITEM_REACHED")["seq"] == 2
+    assert driver.encoded("MISSION_ITEM_REACHED") is None
 
 
 # -- set-points
@@ -209,9 +209,9 @@ def test_incomplete_set_points_are_refused(seen: Telemetry, mask: int) -> None:
         local_target(local(1, mask), seen)
 
 
-def test_without_an_own_position_there_is_no_local_target(bird: Bird) -> None:
+def test_without_an_own_position_there_is_no_local_target(driver: FakeDriver) -> None:
     with pytest.raises(UsageError, match="not known yet"):
-        local_target(local(1, POSITION), bird.telemetry)
+        local_target(local(1, POSITION), driver.telemetry)
 
 
 # -- sticks
