@@ -85,7 +85,7 @@ def test_a_framework_callback_must_not_block(kernel: Kernel) -> None:
 
 def test_current_is_the_running_task_and_none_in_framework_callbacks(kernel: Kernel, spawn: Spawn) -> None:
     seen: list[object] = []
-    looked = Event(kernel, "house code looked")
+    looked = Event(kernel, "a callback looked")
 
     def look() -> None:
         seen.append(kernel.current())
@@ -119,14 +119,14 @@ def test_a_task_can_spawn_tasks(kernel: Kernel, spawn: Spawn) -> None:
 
 
 def test_what_escapes_from_a_task_is_raised_by_run_as_it_is(kernel: Kernel, spawn: Spawn) -> None:
-    fault = ValueError("a fault of the house")
+    fault = ValueError("an error of the framework")
 
     def body() -> None:
         sleep(kernel, MS)
         raise fault
 
     spawn(body)
-    with pytest.raises(ValueError, match="a fault of the house") as caught:
+    with pytest.raises(ValueError, match="an error of the framework") as caught:
         kernel.run(LONG)
     assert caught.value is fault
 

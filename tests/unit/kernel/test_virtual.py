@@ -65,7 +65,7 @@ def test_tasks_of_one_instant_run_in_the_order_in_which_they_asked(
 
     for name in "abc":
         spawn(body(name), name)
-    virtual.call_at(20, lambda: seen.append("house"))
+    virtual.call_at(20, lambda: seen.append("framework"))
     virtual.run(S)
     assert "".join(each[0] for each in seen) == "abchabcabc"
 
@@ -360,7 +360,7 @@ def test_the_watchdog_reports_only_the_task_that_does_not_block() -> None:
     look(0.0, a, 5)
     look(9.0, a, 6)  # time has moved
     look(18.0, b, 6)  # another task
-    look(27.0, None, 6)  # house code, such as a first compilation
+    look(27.0, None, 6)  # a framework callback, such as a first compilation
     look(36.0, b, 6)
     assert accused.whom == []
     look(46.0, b, 6)

@@ -327,7 +327,7 @@ def test_a_rate_that_is_more_than_two_periods_late_starts_anew(
 def test_a_rate_always_ends_the_activation(virtual: VirtualKernel, activations: Activations) -> None:
     def body() -> None:
         rate = Rate(virtual, 10 * MS)
-        virtual.sleep_until(30 * MS)  # of the house: no end of an activation
+        virtual.sleep_until(30 * MS)  # of the framework: no end of an activation
         for _ in range(4):
             rate.sleep()
 

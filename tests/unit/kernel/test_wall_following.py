@@ -11,7 +11,7 @@ from volery.kernel.wall import FollowingKernel
 def test_time_stands_still_until_it_is_advanced() -> None:
     kernel = FollowingKernel()
     happened: list[str] = []
-    asleep, house, over = threading.Event(), threading.Event(), threading.Event()
+    asleep, framework, over = threading.Event(), threading.Event(), threading.Event()
 
     def body() -> None:
         asleep.set()
@@ -20,8 +20,8 @@ def test_time_stands_still_until_it_is_advanced() -> None:
         over.set()
 
     def act() -> None:
-        happened.append("house")
-        house.set()
+        happened.append("framework")
+        framework.set()
 
     with kernel.adopt("test"):
         kernel.spawn(body, "sleeper", ExecutionContext("sleeper"))
@@ -34,10 +34,10 @@ def test_time_stands_still_until_it_is_advanced() -> None:
         kernel.sleep_until(4 * S)
         kernel.advance(-S)  # never goes back
         assert kernel.now() == 4 * S
-        house.wait()
+        framework.wait()
         kernel.advance(S)
         over.wait()
-    assert happened == ["house", "woke at 5"]
+    assert happened == ["framework", "woke at 5"]
     assert kernel.close() == []
 
 

@@ -41,7 +41,8 @@ def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeCon
     if found is None:
         found = graph.topics[name] = Topic(name, full)
     elif found.type != full:
-        users = [one.node.name for one in (*found.publishers, *found.subscriptions)]
+        users = [publisher.node.name for publisher in found.publishers]
+        users += [subscription.node.name for subscription in found.subscriptions]
         raise UsageError(
             f"node {node.name}: topic {name} carries {found.type} (of {', '.join(users)}), not {full}"
         )

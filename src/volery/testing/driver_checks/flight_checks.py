@@ -248,7 +248,7 @@ def safety_comes_first(stage: Stage) -> str:
     stage.later(3.0, stage.drone.land)
     with raising(VehicleError, UsageError, naming=stage.name) as caught:
         stage.drone.goto(stage.at(60, 0))
-    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not land")
     return caught.text.removeprefix(f"{stage.name}: ")
 
 

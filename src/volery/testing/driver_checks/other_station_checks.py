@@ -26,7 +26,7 @@ def mode_change_by_another(stage: Stage) -> str:
         with raising(VehicleError, naming=stage.name):
             stage.drone.goto(stage.at(10, 0))
         demand(stage.drone.mode == theirs, f"its mode was fought: {theirs} became {stage.drone.mode}")
-    stage.until(lambda: not stage.drone.armed, 120.0, f"it did not come down in {theirs}")
+    stage.until(lambda: not stage.drone.armed, 120.0, f"it did not land in {theirs}")
     return caught.text.removeprefix(f"{stage.name}: ")
 
 
@@ -65,7 +65,7 @@ def mode_change_while_idle(stage: Stage) -> None:
     stage.sleep(4)
     with raising(Overridden, naming=stage.name):
         stage.drone.goto(stage.at(10, 0))
-    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not land")
 
 
 @check(needs=(Capability.TAKEOFF, Capability.LAND), flies=True)
@@ -81,7 +81,7 @@ def mode_change_during_takeoff(stage: Stage) -> str:
     stage.later(0.0, land_in_the_air)
     with raising(VehicleError, naming=stage.name) as caught:
         stage.drone.takeoff(20)
-    stage.until(lambda: not stage.drone.armed, 120.0, "it did not come down")
+    stage.until(lambda: not stage.drone.armed, 120.0, "it did not land")
     return caught.text.removeprefix(f"{stage.name}: ")
 
 

@@ -178,7 +178,7 @@ class Ros2Library:
                 by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
                 listed = "; ".join(f"{kind} of {', '.join(who)}" for kind, who in sorted(by_type.items()))
                 self.say(
-                    f"{name} carries several types, and nodes with different types are not connected: {listed}"
+                    f"{name} carries several types; nodes of different types are not connected: {listed}"
                 )
 
     def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
