@@ -50,7 +50,15 @@ def test_help_is_light(word):
 
 
 @pytest.mark.parametrize(
-    "module", ["run.connect", "run.fly", "cli.fly", "cli.bridge", "run.apart.hosted", "run.platform"]
+    "module",
+    [
+        "run.connect",
+        "run.fly",
+        "cli.commands.fly",
+        "cli.commands.ros",
+        "run.distributed.worker",
+        "run.assembly.computers",
+    ],
 )
 def test_where_no_world_is_needed_nothing_of_the_simulation_is_loaded(module):
     """On board of a real vehicle, and in the processes of components that are on a real graph."""
