@@ -67,7 +67,7 @@ def test_tasks_of_one_instant_run_in_the_order_in_which_they_asked(
         spawn(body(name), name)
     virtual.call_at(20, lambda: seen.append("framework"))
     virtual.run(S)
-    assert "".join(each[0] for each in seen) == "abchabcabc"
+    assert "".join(each[0] for each in seen) == "abcfabcabc"
 
 
 def test_a_lone_task_leaps_but_not_over_an_action_nor_over_the_end(
