@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from volery.base.errors import ModelError
+from volery.base.errors import CapabilityError, ModelError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.network import Network
@@ -214,6 +214,29 @@ def test_a_degraded_network_delays(run):
     }
     assert delays[3 * S] - delays[1 * S] == 50 * MS
     assert delays[5 * S] == delays[1 * S]
+
+
+def test_faults_of_one_link_may_overlap(run):
+    trouble = run(LinkDegraded, vehicle="drone", duplicate=1.0)
+    inject([LinkCut(name="cut", vehicle="drone", at_ns=3 * S, duration_ns=3 * S)], trouble.affected)
+    listen(trouble)
+    assert frames_in(trouble, BEGIN, 3 * S)
+    assert not frames_in(trouble, 3100 * MS, 6 * S)  # the end of the other fault does not restore the link
+    assert frames_in(trouble, 6 * S, 7 * S)
+
+
+def test_faults_of_one_network_may_overlap(run):
+    trouble = run(NetworkDegraded, network="radio", delay_ns=50 * MS)
+    inject([NetworkCut(name="cut", network="radio", at_ns=3 * S, duration_ns=2 * S)], trouble.affected)
+    delays = {at: arrival - at for at, arrival in arrivals_of_packets(trouble)}
+    assert delays[2500 * MS] - delays[1 * S] == 50 * MS
+    assert not [at for at in delays if 3 * S <= at < 5 * S]
+    assert delays[5500 * MS] == delays[1 * S]
+
+
+def test_a_computer_that_is_not_modelled_is_refused(run):
+    with pytest.raises(CapabilityError, match="fault trouble: elsewhere is not modelled in this run"):
+        run(ComputerStopped, processor="elsewhere")
 
 
 def finished_at(trouble, start, amount):
