@@ -179,18 +179,18 @@ def many(chunks: Chunks, seconds: float) -> None:
         child = subprocess.Popen([sys.executable, __file__, "--replay", str(file), "--ports", ports])
         while not all(drone.telemetry.last_message_ns >= 0 for drone in drones):
             sleep(0.1)
-        heard = sum(link.statistics.frames for link in links)
+        frames = sum(link.statistics.frames for link in links)
         start, began = process_time(), perf_counter()
         sleep(seconds)
         share = (process_time() - start) / (perf_counter() - began)
-        heard = sum(link.statistics.frames for link in links) - heard
+        frames = sum(link.statistics.frames for link in links) - frames
         child.terminate()
         child.wait()
     for drone in drones:
         drone.close()
     kernel.close()
     print(
-        f"{VEHICLES} vehicles on UDP sockets at default rates: {heard / seconds:.0f} messages/s, "
+        f"{VEHICLES} vehicles on UDP sockets at default rates: {frames / seconds:.0f} messages/s, "
         f"{share:.1%} of a core"
     )
 

@@ -153,9 +153,9 @@ def mirror() -> Iterator[str]:
         if not (PACKAGE / folder).is_dir():
             yield f"{path.relative_to(ROOT)}: there is no src/volery/{folder}"
         elif path.name.startswith("test_"):
-            modules = {each.stem for each in (PACKAGE / folder).iterdir() if not each.stem.startswith("__")}
             stem = path.stem.removeprefix("test_")
-            if not any(stem == each or stem.startswith(f"{each}_") for each in modules):
+            names = {each.stem for each in (PACKAGE / folder).iterdir()} | {folder.name, "interface"}
+            if not any(stem == each or stem.startswith(f"{each}_") for each in names):
                 yield f"{path.relative_to(ROOT)}: src/volery/{folder} has no module that it is named after"
 
 
