@@ -94,6 +94,18 @@ SPOILT = {
         "environment.places.hospital.latitude",
         ["143.471 is off the globe: -90 to 90 degrees"],
     ),
+    "half an origin": (
+        ("origin: {latitude: 43.47, longitude: -3.8, ", "origin: {latitude: 43.47, "),
+        "origin: {latitude",
+        "environment.origin.longitude",
+        ["this key is missing"],
+    ),
+    "component figures at an unknown processor": (
+        ("at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}", "at: {processor: z80, frequency: 1 MHz}"),
+        "at: {processor: z80",
+        "components.RouteGenerator.at.processor",
+        ["no processor in the catalogue named 'z80'"],
+    ),
     "unknown language": (
         ("language: rospy", "language: rosyp"),
         "language: rosyp",
@@ -592,3 +604,16 @@ def test_a_wrong_end_of_a_scenario_is_reported_once_where_it_is_written(workshop
         workshop.load("pocket", None)
     assert not isinstance(caught.value, CollectedModelError)
     assert caught.value.path == "scenarios.pocket.until"
+
+
+def test_a_value_that_is_used_twice_is_reported_once(workshop):
+    workshop.change("carried_by: drone_1", "carried_by: drone_9")
+    workshop.change(
+        "at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}", "at: {processor: z80, frequency: 1 MHz}"
+    )
+    with pytest.raises(CollectedModelError) as caught:
+        workshop.load()
+    assert [error.path for error in caught.value.errors] == [
+        "components.RouteGenerator.at.processor",
+        "platform.processors.onboard.carried_by",
+    ]

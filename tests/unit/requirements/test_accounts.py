@@ -227,7 +227,7 @@ def test_failures_are_kept() -> None:
     assert books(Failure(3 * S, "control", "ValueError: no")).failures[0].who == "control"
 
 
-def test_warnings_of_the_house_are_kept_once() -> None:
+def test_warnings_of_the_framework_are_kept_once() -> None:
     warning = Text(0, "volery", 4, "a law was used outside its range")
     others = (Text(0, "volery", 6, "hello"), Text(0, "drone_1", 3, "Crash: disarming"))
     assert books(warning, *others, warning).warnings == [warning.text]
