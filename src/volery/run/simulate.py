@@ -14,7 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.reader import load
 from volery.model.system import System
 from volery.requirements.verdicts import Observers
-from volery.run.assembly.components import Builder, BuiltComponents
+from volery.run.assembly.component_builder import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.assembly.faults import Affected, FleetLinks, inject, with_faulty_links

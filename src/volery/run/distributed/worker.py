@@ -20,7 +20,7 @@ from volery.base.position import Position
 from volery.components.loader import Loader
 from volery.kernel.wall import FollowingKernel
 from volery.requirements.record import Status
-from volery.run.assembly.components import Builder, BuiltComponents, ProcessPart
+from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
 from volery.run.distributed.pipe import Pipe
