@@ -208,6 +208,7 @@ def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
         what = "a time means nothing without where it was taken: add `at: {processor: ..., frequency: ...}`"
         reading.problems.add(path, what)
         raise WrongValueError("")
+    reading.problems.copied((*path, "at"), (*path[:2], "at"))
     return replace(node, value={**node.items, "at": default})
 
 
@@ -232,6 +233,7 @@ class Activity:
 def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
     """Make the period the deadline where none is stated."""
     if "period" in node.items and "deadline" not in node.items:
+        reading.problems.copied((*path, "deadline"), (*path, "period"))
         return replace(node, value={**node.items, "deadline": node.items["period"]})
     return node
 

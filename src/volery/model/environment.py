@@ -85,8 +85,8 @@ class Place:
 class Origin:
     """The origin of the local frame. The ground is flat at its altitude."""
 
-    latitude: Annotated[float, LATITUDE, "WGS-84 latitude."] = 0.0
-    longitude: Annotated[float, LONGITUDE, "WGS-84 longitude."] = 0.0
+    latitude: Annotated[float, LATITUDE, "WGS-84 latitude."]
+    longitude: Annotated[float, LONGITUDE, "WGS-84 longitude."]
     amsl: Annotated[float, LENGTH, "Altitude of the ground above mean sea level."] = 0.0
 
 
@@ -112,7 +112,7 @@ class Geography:
     """The local frame and the named places of a model that is being read. Use with ``Reading.once``."""
 
     def __init__(self, reading: Reading) -> None:
-        origin = Origin()
+        origin = Origin(0.0, 0.0)
         node = reading.root.at((*_ENVIRONMENT, "origin"))
         if node is not None:
             right, found = read_child(Record(Origin), node, (*_ENVIRONMENT, "origin"), reading)

@@ -92,6 +92,7 @@ def _with_kind(node: Node, path: Path, reading: Reading) -> Node:
     if kind is not None and ("cores" not in added or added["cores"].value is None):
         added["cores"] = Node(kind.cores, node.where)
     if "carried_by" in added and ("powered_by" not in added or added["powered_by"].value is None):
+        reading.problems.copied((*path, "powered_by"), (*path, "carried_by"))
         added["powered_by"] = added["carried_by"]
     return replace(node, value=added)
 

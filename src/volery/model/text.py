@@ -62,11 +62,10 @@ class Problems:
 
     def add(self, path: Path, what: str, where: Location | None = None) -> None:
         """Report that *what* is wrong at *path*, which stands at *where*; the same problem counts once."""
-        where = where or self._locate(path)
         for copy, origin in self._origins.items():
             if path[: len(copy)] == copy:
                 path = origin + path[len(copy) :]
-        error = ModelError(what, written(path), where)
+        error = ModelError(what, written(path), where or self._locate(path))
         if str(error) not in {str(known) for known in self._found}:
             self._found.append(error)
 

@@ -17,7 +17,7 @@ def fly_with(fault: str, **more: str) -> volery.Run:
     return volery.simulate(STARTER, overrides=[f"environment.faults.trouble={{{entries}}}"])
 
 
-def test_without_satellites_the_autopilot_lands_and_the_mission_is_told():
+def test_without_satellites_the_autopilot_lands_and_the_mission_fails():
     run = fly_with("gps-lost", at="30 s")
     assert isinstance(run.error, Failsafe)
     assert "EKF Failsafe" in str(run.error)

@@ -12,7 +12,7 @@ from functools import partial
 from math import cos, radians, sin
 from typing import Any, Protocol
 
-from volery.base.errors import ModelError
+from volery.base.errors import CapabilityError, ModelError
 from volery.base.time import Ns
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.network import Network
@@ -35,6 +35,8 @@ from volery.model.faults import (
     MotorDead,
     NetworkCut,
     NetworkDegraded,
+    NetworkFault,
+    ProcessorFault,
     VehicleFault,
     WindChange,
 )
@@ -64,23 +66,31 @@ class FleetLinks:
     """Control of the links that a fleet has made for a model."""
 
     fleet: SimulatedFleet
+    _cut: set[str] = field(default_factory=set)
     _faults: dict[str, WireFaults] = field(default_factory=dict)
 
     def cut(self, vehicle: str, active: bool) -> None:
         """See ``LinkControl``."""
-        faults = self._faults.get(vehicle, NO_WIRE_FAULTS)
-        self.set_faults(vehicle, replace(faults, cuts=ALWAYS if active else ()))
+        if active:
+            self._cut.add(vehicle)
+        else:
+            self._cut.discard(vehicle)
+        self.set_faults(vehicle, self._faults.get(vehicle, NO_WIRE_FAULTS))
 
     def set_faults(self, vehicle: str, faults: WireFaults) -> None:
-        """See ``LinkControl``."""
+        """See ``LinkControl``. A link that is cut stays cut."""
         self._faults[vehicle] = faults
         for link in self.fleet.faulty_links(vehicle):
-            link.set_faults(faults)
+            link.set_faults(replace(faults, cuts=ALWAYS) if vehicle in self._cut else faults)
 
 
 @dataclass
 class Affected:
-    """The parts of a run that faults act on. ``wind`` is the one that returns when a fault of it is over."""
+    """The parts of a run that faults act on.
+
+    ``wind`` is the one that returns when a fault of it is over. ``loads`` and ``degraded`` are the loads of
+    computers and the loss and delay of networks that faults cause at present, by fault.
+    """
 
     kernel: Kernel
     fleet: SimulatedFleet
@@ -89,6 +99,7 @@ class Affected:
     processors: Mapping[str, Processor] = field(default_factory=dict)
     networks: Mapping[str, Network] = field(default_factory=dict)
     loads: dict[str, list[Handle]] = field(default_factory=dict)
+    degraded: dict[str, dict[str, tuple[float, Ns]]] = field(default_factory=dict)
 
 
 def with_faulty_links(environment: Environment) -> frozenset[str]:
@@ -110,9 +121,19 @@ def with_faulty_links(environment: Environment) -> frozenset[str]:
 
 
 def inject(faults: Iterable[Fault], affected: Affected) -> None:
-    """Schedule every fault and its end, both of which are recorded in the trace."""
+    """Schedule every fault and its end, both of which are recorded in the trace.
+
+    Raises:
+        CapabilityError: this run does not model what a fault happens to.
+    """
     kernel = affected.kernel
     for fault in faults:
+        modelled = {ProcessorFault: affected.processors, NetworkFault: affected.networks}
+        if any(isinstance(fault, kind) and fault.subject not in known for kind, known in modelled.items()):
+            raise CapabilityError(
+                f"fault {fault.name}: {fault.subject} is not modelled in this run; "
+                "faults of computers and networks need the embedded graph"
+            )
         kernel.call_at(fault.at_ns, partial(_happen, fault, affected, True))
         if fault.duration_ns is not None:
             kernel.call_at(fault.at_ns + fault.duration_ns, partial(_happen, fault, affected, False))
@@ -168,13 +189,14 @@ def _degrade_link(fault: LinkDegraded, affected: Affected, active: bool) -> None
     affected.links.set_faults(fault.vehicle, faults if active else NO_WIRE_FAULTS)
 
 
-def _cut_network(fault: NetworkCut, affected: Affected, active: bool) -> None:
-    affected.networks[fault.network].degrade(loss=1.0 if active else 0.0)
-
-
-def _degrade_network(fault: NetworkDegraded, affected: Affected, active: bool) -> None:
-    network = affected.networks[fault.network]
-    network.degrade(loss=fault.loss if active else 0.0, delay=fault.delay_ns if active else 0)
+def _degrade_network(fault: NetworkCut | NetworkDegraded, affected: Affected, active: bool) -> None:
+    """Apply the greatest loss and the sum of the delays of all faults of a network at present."""
+    present = affected.degraded.setdefault(fault.network, {})
+    present.pop(fault.name, None)
+    if active:
+        present[fault.name] = (1.0, 0) if isinstance(fault, NetworkCut) else (fault.loss, fault.delay_ns)
+    losses, delays = [loss for loss, _ in present.values()], [delay for _, delay in present.values()]
+    affected.networks[fault.network].degrade(loss=max(losses, default=0.0), delay=sum(delays))
 
 
 def _stop_computer(fault: ComputerStopped, affected: Affected, active: bool) -> None:
@@ -206,7 +228,8 @@ def _slow_computer(fault: ComputerSlowed, affected: Affected, active: bool) -> N
 
 def _change_wind(fault: WindChange, affected: Affected, active: bool) -> None:
     wind = Wind(fault.speed_m_s, fault.direction_deg, fault.gusts_m_s) if active else affected.wind
-    affected.fleet.world.set_wind(wind_of(wind))
+    if affected.fleet.flights:  # a model of computers alone has no world
+        affected.fleet.world.set_wind(wind_of(wind))
 
 
 EFFECTS: Mapping[type[Fault], Callable[[Any, Affected, bool], None]] = {
@@ -223,7 +246,7 @@ EFFECTS: Mapping[type[Fault], Callable[[Any, Affected, bool], None]] = {
     CompassStuck: _flight_effect(lambda flight, fault, active: flight.block_compass(active)),
     LinkCut: _cut_link,
     LinkDegraded: _degrade_link,
-    NetworkCut: _cut_network,
+    NetworkCut: _degrade_network,
     NetworkDegraded: _degrade_network,
     ComputerStopped: _stop_computer,
     ComputerSlowed: _slow_computer,
