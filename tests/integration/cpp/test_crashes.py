@@ -50,7 +50,7 @@ class Other:
 WAYS = {
     "segmentation fault": "segmentation fault at address 0, in main (crash.cpp:24)",
     "throw": "main() raised std::out_of_range: nothing there",
-    "loop": "virtual time is frozen: it computes and asks nothing any more, in main (crash.cpp:26)",
+    "loop": "virtual time is frozen: it computes and makes no request any more, in main (crash.cpp:26)",
     "recursion": "its stack is full: it recurses without end, or keeps too much in local variables",
     "abort": "aborted: abort(), a failed assertion or an exception that nothing catches",
     "status": "ended with exit status 3",
