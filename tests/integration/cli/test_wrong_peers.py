@@ -59,7 +59,7 @@ def peer(words: bytes) -> Iterator[str]:
                 thread.join(WITHIN_S)
 
 
-def test_the_user_is_told_what_is_there_instead(tmp_path):
+def test_the_message_names_what_answers_instead(tmp_path):
     """All at once: each waits its ten seconds for an autopilot."""
     with ExitStack() as stack:
         flights = {}

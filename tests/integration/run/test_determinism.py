@@ -43,7 +43,7 @@ def flown(delivery, tmp_path_factory):
     return pocket(delivery, tmp_path_factory.mktemp("first")).folder
 
 
-def test_twice_in_one_process_and_with_somebody_who_watches(delivery, flown, tmp_path):
+def test_twice_in_one_process_and_with_progress_shown(delivery, flown, tmp_path):
     seen = []
     again = pocket(delivery, tmp_path, show=seen.append)
     assert digest(again.folder) == digest(flown)

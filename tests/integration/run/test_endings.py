@@ -69,7 +69,7 @@ def test_a_signal_ends_a_run_in_order(commands, in_the_air, number):
     assert_brought_down(commands.folder / "out")
 
 
-def test_a_second_ctrl_c_waits_for_nobody(commands, in_the_air):
+def test_a_second_ctrl_c_stops_at_once(commands, in_the_air):
     """The way down takes a while at this pace; the files are finished all the same."""
     process = in_the_air()
     process.send_signal(signal.SIGINT)
@@ -129,7 +129,7 @@ FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400
 """A file that reaches this size cannot be written on: as on a full disk, but for the words."""
 
 
-def test_a_folder_that_is_full_is_told_and_the_flight_goes_on(commands, one_drone):
+def test_a_full_folder_is_reported_and_the_flight_continues(commands, one_drone):
     folder = one_drone(commands.folder, LAND)
     until = ("--set", "run.until={observe: drone_1.landing_offset, min: 0 m}")
     done = commands.run("simulate", folder, *until, "--out", "out", prelude=FULL)
