@@ -29,12 +29,12 @@ def test_a_lost_interrupt_comes_again(struck):
     assert struck.wait(30)
 
 
-def test_other_errors_are_told_as_ever(monkeypatch, struck):
-    told = []
-    monkeypatch.setattr(sys, "unraisablehook", told.append)
+def test_other_errors_reach_the_usual_hook(monkeypatch, struck):
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", reported.append)
     fault = lost(ValueError)
     with resend_lost_interrupts():
         sys.unraisablehook(fault)
-    assert told == [fault]
-    assert sys.unraisablehook == told.append
+    assert reported == [fault]
+    assert sys.unraisablehook == reported.append
     assert not struck.is_set()

@@ -26,7 +26,7 @@ def test_it_tells_time_speed_vehicles_and_parcels():
     assert "on the ground" in said
 
 
-def test_nobody_watches_a_pipe():
+def test_progress_is_not_drawn_into_a_pipe():
     with run_progress(Output(notes=Console(file=io.StringIO())), "x") as show:
         assert show is None
 

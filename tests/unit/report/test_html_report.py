@@ -161,7 +161,7 @@ def test_a_vehicle_without_a_map(tmp_path: Path) -> None:
     assert embedded(html)["scenery"] is None
 
 
-def test_a_real_vehicle_whose_truth_nobody_knows(tmp_path: Path) -> None:
+def test_a_real_vehicle_of_unknown_truth(tmp_path: Path) -> None:
     lost = VehicleState(0, "d", *[float("nan")] * 13, 0.5, *[float("nan")] * 2, True, "GUIDED")
     events = [
         lost,
