@@ -15,7 +15,7 @@ from typing import Any
 
 from volery.testing.driver_conformance import conformance
 from volery.testing.fault_trials import PHASES, try_fault
-from volery.testing.faults import FAULTS
+from volery.testing.trial_faults import FAULTS
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 KEPT = Path(__file__).parent.parent / "docs" / "reference" / "trials.json"

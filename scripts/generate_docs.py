@@ -29,7 +29,7 @@ from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import PHASES
-from volery.testing.faults import FAULTS as TRIALS
+from volery.testing.trial_faults import FAULTS as TRIALS
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"

@@ -11,13 +11,13 @@ from volery.base.errors import CapabilityError, UsageError, choices
 from volery.base.time import MS, Ns
 from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
-from volery.model.reader import load
+from volery.model.loader import load
 from volery.model.system import System
 from volery.requirements.verdicts import Observers
 from volery.run.assembly.component_builder import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
-from volery.run.assembly.faults import Affected, FleetLinks, inject, with_faulty_links
+from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import DistributedRun, GraphSettings, HostPlatform, unallocated, without_computers

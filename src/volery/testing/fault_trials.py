@@ -18,13 +18,13 @@ from volery.base.errors import VoleryError
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.task import Cancelled, ExecutionContext
 from volery.model.faults import OtherStation, ProgramKilled
-from volery.run.assembly.faults import NO_WIRE_FAULTS
+from volery.run.assembly.fault_effects import NO_WIRE_FAULTS
 from volery.testing.checks import CheckFailedError, demand
 from volery.testing.driver_checks.manual_control_checks import fly_by_hand
-from volery.testing.faults import FAULTS
-from volery.testing.faults import strike as strike_now
 from volery.testing.simulated_stage import SimulatedStage
 from volery.testing.stage import Stage
+from volery.testing.trial_faults import FAULTS
+from volery.testing.trial_faults import strike as strike_now
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone
 from volery.vehicles.address import parse

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.model.reader import load
+from volery.model.loader import load
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
 from volery.requirements.observables import OBSERVABLES

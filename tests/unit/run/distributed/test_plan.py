@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import CapabilityError
-from volery.model.reader import load
+from volery.model.loader import load
 from volery.model.system import System
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import plan

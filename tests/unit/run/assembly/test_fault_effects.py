@@ -30,7 +30,7 @@ from volery.model.faults import (
     NetworkDegraded,
     WindChange,
 )
-from volery.run.assembly.faults import EFFECTS, Affected, FleetLinks, inject, with_faulty_links
+from volery.run.assembly.fault_effects import EFFECTS, Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 from volery.simulation.world.state_layout import M_BARO, M_GPS, M_GPS_FIX, M_MAG, U_MOTOR_HEALTH, U_WIND
 from volery.trace.events import Slice, Text

@@ -11,7 +11,7 @@ from volery.base.time import MS, S
 from volery.model.components import Activity, Figure, Reference
 from volery.model.faults import MotorDead
 from volery.model.instances import Connection, Target, TargetKind
-from volery.model.reader import check, load
+from volery.model.loader import check, load
 from volery.model.reading import ProcessorKind
 from volery.model.system import Chain
 

@@ -23,7 +23,7 @@ from volery.model.faults import (
     VehicleFault,
     WindChange,
 )
-from volery.run.assembly.faults import Affected, apply_fault
+from volery.run.assembly.fault_effects import Affected, apply_fault
 from volery.testing.simulated_stage import SimulatedStage
 
 F = TypeVar("F", bound=Fault)
@@ -63,14 +63,14 @@ class _StageLinks:
     stage: SimulatedStage
 
     def cut(self, vehicle: str, active: bool) -> None:
-        """See ``volery.run.assembly.faults.LinkControl``."""
+        """See ``volery.run.assembly.fault_effects.LinkControl``."""
         if active:
             self.stage.link_control.drop()
         else:
             self.stage.link_control.restore()
 
     def set_faults(self, vehicle: str, faults: WireFaults) -> None:
-        """See ``volery.run.assembly.faults.LinkControl``."""
+        """See ``volery.run.assembly.fault_effects.LinkControl``."""
         self.stage.set_faults(faults)
 
 
