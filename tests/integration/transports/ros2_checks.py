@@ -95,7 +95,7 @@ def a_message_that_is_none(site: Site, texts: list[str]) -> None:
     publisher: Any = speaker.advertise("imu", "sensor_msgs/msg/Imu")
     site.until(speaker, publisher.subscribers, "they connect")
     for data in (b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 20):
-        publisher._outlet.send(data)
+        publisher._publisher.send(data)
     publisher.publish(new("sensor_msgs/msg/Imu"))
     site.spin_until(listener, lambda: heard, "the good one arrives")
     demand(subscription.garbled == 2, f"{subscription.garbled} of 2 were found out")
@@ -137,7 +137,7 @@ def another_type_on_our_topic(site: Site, texts: list[str]) -> None:
     heard: list[Any] = []
     subscription: Any = listener.subscribe("chat", STRING, heard.append)
     with stranger("numbers", subscription.topic):
-        site.until(listener, lambda: any("std_msgs/msg/Int32" in one for one in texts), "it is told")
+        site.until(listener, lambda: any("std_msgs/msg/Int32" in one for one in texts), "the warning arrives")
     told = next(one for one in texts if "std_msgs/msg/Int32" in one)
     demand(f"{subscription.topic} carries several types" in told and "Int32 of /stranger" in told, told)
     demand(not heard, f"heard {heard}")
