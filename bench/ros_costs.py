@@ -39,8 +39,8 @@ from volery.calibration.validation.node_comparison import (
 from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
 from volery.cli.commands.validate import comparison_tables
 from volery.cost import load_catalogue
-from volery.model.loader import load
 from volery.model.system import System
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 
 NODES = Path(__file__).parent / "ros_nodes"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from volery.model.loader import load
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
+from volery.model.system_loader import load
 from volery.requirements.observables import OBSERVABLES
 
 CITY = """\

@@ -185,7 +185,7 @@ def profile(
     require_extra("simulation", "profiles")
     from volery.calibration.component_profile import profile_components
     from volery.cli.progress import run_progress
-    from volery.model.loader import load
+    from volery.model.system_loader import load
     from volery.run.assembly.vocabulary import vocabulary
     from volery.run.result import Options
 

@@ -58,7 +58,7 @@ def demo(
     """
     require_extra("simulation", "simulated runs")
     from volery.cli.outcome import unmet
-    from volery.model.loader import load
+    from volery.model.system_loader import load
     from volery.report.html_report import write_comparison
     from volery.report.terminal import short_comparison
     from volery.run.assembly.vocabulary import vocabulary

@@ -25,8 +25,8 @@ FIDELITIES = ("times", "code")
 @commands.add("quiet", "json", "debug")
 def check(output: Output, model: Model, overrides: Overrides = None) -> int:
     """Check a model with each of its allocations and scenarios."""
-    from volery.model.loader import check as check_model
-    from volery.model.loader import gaps
+    from volery.model.system_loader import check as check_model
+    from volery.model.system_loader import gaps
     from volery.run.assembly.vocabulary import vocabulary
 
     words = vocabulary()
@@ -90,7 +90,7 @@ def show(
 ) -> int:
     """Draw one variant of a model in text: allocation and connections."""
     from volery.model.diagram import diagram
-    from volery.model.loader import load
+    from volery.model.system_loader import load
     from volery.run.assembly.vocabulary import vocabulary
 
     system = load(model, vocabulary(), scenario, allocation, overrides or ())

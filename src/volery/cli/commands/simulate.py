@@ -50,7 +50,7 @@ def simulate(
     require_extra("simulation", "simulated runs")
     from volery.cli.outcome import next_folder, show_outcome
     from volery.cli.progress import run_progress
-    from volery.model.loader import load
+    from volery.model.system_loader import load
     from volery.run.assembly.vocabulary import vocabulary
     from volery.run.recording import make_folder
     from volery.run.result import Options

@@ -52,7 +52,7 @@ def validate(
         measure_runs,
         prepare_nodes,
     )
-    from volery.model.loader import load
+    from volery.model.system_loader import load
     from volery.run.assembly.vocabulary import vocabulary
 
     if runs < 1:

@@ -3,7 +3,7 @@
 import pytest
 
 from volery.base.errors import ModelError
-from volery.model.loader import check_ready, gaps
+from volery.model.system_loader import check_ready, gaps
 
 
 def test_times_needs_a_figure_at_each_kind_of_processor(workshop):

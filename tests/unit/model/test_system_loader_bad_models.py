@@ -3,7 +3,7 @@
 import pytest
 
 from volery.base.errors import ModelError, UsageError
-from volery.model.loader import load
+from volery.model.system_loader import load
 from volery.model.text import CollectedModelError
 
 # what is spoilt: (old text, new text), a text in the line to blame, the path, and pieces of the complaint

@@ -11,9 +11,9 @@ from volery.base.time import MS, S
 from volery.model.components import Activity, Figure, Reference
 from volery.model.faults import MotorDead
 from volery.model.instances import Connection, Target, TargetKind
-from volery.model.loader import check, load
 from volery.model.reading import ProcessorKind
 from volery.model.system import Chain
+from volery.model.system_loader import check, load
 
 
 def test_units_are_si_and_times_nanoseconds(workshop):
