@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from volery.base.errors import ModelError
-from volery.model.reader import load
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
+from volery.model.system_loader import load
 from volery.requirements.observables import OBSERVABLES
 
 STARTER = Path(__file__).parents[2] / "examples" / "starter"

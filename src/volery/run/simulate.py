@@ -11,8 +11,8 @@ from volery.base.errors import CapabilityError, UsageError, choices
 from volery.base.time import MS, Ns
 from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
-from volery.model.loader import load
 from volery.model.system import System
+from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
 from volery.run.assembly.component_builder import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed

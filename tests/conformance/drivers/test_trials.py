@@ -13,7 +13,7 @@ import pytest
 
 from volery.testing import conformance
 from volery.testing.fault_trials import PHASES, try_fault
-from volery.testing.faults import FAULTS
+from volery.testing.trial_faults import FAULTS
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 REFERENCE = Path(__file__).parents[3] / "docs" / "reference" / "trials.json"

@@ -23,7 +23,7 @@ from volery.calibration.validation.node_comparison import prepare_nodes
 from volery.calibration.validation.node_processes import measurement_session
 from volery.cli.main import app
 from volery.cost import load_catalogue
-from volery.model.reader import load
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 
 pytestmark = pytest.mark.integration

@@ -8,7 +8,7 @@ from volery.base.errors import UsageError
 from volery.calibration.component_profile import profile_components
 from volery.calibration.host_machine import Machine, put_law
 from volery.cost import load_catalogue
-from volery.model.reader import load
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.result import Options
 from volery.trace.events import Charge, Milestone, Text

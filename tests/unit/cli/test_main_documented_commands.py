@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from volery.cli.main import app
-from volery.model.loader import load
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 
 ROOT = Path(__file__).parents[3]

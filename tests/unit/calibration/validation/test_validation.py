@@ -10,7 +10,7 @@ from volery.base.time import S
 from volery.calibration.validation.meters.rospy import imported
 from volery.calibration.validation.node_comparison import NodeComparison, NodeEstimate, compare, compare_nodes
 from volery.calibration.validation.node_processes import node_programs, process_cpu
-from volery.model.reader import load
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 
 MODEL = """

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import CapabilityError
-from volery.model.loader import load
 from volery.model.system import System
+from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import plan
 
