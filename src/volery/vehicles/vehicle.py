@@ -69,7 +69,7 @@ REFRESHED_WITHIN_S = 2.0
 ASK_PERIOD: Ns = 500 * MS
 ASK_FOR: Ns = MINUTE
 """An autopilot that has not sent its parameters after this time will not send them."""
-ON_LINK_LOSS = "if this program falls silent"
+ON_LINK_LOSS = "if this program stops sending"
 """Beginning of the recorded line that states the vehicle's reaction to a lost link."""
 
 MANUAL_CONTROL_FRESH: Ns = S

@@ -75,7 +75,7 @@ def fly(tmp_path: Path) -> Any:
 def test_inside_everything_it_flies_and_says_what_it_does_if_left_alone(fly: Any) -> None:
     status, said = fly("--ceiling", "40", "--reserve", "20%", fence=polygon(ring(0.002)))
     assert status == 0
-    assert "ardupilot: if this program falls silent: it " in said
+    assert "ardupilot: if this program stops sending: it " in said
 
 
 @pytest.mark.parametrize(

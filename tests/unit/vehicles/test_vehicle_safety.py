@@ -458,4 +458,4 @@ def test_the_reaction_to_link_loss_is_recorded_once_it_is_known(bench: Make) -> 
         assert drone.on_link_loss == "it lands"
 
     at.fly(mission)
-    assert [one.text for one in at.recorded(Text)] == ["if this program falls silent: it lands"]
+    assert [one.text for one in at.recorded(Text)] == ["if this program stops sending: it lands"]

@@ -128,8 +128,9 @@ def inject(faults: Iterable[Fault], affected: Affected) -> None:
     """
     kernel = affected.kernel
     for fault in faults:
-        modelled = {ProcessorFault: affected.processors, NetworkFault: affected.networks}
-        if any(isinstance(fault, kind) and fault.subject not in known for kind, known in modelled.items()):
+        if (isinstance(fault, ProcessorFault) and fault.subject not in affected.processors) or (
+            isinstance(fault, NetworkFault) and fault.subject not in affected.networks
+        ):
             raise CapabilityError(
                 f"fault {fault.name}: {fault.subject} is not modelled in this run; "
                 "faults of computers and networks need the embedded graph"

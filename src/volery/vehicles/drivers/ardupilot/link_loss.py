@@ -47,7 +47,7 @@ def on_link_loss(kind: str, parameters: Mapping[str, float]) -> str:
     copter = kind == DRONE_KIND
     enabled = round(parameters.get("FS_GCS_ENABLE", 0.0))
     if not enabled:
-        line = "it does not miss its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there"
+        line = "it does not react (FS_GCS_ENABLE=0): it flies to its last target and stays there"
         lasts = parameters.get("GUID_TIMEOUT", 3.0)
         return f"{line}; a velocity ends after {lasts:g} s" if copter else line
     action = _COPTER.get(enabled) if copter else _ROVER.get(round(parameters.get("FS_ACTION", 0.0)))

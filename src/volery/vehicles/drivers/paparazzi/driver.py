@@ -92,10 +92,10 @@ class Paparazzi:
             return ""
         farthest = self._backend.aircraft.farthest
         far = f", further than {farthest:g} m from home it turns back" if farthest else ""
-        return (  # recorded in traces: do not reword
-            "in GUIDED it misses nobody: it goes to its last set-point and stays there, and a velocity "
+        return (
+            "in GUIDED it does not react: it flies to its last set-point and stays there, and a velocity "
             f"goes on without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by "
-            "sticks it comes down (FAILSAFE)"
+            "sticks it descends (FAILSAFE)"
         )
 
     def problem(self) -> LinkError | CapabilityError | None:

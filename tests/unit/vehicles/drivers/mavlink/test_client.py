@@ -50,7 +50,7 @@ def test_parameters_are_asked_for_until_they_come(bench: Make) -> None:
     at.autopilot.parameters = {"FS_GCS_ENABLE": 0.0, "GUID_TIMEOUT": 3.0, "SYSID_MYGCS": 255.0}
     at.kernel.run(15 * S)
     assert driver.on_link_loss() == (
-        "it does not miss its commander (FS_GCS_ENABLE=0): it goes to its last target and stays there; "
+        "it does not react (FS_GCS_ENABLE=0): it flies to its last target and stays there; "
         "a velocity ends after 3 s"
     )
     asked = [fields["param_id"] for fields in at.autopilot.sent("PARAM_REQUEST_READ")]

@@ -515,7 +515,7 @@ def test_what_it_will_do_if_its_commander_falls_silent(bench: Make) -> None:
     at.autopilot.parameters["NAV_DLL_ACT"] = 0.0
     at.kernel.run(10 * S)
     assert driver.on_link_loss() == (
-        "it does not miss its commander (NAV_DLL_ACT=0): it goes to its last target and stays there; "
-        "a velocity ends after 1 s in POSCTL, where it sinks unless somebody has the sticks; "
+        "it does not react (NAV_DLL_ACT=0): it flies to its last target and stays there; "
+        "a velocity ends after 1 s in POSCTL, where it sinks unless a pilot moves the sticks; "
         "0.5 s after the last sticks it returns home"
     )

@@ -291,3 +291,21 @@ def test_the_same_flight_twice() -> None:
         return [repr(event) for event in field.events if isinstance(event, Operation | Text)]
 
     assert flown() == flown()
+
+
+def test_a_mode_of_sticks_is_asked_for_when_px4_has_taken_them_in() -> None:
+    """The original refuses it with the first sample: 4 of 4 first tries."""
+    field = Field()
+
+    def by_sticks(drone: Drone) -> None:
+        drone.takeoff(10)
+        drone.manual_control(0.0, 0.0, 0.5, 0.0)
+        drone.altitude_hold()
+        assert drone.mode == "ALTCTL"
+        drone.land()
+
+    field.fly(by_sticks)
+    refused = [
+        event for event in field.events if isinstance(event, Text) and "not available" in event.text
+    ]
+    assert refused == []
