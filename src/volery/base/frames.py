@@ -208,6 +208,17 @@ class LocalFrame:
         """Convert degrees and metres AMSL to north, east, down metres from the origin."""
         return enu_to_ned(self.to_enu(latitude, longitude, amsl))
 
+    def to_ned_flat(self, latitude: float, longitude: float, amsl: float) -> Vector:
+        """Convert degrees and metres AMSL to north, east, down metres on a map unrolled from the origin.
+
+        For points beyond the horizon, where the tangent plane lies far above the ground: directions and
+        heights are those in which a vehicle sets off, lengths are rough.
+        """
+        mean = radians((latitude + self.latitude) / 2.0)
+        north = radians(latitude - self.latitude) * EQUATOR_M
+        east = wrap(radians(longitude - self.longitude)) * EQUATOR_M * cos(mean)
+        return north, east, self.amsl - amsl
+
     def from_ned(self, ned: Vector) -> Vector:
         """Convert north, east, down metres to latitude, longitude (degrees) and metres AMSL."""
         return self.from_enu(ned_to_enu(ned))

@@ -170,3 +170,19 @@ def test_a_restart_boots_in_place_and_keeps_mission_and_parameters(bench: Any) -
     assert rig.vehicle.parameters["WPNAV_SPEED"] == 700.0
     rig.run(45.0)
     assert rig.command(400, 1) == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("pause", [0.0, 0.13, 0.3])
+def test_home_comes_after_a_restart_and_the_boot_is_counted(kind: str, pause: float, bench: Any) -> None:
+    rig = bench(kind)
+    rig.run(1.0 + pause)
+    booted = rig.vehicle.parameters["STAT_BOOTCNT"]
+    assert rig.command(246, 1) == 0
+    assert rig.vehicle.parameters["STAT_BOOTCNT"] == booted + 1
+    rig.run_until(lambda: rig.vehicle.home is not None, within=30.0)
+    rig.run(12.0)
+    assert [text for text in rig.texts() if text.startswith("Field Elevation Set")] == [
+        "Field Elevation Set: 584m"
+    ]
+    assert rig.command(410) == 0

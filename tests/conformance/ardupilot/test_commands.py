@@ -25,6 +25,7 @@ ON_THE_GROUND = [
     ("yaw", (115, 90, 0, 1, 0), ACCEPTED),
     ("yaw beyond the circle", (115, 400, 0, 1, 0), FAILED),
     ("home here", (179, 1), ACCEPTED),
+    ("home at zero means here", (179, 0, 0, 0, 0, 0, 0, 5), ACCEPTED),
     ("home off the globe", (179, 0, 0, 0, 0, 95, 10, 5), DENIED),
     ("calibration", (241, 1), ACCEPTED),
     ("termination without its value", (185, 0), FAILED),

@@ -372,3 +372,33 @@ def test_an_item_with_current_two_is_a_guided_target(bench: Any) -> None:
     assert rig.latest["MISSION_ACK"]["type"] == ACCEPTED
     assert rig.vehicle.estimate.position[0] == pytest.approx(12.0, abs=1.5)
     assert rig.height == pytest.approx(7.0, abs=0.6)
+
+
+def test_a_mission_that_is_only_a_take_off_ends_in_the_air(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    rig.command(511, 245, 200_000)
+    assert upload(rig, [HOME, item(TAKEOFF)]) == 0
+    start(rig)
+    rig.run(25.0)
+    assert rig.latest["EXTENDED_SYS_STATE"]["landed_state"] == 2
+
+
+def test_a_take_off_to_below_the_ground_climbs_a_metre(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert upload(rig, [HOME, item(TAKEOFF, height=-10.0), item(DELAY, param1=30.0)]) == 0
+    start(rig)
+    rig.run(15.0)
+    assert rig.vehicle.armed
+    assert rig.height == pytest.approx(1.0, abs=0.4)
+
+
+@pytest.mark.parametrize("command", [189, 201, 195])
+def test_items_at_a_place_keep_their_frame(command: int, bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert upload(rig, [HOME, item(command, frame=3)]) == 0
+    rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1)
+    rig.run(0.05)
+    assert rig.latest["MISSION_ITEM_INT"]["frame"] == 3

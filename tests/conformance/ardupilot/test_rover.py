@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin
+from math import atan2, cos, degrees, hypot, radians, sin
 from typing import Any
 
 import pytest
+
+from rigs.station import TARGET
 
 MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
 
@@ -172,3 +174,71 @@ def test_rates_that_were_asked_for_are_stored(bench: Any) -> None:
     stored = {one.fields["param_id"]: one.fields["param_value"] for one in rig.of("PARAM_VALUE")}
     assert stored["SR0_EXTRA1"] == 4.0
     assert len(stored) == 9
+
+
+def test_a_velocity_turns_it_to_its_direction(bench: Any) -> None:
+    rig = armed(bench, GUIDED)
+    for _ in range(20):
+        rig.send(
+            "SET_POSITION_TARGET_LOCAL_NED",
+            target_system=1,
+            target_component=1,
+            coordinate_frame=1,
+            type_mask=3527,
+            vx=1.0,
+            vy=1.0,
+        )
+        rig.run(0.5)
+    north, east, _ = rig.vehicle.estimate.velocity
+    assert hypot(north, east) == pytest.approx(1.414, abs=0.2)
+    assert degrees(atan2(east, north)) == pytest.approx(45.0, abs=5.0)
+
+
+def test_relative_headings_add_to_the_one_asked_for_last(bench: Any) -> None:
+    rig = bench("rover")
+    rig.run(0.5)
+    rig.mode(15)
+    rig.command(400, 1)
+    rig.command(213, 90, 1, 0)
+    for _ in range(5):
+        rig.command(213, 5, 1, 1)
+    assert degrees(rig.vehicle.manoeuvre.asked_heading) == pytest.approx(115.0, abs=0.01)
+
+
+def test_the_end_of_a_return_is_said(bench: Any) -> None:
+    rig = bench("rover")
+    rig.beat()
+    rig.run(0.5)
+    rig.command(400, 1)
+    assert rig.mode(11) == 0
+    rig.run(8.0)
+    assert rig.texts()[-1] == "Reached destination"
+
+
+def test_after_the_mission_it_shows_no_target(bench: Any) -> None:
+    rig = bench("rover")
+    rig.run(0.5)
+    rig.command(511, 87, 200_000)
+    latitude, longitude, _ = rig.vehicle.estimate.geodetic
+    rig.send("MISSION_COUNT", target_system=1, target_component=1, count=2)
+    for sequence in range(2):
+        rig.run(0.05)
+        place = {"x": round((latitude + 1e-4 * sequence) * 1e7), "y": round(longitude * 1e7)}
+        rig.send(
+            "MISSION_ITEM_INT",
+            target_system=1,
+            target_component=1,
+            seq=sequence,
+            frame=6,
+            command=16,
+            **place,
+        )
+    rig.run(0.2)
+    rig.mode(AUTO)
+    rig.command(400, 1)
+    rig.run_until(lambda: "Mission Complete" in rig.texts())
+    assert rig.of("POSITION_TARGET_GLOBAL_INT")
+    rig.run(0.3)
+    rig.received.clear()
+    rig.run(2.0)
+    assert not rig.of("POSITION_TARGET_GLOBAL_INT")

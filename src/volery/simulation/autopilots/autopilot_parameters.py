@@ -130,6 +130,10 @@ class Tuning:
     waypoint_radius: float = 2.0
     face_path: bool = True
     """Whether the nose points along the path of a mission."""
+    face_return: bool = False
+    """Whether the nose points along the path of a return."""
+    straight: bool = False
+    """Whether a point at another height is approached along a straight line."""
 
     land_speed: float = 0.5
     land_speed_high: float = 1.5

@@ -104,6 +104,10 @@ class CommandedLimits:
     """Descent rate [m/s]."""
     yaw: float | None = None
     """Heading, clockwise from north [rad]."""
+    yaw_left: float = 0.0
+    """Angle by which ``yaw`` still turns, clockwise [rad], for firmwares that turn it at a rate."""
+    yaw_rate: float = 0.0
+    """That rate [rad/s]."""
 
 
 @dataclass

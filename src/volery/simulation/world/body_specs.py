@@ -1,7 +1,9 @@
 """Bodies as frozen data, and how they become parameters and initial states of the compiled step.
 
-Defaults describe a quadrotor of 1.5 kg with 12-inch propellers on three lithium-polymer cells, and a rover
-the size of a large model car. Figures are estimated unless the file that sets one says otherwise.
+Defaults describe the bodies that ArduPilot's own simulator flies and drives by default: a quadrotor of 3 kg
+with rotors of 0.35 m on three lithium-polymer cells of 3.3 A h, which draws about 28 A in hover, and a rover
+the size of a large model car. Inertia, drag and rotor lag are estimated; the power is fitted to the energy
+that ArduPilot's simulator reports. The multirotor flies some seven minutes on a charge.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from math import pi, radians, sqrt
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.arithmetic import exponential, sine_cosine
-from volery.simulation.world.dynamics import CELL_FULL_VOLTS
+from volery.simulation.world.dynamics import CELL_FULL_VOLTS, battery_current
 from volery.simulation.world.environment_models import GUST_EVERY, Terrain, Wind, magnetic_field
 from volery.simulation.world.sensors import fill_sensor_parameters, sensor_suite
 from volery.simulation.world.state_layout import (
@@ -112,9 +114,9 @@ class Battery:
         left: Fraction of the charge left at the start, above 0 and at most 1.
     """
 
-    capacity_ah: float = 5.0
+    capacity_ah: float = 3.3
     cells: int = 3
-    resistance_ohm: float = 0.015
+    resistance_ohm: float = 0.010
     left: float = 1.0
 
     def __post_init__(self) -> None:
@@ -184,18 +186,18 @@ class Multirotor:
     sensors: str = "consumer"
     added_sensors: tuple[str, ...] = ()
     battery: Battery = Battery()
-    mass: float = 1.5
-    inertia: Vector = (0.020, 0.020, 0.036)
+    mass: float = 3.0
+    inertia: Vector = (0.040, 0.040, 0.089)
     rotors: tuple[Rotor, Rotor, Rotor, Rotor] = field(default_factory=lambda: x_frame(0.25))
-    thrust_coefficient: float = 2.0e-5
-    propeller_diameter: float = 0.3048
+    thrust_coefficient: float = 4.0e-5
+    propeller_diameter: float = 0.35
     figure_of_merit: float = 0.6
     efficiency: float = 0.8
     top_speed: float = 760.0
     rotor_lag: float = 0.04
-    drag_linear: float = 0.25
-    drag_quadratic: float = 0.03
-    spin_damping: float = 0.002
+    drag_linear: float = 0.5
+    drag_quadratic: float = 0.06
+    spin_damping: float = 0.004
     feet: Vector = (0.15, 0.15, 0.12)
     friction: float = 0.6
     idle_power: float = 3.0
@@ -217,6 +219,20 @@ class Multirotor:
     def hover_speed(self) -> float:
         """Rotor speed at which the thrust equals the weight [rad/s]."""
         return sqrt(self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient))
+
+    @property
+    def hover_power(self) -> float:
+        """Electrical power in hover, without payload [W]."""
+        return 4.0 * self.torque_coefficient * self.hover_speed**3 / self.efficiency + self.idle_power
+
+    @property
+    def hover_current(self) -> float:
+        """Current in hover with a full battery [A]."""
+        battery = self.battery
+        current: float = battery_current(
+            battery.cells * CELL_FULL_VOLTS, battery.resistance_ohm, self.hover_power
+        )
+        return current
 
 
 @dataclass(frozen=True)
@@ -257,7 +273,7 @@ class Rover:
     speed_top: float = 20.0
     speed_lag: float = 1.7
     rolling: float = 0.03
-    efficiency: float = 0.6
+    efficiency: float = 0.235
     drag_linear: float = 0.0
     drag_quadratic: float = 0.3
     grip: float = 4.0

@@ -74,7 +74,7 @@ def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
 
 
 def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
-    spec = Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.5))
+    spec = Multirotor(sensors="perfect", battery=Battery(capacity_ah=1.3))
     world = World(clock, [spec], frame=frame)
     world.set_input(0, U_THROTTLE, 1.0, 1.0, 1.0, 1.0)
     clock.wait(1)
@@ -110,7 +110,7 @@ def test_a_cell_breaks_down_once_it_is_empty():
 
 
 def test_an_empty_battery_stops_the_rotors(clock, frame):
-    world = World(clock, [Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.02))], frame=frame)
+    world = World(clock, [Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.05))], frame=frame)
     world.set_input(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
     clock.wait(3)
     assert world.truth(0).position[2] > 2.0

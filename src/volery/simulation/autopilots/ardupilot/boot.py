@@ -80,9 +80,19 @@ def set_home_position(vehicle: Vehicle) -> None:
         vehicle.set_home_here()
 
 
+def find_home(vehicle: Vehicle) -> None:
+    """Set the home position as soon as the estimator has a position, if it had none at the usual time."""
+    late = vehicle.uptime() > vehicle.rules.startup.origin_after + S // 2
+    waits = vehicle.home is None and late and "elevation" not in vehicle.reports.sent_once
+    if waits and vehicle.estimate.position_ok:
+        set_home_position(vehicle)
+        report_field_elevation(vehicle)
+
+
 def report_field_elevation(vehicle: Vehicle) -> None:
-    """Report the altitude of the home position."""
-    if vehicle.home is not None:
+    """Report the altitude of the home position once after a boot."""
+    if vehicle.home is not None and "elevation" not in vehicle.reports.sent_once:
+        vehicle.reports.sent_once.add("elevation")
         vehicle.send_text(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
 
 
@@ -210,9 +220,16 @@ Problems = Callable[[Vehicle], list[str]]
 """Returns the texts of all checks that forbid arming, in the firmware's words."""
 
 
+def skip_elevation(vehicle: Vehicle) -> None:
+    """Regard the field elevation as reported: a warm vehicle has its home a moment later."""
+    vehicle.reports.sent_once.add("elevation")
+
+
 def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
     """Set the home position and evaluate the pre-arm checks of a vehicle that starts warm."""
     set_home_position(vehicle)
+    if vehicle.home is None:
+        vehicle.reports.sent_once.discard("elevation")
     vehicle.arming.checks_passed = not before_arming(vehicle)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from math import isfinite, isnan, radians
+from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot.modes import (
@@ -27,7 +27,7 @@ from volery.simulation.autopilots.mavlink.command import (
     Command,
     Handler,
 )
-from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.mavlink.message_fields import all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -38,6 +38,9 @@ CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 24
 
 HIGHEST = 83_000.0
 """Largest altitude that a location can hold [m] (LOCATION_ALT_MAX_M)."""
+
+FARTHEST_POINT = 2.1e7
+"""Largest distance of a target that is flown towards [m]: any point of the globe."""
 
 Problems = Callable[[Vehicle], list[str]]
 
@@ -129,34 +132,58 @@ def on_condition_yaw(vehicle: Vehicle, command: Command) -> int:
     """Handle CONDITION_YAW: an absolute heading or a relative angle."""
     if not 0.0 <= command.param1 <= 360.0 or command.param4 not in (0.0, 1.0):
         return FAILED
-    turn_to(vehicle, command.param1, command.param3, relative=command.param4 == 1.0)
+    turn_to(vehicle, command.param1, command.param2, command.param3, relative=command.param4 == 1.0)
     return ACCEPTED
 
 
-def turn_to(vehicle: Vehicle, degrees: float, direction: float, relative: bool) -> None:
-    """Set the heading for modes that the autopilot flies; the vehicle turns the shorter way.
+SLEW_YAW = 60.0
+"""ATC_SLEW_YAW: fastest turn to a heading [deg/s], and the rate where a command names none."""
+
+
+def turn_to(vehicle: Vehicle, degrees: float, rate: float, direction: float, relative: bool) -> None:
+    """Turn to a heading in modes that the autopilot flies.
 
     Args:
         vehicle: The vehicle.
-        degrees: Heading from north or angle to turn by [deg], clockwise.
-        direction: Negative turns a relative angle anticlockwise.
+        degrees: Heading from north, or angle to turn by [deg], clockwise.
+        rate: Turn rate [deg/s]; not positive: the fastest.
+        direction: Negative turns anticlockwise, positive clockwise; 0 turns the shorter way to a heading, and
+            clockwise by an angle.
         relative: Whether ``degrees`` counts from the present heading.
     """
-    angle = radians(degrees)
+    commanded = vehicle.commanded
+    now = vehicle.estimate.attitude[2] if commanded.yaw is None else commanded.yaw
     if relative:
-        now = vehicle.estimate.attitude[2]
-        angle = now + (-angle if direction < 0.0 else angle)
-    vehicle.commanded.yaw = wrap(angle)
+        left = -radians(degrees) if direction < 0.0 else radians(degrees)
+    else:
+        left = wrap(radians(degrees) - now)
+        if direction < 0.0 < left:
+            left -= 2.0 * pi
+        elif direction > 0.0 > left:
+            left += 2.0 * pi
+    commanded.yaw, commanded.yaw_left = now, left
+    commanded.yaw_rate = radians(min(SLEW_YAW, rate) if rate > 0.0 else SLEW_YAW)
+
+
+def continue_turn(vehicle: Vehicle, seconds: float) -> None:
+    """Move the commanded heading along its turn by some seconds."""
+    commanded = vehicle.commanded
+    if commanded.yaw is None or not commanded.yaw_left:
+        return
+    most = commanded.yaw_rate * seconds
+    passed = min(most, max(-most, commanded.yaw_left))
+    commanded.yaw = wrap(commanded.yaw + passed)
+    commanded.yaw_left -= passed
 
 
 def on_set_home(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_SET_HOME. The altitude is AMSL in COMMAND_LONG and follows the frame in COMMAND_INT."""
-    if command.param1 == 1.0:
+    if command.param1 == 1.0 or (command.x == 0.0 and command.y == 0.0):
         if not vehicle.has_position:
             return FAILED
         vehicle.set_home_here(by_user=True)
     else:
-        if not _is_place(command) or (command.x == 0.0 and command.y == 0.0):
+        if not _is_place(command):
             return DENIED
         relative = command.is_int and command.frame not in (GLOBAL, 5)
         base = vehicle.home.amsl if relative and vehicle.home else 0.0
@@ -195,7 +222,7 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
         yaw: Heading [rad], or None to leave it to the firmware.
     """
     point = vehicle.point(frame, *place)
-    if not all_within(point, FARTHEST):
+    if not all_within(point, FARTHEST_POINT):
         return False
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, Guided):
@@ -213,13 +240,17 @@ def go_to_item(vehicle: Vehicle, item: MissionItem) -> bool:
 
 
 def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
-    """Handle NAV_SET_YAW_SPEED of a rover: heading [deg], relative if param3 is positive, and speed [m/s]."""
+    """Handle NAV_SET_YAW_SPEED of a rover: heading [deg] and speed [m/s].
+
+    With a positive param3 the angle adds to the heading that was last asked for.
+    """
     manoeuvre = vehicle.manoeuvre
     if not isinstance(manoeuvre, GuidedRover):
         return FAILED
     heading = radians(command.param1)
     if command.param3 > 0.0:
-        heading += vehicle.estimate.attitude[2]
+        asked = manoeuvre.asked_heading
+        heading += vehicle.estimate.attitude[2] if asked is None else asked
     manoeuvre.follow_speed(command.param2, Turn(yaw=wrap(heading)))
     return ACCEPTED
 
@@ -245,6 +276,7 @@ def on_reboot(vehicle: Vehicle, command: Command) -> int:
         return UNSUPPORTED
     if vehicle.armed and round(command.y) != 20_190_226:
         return FAILED
+    vehicle.parameters.set("STAT_BOOTCNT", vehicle.parameters["STAT_BOOTCNT"] + 1.0)
     vehicle.output.after_reply(vehicle.restart)
     return ACCEPTED
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache, partial
 
-from volery.base.time import MS, S, from_seconds
+from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -178,12 +178,15 @@ def finish_setup(vehicle: Vehicle) -> None:
 def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
+    boot.skip_elevation(vehicle)
     finish_setup(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
     """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
+    boot.find_home(vehicle)
+    commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:
         return
     if not vehicle.landed:

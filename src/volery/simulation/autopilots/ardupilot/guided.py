@@ -6,13 +6,14 @@ ignored.
 
 from __future__ import annotations
 
-from math import cos, hypot, isfinite, sin
+from math import atan2, cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
+from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
-from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
+from volery.simulation.autopilots.mavlink.message_fields import all_within
 from volery.simulation.autopilots.onboard_mission import (
     BODY_NED,
     BODY_OFFSET_NED,
@@ -100,7 +101,7 @@ def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
 def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target | None:
     place, velocity, push = groups
     for group, values in ((POSITION, place), (VELOCITY, velocity), (ACCELERATION, push)):
-        if _given(mask, group) and not all_within(values, FARTHEST):
+        if _given(mask, group) and not all_within(values, FARTHEST_POINT):
             return None
     return Target(
         place if _given(mask, POSITION) else None,
@@ -159,14 +160,12 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
 
 def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED of a rover, which reads the horizontal axes only."""
-    _drive(
-        vehicle, _of_local(vehicle, _level(fields)), fields["coordinate_frame"] in BODY_FRAMES, fields["vx"]
-    )
+    _drive(vehicle, _of_local(vehicle, _level(fields)), fields["vx"])
 
 
 def rover_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_GLOBAL_INT of a rover."""
-    _drive(vehicle, _of_global(vehicle, _level(fields)), ahead_given=False, ahead=0.0)
+    _drive(vehicle, _of_global(vehicle, _level(fields)), fields["vx"])
 
 
 def _level(fields: dict[str, Any]) -> dict[str, Any]:
@@ -177,13 +176,26 @@ def _level(fields: dict[str, Any]) -> dict[str, Any]:
     return {**fields, "type_mask": mask}
 
 
-def _drive(vehicle: Vehicle, target: Target | None, ahead_given: bool, ahead: float) -> None:
+def _drive(vehicle: Vehicle, target: Target | None, ahead: float) -> None:
+    """Drive to a point, along a velocity, or at a velocity's length with a heading or a turn rate of its own.
+
+    Args:
+        vehicle: The vehicle.
+        target: The target; ``None``: ignored.
+        ahead: First component of the velocity as sent: its sign is the direction of driving beside a turn.
+    """
     guided = vehicle.manoeuvre
     if target is None or not isinstance(guided, GuidedRover):
         return
+    turns = target.turn.yaw is not None or target.turn.rate is not None
     if target.position is not None:
         guided.go_to(target.position)
-    elif target.velocity is not None and ahead_given:
-        guided.follow_speed(ahead, target.turn)
     elif target.velocity is not None:
-        guided.follow_velocity(target.velocity, target.turn)
+        north, east, _ = target.velocity
+        speed = min(hypot(north, east), vehicle.tuning.speed)
+        if turns:
+            guided.follow_speed(-speed if ahead < 0.0 else speed, target.turn)
+        else:
+            guided.follow_speed(speed, Turn(atan2(east, north)))
+    elif turns and target.acceleration is None:
+        guided.follow_speed(0.0, target.turn)

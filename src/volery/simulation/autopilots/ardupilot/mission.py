@@ -79,7 +79,12 @@ PLACED = frozenset(
         SET_HOME,
     }
 )
-"""Items whose frame is stored; the others read back frame 0."""
+"""Items whose place is checked and whose frame is stored."""
+
+KEEPS_FRAME = PLACED | {189, 191, 195, 201}
+"""Items whose frame is stored; the others read back frame 0. The last four: landing sequence, go-around and
+regions of interest.
+"""
 
 STORED_FRAMES = {
     GLOBAL: GLOBAL,
@@ -103,7 +108,7 @@ def stored_item(item: MissionItem) -> MissionItem | int:
     wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
     if wrong:
         return wrong
-    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in PLACED else GLOBAL
+    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in KEEPS_FRAME else GLOBAL
     return item._replace(
         frame=frame,
         param1=finite(item.param1),
@@ -166,7 +171,7 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
     if item.command == CHANGE_SPEED:
         change_speed(vehicle, round(item.param1), item.param2)
     elif item.command == CONDITION_YAW:
-        turn_to(vehicle, item.param1, item.param3, relative=item.param4 == 1.0)
+        turn_to(vehicle, item.param1, item.param2, item.param3, relative=item.param4 == 1.0)
     elif item.command == SET_HOME:
         if item.param1 == 1.0 or not item.has_place:
             vehicle.set_home_here()

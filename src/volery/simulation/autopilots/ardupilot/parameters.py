@@ -52,6 +52,7 @@ _SHARED = {
     "RC_OVERRIDE_TIME": "time after which overrides end; 0 refuses them, a negative value keeps them",
     "RNGFND1_TYPE": "any value but 0 sends RANGEFINDER and DISTANCE_SENSOR",
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
+    "STAT_BOOTCNT": "counts the boots",
     "SYSID_MYGCS": "system id whose heartbeats and manual control count",
 }
 
@@ -94,7 +95,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "WPNAV_SPEED": "speed in the plane",
         "WPNAV_SPEED_DN": "descent",
         "WPNAV_SPEED_UP": "climb",
-        "WP_YAW_BEHAVIOR": "1 and 2 turn the nose along a mission's path",
+        "WP_YAW_BEHAVIOR": "1, 2 and 3 turn the nose along the path, 2 not on the return",
     }
 )
 """Parameters of a copter that have an effect, and what each changes."""
@@ -177,7 +178,9 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         accel_z=_moving(p["WPNAV_ACCEL_Z"] / 100.0, 1.0),
         tilt=angle,
         waypoint_radius=_moving(p["WPNAV_RADIUS"] / 100.0),
-        face_path=p["WP_YAW_BEHAVIOR"] in (1.0, 2.0),
+        face_path=p["WP_YAW_BEHAVIOR"] in (1.0, 2.0, 3.0),
+        face_return=p["WP_YAW_BEHAVIOR"] in (1.0, 3.0),
+        straight=True,
         land_speed=_moving(p["LAND_SPEED"] / 100.0),
         land_speed_high=_moving(p["LAND_SPEED_HIGH"] / 100.0, speed_down),
         land_slow_below=p["LAND_ALT_LOW"] / 100.0,

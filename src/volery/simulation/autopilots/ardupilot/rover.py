@@ -19,6 +19,7 @@ from volery.simulation.autopilots.ardupilot.guided import rover_global, rover_lo
 from volery.simulation.autopilots.ardupilot.modes import (
     CUSTOM,
     GUIDED,
+    INFO,
     MANUAL,
     ROVER_DISARMED,
     SHARED_CHECKS,
@@ -89,6 +90,11 @@ def guided_stale(vehicle: Vehicle) -> None:
     vehicle.send_text(WARNING, "target not received last 3secs, stopping")
 
 
+def returned(vehicle: Vehicle) -> None:
+    """Report the end of a return."""
+    vehicle.send_text(INFO, "Reached destination")
+
+
 MODES = {
     mode.number: mode
     for mode in (
@@ -102,7 +108,15 @@ MODES = {
             STEERED,
             needs_position=True,
         ),
-        Mode(11, "RTL", AUTO_BITS, ReturnRover, STEERED, needs_position=True, armable=False),
+        Mode(
+            11,
+            "RTL",
+            AUTO_BITS,
+            lambda vehicle: ReturnRover(vehicle, returned),
+            STEERED,
+            needs_position=True,
+            armable=False,
+        ),
         Mode(
             15,
             "GUIDED",
@@ -160,12 +174,14 @@ def finish_setup(vehicle: Vehicle) -> None:
 def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
+    boot.skip_elevation(vehicle)
     finish_setup(vehicle)
 
 
 def on_step(vehicle: Vehicle) -> None:
     """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
+    boot.find_home(vehicle)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.message_fields import (
     EPOCH_US,
@@ -75,7 +76,7 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
     return {
         "airspeed": hypot(ground, down),
         "groundspeed": ground,
-        "heading": int(degrees(estimate.attitude[2])) % 360,
+        "heading": int(degrees(estimate.attitude[2]) % 360.0) % 360,
         "throttle": round(abs(estimate.throttle) * 100.0) if vehicle.armed else 0,
         "alt": estimate.geodetic[2] if _has_fix(vehicle) else 0.0,
         "climb": -down,
@@ -240,20 +241,25 @@ def position_target(vehicle: Vehicle) -> Fields | None:
     }
 
 
+VELOCITY_ONLY = 0b1100_0000_0111
+"""``type_mask`` of a velocity and an acceleration: position, yaw and yaw rate are ignored."""
+
+
 def local_target(vehicle: Vehicle) -> Fields | None:
-    """Return POSITION_TARGET_LOCAL_NED while the vehicle flies to a point."""
-    target = vehicle.manoeuvre.target
-    if target is None or not vehicle.armed:
+    """Return POSITION_TARGET_LOCAL_NED while the vehicle flies to a point or follows a velocity."""
+    manoeuvre = vehicle.manoeuvre
+    if not vehicle.armed:
         return None
-    x, y, z = target
-    return {
-        "time_boot_ms": boot_ms(vehicle),
-        "coordinate_frame": 1,
-        "type_mask": 65_016,
-        "x": x,
-        "y": y,
-        "z": z,
-    }
+    fields: Fields = {"time_boot_ms": boot_ms(vehicle), "coordinate_frame": 1}
+    followed = manoeuvre.followed if isinstance(manoeuvre, Guided) else None
+    if followed is not None:
+        (vx, vy, vz), (ax, ay, az) = followed
+        motion = {"vx": vx, "vy": vy, "vz": vz, "afx": ax, "afy": ay, "afz": az}
+        return {**fields, "type_mask": VELOCITY_ONLY, **motion}
+    if manoeuvre.target is None:
+        return None
+    x, y, z = manoeuvre.target
+    return {**fields, "type_mask": 65_016, "x": x, "y": y, "z": z}
 
 
 def home_position(vehicle: Vehicle) -> Fields | None:

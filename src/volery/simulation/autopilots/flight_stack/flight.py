@@ -67,6 +67,7 @@ from volery.simulation.world.world import STEP, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
+_FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 
 
@@ -143,6 +144,8 @@ class Setpoint:
         accel_z: Limit of vertical acceleration [m/s^2].
         tilt: Limit of tilt [rad].
         jerk: Limit of the target's jerk [m/s^3]; the default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z.
+        straight: POSITION: whether a point is approached along a straight line; else height and horizontal
+            position have their own limits.
     """
 
     control: Control
@@ -162,6 +165,7 @@ class Setpoint:
     accel_z: float = 1.0
     tilt: float = 0.5235987755982988
     jerk: float = 5.0
+    straight: bool = False
 
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
@@ -189,6 +193,7 @@ class Setpoint:
             self.accel_z,
             self.tilt,
             self.jerk,
+            float(self.straight),
         )
 
 
@@ -306,6 +311,8 @@ class Flight:
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
         """Convert degrees and metres AMSL to north, east, down about the estimator's present origin [m]."""
         north, east, down = self.frame.to_ned(latitude, longitude, amsl)
+        if max(abs(north), abs(east), abs(down)) > _FAR:
+            north, east, down = self.frame.to_ned_flat(latitude, longitude, amsl)
         origin = self.estimate().origin_ned
         return north - origin[0], east - origin[1], down - origin[2]
 

@@ -42,7 +42,7 @@ assert FLIGHT_LAYOUT.start == WORLD
 # --- scratch ---
 W_DCM = _add("W_DCM", "1", f"matrix from body ({FRD}) to {NED}", 9, "3 x 3 by rows")
 
-# --- commands: C_CONTROL to C_JERK in the order of ``Setpoint.row`` ---
+# --- commands: C_CONTROL to C_STRAIGHT in the order of ``Setpoint.row`` ---
 C_CONTROL = _add("C_CONTROL", "1", "a Control")
 C_POSITION = _add("C_POSITION", "m", "about the estimator's origin", 3, NED)
 C_VELOCITY = _add("C_VELOCITY", "m/s", "over the ground; rover DRIVE: the first is the forward speed", 3, NED)
@@ -61,6 +61,7 @@ C_ACCEL = _add("C_ACCEL", "m/s^2", "limit of horizontal acceleration")
 C_ACCEL_Z = _add("C_ACCEL_Z", "m/s^2", "limit of vertical acceleration")
 C_TILT = _add("C_TILT", "rad", "limit of tilt")
 C_JERK = _add("C_JERK", "m/s^3", "limit of the shaped target's jerk")
+C_STRAIGHT = _add("C_STRAIGHT", "1", "1: height and horizontal position are approached along a straight line")
 C_AIDED = _add("C_AIDED", "1", "1: use satellites; the estimator's origin is the position when this became 1")
 
 # --- memory that ``Estimate`` shows ---

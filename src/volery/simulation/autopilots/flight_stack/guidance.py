@@ -24,6 +24,7 @@ from volery.simulation.autopilots.flight_stack.flight_layout import (
     C_SPEED,
     C_SPEED_DOWN,
     C_SPEED_UP,
+    C_STRAIGHT,
     C_THROTTLE,
     C_TILT,
     C_VELOCITY,
@@ -79,6 +80,7 @@ _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
 _TC = 0.15  # [s] ATC_INPUT_TC
 _LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
+_OVERSPEED_GAIN = 2.0  # POSCONTROL_OVERSPEED_GAIN_Z
 _MAX_LIFT = 2.2  # in multiples of gravity
 
 
@@ -182,13 +184,35 @@ def _reset_target(row: Array) -> None:
 
 
 @njit(cache=False)
-def _move_target(row: Array, axis: int, speed: float, accel: float) -> None:
+def _move_target(row: Array, axis: int, accel: float, jerk: float) -> None:
     """Integrate one axis of the target; *accel* is the acceleration that the limits allow."""
-    target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, row[C_JERK] * GUIDE_S)
+    target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, jerk * GUIDE_S)
     row[K_TARGET_ACCEL + axis] = target_accel
     before = row[K_TARGET_VELOCITY + axis]
     row[K_TARGET_VELOCITY + axis] = before + target_accel * GUIDE_S
     row[K_TARGET + axis] += (before + 0.5 * target_accel * GUIDE_S) * GUIDE_S
+
+
+@njit(cache=False)
+def _speed_along(row: Array) -> tuple[float, float]:
+    """Return the limits of horizontal and vertical speed towards the commanded point [m/s].
+
+    Where the set-point asks for a straight line, both axes share the speed at which neither exceeds its own
+    limit, as in ArduPilot's input shaping of positions; else each axis has its own limit.
+    """
+    speed = row[C_SPEED]
+    north = row[C_POSITION] + row[K_ORIGIN] - row[K_TARGET]
+    east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_TARGET + 1]
+    down = row[C_POSITION + 2] + row[K_ORIGIN + 2] - row[K_TARGET + 2]
+    vertical = row[C_SPEED_DOWN] if down > 0.0 else row[C_SPEED_UP]
+    if row[C_STRAIGHT] < 0.5:
+        return speed, vertical
+    level = sqrt(north * north + east * east)
+    if level < 1e-3 or abs(down) < 1e-3:
+        return speed, vertical
+    if speed * abs(down) > vertical * level:
+        return vertical * level / abs(down), vertical
+    return speed, speed * abs(down) / level
 
 
 @njit(cache=False)
@@ -199,7 +223,8 @@ def _shape_horizontal(row: Array, control: int) -> None:
         north = row[C_POSITION] + row[K_ORIGIN] - row[K_TARGET]
         east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_TARGET + 1]
         distance = sqrt(north * north + east * east)
-        speed = min(approach(distance, _POSITION_GAIN, _HORIZONTAL_BRAKE_SHARE * limit), row[C_SPEED])
+        most = row[C_SPEED] if control == POSITION_CLIMB else _speed_along(row)[0]
+        speed = min(approach(distance, _POSITION_GAIN, _HORIZONTAL_BRAKE_SHARE * limit), most)
         scale = speed / distance if distance > 1e-9 else 0.0
         north, east = north * scale, east * scale
     else:
@@ -209,8 +234,8 @@ def _shape_horizontal(row: Array, control: int) -> None:
     gap = sqrt(dn * dn + de * de)
     push = min(approach(gap, _SHAPING_GAIN, row[C_JERK]), limit)
     scale = push / gap if gap > 1e-9 else 0.0
-    _move_target(row, 0, north, dn * scale)
-    _move_target(row, 1, east, de * scale)
+    _move_target(row, 0, dn * scale, row[C_JERK])
+    _move_target(row, 1, de * scale, row[C_JERK])
     ahead_n, ahead_e = shorten(
         row[K_TARGET] - row[K_POSITION], row[K_TARGET + 1] - row[K_POSITION + 1], _LEASH
     )
@@ -219,19 +244,34 @@ def _shape_horizontal(row: Array, control: int) -> None:
 
 
 @njit(cache=False)
+def _overspeed(row: Array) -> float:
+    """Return the factor on vertical acceleration and jerk of a target that is beyond its speed limits.
+
+    ArduPilot brakes the harder, the faster the vehicle is: twice the speed over its limit.
+    """
+    down = row[K_TARGET_VELOCITY + 2]
+    limit = row[C_SPEED_DOWN] if down > 0.0 else row[C_SPEED_UP]
+    if limit <= 0.0 or abs(down) <= limit:
+        return 1.0
+    return _OVERSPEED_GAIN * abs(down) / limit
+
+
+@njit(cache=False)
 def _shape_vertical(row: Array, control: int) -> None:
     """Move the vertical target by one guidance period."""
-    limit = row[C_ACCEL_Z]
+    harder = _overspeed(row)
+    limit, jerk = row[C_ACCEL_Z] * harder, row[C_JERK] * harder
+    most = _speed_along(row)[1] if control == POSITION else 1e9
     if control in (POSITION, VELOCITY_HEIGHT):
         left = row[C_POSITION + 2] + row[K_ORIGIN + 2] - row[K_TARGET + 2]
-        down = approach(left, _POSITION_GAIN, _BRAKE_SHARE * limit)
+        down = clip(approach(left, _POSITION_GAIN, _BRAKE_SHARE * row[C_ACCEL_Z]), -most, most)
     elif control == VELOCITY:
         down = row[C_VELOCITY + 2]
     else:
         down = -row[C_CLIMB]
     down = clip(down, -row[C_SPEED_UP], row[C_SPEED_DOWN])
-    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, row[C_JERK])
-    _move_target(row, 2, down, clip(push, -limit, limit))
+    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, jerk)
+    _move_target(row, 2, clip(push, -limit, limit), jerk)
     ahead = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_HEIGHT_LEASH, _HEIGHT_LEASH)
     row[K_TARGET + 2] = row[K_POSITION + 2] + ahead
 

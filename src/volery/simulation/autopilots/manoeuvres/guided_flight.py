@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import TakeOff, ToPoint
+from volery.simulation.autopilots.manoeuvres.to_point import TakeOff, ToPoint, direction_of_flight
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 
 class Turn(NamedTuple):
-    """Commanded heading [rad] or yaw rate [rad/s]; neither: keep the heading."""
+    """Commanded heading [rad] or yaw rate [rad/s]; neither: the firmware's own choice."""
 
     yaw: float | None = None
     rate: float | None = None
 
 
-KEEP_HEADING = Turn()
-"""Keep the heading."""
+OWN_HEADING = Turn()
+"""Face the direction of flight where the tuning says so, else keep the heading."""
 
 
 class FollowVelocity(Manoeuvre):
@@ -36,17 +37,28 @@ class FollowVelocity(Manoeuvre):
         self, vehicle: Vehicle, velocity: Vector, turn: Turn, acceleration: Vector = (0.0, 0.0, 0.0)
     ) -> None:
         super().__init__(vehicle)
-        self._velocity = velocity
-        self._acceleration = acceleration
+        self.velocity = velocity
+        self.acceleration = acceleration
         self._turn = turn
         self._given: Ns = vehicle.kernel.now()
+
+    def _heading(self, stale: bool) -> Turn:
+        """Return the turn now: commanded by a heading command, by the target, or along the flight."""
+        vehicle = self.vehicle
+        if vehicle.commanded.yaw is not None:
+            return Turn(vehicle.commanded.yaw)
+        if stale:
+            return Turn(self._turn.yaw)
+        if self._turn == OWN_HEADING and vehicle.tuning.face_path:
+            return Turn(direction_of_flight(vehicle))
+        return self._turn
 
     def step(self) -> None:
         """Give the velocity, or zero once the command is outdated."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         age = vehicle.kernel.now() - self._given
         stale = age > tuning.target_timeout
-        turn = Turn() if stale else self._turn
+        turn = self._heading(stale)
         vehicle.drive(
             Setpoint(
                 Control.VELOCITY,
@@ -64,9 +76,33 @@ class FollowVelocity(Manoeuvre):
 
     def _after(self, seconds: float) -> Vector:
         """Return the velocity some seconds after the command."""
-        north, east, down = self._velocity
-        more_north, more_east, more_down = self._acceleration
+        north, east, down = self.velocity
+        more_north, more_east, more_down = self.acceleration
         return north + more_north * seconds, east + more_east * seconds, down + more_down * seconds
+
+
+class TurnAtPoint(ToPoint):
+    """Go to a point and turn at a rate meanwhile; the turn ends when no command arrives for the time-out.
+
+    Args:
+        vehicle: The vehicle.
+        point: North, east, down about the estimator's origin [m].
+        rate: Yaw rate [rad/s].
+    """
+
+    def __init__(self, vehicle: Vehicle, point: Vector, rate: float) -> None:
+        super().__init__(vehicle, point)
+        self._rate = rate
+        self._given: Ns = vehicle.kernel.now()
+
+    def towards(self, point: Vector) -> Setpoint:
+        """Return the set-point for a point, with the turn while it is in force."""
+        vehicle = self.vehicle
+        stale = vehicle.kernel.now() - self._given > vehicle.tuning.target_timeout
+        setpoint = super().towards(point)
+        if stale or vehicle.commanded.yaw is not None:
+            return setpoint
+        return replace(setpoint, yaw=None, yaw_rate=self._rate)
 
 
 class FollowAttitude(Manoeuvre):
@@ -132,6 +168,12 @@ class Guided(Manoeuvre):
         if self.vehicle.armed and not self.vehicle.landed:
             doing.step()
 
+    @property
+    def followed(self) -> tuple[Vector, Vector] | None:
+        """The commanded velocity [m/s] and acceleration [m/s^2], north, east, down; ``None``: a point."""
+        doing = self._doing
+        return (doing.velocity, doing.acceleration) if isinstance(doing, FollowVelocity) else None
+
     def takeoff_requested(self) -> bool:
         """Return whether the command is a take-off."""
         return self._doing.taking_off
@@ -147,16 +189,23 @@ class Guided(Manoeuvre):
         """Climb straight up to a height above home [m]."""
         self._begin(TakeOff(self.vehicle, height))
 
-    def go_to(self, point: Vector, turn: Turn = KEEP_HEADING) -> None:
+    def go_to(self, point: Vector, turn: Turn = OWN_HEADING) -> None:
         """Go to a point north, east, down about the estimator's origin [m]; the command does not expire."""
-        self._begin(ToPoint(self.vehicle, point, turn.yaw))
+        self.vehicle.commanded.yaw = None
+        if turn.rate is not None:
+            self._begin(TurnAtPoint(self.vehicle, point, turn.rate))
+            return
+        facing = turn == OWN_HEADING and self.vehicle.tuning.face_path
+        self._begin(ToPoint(self.vehicle, point, turn.yaw, facing=facing))
 
-    def follow_velocity(self, velocity: Vector, turn: Turn = KEEP_HEADING) -> None:
+    def follow_velocity(self, velocity: Vector, turn: Turn = OWN_HEADING) -> None:
         """Follow a velocity north, east, down [m/s]."""
+        self.vehicle.commanded.yaw = None
         self._begin(FollowVelocity(self.vehicle, velocity, turn))
 
-    def follow_acceleration(self, acceleration: Vector, turn: Turn = KEEP_HEADING) -> None:
+    def follow_acceleration(self, acceleration: Vector, turn: Turn = OWN_HEADING) -> None:
         """Follow an acceleration north, east, down [m/s^2], from the present velocity."""
+        self.vehicle.commanded.yaw = None
         self._begin(FollowVelocity(self.vehicle, self.vehicle.estimate.velocity, turn, acceleration))
 
     def follow_attitude(self, attitude: Quaternion | None, yaw_rate: float | None, thrust: float) -> None:

@@ -34,6 +34,9 @@ from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 FOREVER = -1
 
+LEAST_CLIMB = 1.0
+"""Height above the ground to which a take-off climbs at least [m]."""
+
 
 @dataclass
 class Leg:
@@ -175,6 +178,7 @@ class FlyMission(Manoeuvre):
             index = self._act(index, item)
         plan.complete = True
         plan.current = 0
+        self.target, self.landing, self.taking_off = None, False, False
         self._rules.ended(vehicle)
 
     def _begin(self, index: int, item: MissionItem) -> None:
@@ -330,7 +334,8 @@ def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
 
 def _take_off(vehicle: Vehicle, item: MissionItem) -> Leg:
     home = vehicle.home.ned[2] if vehicle.home else 0.0
-    climbing = TakeOff(vehicle, home - point_height(vehicle, item))
+    lowest = vehicle.height + (LEAST_CLIMB if vehicle.landed else 0.0)
+    climbing = TakeOff(vehicle, max(lowest, home - point_height(vehicle, item)))
     return Leg(climbing, climbing.arrived)
 
 

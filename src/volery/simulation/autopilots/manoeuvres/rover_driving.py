@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import hypot
 
 from volery.base.frames import Vector
-from volery.base.time import Ns, from_seconds
+from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FOREVER, Leg, item_point
@@ -17,10 +17,13 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction, do_nothing
 
 AT_POINT = 1.0
 """Distance within which a rover that stops has arrived [m]."""
+
+SETTLED: Ns = 4 * S
+"""Time at home after which a return counts as done [ns]; 3 s are not enough in a recorded return."""
 
 STANDING = Setpoint(Control.STEER)
 
@@ -93,7 +96,7 @@ class FollowSpeed(Manoeuvre):
 
     def __init__(self, vehicle: Vehicle, speed: float, turn: Turn) -> None:
         super().__init__(vehicle)
-        self._speed, self._turn = speed, turn
+        self._speed, self.turn = speed, turn
         self._given: Ns = vehicle.kernel.now()
         self.stale = False
 
@@ -106,8 +109,8 @@ class FollowSpeed(Manoeuvre):
             Setpoint(
                 Control.DRIVE,
                 velocity=(speed, 0.0, 0.0),
-                yaw=self._turn.yaw if self._turn.rate is None and not self.stale else None,
-                yaw_rate=None if self.stale else self._turn.rate,
+                yaw=self.turn.yaw if self.turn.rate is None and not self.stale else None,
+                yaw_rate=None if self.stale else self.turn.rate,
                 speed=max(abs(speed), tuning.speed),
                 accel=tuning.accel,
             )
@@ -160,19 +163,25 @@ class GuidedRover(Manoeuvre):
         """Drive forward at a speed [m/s]; backwards if negative."""
         self._begin(FollowSpeed(self.vehicle, speed, turn))
 
-    def follow_velocity(self, velocity: Vector, turn: Turn) -> None:
-        """Drive at the part of a velocity (north, east, down [m/s]) that lies along the heading."""
-        north, east, _ = velocity
-        heading = self.vehicle.estimate.attitude[2]
-        ahead = north * cos(heading) + east * sin(heading)
-        self.follow_speed(ahead, turn)
+    @property
+    def asked_heading(self) -> float | None:
+        """The heading that is followed, clockwise from north [rad]; ``None``: none was commanded."""
+        doing = self._doing
+        return doing.turn.yaw if isinstance(doing, FollowSpeed) else None
 
 
 class ReturnRover(Manoeuvre):
-    """Drive home and stop."""
+    """Drive home and stop.
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    Args:
+        vehicle: The vehicle.
+        on_arrival: Called once home is reached.
+    """
+
+    def __init__(self, vehicle: Vehicle, on_arrival: VehicleAction = do_nothing) -> None:
         super().__init__(vehicle)
+        self._on_arrival, self._reported = on_arrival, False
+        self._arrived_at: Ns | None = None
         home = vehicle.home
         self._driving = DriveTo(vehicle, home.ned if home else vehicle.estimate.position)
 
@@ -182,8 +191,14 @@ class ReturnRover(Manoeuvre):
         self.vehicle.commanded.speed = self.vehicle.tuning.return_speed
 
     def step(self) -> None:
-        """Give the set-point."""
+        """Give the set-point; report once that home is reached."""
         self._driving.step()
+        now = self.vehicle.kernel.now()
+        if self._arrived_at is None:
+            self._arrived_at = now if self.arrived() else None
+        elif not self._reported and now - self._arrived_at >= SETTLED:
+            self._reported = True
+            self._on_arrival(self.vehicle)
 
     def arrived(self) -> bool:
         """Return whether the rover is home."""

@@ -15,6 +15,9 @@ CLOSE = 0.1
 SLOW = 0.05
 """Speed below which a vehicle counts as standing still [m/s]."""
 
+FACING_SHARE = 0.05
+"""Share of the speed limit above which the nose follows the direction of flight."""
+
 
 def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
     """Return the speed [m/s] from which a vehicle can stop.
@@ -59,6 +62,13 @@ def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: fl
     )
 
 
+def direction_of_flight(vehicle: Vehicle) -> float | None:
+    """Return the direction in which the target moves, clockwise from north [rad]; ``None``: it is slow."""
+    north, east, _ = vehicle.estimate.target_velocity
+    fast = hypot(north, east) > FACING_SHARE * vehicle.tuning.speed
+    return atan2(east, north) if fast else None
+
+
 def bearing(start: Vector, end: Vector) -> float:
     """Return the bearing from *start* to *end*, clockwise from north [rad]."""
     return atan2(end[1] - start[1], end[0] - start[0])
@@ -71,12 +81,21 @@ class ToPoint(Manoeuvre):
         vehicle: The vehicle.
         point: North, east, down about the estimator's origin [m]; ``None``: where the vehicle can stop.
         yaw: Heading [rad]; ``None``: keep it.
+        facing: Whether the nose follows the direction of flight.
     """
 
-    def __init__(self, vehicle: Vehicle, point: Vector | None = None, yaw: float | None = None) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        point: Vector | None = None,
+        yaw: float | None = None,
+        *,
+        facing: bool = False,
+    ) -> None:
         super().__init__(vehicle)
         self.point = point
         self.yaw = yaw
+        self.facing = facing
         self.speed: float | None = None
 
     def enter(self) -> None:
@@ -96,6 +115,9 @@ class ToPoint(Manoeuvre):
     def towards(self, point: Vector) -> Setpoint:
         """Return the set-point for a point, with the limits in force."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
+        if self.facing:
+            ahead = direction_of_flight(vehicle)
+            self.yaw = self.yaw if ahead is None else ahead
         return Setpoint(
             Control.POSITION,
             position=point,
@@ -106,6 +128,7 @@ class ToPoint(Manoeuvre):
             accel=tuning.accel,
             accel_z=tuning.accel_z,
             tilt=tuning.tilt,
+            straight=tuning.straight,
         )
 
     def arrived(self, passing: bool = False) -> bool:
@@ -241,7 +264,7 @@ class Return(Manoeuvre):
         """Change to the next stage when one is done."""
         stage, now = self._stage, self.vehicle.kernel.now()
         if self._name == "climb" and isinstance(stage, ToPoint) and stage.arrived(passing=True):
-            self._begin("fly", ToPoint(self.vehicle, self._home))
+            self._begin("fly", ToPoint(self.vehicle, self._home, facing=self.vehicle.tuning.face_return))
         elif self._name == "fly" and isinstance(stage, ToPoint) and stage.arrived():
             self._waiting_since = now
             self._begin("wait", ToPoint(self.vehicle, self._home))
