@@ -40,6 +40,11 @@ ON_THE_GROUND = [
     ("version", (520, 1), ACCEPTED),
     ("mission start without a mission", (300,), DENIED),
     ("home here", (179, 1), ACCEPTED),
+    ("get home", (410,), ACCEPTED),
+    ("store parameters", (245, 1), ACCEPTED),
+    ("run the arming checks", (401,), ACCEPTED),
+    ("region of interest", (195,), ACCEPTED),
+    ("no region of interest", (197,), ACCEPTED),
 ]
 
 
@@ -233,6 +238,92 @@ def test_posctl_needs_sticks_and_a_throttle_that_is_not_high(bench: Any) -> None
     rig.sticks(z=500)
     rig.run(0.5)
     assert rig.command(400, 1) == ACCEPTED
+
+
+@pytest.mark.parametrize("main", [1, 2, 3, 7])
+def test_a_mode_of_sticks_is_refused_until_they_are_taken_in(main: int, bench: Any) -> None:
+    """Observed: refused with the first sample, 4 of 4 times, and accepted 0.3 s later."""
+    rig = bench()
+    rig.airborne()
+    rig.sticks()
+    rig.run(0.02)
+    assert rig.mode(main) == REJECTED
+    assert "currently not available" in rig.texts()[-1]
+    rig.run(0.3)
+    assert rig.mode(main) == ACCEPTED
+
+
+def test_a_reposition_beyond_the_geofence_is_accepted_and_not_flown(bench: Any) -> None:
+    """Observed with GF_MAX_HOR_DIST 100 and GF_ACTION 3: two texts and two events as it begins."""
+    rig = bench(parameters={"GF_ACTION": 3, "GF_MAX_HOR_DIST": 100.0})
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    there = {"x": round((latitude + 3e-3) * 1e7), "y": round(longitude * 1e7), "z": amsl, "param4": nan}
+    since = rig.now
+    assert rig.command_int(192, param1=-1, param2=1, **there) == ACCEPTED
+    rig.run(0.3)
+    assert rig.texts(since)[:2] == [
+        "Maximum distance from home reached\t",
+        "Reposition is outside geofence\t",
+    ]
+    assert rig.events(since)[:2] == [0x0115F1B8, 0x01CDEBC4]
+    rig.run(5.0)
+    assert abs(rig.ned[0]) < 2.0
+    inside = {**there, "x": round((latitude + 5e-4) * 1e7)}
+    assert rig.command_int(192, param1=-1, param2=1, **inside) == ACCEPTED
+    rig.run(8.0)
+    assert rig.ned[0] > 20.0
+
+
+def test_a_required_mission_refuses_arming_and_says_so_in_an_event(bench: Any) -> None:
+    """Observed with COM_ARM_MIS_REQ 1: the check is only of level Info, names all modes, and blocks."""
+    rig = bench(parameters={"COM_ARM_MIS_REQ": 1}, warm=False)
+    rig.run(12.0)
+    assert rig.command(400, 1) == REJECTED
+    check = [one.fields for one in rig.of("EVENT") if one.fields["id"] == event_interface.NO_MISSION.id][-1]
+    assert check["log_levels"] & 0xF == 6
+    assert bytes(check["arguments"][:4]) == b"\xff\xff\xff\xff"
+
+
+def test_events_that_were_missed_are_sent_again(bench: Any) -> None:
+    """A client of a vehicle that already runs asks for the report of its arming checks."""
+    rig = bench(warm=False)
+    rig.run(12.0)
+    first = rig.of("EVENT")[0].fields["sequence"]
+    sent = len(rig.of("EVENT"))
+    rig.send(
+        "REQUEST_EVENT",
+        target_system=1,
+        target_component=1,
+        first_sequence=(first - 2) % 65_536,
+        last_sequence=(first + 3) % 65_536,
+    )
+    rig.run(0.1)
+    again = [one.fields["sequence"] for one in rig.of("EVENT")[sent:]]
+    missing = [one.fields["sequence"] for one in rig.of("RESPONSE_EVENT_ERROR")]
+    kept = {
+        one.fields["sequence"] for one in rig.of("EVENT")[max(0, sent - event_interface.KEPT_EVENTS) : sent]
+    }
+    asked = [(first + step) % 65_536 for step in range(-2, 4)]
+    assert again == [sequence for sequence in asked if sequence in kept]
+    assert missing == [sequence for sequence in asked if sequence not in kept]
+
+
+def test_without_a_position_the_home_is_missing_too(bench: Any) -> None:
+    rig = bench(warm=False)
+    rig.flight.block_gps()
+    rig.run(15.0)
+    found = set(rig.events())
+    assert {0x01D31BB9, 0x0198C273, 0x0105C2D9, 0x01013630} <= found
+
+
+def test_it_has_no_current_sensor(bench: Any) -> None:
+    """Recorded in all of 2005 SYS_STATUS and 267 BATTERY_STATUS."""
+    rig = bench()
+    rig.airborne()
+    assert rig.latest["SYS_STATUS"]["current_battery"] == -100
+    assert rig.latest["BATTERY_STATUS"]["current_battery"] == -100
+    assert rig.latest["BATTERY_STATUS"]["current_consumed"] == 0
 
 
 def in_posctl(rig: Any) -> None:

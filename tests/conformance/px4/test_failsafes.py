@@ -18,7 +18,7 @@ def hovering(rig: Any) -> float:
 
 @pytest.mark.parametrize(("action", "mode"), [(2, LAND), (3, RTL)])
 def test_a_critical_battery_holds_and_then_acts(action: int, mode: str, bench: Any) -> None:
-    rig = bench(parameters={"COM_LOW_BAT_ACT": action})
+    rig = bench(parameters={"COM_LOW_BAT_ACT": action, "BAT_EMERGEN_THR": 0.02})
     since = hovering(rig)
     rig.flight.drain_battery(0.06)
     rig.run(1.0)
@@ -83,6 +83,66 @@ def test_the_user_may_leave_a_failsafe(bench: Any) -> None:
     rig.stream(z=-9.0)
     rig.run(1.0)
     assert rig.vehicle.mode.name == LOITER  # another wish is another wish
+
+
+def in_lost_sticks(rig: Any) -> None:
+    """Hovering in LOITER after the loss of sticks that were in use."""
+    rig.airborne()
+    rig.sticks()
+    rig.run(1.0)
+    rig.stop_stream()
+    rig.run(1.5)
+    assert rig.latest["HEARTBEAT"]["system_status"] == 5
+
+
+def test_a_mode_of_the_user_stays_while_the_sticks_are_still_lost(bench: Any) -> None:
+    """Recorded: LAND, then LOITER: no second return, and the status stays critical."""
+    rig = bench()
+    in_lost_sticks(rig)
+    assert rig.mode(4, 6) == 0
+    rig.run(2.0)
+    assert rig.latest["HEARTBEAT"]["system_status"] == 5
+    assert rig.mode(4, 3) == 0
+    since = rig.now
+    rig.run(12.0)
+    assert rig.vehicle.mode.name == LOITER
+    assert rig.latest["HEARTBEAT"]["system_status"] == 5
+    assert not [text for text in rig.texts(since) if "Failsafe" in text]
+
+
+def test_sticks_that_return_and_are_lost_again_are_a_failsafe_again(bench: Any) -> None:
+    rig = bench()
+    in_lost_sticks(rig)
+    assert rig.mode(4, 3) == 0
+    rig.sticks()
+    rig.run(1.0)
+    assert rig.latest["HEARTBEAT"]["system_status"] == 4
+    rig.stop_stream()
+    rig.run(8.0)
+    assert rig.vehicle.mode.name == RTL
+
+
+def test_after_a_kill_in_the_air_it_counts_as_landed_at_once(bench: Any) -> None:
+    """Observed 0.42 s after a kill at 25 m; the vehicle is still falling."""
+    rig = bench(use="onboard")
+    rig.airborne(25.0)
+    assert rig.command(400, 0, 21196) == 0
+    killed = rig.now
+    rig.run_until(lambda: rig.latest["EXTENDED_SYS_STATE"]["landed_state"] == 1, within=1.0)
+    assert rig.now - killed == pytest.approx(0.42, abs=0.22)  # sent five times a second
+    assert rig.height > 10.0
+
+
+@pytest.mark.parametrize(("action", "mode"), [(1, LOITER), (2, LOITER), (3, RTL), (5, LAND)])
+def test_outside_its_geofence_it_does_what_gf_action_says(action: int, mode: str, bench: Any) -> None:
+    rig = bench(parameters={"GF_ACTION": action, "GF_MAX_HOR_DIST": 12.0})
+    rig.airborne()
+    rig.offboard(x=30.0, y=0.0, z=-9.0)
+    rig.run_until(lambda: rig.ned[0] > 12.5, within=10.0)
+    rig.run(0.2)
+    assert "Maximum distance from home reached\t" in rig.texts()
+    rig.run(6.5)
+    assert rig.vehicle.mode.name == ("OFFBOARD" if action == 1 else mode)
 
 
 def test_a_rover_drives_where_the_stream_says_and_stops_without_it(bench: Any) -> None:

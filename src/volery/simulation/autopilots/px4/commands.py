@@ -22,16 +22,23 @@ from volery.simulation.autopilots.mavlink.command import (
 from volery.simulation.autopilots.mavlink.firmware import MessageHandler
 from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
-from volery.simulation.autopilots.px4 import event_interface, modes, offboard
-from volery.simulation.autopilots.px4.failsafes import OFFBOARD_LOST
+from volery.simulation.autopilots.px4 import event_interface, geofence, modes, offboard
 from volery.simulation.autopilots.px4.flight_modes import Hold
-from volery.simulation.autopilots.px4.modes import CRITICAL, FORCE, INFO, Commander, commander_of
+from volery.simulation.autopilots.px4.modes import (
+    CRITICAL,
+    FORCE,
+    INFO,
+    OFFBOARD_LOST,
+    Commander,
+    commander_of,
+)
 from volery.simulation.autopilots.px4.pilot_input import deflection, set_rc_channels
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
-REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 246, 300, 400, 519
+STORAGE, REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 245, 246, 300, 400, 519
+ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS = 195, 197, 201, 410, 401
 
 CUSTOM_MODE_ENABLED = 1
 CHANGE_MODE = 1
@@ -121,7 +128,8 @@ def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
 def on_reposition(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_REPOSITION.
 
-    Without its flag the command is refused, and in AUTO.LOITER flown nevertheless, as recorded.
+    Without its flag the command is refused, and in AUTO.LOITER flown nevertheless, as recorded. Beyond the
+    geofence it is accepted, and the vehicle holds its position.
     """
     commander = commander_of(vehicle)
     point = commanded_point(vehicle, command)
@@ -131,13 +139,14 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
     flagged = to_integer(command.param2) == CHANGE_MODE
     if not flagged:
         holding = vehicle.manoeuvre
-        if vehicle.mode.number == modes.LOITER and vehicle.armed and isinstance(holding, Hold):
+        loiters = vehicle.mode.number == modes.LOITER and vehicle.armed
+        if loiters and isinstance(holding, Hold) and geofence.admits(vehicle, point):
             _move_hold(holding, point, heading, command.param1)
         return UNSUPPORTED
     speed = vehicle.commanded.speed
     commander.restart_mode(modes.LOITER)
     holding = vehicle.manoeuvre
-    if isinstance(holding, Hold):
+    if isinstance(holding, Hold) and geofence.admits(vehicle, point):
         vehicle.commanded.speed = speed
         _move_hold(holding, point, heading, command.param1)
     return ACCEPTED
@@ -201,6 +210,27 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
+def on_get_home(vehicle: Vehicle, _command: Command) -> int:
+    """Handle GET_HOME_POSITION."""
+    vehicle.output.after_reply(lambda: vehicle.output.send_message("HOME_POSITION"))
+    return ACCEPTED
+
+
+def on_run_checks(vehicle: Vehicle, _command: Command) -> int:
+    """Handle RUN_PREARM_CHECKS: report the arming checks anew; refused while armed."""
+    if vehicle.armed:
+        return TEMPORARILY_REJECTED
+    commander = commander_of(vehicle)
+    commander.reported = None
+    vehicle.output.after_reply(commander.report)
+    return ACCEPTED
+
+
+def accept(_vehicle: Vehicle, _command: Command) -> int:
+    """Accept a command that changes nothing here: storage of parameters, regions of interest."""
+    return ACCEPTED
+
+
 SHARED_COMMANDS: Mapping[int, Handler] = {
     RETURN: on_return,
     DO_SET_MODE: on_set_mode,
@@ -211,7 +241,13 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     REBOOT: lambda _vehicle, _command: DENIED,  # as the firmware's simulator does
     MISSION_START: on_mission_start,
     ARM_DISARM: on_arm,
-    REQUEST_PROTOCOL: lambda _vehicle, _command: ACCEPTED,
+    REQUEST_PROTOCOL: accept,
+    STORAGE: accept,
+    ROI: accept,
+    ROI_LOCATION: accept,
+    ROI_NONE: accept,
+    GET_HOME: on_get_home,
+    RUN_CHECKS: on_run_checks,
 }
 
 COPTER_COMMANDS: Mapping[int, Handler] = {
@@ -243,6 +279,11 @@ def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None
     """Handle HEARTBEAT of a ground station."""
     if fields["type"] == GROUND_STATION:
         commander_of(vehicle).station_seen = vehicle.kernel.now()
+
+
+def on_event_request(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle REQUEST_EVENT: send the events again that are still kept."""
+    commander_of(vehicle).log.send_again(fields["first_sequence"], fields["last_sequence"])
 
 
 def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
@@ -308,6 +349,7 @@ def on_attitude_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -
 MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
     "HEARTBEAT": on_heartbeat,
     "MANUAL_CONTROL": on_manual_control,
+    "REQUEST_EVENT": on_event_request,
     "SET_ATTITUDE_TARGET": on_attitude_target,
     "SET_POSITION_TARGET_GLOBAL_INT": on_global_target,
     "SET_POSITION_TARGET_LOCAL_NED": on_local_target,

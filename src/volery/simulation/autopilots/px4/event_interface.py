@@ -8,7 +8,9 @@ seconds, as a summary, the checks that fail, and a summary of the sensors.
 from __future__ import annotations
 
 import struct
-from typing import NamedTuple
+from collections import deque
+from itertools import islice
+from typing import Any, NamedTuple
 
 from volery.base.time import MS
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -40,6 +42,8 @@ MINIMUM_TAKEOFF = Event(0x01DBF722, 0x66)
 FAILSAFE = Event(0x01DEDBD0, 0x42)
 FAILSAFE_HOLD = Event(0x01D11DF6, 0x42)
 FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
+FENCE_DISTANCE = Event(0x0115F1B8, 0x44)
+REPOSITION_OUTSIDE = Event(0x01CDEBC4, 0x33)
 STICKS_LOST = Event(0x0155CD44, 0x62)
 STICKS_BACK = Event(0x010AE2BD, 0x66)
 PILOT_TOOK_OVER = Event(0x010EAC3F, 0x66)
@@ -55,6 +59,7 @@ NO_MISSION = Event(0x0105C2D9, 0x66)
 NO_OFFBOARD_SIGNAL = Event(0x012F1DC7, 0x33)
 NO_STICKS = Event(0x0106ED29, 0x44)
 MODE_NOT_ARMABLE = Event(0x011C8F61, 0x66)
+NO_HOME = Event(0x01013630, 0x66)
 STILL_STARTING = Event(0x0167C97B, 0x66)
 SENSORS_SUMMARY = Event(0x011D3727, 0x88)
 
@@ -66,6 +71,12 @@ FIRST_SEQUENCE = 65_526
 
 _EVENTS_OF_OFFBOARD, _EVENTS_OF_STICKS = 1 << 20, 1 << 7
 
+_MISSION_STATE, _RETURN_STATE, _GROUP = 3, 5, 0x14
+"""``nav_state`` of AUTO.MISSION and AUTO.RTL, and the health component of checks of modes."""
+
+KEPT_EVENTS = 20
+"""Number of events that a client may request again."""
+
 
 class EventLog:
     """Numbered events of one vehicle."""
@@ -73,6 +84,7 @@ class EventLog:
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
         self.latest = FIRST_SEQUENCE
+        self._kept: deque[dict[str, Any]] = deque(maxlen=KEPT_EVENTS)
 
     def send(self, event: Event, arguments: bytes = b"") -> None:
         """Send an event on all links."""
@@ -84,7 +96,34 @@ class EventLog:
             "log_levels": event.levels,
             "arguments": tuple(arguments),
         }
+        self._kept.append(fields)
         self._vehicle.output.send_event("EVENT", fields)
+
+    def send_again(self, first: int, last: int) -> None:
+        """Send events that a client missed, by their sequence numbers, and report those that are not kept.
+
+        Args:
+            first: First sequence number.
+            last: Last sequence number; before ``first``, the numbers run over 65535.
+        """
+        kept = {fields["sequence"]: fields for fields in self._kept}
+        wanted = ((first + step) % 65_536 for step in range((last - first) % 65_536 + 1))
+        for sequence in islice(wanted, 2 * KEPT_EVENTS):
+            if sequence in kept:
+                self._vehicle.output.send_event("EVENT", kept[sequence])
+            else:
+                self._report_missing(sequence)
+
+    def _report_missing(self, sequence: int) -> None:
+        oldest = self._kept[0]["sequence"] if self._kept else self.latest
+        fields = {
+            "target_system": 0,
+            "target_component": 0,
+            "sequence": sequence,
+            "sequence_oldest_available": oldest,
+            "reason": 0,
+        }
+        self._vehicle.output.send_event("RESPONSE_EVENT_ERROR", fields)
 
 
 class ArmingChecks(NamedTuple):
@@ -95,6 +134,9 @@ class ArmingChecks(NamedTuple):
     position: bool
     sticks: bool
     mission: bool
+    mission_required: bool
+    """Whether a missing mission refuses arming in every mode."""
+    home: bool
     offboard: bool
     mode: bool
     """Whether the requested mode may be armed."""
@@ -119,19 +161,26 @@ def _modes(checks: ArmingChecks) -> int:
     return allowed
 
 
+ALL_MODES = 0xFFFF_FFFF
+
+
 def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
     """Return the events that report these checks."""
     able = _modes(checks)
+    armable = 0 if checks.mission_required and not checks.mission else able
     errors = 0 if checks.offboard else _EVENTS_OF_OFFBOARD
     warnings = 0 if checks.sticks else _EVENTS_OF_STICKS
-    found = [(CHECKS_SUMMARY, struct.pack("<BIIII", 0, errors, warnings, able, able))]
+    found = [(CHECKS_SUMMARY, struct.pack("<BIIII", 0, errors, warnings, armable, able))]
     if not checks.attitude:
         found.append((NO_ATTITUDE, bytes.fromhex("3ed07e0014")))
     if not checks.position:
         found.append((NO_LOCAL_POSITION, bytes.fromhex("3c007e0014")))
         found.append((NO_GLOBAL_POSITION, bytes.fromhex("3800000014")))
     if not checks.mission:
-        found.append((NO_MISSION, bytes.fromhex("0800000014")))
+        forbids = ALL_MODES if checks.mission_required else 1 << _MISSION_STATE
+        found.append((NO_MISSION, struct.pack("<IB", forbids, _GROUP)))
+    if not checks.home:
+        found.append((NO_HOME, struct.pack("<IB", 1 << _RETURN_STATE, _GROUP)))
     if not checks.offboard:
         found.append((NO_OFFBOARD_SIGNAL, bytes.fromhex("0040000014")))
     if not checks.sticks:

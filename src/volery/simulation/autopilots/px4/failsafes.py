@@ -9,19 +9,31 @@ from __future__ import annotations
 import struct
 
 from volery.base.time import MS, Ns, from_seconds, to_seconds
-from volery.simulation.autopilots.px4 import event_interface, modes
-from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, Commander, commander_of
+from volery.simulation.autopilots.px4 import event_interface, geofence, modes
+from volery.simulation.autopilots.px4.modes import (
+    BATTERY_CRITICAL,
+    BATTERY_EMERGENCY,
+    CRITICAL,
+    INFO,
+    LINK_LOST,
+    OFFBOARD_LOST,
+    OUTSIDE_FENCE,
+    POSITION_LOST,
+    STICKS_LOST,
+    Commander,
+    commander_of,
+)
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 WARNING = 4
 """MAV_SEVERITY."""
 
-OFFBOARD_LOST, STICKS_LOST, LINK_LOST, POSITION_LOST = "offboard", "sticks", "link", "position"
-BATTERY_CRITICAL, BATTERY_EMERGENCY = "battery critical", "battery emergency"
-
 HOLD, RETURN, LAND, TERMINATE, DISARM = 1, 2, 3, 5, 6
 """Values of NAV_RCL_ACT and NAV_DLL_ACT."""
+
+FENCE_ACTIONS, FENCE_TERMINATE = {2: HOLD, 3: RETURN, 5: LAND}, 4
+"""GF_ACTION to the action; 1 only warns."""
 
 ACTIONS = {HOLD: modes.LOITER, RETURN: modes.RTL, LAND: modes.LAND}
 OFFBOARD_ACTIONS = {
@@ -39,14 +51,18 @@ OUTRANKS = {
     LINK_LOST: 1,
     OFFBOARD_LOST: 2,
     STICKS_LOST: 3,
-    BATTERY_CRITICAL: 4,
-    BATTERY_EMERGENCY: 5,
-    POSITION_LOST: 6,
+    OUTSIDE_FENCE: 4,
+    BATTERY_CRITICAL: 5,
+    BATTERY_EMERGENCY: 6,
+    POSITION_LOST: 7,
 }
 """Rank of each failsafe."""
 
 LOSS_DETECTION_DELAY = 145 * MS
 """Recorded: with COM_RC_LOSS_T = 0.5 s the loss was detected 0.63 to 0.65 s after the last sample."""
+
+ON_GROUND_AFTER: Ns = 300 * MS
+"""Without motors the vehicle counts as on the ground, in the air too: told 0.42 s after a kill at 25 m."""
 
 RECOVERY = 0.25
 """Hold time [s] that is regained for each second without a failsafe, as recorded."""
@@ -60,6 +76,7 @@ def on_step(vehicle: Vehicle) -> None:
     commander.last_step = now
     _detect_stick_loss(commander, now)
     _detect_ground(commander, now)
+    _forget_ended_cause(commander)
     if vehicle.armed:
         _check_failsafes(commander, passed)
     if vehicle.armed:
@@ -91,9 +108,9 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
         commander.took_off, commander.lifted_at = True, now
         vehicle.send_text(INFO, "Takeoff detected\t")
         commander.log.send(event_interface.TAKEOFF_DETECTED)
-    elif commander.flying and not vehicle.armed and vehicle.estimate.landed:
-        flying = False  # a fall is not reported
-        vehicle.ground.landed = True
+    elif commander.flying and not vehicle.armed:
+        flying = now - vehicle.arming.disarmed_at < ON_GROUND_AFTER  # a fall is not reported
+        vehicle.ground.landed = not flying
     elif commander.flying and vehicle.landed:
         flying = False
         commander.landed_at = now
@@ -129,6 +146,7 @@ def _check_failsafes(commander: Commander, passed: float) -> None:
     _end_hold(commander)
     _check_position(commander)
     _check_battery(commander)
+    _check_geofence(commander)
     _check_sticks(commander)
     _check_offboard(commander)
     _check_link(commander)
@@ -149,7 +167,24 @@ def _end_of_offboard_on_ground(commander: Commander) -> None:
         commander.resume_requested()
 
 
+def _forget_ended_cause(commander: Commander) -> None:
+    """Let a failsafe that the user has ended act again once its cause has ended in between."""
+    causes = {
+        STICKS_LOST: lambda: not commander.joystick.valid,
+        LINK_LOST: lambda: _link_lost(commander),
+        OUTSIDE_FENCE: lambda: bool(geofence.breach(commander.vehicle, commander.vehicle.estimate.position)),
+        BATTERY_CRITICAL: lambda: _battery_below(commander, CRITICALLY_LOW),
+        BATTERY_EMERGENCY: lambda: _battery_below(commander, EMERGENCY),
+    }
+    cause = causes.get(commander.taken_over)
+    if cause is None or not cause():
+        commander.taken_over = ""
+
+
 def _outranked(commander: Commander, name: str) -> bool:
+    """Return whether a failsafe does not act: a higher one does, or the user has ended it."""
+    if name == commander.taken_over:
+        return True
     return OUTRANKS[commander.failsafe] >= OUTRANKS[name]
 
 
@@ -221,10 +256,32 @@ def _check_link(commander: Commander) -> None:
     action = round(vehicle.parameters["NAV_DLL_ACT"])
     if not action or commander.station_seen == NEVER:
         return
-    lost = vehicle.kernel.now() - commander.station_seen > vehicle.seconds_parameter("COM_DL_LOSS_T")
-    if lost and not _outranked(commander, LINK_LOST) and commander.requested not in (modes.RTL, modes.LAND):
+    if (
+        _link_lost(commander)
+        and not _outranked(commander, LINK_LOST)
+        and commander.requested not in (modes.RTL, modes.LAND)
+    ):
         vehicle.send_text(INFO, "Data link lost\t")
         _act(commander, LINK_LOST, action)
+
+
+def _link_lost(commander: Commander) -> bool:
+    vehicle = commander.vehicle
+    return vehicle.kernel.now() - commander.station_seen > vehicle.seconds_parameter("COM_DL_LOSS_T")
+
+
+def _check_geofence(commander: Commander) -> None:
+    """React to a vehicle outside of the geofence, as GF_ACTION states."""
+    vehicle = commander.vehicle
+    action = round(vehicle.parameters["GF_ACTION"])
+    said = geofence.breach(vehicle, vehicle.estimate.position) if action else ""
+    if not said or _outranked(commander, OUTSIDE_FENCE):
+        return
+    _report_once(vehicle, CRITICAL, said)
+    if action == FENCE_TERMINATE:
+        commander.finish_disarming("failsafe", event_interface.BY_COMMAND)
+    elif action in FENCE_ACTIONS and commander.requested not in (modes.RTL, modes.LAND):
+        _act(commander, OUTSIDE_FENCE, FENCE_ACTIONS[action])
 
 
 def _act(commander: Commander, name: str, action: int) -> None:
@@ -241,6 +298,10 @@ def _act(commander: Commander, name: str, action: int) -> None:
 
 
 LOW, CRITICALLY_LOW, EMERGENCY = "BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"
+
+
+def _battery_below(commander: Commander, level: str) -> bool:
+    return commander.vehicle.estimate.battery_left < commander.vehicle.parameters[level]
 
 
 def _check_battery(commander: Commander) -> None:

@@ -68,14 +68,17 @@ def stored_item(item: MissionItem) -> MissionItem | int:
 
 
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
-    """Send MISSION_ITEM_REACHED with its repetitions."""
+    """Send MISSION_ITEM_REACHED with its repetitions, which the next item that is reached ends."""
+    commander, began = commander_of(vehicle), vehicle.kernel.now()
+    commander.reached = index, began
 
     def send() -> None:
-        vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
+        if commander.reached == (index, began):
+            vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
 
     send()
     for again in range(1, REACHED_AGAIN + 1):
-        vehicle.kernel.call_at(vehicle.kernel.now() + again * REACHED_EVERY, send)
+        vehicle.kernel.call_at(began + again * REACHED_EVERY, send)
 
 
 def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:

@@ -109,11 +109,25 @@ CRITICAL, INFO = 2, 6
 
 FORCE = 21_196
 
+OFFBOARD_LOST, STICKS_LOST, LINK_LOST, POSITION_LOST = "offboard", "sticks", "link", "position"
+OUTSIDE_FENCE = "geofence"
+BATTERY_CRITICAL, BATTERY_EMERGENCY = "battery critical", "battery emergency"
+"""Names of failsafes."""
+
+TAKEN_OVER = frozenset({STICKS_LOST, LINK_LOST, OUTSIDE_FENCE, BATTERY_CRITICAL, BATTERY_EMERGENCY})
+"""Failsafes that a mode of the user ends for as long as their cause lasts; the status stays critical.
+
+Recorded of lost sticks; the others follow the documentation.
+"""
+
 READY_AFTER: Ns = 8_600 * MS
 """Recorded: armable 8.56 to 9.16 s after boot."""
 
 ATTITUDE_AFTER: Ns = 6_400 * MS
 STARTED_AFTER: Ns = 4_000 * MS
+HOME_CHECK_FROM: Ns = 10_000 * MS
+"""From then on a missing home position is reported; the recorded reports of a boot do not contain it."""
+
 REPORT_FROM: Ns = 2_084 * MS
 REPORT_EVERY: Ns = 2_000 * MS
 
@@ -140,6 +154,8 @@ class Commander:
         self.after_disarming = LOITER
         self.failsafe = ""
         """Name of the active failsafe, or empty."""
+        self.taken_over = ""
+        """Name of the failsafe that the user ended while its cause lasted, or empty."""
         self.failsafe_mode: int | None = None
         """Mode that the failsafe flies; None: the requested one."""
         self.descending = False
@@ -154,6 +170,8 @@ class Commander:
         """Remaining hold before a failsafe acts [s]; negative: all of COM_FAIL_ACT_T."""
         self.hold_until: Ns = NEVER
         self.after_hold = 0
+        self.reached: tuple[int, Ns] | None = None
+        """Mission item that was reached last, and when."""
         self.station_seen: Ns = NEVER
         self.ground = 0.0
         """Height of the ground at arming, down about the estimator's origin [m]."""
@@ -184,6 +202,16 @@ class Commander:
         vehicle = self.vehicle
         return self.stream.alive(vehicle.kernel.now(), vehicle.seconds_parameter("COM_OF_LOSS_T"))
 
+    @property
+    def has_sticks(self) -> bool:
+        """Whether manual control has been taken in."""
+        return self.joystick.taken_in(self.vehicle.kernel.now())
+
+    @property
+    def mission_required(self) -> bool:
+        """Whether arming needs a mission on board (COM_ARM_MIS_REQ)."""
+        return self.vehicle.parameters["COM_ARM_MIS_REQ"] != 0.0
+
     def checks(self) -> event_interface.ArmingChecks:
         """Return the results of the arming checks."""
         vehicle = self.vehicle
@@ -192,8 +220,10 @@ class Commander:
             started=age >= STARTED_AFTER,
             attitude=age >= ATTITUDE_AFTER,
             position=self.ready,
-            sticks=self.joystick.valid,
+            sticks=self.has_sticks,
             mission=len(vehicle.mission) > 0,
+            mission_required=self.mission_required,
+            home=vehicle.home is not None or age < HOME_CHECK_FROM,
             offboard=self.stream_alive(),
             mode=vehicle.armed or vehicle.rules.modes[self.requested].armable,
         )
@@ -204,7 +234,7 @@ class Commander:
         mode = vehicle.rules.modes[number]
         if mode.needs_position and not vehicle.has_position:
             return False
-        if number in NEEDS_STICKS and not self.joystick.valid:
+        if number in NEEDS_STICKS and not self.has_sticks:
             return False
         if number == OFFBOARD and not self.stream_alive():
             return False
@@ -233,6 +263,8 @@ class Commander:
         self.requested = number
         if vehicle.rules.modes[number].armable:
             self.after_disarming = number
+        if self.failsafe in TAKEN_OVER:
+            self.taken_over = self.failsafe
         self.end_failsafe()
         self.joystick.set_reference()
         self._fly(number)
@@ -304,7 +336,7 @@ class Commander:
                 return TEMPORARILY_REJECTED
         if vehicle.has_position and not (vehicle.home and vehicle.home.by_user):
             vehicle.set_home_here()
-        self.joystick.lost_when_armed = not self.joystick.valid
+        self.joystick.lost_when_armed = not self.has_sticks
         self.joystick.set_reference()
         self.took_off = False
         self.lifted_at = NEVER
@@ -330,13 +362,15 @@ class Commander:
         mode = self.vehicle.rules.modes[self.requested]
         if not mode.armable or not self.can_fly(self.requested):
             return False
+        if self.mission_required and len(self.vehicle.mission) == 0:
+            return False
         if self.ready:
             return True
         without_position = self.vehicle.parameters["COM_ARM_WO_GPS"] != 0.0
         return not mode.needs_position and without_position and self.checks().attitude
 
     def _throttle_is_high(self) -> bool:
-        if not self.joystick.valid or self.requested not in NEEDS_STICKS:
+        if not self.has_sticks or self.requested not in NEEDS_STICKS:
             return False
         by_thrust = self.vehicle.flies and self.requested in (MANUAL, STABILIZE, ACRO)
         return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
@@ -360,6 +394,7 @@ class Commander:
         vehicle.send_text(INFO, f"Disarmed by {words}\t")
         self.log.send(event_interface.DISARMED, reason)
         self.end_failsafe()
+        self.taken_over = ""
         self.takeoff_amsl = None
         self.requested = self.after_disarming
         self._fly(self.requested)

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from volery.base.time import Ns, to_seconds
+from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 INVALID = 32_767
 CENTRE = 500
 """``z`` of a centred throttle stick."""
+
+TAKEN_IN_AFTER: Ns = 250 * MS
+"""Time from the first sample until manual control counts for modes and arming.
+
+Observed: a mode of sticks is refused at the first sample (4 of 4) and accepted 0.3 s later; a report of the
+arming checks 0.24 s after the first sample still misses manual control.
+"""
 
 ROLL, PITCH, THROTTLE, YAW = 1, 2, 3, 4
 NEUTRAL = (1500,) * 4 + (0,) * 12
@@ -43,6 +50,7 @@ class Joystick:
         self.now = StickDeflection()
         self.last_received_ns: Ns = NEVER
         self.valid = False
+        self._valid_since_ns: Ns = NEVER
         self.lost_when_armed = True
         """Whether manual control was missing at arming and since, which is no failsafe."""
         self._reference = StickDeflection()
@@ -52,6 +60,10 @@ class Joystick:
     def ever_received(self) -> bool:
         """Whether manual control was ever received."""
         return self.last_received_ns != NEVER
+
+    def taken_in(self, now: Ns) -> bool:
+        """Return whether manual control has been received long enough to fly and to arm by it."""
+        return self.valid and now - self._valid_since_ns >= TAKEN_IN_AFTER
 
     def set_reference(self) -> None:
         """Measure stick movement from the present deflection on."""
@@ -63,6 +75,7 @@ class Joystick:
         lost_for = to_seconds(now - self.last_received_ns) if self.ever_received and not self.valid else 0.0
         if not self.valid:
             self._reference = given
+            self._valid_since_ns = now
         self.now, self.last_received_ns, self.valid = given, now, True
         self.lost_when_armed = False
         return lost_for

@@ -314,6 +314,8 @@ ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 """MAV_LANDED_STATE."""
 
 NOT_THERE = 65_535
+NO_CURRENT = -100
+"""Current of a battery without a current sensor [cA], as recorded; ``current_consumed`` is then 0."""
 
 PRESENT, ENABLED, HEALTHY, PREARM, GPS = 35_651_629, 35_717_165, 572_555_327, 1 << 28, 1 << 5
 """Sensor bits of SYS_STATUS as recorded; the pre-arm check is a separate bit."""
@@ -338,7 +340,7 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     if mode.number == modes.OFFBOARD and commander.stream.target is None:
         base = modes.CUSTOM
     state = ACTIVE if vehicle.armed else STANDBY
-    if vehicle.armed and commander.failsafe:
+    if vehicle.armed and (commander.failsafe or commander.taken_over):
         state = CRITICAL
     return {
         "type": kind,
@@ -364,7 +366,7 @@ def sys_status(vehicle: Vehicle) -> Fields:
         "onboard_control_sensors_health": healthy,
         "load": 100,
         "voltage_battery": to_uint16(estimate.battery_volts * 1000.0),
-        "current_battery": to_int16(estimate.battery_amps * 100.0),
+        "current_battery": NO_CURRENT,
         "battery_remaining": _percent(vehicle),
         "onboard_control_sensors_health_extended": 1,
     }
@@ -383,8 +385,8 @@ def battery_status(vehicle: Vehicle) -> Fields:
         "type": 1,
         "temperature": 32_767,
         "voltages": (to_uint16(estimate.battery_volts * 1000.0), *([NOT_THERE] * 9)),
-        "current_battery": to_int16(estimate.battery_amps * 100.0),
-        "current_consumed": int(estimate.battery_used_mah),
+        "current_battery": NO_CURRENT,
+        "current_consumed": 0,
         "energy_consumed": -1,
         "battery_remaining": _percent(vehicle),
         "charge_state": _charge_state(vehicle),

@@ -287,17 +287,17 @@ class PX4(MavlinkDriver):
         """Enter STABILIZED with manual control repeated; in the air not with an idle throttle."""
         self._manual.hold_any()
         check_throttle(self.telemetry, self._manual.held)
-        return (self._change_mode(modes.STABILIZED),)
+        return (*self._taken_in(), self._change_mode(modes.STABILIZED))
 
     def altitude_hold(self) -> Sequence[Step]:
         """Enter ALTCTL with manual control repeated."""
         self._manual.hold_any()
-        return (self._change_mode(modes.ALTCTL),)
+        return (*self._taken_in(), self._change_mode(modes.ALTCTL))
 
     def manual(self) -> Sequence[Step]:
         """Enter MANUAL with manual control repeated."""
         self._manual.hold_any()
-        return (self._change_mode(modes.MANUAL),)
+        return (*self._taken_in(), self._change_mode(modes.MANUAL))
 
     def manual_control(self, control: ManualControl | None) -> None:
         """Repeat *control* while the mode is ours; ``None`` centres it."""
@@ -306,21 +306,37 @@ class PX4(MavlinkDriver):
         else:
             self._manual.hold(control)
 
+    def _taken_in(self) -> Sequence[Step]:
+        """Wait until PX4 counts manual control: it refuses a mode of sticks before."""
+        if self._manual.taken_in():
+            return ()
+        wait = Step(
+            ask="have the sticks taken in",
+            send=send_nothing,
+            done=lambda _: self._manual.taken_in(),
+            within=5 * S,
+            keep=self._repeated_sticks(),
+        )
+        return (wait,)
+
+    def _repeated_sticks(self) -> Repeat:
+        def keep() -> None:
+            self._manual.repeat()
+            self.telemetry.changed.notify()
+
+        return Repeat(SETPOINT_PERIOD, keep)
+
     def _end_manual_control(self) -> Sequence[Step]:
         """Centre manual control and wait, because it counts as moving for a moment after it was centred."""
         if self._manual.held is None:
             return ()
-
-        def keep() -> None:
-            self._manual.repeat()
-            self.telemetry.changed.notify()
 
         centre = Step(
             ask="centre the sticks",
             send=self._manual.centre,
             done=lambda _: self._manual.settled(),
             within=5 * S,
-            keep=Repeat(SETPOINT_PERIOD, keep),
+            keep=self._repeated_sticks(),
         )
         return (centre,)
 

@@ -148,6 +148,12 @@ class OffboardStream:
             self._takeover.begin()
 
 
+TAKEN_IN: Ns = 500 * MS
+"""Time after which manual control counts: a mode of sticks was refused at the first sample, and accepted 0.3 s
+later.
+"""
+
+
 class ManualControlStream:
     """Stream of manual control, which PX4 needs more than twice a second (COM_RC_LOSS_T).
 
@@ -165,6 +171,7 @@ class ManualControlStream:
         self._commanded_mode = ""
         self._mode_before = ""
         self._centred_at: Ns = 0
+        self._began_at: Ns = 0
         self._timer: Handle | None = None
 
     def note_commanded(self, mode: str) -> None:
@@ -175,6 +182,8 @@ class ManualControlStream:
 
     def hold(self, control: ManualControl) -> None:
         """Send *control* at once and repeat it."""
+        if self.held is None:
+            self._began_at = self._kernel.now()
         self.held = control
         self._send()
         if self._timer is None and self._backend.cycle is None and self.held is not None:
@@ -195,6 +204,10 @@ class ManualControlStream:
         """Send again, from the loop of a node."""
         if self._backend.cycle is not None:
             self._send()
+
+    def taken_in(self) -> bool:
+        """Return whether the stream has lasted until PX4 counts it."""
+        return self.held is not None and self._kernel.now() - self._began_at >= TAKEN_IN
 
     def settled(self) -> bool:
         """Return whether the stream has been centred long enough not to count as moving."""

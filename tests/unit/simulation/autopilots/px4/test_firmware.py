@@ -87,7 +87,7 @@ def test_an_integer_survives_as_bytes(number: int) -> None:
 
 
 def test_all_checks_passed_leaves_two_summaries() -> None:
-    fine = ArmingChecks(*([True] * 7))
+    fine = ArmingChecks(*([True] * 9))
     assert len(arming_report(fine)) == 2
     assert len(arming_report(fine._replace(position=False))) == 4
 
