@@ -22,7 +22,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError
-from volery.components.instance import COMPONENT_MARK
+from volery.components.instance import COMPONENT_MARK, describe
 from volery.cost import StepCounter
 
 _PREFIX = "volery.user"
@@ -149,9 +149,7 @@ class Loader:
         try:
             exec(code, module.__dict__)
         except Exception as error:
-            raise ComponentError(
-                name, f"{module.__file__} cannot be loaded: {type(error).__name__}: {error}"
-            ) from error
+            raise ComponentError(name, f"{module.__file__} cannot be loaded: {describe(error)}") from error
         finally:
             if self.steps:
                 self.steps.take()  # loading is not charged

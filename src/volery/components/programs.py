@@ -8,7 +8,7 @@ control, so a constructor may block, call ROS and take time.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -61,6 +61,27 @@ class ClassProgram:
                 )
         if active and not callable(getattr(self._class, RUN, None)):
             raise self._error(f"has no method {RUN!r}, but is active")
+
+    def check_signature(self, operation: str, arguments: Sequence[str]) -> None:
+        """Raise ``ModelError`` if a method cannot be called with the arguments that the model states.
+
+        Args:
+            operation: Name of the operation. A missing method is left to ``check``.
+            arguments: Names of its arguments in the model, in order; without any, nothing is checked.
+        """
+        method = inspect.getattr_static(self._class, operation, None)
+        if not arguments or not inspect.isfunction(method):
+            return
+        signature = inspect.signature(method)
+        try:
+            signature.bind(None, *arguments)
+        except TypeError as error:
+            names = [name for name in signature.parameters if name != "self"]
+            raise self._error(
+                f"{operation}({', '.join(names)}) does not fit the interface's "
+                f"{operation}({', '.join(arguments)}): {error}",
+                operation,
+            ) from error
 
     def _check_arguments(self, given: list[str]) -> None:
         parameters = self._parameters()

@@ -24,13 +24,15 @@ FIDELITIES = ("times", "code")
 
 @commands.add("quiet", "json", "debug")
 def check(output: Output, model: Model, overrides: Overrides = None) -> int:
-    """Check a model with each of its allocations and scenarios."""
+    """Check a model with each of its allocations and scenarios, and load its Python components."""
     from volery.model.system_loader import check as check_model
     from volery.model.system_loader import gaps
+    from volery.run.assembly.component_checks import check_components
     from volery.run.assembly.vocabulary import vocabulary
 
     words = vocabulary()
     system = check_model(model, words, overrides or ())
+    check_components(system, words.languages)
     missing = {fidelity: [str(gap) for gap in gaps(system, fidelity, words)] for fidelity in FIDELITIES}
     warnings = [Text(f"⚠ {warning}", style="yellow") for warning in system.warnings]
     output.show(_summary(system), _instances(system), *_readiness(missing), *warnings)

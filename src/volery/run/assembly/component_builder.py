@@ -13,6 +13,7 @@ from volery.components.instance import Instance
 from volery.components.loader import Loader
 from volery.components.ports import ObservedVehicle, Port, PortList
 from volery.components.programs import (
+    ClassProgram,
     Program,
     ScriptProgram,
     StubProgram,
@@ -24,7 +25,7 @@ from volery.components.virtual_stdlib import virtual_modules
 from volery.cost import StepCounter
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
-from volery.model.components import VEHICLE_INTERFACES
+from volery.model.components import VEHICLE_INTERFACES, Signature
 from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
@@ -209,11 +210,7 @@ class Builder:
 
     def _operations(self, model: InstanceModel) -> dict[str, str]:
         """Return the operations that an instance provides, with the type that each returns."""
-        return {
-            name: signature.returns
-            for interface in model.component.provides.values()
-            for name, signature in self._system.interfaces[interface].operations.items()
-        }
+        return {name: one.returns for name, one in provided_operations(self._system, model).items()}
 
     def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
         instance = self._instances[model.name]
@@ -235,11 +232,7 @@ class Builder:
             return StubProgram(self._kernel, self._operations(model), period)
         if is_cpp(component):
             return self._cpp.program(model)
-        path = self._system.file_of(component)
-        chosen = component.class_name
-        if component.language in PYTHON_ROS and not component.stated_class:
-            chosen = script_or_class(path, chosen, component.where)
-        return load_program(loader, model.name, path, chosen, component.where)
+        return python_program(self._system, model, loader)
 
     # -- ports
 
@@ -330,6 +323,34 @@ class Builder:
             node_name(name), self._platform.processors[processor] if processor else None
         )
         serve_on_graph(self._graph, fleet, name, graph_access(self._autopilot(name), name), context)
+
+
+def python_program(system: System, model: InstanceModel, loader: Loader) -> Program:
+    """Load the Python file of an instance, and check its operations against the interfaces.
+
+    Raises:
+        ModelError: The file is missing, is not Python, or an operation does not take its arguments.
+        ComponentError: The file raises an exception while it is loaded.
+    """
+    component = model.component
+    path = system.file_of(component)
+    chosen = component.class_name
+    if component.language in PYTHON_ROS and not component.stated_class:
+        chosen = script_or_class(path, chosen, component.where)
+    program = load_program(loader, model.name, path, chosen, component.where)
+    if isinstance(program, ClassProgram):
+        for signature in provided_operations(system, model).values():
+            program.check_signature(signature.name, [one.name for one in signature.arguments])
+    return program
+
+
+def provided_operations(system: System, model: InstanceModel) -> dict[str, Signature]:
+    """Return the operations that an instance provides, by name."""
+    return {
+        name: signature
+        for interface in model.component.provides.values()
+        for name, signature in system.interfaces[interface].operations.items()
+    }
 
 
 def _kind(connection: Connection) -> TargetKind | None:
