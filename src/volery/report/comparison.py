@@ -140,7 +140,7 @@ def cost_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid
             if any(cell.text != NOTHING for cell in cells):
                 rows.append((Cell(""), Cell(question, status="quiet"), *_relative(cells)))
     columns = (Column("component"), Column(""), *(Column(label, True) for label in labels))
-    return Grid("What each component costs", columns, tuple(rows))
+    return Grid("Cost of each component", columns, tuple(rows))
 
 
 def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
@@ -153,7 +153,7 @@ def cost_matrix(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
             cells += _relative([take(one) if one else Cell(NOTHING) for one in found])
         rows.append(tuple(cells))
     columns = [Column(f"{question}\n{label}", True) for question, _ in _IN_SHORT for label in labels]
-    return Grid("What each component costs", (Column("component"), *columns), tuple(rows))
+    return Grid("Cost of each component", (Column("component"), *columns), tuple(rows))
 
 
 def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
@@ -161,18 +161,15 @@ def processor_comparison(labels: Sequence[str], records: Sequence[RunRecord]) ->
     rows = []
     for name in _names(record.processors for record in records):
         found = [record.processors.get(name) for record in records]
-        kinds = [
-            Cell(f"{one.kind} at {number(one.frequency_mhz, 0, 'MHz')}", status="quiet")
-            if one
-            else Cell(NOTHING)
-            for one in found
-        ]
+        kinds = [Cell(one.kind, status="quiet") if one else Cell(NOTHING) for one in found]
+        frequencies = [Cell(number(one.frequency_mhz, 0, "MHz") if one else NOTHING) for one in found]
         loads = [
             Cell(number(100.0 * one.utilisation, 2, "%"), share=one.utilisation) if one else Cell(NOTHING)
             for one in found
         ]
         taken = [Cell(energy(one.energy_j), share=one.energy_j) if one else Cell(NOTHING) for one in found]
         rows.append((Cell(name), Cell("kind", status="quiet"), *kinds))
+        rows.append((Cell(""), Cell("frequency", status="quiet"), *frequencies))
         rows.append((Cell(""), Cell("utilisation", status="quiet"), *loads))
         rows.append((Cell(""), Cell("energy", status="quiet"), *_relative(taken)))
     columns = (Column("processor"), Column(""), *(Column(label, True) for label in labels))

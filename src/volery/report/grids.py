@@ -198,7 +198,7 @@ def cost_grid(record: RunRecord) -> Grid:
             "processor's power figures",
         ),
     )
-    return Grid("What each component costs", columns, rows)
+    return Grid("Cost of each component", columns, rows)
 
 
 def _energy_title(record: RunRecord) -> str:

@@ -19,20 +19,22 @@ _STYLES = {"": "", "good": "green", "bad": "bold red", "warn": "yellow", "quiet"
 
 
 class GridTable:
-    """Grid that omits inessential columns on a narrow terminal."""
+    """Grid that omits inessential columns on a narrow terminal, and then wraps cells between words."""
 
     def __init__(self, grid: Grid) -> None:
         self.grid = grid
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the table with all columns if they fit without folding, else the essential ones."""
-        whole = _table(self.grid, essential=False)
         unlimited = options.update(max_width=_UNLIMITED)
-        fits = Measurement.get(console, unlimited, whole).maximum <= options.max_width
-        yield whole if fits else _table(self.grid, essential=True)
+        for table in (_table(self.grid), _table(self.grid, essential=True)):
+            if Measurement.get(console, unlimited, table).maximum <= options.max_width:
+                yield table
+                return
+        yield _table(self.grid, essential=True, wrapped=True)
 
 
-def _table(grid: Grid, essential: bool) -> Table:
+def _table(grid: Grid, *, essential: bool = False, wrapped: bool = False) -> Table:
     made = Table(
         title=grid.title,
         title_justify="left",
@@ -46,10 +48,22 @@ def _table(grid: Grid, essential: bool) -> Table:
         column = grid.columns[index]
         whole = column.numeric or index == 0  # a truncated name or figure would mislead
         side: JustifyMethod = "right" if column.numeric else "left"
-        made.add_column(column.title, justify=side, no_wrap=whole, overflow="fold")
+        made.add_column(
+            column.title,
+            justify=side,
+            no_wrap=whole and not wrapped,
+            overflow="fold",
+            min_width=_longest_word(grid, index) if wrapped else None,
+        )
     for row in grid.rows:
         made.add_row(*(_text(row[index]) for index in shown))
     return made
+
+
+def _longest_word(grid: Grid, index: int) -> int:
+    """Return the width below which a column would be broken inside a word."""
+    texts = (grid.columns[index].title, *(row[index].text for row in grid.rows))
+    return max((len(word) for text in texts for word in text.split()), default=1)
 
 
 def _text(cell: Cell) -> Text:
