@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import volery.simulation.autopilots
+from rigs.station import TARGET
 from volery.base.errors import UsageError
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 
@@ -161,3 +162,31 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     for firmware in FIRMWARE.kinds.values():
         names = {parameter.name for parameter in firmware.rules.parameters.defaults()}
         assert set(firmware.rules.parameters.supported) <= names
+
+
+def set_to(rig: Any, name: str, value: float) -> float:
+    """Set a parameter and return the value that is reported."""
+    rig.send("PARAM_SET", **TARGET, param_id=name, param_value=value, param_type=9)
+    rig.run(0.05)
+    assert rig.latest["PARAM_VALUE"]["param_id"] == name
+    return float(rig.latest["PARAM_VALUE"]["param_value"])
+
+
+def test_a_simulation_parameter_without_effect_is_refused(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    before = rig.vehicle.parameters["SIM_WIND_SPD"]
+    assert set_to(rig, "SIM_WIND_SPD", before + 5.0) == before
+    assert rig.texts()[-1] == "Param write denied (SIM_WIND_SPD)"
+    assert set_to(rig, "SIM_RC_FAIL", 1.0) == 1.0
+
+
+def test_satellites_and_motors_fail_by_parameter(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    assert set_to(rig, "SIM_GPS_DISABLE", 1.0) == 1.0
+    rig.run_until(lambda: rig.vehicle.mode.name == "LAND", within=20.0)
+    assert set_to(rig, "SIM_GPS_DISABLE", 0.0) == 0.0
+    set_to(rig, "SIM_ENGINE_MUL", 0.0)
+    rig.run(3.0)
+    assert rig.flight.truth().position[2] < 3.0

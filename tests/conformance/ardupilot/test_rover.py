@@ -7,8 +7,6 @@ from typing import Any
 
 import pytest
 
-from rigs.station import TARGET
-
 MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
 
 

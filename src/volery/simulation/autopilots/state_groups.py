@@ -93,6 +93,14 @@ class GroundState:
 
 
 @dataclass
+class OutputState:
+    """Outputs beside the motors, as commands have set them."""
+
+    servos: dict[int, int] = field(default_factory=dict)
+    """Pulse widths [us] by channel, from 1."""
+
+
+@dataclass
 class CommandedLimits:
     """Limits and heading that commands and mission items have set for the present mode; ``None``: not set."""
 
@@ -118,6 +126,8 @@ class FailsafeState:
     """Names of the failsafes whose condition is true."""
     station_last_ns: Ns = NEVER
     """Time of the last message of the ground station that controls the vehicle [ns]."""
+    simulated: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Values of the parameters that inject faults, as they were last applied."""
     low_voltage_since: dict[str, Ns] = field(default_factory=dict)
     """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""
 
@@ -134,3 +144,7 @@ class ReportState:
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
+    fence_breaches: int = 0
+    """Number of times that the vehicle has left the fence."""
+    fence_breached_at: Ns = 0
+    """Uptime of the last of them [ns]."""

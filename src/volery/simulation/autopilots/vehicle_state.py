@@ -20,7 +20,7 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, Paramet
 from volery.simulation.autopilots.endpoint import VehicleOutput
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import RcChannels
-from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, OnboardMission
+from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, MissionItem, OnboardMission
 from volery.simulation.autopilots.state_groups import (
     NEVER,
     ArmingState,
@@ -28,6 +28,7 @@ from volery.simulation.autopilots.state_groups import (
     FailsafeState,
     GroundState,
     Home,
+    OutputState,
     ReportState,
 )
 
@@ -73,6 +74,14 @@ class Manoeuvre:
 
     def takeoff_requested(self) -> bool:
         """Return whether the motors should come up from idle on the ground."""
+        return False
+
+    def pause(self) -> bool:
+        """Stop where the vehicle is until ``resume``; return False where that is not possible."""
+        return False
+
+    def resume(self) -> bool:
+        """Continue after a pause; return False where there is nothing to continue."""
         return False
 
     def distance(self) -> float:
@@ -223,6 +232,8 @@ class Vehicle:
         self.tuning = rules.parameters.tuning(self.parameters)
         self.rc = RcChannels(rules.rc.transmitter)
         self.mission = OnboardMission()
+        self.points: dict[int, list[MissionItem]] = {}
+        """Points of the fence and rally points, by MAV_MISSION_TYPE; they persist like the mission."""
         self.firmware_state: Any = rules.firmware_state(self)
         """State that only the firmware uses."""
         self.boot_at: Ns = kernel.now()
@@ -234,6 +245,7 @@ class Vehicle:
         self.arming = ArmingState()
         self.ground = GroundState()
         self.commanded = CommandedLimits()
+        self.outputs = OutputState()
         self.failsafes = FailsafeState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None

@@ -7,8 +7,11 @@ from functools import partial
 from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
+from volery.simulation.autopilots.ardupilot.fence import admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
+    CRITICAL,
     FORCE,
+    INFO,
     SKIP_CHECKS,
     arm,
     change_mode,
@@ -23,6 +26,7 @@ from volery.simulation.autopilots.mavlink.command import (
     ACCEPTED,
     DENIED,
     FAILED,
+    TEMPORARILY_REJECTED,
     UNSUPPORTED,
     Command,
     Handler,
@@ -34,6 +38,7 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
+SET_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 183, 207, 401
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
@@ -41,6 +46,8 @@ HIGHEST = 83_000.0
 
 FARTHEST_POINT = 2.1e7
 """Largest distance of a target that is flown towards [m]: any point of the globe."""
+
+LONGEST_PULSE = 65_535
 
 Problems = Callable[[Vehicle], list[str]]
 
@@ -222,7 +229,7 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
         yaw: Heading [rad], or None to leave it to the firmware.
     """
     point = vehicle.point(frame, *place)
-    if not all_within(point, FARTHEST_POINT):
+    if not all_within(point, FARTHEST_POINT) or not admits(vehicle, point):
         return False
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, Guided):
@@ -289,11 +296,46 @@ def on_get_home(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-def shared_commands(problems: Problems, words: tuple[str, str], guided: int) -> dict[int, Handler]:
+def on_pause(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_PAUSE_CONTINUE: 0 pauses, 1 continues."""
+    if command.param1 not in (0.0, 1.0):
+        return DENIED
+    done = vehicle.manoeuvre.resume() if command.param1 else vehicle.manoeuvre.pause()
+    if not done:
+        vehicle.send_text(INFO, f"Failed to {'resume' if command.param1 else 'pause'}")
+    return ACCEPTED if done else FAILED
+
+
+def on_prearm_checks(vehicle: Vehicle, _command: Command, problems: Problems) -> int:
+    """Handle RUN_PREARM_CHECKS: make the checks of arming and report those that fail."""
+    if vehicle.armed:
+        return TEMPORARILY_REJECTED
+    for text in problems(vehicle):
+        vehicle.send_text(CRITICAL, f"PreArm: {text}")
+    return ACCEPTED
+
+
+def on_set_servo(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_SERVO: a channel that drives nothing else takes the pulse width."""
+    channel, pulse = round(command.param1), round(command.param2)
+    function = f"SERVO{channel}_FUNCTION"
+    if function not in vehicle.parameters or not 0 <= pulse <= LONGEST_PULSE:
+        return FAILED
+    if vehicle.parameters[function]:
+        vehicle.send_text(INFO, f"ServoRelayEvent: Channel {channel} is already in use")
+        return FAILED
+    vehicle.outputs.servos[channel] = pulse
+    return ACCEPTED
+
+
+def shared_commands(
+    problems: Problems, prearm: Problems, words: tuple[str, str], guided: int
+) -> dict[int, Handler]:
     """Return the commands that copter and rover share.
 
     Args:
         problems: Returns the texts that forbid arming.
+        prearm: Returns those of the checks that are made before it regularly.
         words: Status texts of arming and disarming.
         guided: Number of the mode GUIDED.
     """
@@ -310,29 +352,33 @@ def shared_commands(problems: Problems, words: tuple[str, str], guided: int) -> 
         CALIBRATION: on_calibration,
         STORAGE: on_calibration,
         REBOOT: on_reboot,
+        RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
+        SET_SERVO: on_set_servo,
+        FENCE_ENABLE: on_fence_enable,
     }
 
 
 def copter_commands(
-    problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
+    problems: Problems, prearm: Problems, words: tuple[str, str], modes: Mapping[str, int]
 ) -> dict[int, Handler]:
     """Return all commands of a copter. ``modes`` maps the names of modes to their numbers."""
     return {
-        **shared_commands(problems, words, modes["GUIDED"]),
+        **shared_commands(problems, prearm, words, modes["GUIDED"]),
         TAKEOFF: on_takeoff,
         LAND: to_mode(modes["LAND"]),
         RETURN: to_mode(modes["RTL"]),
         LOITER_UNLIMITED: to_mode(modes["LOITER"]),
         CONDITION_YAW: on_condition_yaw,
+        PAUSE_CONTINUE: on_pause,
     }
 
 
 def rover_commands(
-    problems: Problems, words: tuple[str, str], modes: Mapping[str, int]
+    problems: Problems, prearm: Problems, words: tuple[str, str], modes: Mapping[str, int]
 ) -> dict[int, Handler]:
     """Return all commands of a rover. ``modes`` maps the names of modes to their numbers."""
     return {
-        **shared_commands(problems, words, modes["GUIDED"]),
+        **shared_commands(problems, prearm, words, modes["GUIDED"]),
         RETURN: to_mode(modes["RTL"]),
         SET_YAW_SPEED: on_set_yaw_speed,
     }

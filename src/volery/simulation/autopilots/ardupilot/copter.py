@@ -7,6 +7,7 @@ from functools import cache, partial
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
+from volery.simulation.autopilots.ardupilot.fence import outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
     ardupilot_mavlink,
     builders,
@@ -137,6 +138,7 @@ CHECKS = (
     Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
+    Check("Vehicle outside fence", outside_fence),
 )
 
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
@@ -259,7 +261,10 @@ _MAVLINK = ardupilot_mavlink(
     },
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
     commands=commands.copter_commands(
-        arming_problems, ARMING_TEXTS, {mode.name: mode.number for mode in MODES.values()}
+        arming_problems,
+        failing_prearm_checks,
+        ARMING_TEXTS,
+        {mode.name: mode.number for mode in MODES.values()},
     ),
     handlers={
         "SET_ATTITUDE_TARGET": copter_attitude,

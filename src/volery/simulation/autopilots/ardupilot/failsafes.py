@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import partial
 
 from volery.base.time import S, from_seconds
+from volery.simulation.autopilots.ardupilot.fence import fence_failsafe
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
     CRITICAL,
@@ -109,6 +110,8 @@ RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 3: (LAND,), 4: (RTL, LAND), 5: 
 """The same for FS_THR_ENABLE."""
 BATTERY_ACTIONS = {1: (LAND,), 2: (RTL, LAND), 3: (RTL, LAND), 4: (LAND,), 7: (BRAKE, LAND)}
 """The same for BATT_FS_LOW_ACT and BATT_FS_CRT_ACT."""
+FENCE_ACTIONS = {1: (RTL, LAND), 2: (LAND,), 3: (RTL, LAND), 4: (BRAKE, LAND), 5: (RTL, LAND)}
+"""The same for FENCE_ACTION."""
 DISARM_ACTION = 5
 """Value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT, and of a rover's FS_ACTION, that disarms."""
 
@@ -186,6 +189,7 @@ COPTER_FAILSAFES = (
         _on_estimator_lost,
         lambda vehicle: vehicle.send_text(CRITICAL, "EKF Failsafe Cleared"),
     ),
+    fence_failsafe(FENCE_ACTIONS, (LAND,)),
 )
 
 
@@ -200,6 +204,10 @@ ROVER_ACTIONS = {
     6: (ROVER_HOLD,),
 }
 """FS_ACTION and the battery actions to the modes that are tried in order."""
+
+
+ROVER_FENCE_ACTIONS = {1: (ROVER_RTL, ROVER_HOLD), 2: (ROVER_HOLD,), 3: (ROVER_RTL, ROVER_HOLD)}
+"""The same for FENCE_ACTION."""
 
 
 def _act_on_rover(vehicle: Vehicle, action: int) -> None:
@@ -233,4 +241,5 @@ ROVER_FAILSAFES = (
     ),
     Failsafe("battery low", battery_low, partial(_on_rover_battery, level="low")),
     Failsafe("battery critical", battery_critical, partial(_on_rover_battery, level="critical")),
+    fence_failsafe(ROVER_FENCE_ACTIONS, (ROVER_HOLD,)),
 )

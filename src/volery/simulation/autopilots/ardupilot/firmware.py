@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.ardupilot import mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot import fence, mission, pilot_input, questions, telemetry
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
+from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink import message_fields
@@ -20,6 +21,7 @@ from volery.simulation.autopilots.mavlink.firmware import (
     MavlinkFirmware,
     MessageHandler,
     MissionPolicy,
+    ParameterPolicy,
     TelemetryPolicy,
 )
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
@@ -42,6 +44,7 @@ BUILDERS: Mapping[str, Builder] = {
     "BATTERY_STATUS": telemetry.battery_status,
     "DISTANCE_SENSOR": telemetry.distance_sensor,
     "EKF_STATUS_REPORT": telemetry.ekf_status,
+    "FENCE_STATUS": fence.fence_status,
     "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
     "GLOBAL_POSITION_INT": telemetry.global_position,
     "GPS_GLOBAL_ORIGIN": telemetry.origin,
@@ -73,7 +76,6 @@ BUILDERS: Mapping[str, Builder] = {
             "AOA_SSA",
             "CAMERA_FEEDBACK",
             "EFI_STATUS",
-            "FENCE_STATUS",
             "GENERATOR_STATUS",
             "GIMBAL_DEVICE_ATTITUDE_STATUS",
             "GPS2_RAW",
@@ -115,6 +117,7 @@ ORDER: Sequence[str] = (
     "SCALED_PRESSURE",
     "SCALED_PRESSURE2",
     "GPS_RAW_INT",
+    "FENCE_STATUS",
     "SYSTEM_TIME",
     "RC_CHANNELS_SCALED",
     "AHRS",
@@ -152,6 +155,7 @@ def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[
             "NAV_CONTROLLER_OUTPUT",
             "MISSION_CURRENT",
             "GPS_RAW_INT",
+            "FENCE_STATUS",
             "POSITION_TARGET_GLOBAL_INT",
         ),
         RC_CHANNELS: ("SERVO_OUTPUT_RAW", "RC_CHANNELS"),
@@ -257,6 +261,7 @@ def ardupilot_mavlink(
             handlers={**MESSAGE_HANDLERS, **handlers},
             set_mode=set_mode,
             set_mode_ack=11,
+            questions=questions.questions(messages["AUTOPILOT_VERSION"]),
         ),
         missions=MissionPolicy(
             runs=mission.runs,
@@ -264,6 +269,12 @@ def ardupilot_mavlink(
             home_item=mission.home_item,
             go_to_item=go_to_item,
             grew=mission.mission_grew,
+            stored_point=fence.stored_point,
+            points_changed=fence.points_changed,
+            writes_parts=True,
+        ),
+        parameters=ParameterPolicy(
+            refuses=lambda name: name.startswith("SIM_") and name not in COPTER_SUPPORTED
         ),
         on_parameter_list=on_parameter_list,
     )

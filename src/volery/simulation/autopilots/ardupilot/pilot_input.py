@@ -88,7 +88,23 @@ def on_step(vehicle: Vehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
     if vehicle.parameters["SIM_RC_FAIL"] or vehicle.rc.transmitter != list(vehicle.rules.rc.transmitter):
         simulate_rc_failure(vehicle)
+    simulate_faults(vehicle)
     expire_overrides(vehicle)
+
+
+def simulate_faults(vehicle: Vehicle) -> None:
+    """Inject the faults that SIM_GPS_DISABLE and SIM_ENGINE_MUL name, once after each change."""
+    parameters = vehicle.parameters
+    motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
+    wanted = (parameters["SIM_GPS_DISABLE"], *motor_and_share)
+    if wanted == vehicle.failsafes.simulated:
+        return
+    vehicle.failsafes.simulated = wanted
+    vehicle.flight.block_gps(bool(wanted[0]))
+    if vehicle.flies:
+        for motor in range(4):
+            weak = motor == round(wanted[1])
+            vehicle.flight.weaken_motor(motor, min(1.0, max(0.0, wanted[2])) if weak else 1.0)
 
 
 def expire_overrides(vehicle: Vehicle) -> None:

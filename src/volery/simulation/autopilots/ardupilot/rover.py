@@ -7,6 +7,7 @@ from functools import cache, partial
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
+from volery.simulation.autopilots.ardupilot.fence import outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
     ardupilot_mavlink,
@@ -138,6 +139,7 @@ CHECKS = (
     Check("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
+    Check("Vehicle outside fence", outside_fence),
 )
 
 HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))
@@ -235,7 +237,10 @@ _MAVLINK = ardupilot_mavlink(
     on_stream_request=on_stream_request,
     least_period=25 * MS,
     commands=commands.rover_commands(
-        arming_problems, ARMING_TEXTS, {mode.name: mode.number for mode in MODES.values()}
+        arming_problems,
+        failing_prearm_checks,
+        ARMING_TEXTS,
+        {mode.name: mode.number for mode in MODES.values()},
     ),
     handlers={
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,

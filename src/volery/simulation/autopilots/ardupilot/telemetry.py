@@ -336,6 +336,7 @@ RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
     1 << 13,
     1 << 14,
 )
+GEOFENCE = 1 << 20
 AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 << 28
 
 
@@ -376,6 +377,9 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         enabled &= ~LOGGING
     if not vehicle.arming.checks_passed:
         healthy &= ~PREARM
+    if vehicle.parameters["FENCE_ENABLE"]:
+        enabled |= GEOFENCE
+        healthy = healthy & ~GEOFENCE if "fence" in vehicle.failsafes.active else healthy | GEOFENCE
     if age > FIX_AFTER and vehicle.estimate.gps.fix_type == 0:
         healthy &= ~GPS
     volts, amps, left = _battery(vehicle)
@@ -480,6 +484,7 @@ def servo_output(vehicle: Vehicle) -> Fields:
         "servo2_raw": second,
         "servo3_raw": third,
         "servo4_raw": fourth,
+        **{f"servo{channel}_raw": pulse for channel, pulse in vehicle.outputs.servos.items()},
     }
 
 

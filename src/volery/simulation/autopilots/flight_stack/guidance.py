@@ -253,7 +253,8 @@ def _overspeed(row: Array) -> float:
     limit = row[C_SPEED_DOWN] if down > 0.0 else row[C_SPEED_UP]
     if limit <= 0.0 or abs(down) <= limit:
         return 1.0
-    return _OVERSPEED_GAIN * abs(down) / limit
+    factor: float = _OVERSPEED_GAIN * abs(down) / limit
+    return factor
 
 
 @njit(cache=False)

@@ -20,7 +20,7 @@ class Turn(NamedTuple):
 
 
 OWN_HEADING = Turn()
-"""Face the direction of flight where the tuning says so, else keep the heading."""
+"""Turn the nose to the direction of flight where the tuning says so, else keep the heading."""
 
 
 class FollowVelocity(Manoeuvre):
@@ -155,6 +155,19 @@ class Guided(Manoeuvre):
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._doing: Manoeuvre = ToPoint(vehicle)
+        self._waiting: Manoeuvre | None = None
+        """What is flown during a pause."""
+
+    def pause(self) -> bool:
+        """Stop; commands that arrive meanwhile are kept until ``resume``."""
+        self._waiting = ToPoint(self.vehicle)
+        self._waiting.enter()
+        return True
+
+    def resume(self) -> bool:
+        """Continue the last command."""
+        self._waiting = None
+        return True
 
     def enter(self) -> None:
         """Stop and hold the position until a command arrives."""
@@ -165,7 +178,7 @@ class Guided(Manoeuvre):
         doing.enter()
         self.target = doing.target
         self.taking_off, self.slow_start = doing.taking_off, doing.slow_start
-        if self.vehicle.armed and not self.vehicle.landed:
+        if self._waiting is None and self.vehicle.armed and not self.vehicle.landed:
             doing.step()
 
     @property
@@ -179,8 +192,11 @@ class Guided(Manoeuvre):
         return self._doing.taking_off
 
     def step(self) -> None:
-        """Continue the command."""
+        """Continue the command, or wait."""
         doing = self._doing
+        if self._waiting is not None:
+            self._waiting.step()
+            return
         if doing.taking_off and isinstance(doing, TakeOff) and doing.arrived():
             self.taking_off = doing.taking_off = False
         doing.step()

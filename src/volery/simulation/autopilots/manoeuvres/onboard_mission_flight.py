@@ -100,6 +100,8 @@ class FlyMission(Manoeuvre):
         self._jumps: dict[int, int] = {}
         self._held: deque[MissionItem] = deque()
         self._condition_since: Ns = 0
+        self._waiting: ToPoint | None = None
+        """What is flown during a pause."""
         self.started = False
         """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
 
@@ -123,11 +125,29 @@ class FlyMission(Manoeuvre):
         return self.started and self._leg is not None and self._leg.manoeuvre.takeoff_requested()
 
     def step(self) -> None:
-        """Continue the leg, or begin the next when it is done."""
+        """Continue the leg, or begin the next when it is done; wait during a pause."""
+        if self._waiting is not None:
+            self._waiting.step()
+            return
         self._progress()
         if self._leg is not None and self.vehicle.armed and not self.vehicle.landed:
             self._leg.manoeuvre.step()
             self._mirror(self._leg.manoeuvre)
+
+    def pause(self) -> bool:
+        """Stop on the way to a waypoint; other items do not pause."""
+        leg = self._leg
+        flies = leg is not None and isinstance(leg.manoeuvre, ToPoint) and not leg.manoeuvre.taking_off
+        if not flies or self._waiting is not None or self._reached_at is not None or self.vehicle.landed:
+            return False
+        self._waiting = ToPoint(self.vehicle)
+        self._waiting.enter()
+        return True
+
+    def resume(self) -> bool:
+        """Continue on the way to the waypoint."""
+        waited, self._waiting = self._waiting is not None, None
+        return waited
 
     def on_ground(self) -> None:
         """Continue the mission: a leg may end on the ground."""
@@ -135,7 +155,7 @@ class FlyMission(Manoeuvre):
 
     def item_chosen(self) -> None:
         """Begin the chosen item at the next step."""
-        self._leg = None
+        self._leg = self._waiting = None
 
     def _progress(self) -> None:
         if self._leg is None:

@@ -100,6 +100,8 @@ class MavlinkChannel:
         self.link = link
         self.index = index
         self.usual = usual
+        self.requested: dict[str, Ns] = {}
+        """Periods of the streams that were requested as a group."""
         self.streams: MessageStreams
         self.texts: StatusTextQueue
         self.open = True
@@ -134,6 +136,10 @@ class Peer(NamedTuple):
     channel: MavlinkChannel
     system: int
     component: int
+
+    def send(self, name: str, fields: dict[str, Any]) -> None:
+        """Send a message that has no target."""
+        self.channel.send(name, fields)
 
     def answer(self, name: str, **fields: Any) -> None:
         """Send a message with the peer as its target."""

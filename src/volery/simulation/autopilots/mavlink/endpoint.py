@@ -65,6 +65,7 @@ class MavlinkEndpoint:
             "MISSION_REQUEST_INT": missions.on_request_int,
             "MISSION_REQUEST_LIST": missions.on_request_list,
             "MISSION_SET_CURRENT": missions.on_set_current,
+            **({"MISSION_WRITE_PARTIAL_LIST": missions.on_partial} if firmware.missions.writes_parts else {}),
             "PARAM_REQUEST_LIST": self._on_parameter_list(parameters.on_list),
             "PARAM_REQUEST_READ": parameters.on_read,
             "PARAM_SET": parameters.on_set,
@@ -121,7 +122,9 @@ class MavlinkEndpoint:
     @property
     def handled_messages(self) -> frozenset[str]:
         """Names of the messages that have an effect or an answer."""
-        return frozenset(self._handlers) | frozenset(self.firmware.commands.handlers)
+        return frozenset(
+            {*self._handlers, *self.firmware.commands.handlers, *self.firmware.commands.questions}
+        )
 
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
         messages, vehicle = self.firmware.telemetry.messages, self._vehicle
@@ -258,8 +261,11 @@ class MavlinkEndpoint:
             channel.texts.on_heartbeat(fields["type"])
         self._handling = True
         own = self._handlers.get(frame.name)
+        question = self.firmware.commands.questions.get(frame.name)
         if own is not None:
             own(Peer(channel, frame.system, frame.component), fields)
+        elif question is not None:
+            question(self._vehicle, fields, Peer(channel, frame.system, frame.component))
         else:
             handler = self.firmware.commands.handlers.get(frame.name)
             if handler is not None:
@@ -297,7 +303,9 @@ class MavlinkEndpoint:
         rate = fields["req_message_rate"] if fields["start_stop"] else 0
         names = firmware.telemetry.streams.get(stream)
         if names is not None:
-            peer.channel.streams.set(names, S // rate if rate else 0)
+            period = S // rate if rate else 0
+            peer.channel.streams.set(names, period)
+            peer.channel.requested.update(dict.fromkeys(names, period))
             firmware.telemetry.on_stream_request(vehicle, peer.channel.index, stream, rate)
 
     def _on_set_mode(self, peer: Peer, fields: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.mavlink.command import Handler
@@ -56,6 +56,8 @@ class ParameterPolicy(NamedTuple):
     """Whether a value outside of a list carries its own index; else 65535."""
     typed: bool = False
     """Whether a PARAM_SET with another type than the parameter's is ignored."""
+    refuses: Callable[[str], bool] = _never
+    """Whether a parameter of that name cannot be set: the value stays and a text says so."""
     checksum: str = ""
     """Name of a checksum over all parameters that is sent first; empty: none."""
 
@@ -78,6 +80,22 @@ Builder = Callable[[Vehicle], dict[str, Any] | None]
 
 MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
 """Handles a message that needs no answer: vehicle, fields, system id of the sender."""
+
+
+class Asker(Protocol):
+    """Sender of a message that is answered with a message."""
+
+    def send(self, name: str, fields: dict[str, Any]) -> None:
+        """Send a message that has no target."""
+        ...
+
+    def answer(self, name: str, **fields: Any) -> None:
+        """Send a message with the asker as its target."""
+        ...
+
+
+QuestionHandler = Callable[[Vehicle, dict[str, Any], Asker], None]
+"""Answers a message: vehicle, fields, asker."""
 
 
 class BootBytes(NamedTuple):
@@ -134,6 +152,8 @@ class CommandPolicy:
     commands: Mapping[int, Handler]
     handlers: Mapping[str, MessageHandler]
     """Messages for this vehicle that need no answer."""
+    questions: Mapping[str, QuestionHandler] = field(default_factory=dict)
+    """Messages for this vehicle that are answered with a message."""
     set_mode: Callable[[Vehicle, int, int], int]
     """Handle SET_MODE (base mode, custom mode) and return a MAV_RESULT."""
     set_mode_ack: int
@@ -162,6 +182,14 @@ class MissionPolicy:
     """Fly to an item that is sent outside an upload (``current`` 2)."""
     grew: Callable[[Vehicle, int], None] = _ignore
     """Called with the number of items after a change."""
+    stored_point: Callable[[int, MissionItem], MissionItem | int] | None = None
+    """The same as ``stored_item`` for the points of the fence and for rally points, by MAV_MISSION_TYPE;
+    ``None``: they are not supported.
+    """
+    points_changed: Callable[[Vehicle, int], None] = _ignore
+    """Called after such a list has changed, with its MAV_MISSION_TYPE."""
+    writes_parts: bool = False
+    """Whether MISSION_WRITE_PARTIAL_LIST replaces a part of the mission."""
 
 
 @dataclass(frozen=True, kw_only=True)

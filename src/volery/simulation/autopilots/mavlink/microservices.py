@@ -90,7 +90,7 @@ class CommandService:
         if self._vehicle.uptime() < self._firmware.telemetry.intervals_after:
             return ACCEPTED
         if interval == 0.0:
-            period = peer.channel.usual.get(name, 0)
+            period = peer.channel.requested.get(name, peer.channel.usual.get(name, 0))
         else:
             period = max(MS, round(interval) * US // MS * MS) if interval > 0 else 0
         peer.channel.streams.set((name,), period)
@@ -194,6 +194,10 @@ class ParameterService:
         found = self._vehicle.parameters.find(name)
         if found is None or (self._policy.typed and kind != found.type):
             return
+        if self._policy.refuses(name):
+            self._vehicle.send_text(4, f"Param write denied ({name})")
+            self._vehicle.output.parameter_changed(name)
+            return
         self._vehicle.set_parameter(
             name, from_bytewise(found.type, value) if self._policy.bytewise else value
         )
@@ -232,6 +236,11 @@ class _Upload:
     peer: Peer
     count: int
     latest: Ns
+    kind: int = 0
+    """MAV_MISSION_TYPE."""
+    first: int = 0
+    """Number of the first item: above 0 only where a part of the mission is replaced."""
+    part: bool = False
     items: list[MissionItem] = field(default_factory=list)
     reminder: Handle | None = None
     by_integers: bool = False
@@ -252,18 +261,46 @@ class MissionService:
     def on_count(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_COUNT: begin an upload."""
         self._drop_upload()
+        kind = fields["mission_type"]
+        if kind != MISSION and not self._stores(kind):
+            self._acknowledge(peer, MISSION_UNSUPPORTED, kind)
+        elif fields["count"] > MAX_ITEMS:
+            self._acknowledge(peer, NO_SPACE, kind)
+        elif fields["count"] == 0:
+            self._clear(kind)
+            self._acknowledge(peer, MISSION_ACCEPTED, kind)
+        else:
+            if kind == MISSION and not self._firmware.missions.upload.keeps_old:
+                self._vehicle.mission.clear()
+            self._upload = _Upload(peer, fields["count"], self._kernel.now(), kind)
+            self._request_item()
+
+    def on_partial(self, peer: Peer, fields: dict[str, Any]) -> None:
+        """Handle MISSION_WRITE_PARTIAL_LIST: request the items that replace a part of the mission."""
+        self._drop_upload()
+        first, last = fields["start_index"], fields["end_index"]
         if fields["mission_type"] != MISSION:
             self._acknowledge(peer, MISSION_UNSUPPORTED, fields["mission_type"])
-        elif fields["count"] > MAX_ITEMS:
-            self._acknowledge(peer, NO_SPACE)
-        elif fields["count"] == 0:
-            self._vehicle.mission.clear()
-            self._acknowledge(peer, MISSION_ACCEPTED)
+        elif not 0 <= first <= last < len(self._vehicle.mission):
+            self._vehicle.send_text(4, "Flight plan update rejected")
+            self._acknowledge(peer, MISSION_ERROR)
         else:
-            if not self._firmware.missions.upload.keeps_old:
-                self._vehicle.mission.clear()
-            self._upload = _Upload(peer, fields["count"], self._kernel.now())
+            self._upload = _Upload(peer, last - first + 1, self._kernel.now(), first=first, part=True)
             self._request_item()
+
+    def _stores(self, kind: int) -> bool:
+        """Return whether a list of that MAV_MISSION_TYPE is stored beside the mission."""
+        return kind in (FENCE, RALLY) and self._firmware.missions.stored_point is not None
+
+    def _clear(self, kind: int) -> None:
+        if kind == MISSION:
+            self._vehicle.mission.clear()
+        else:
+            self._store_points(kind, [])
+
+    def _store_points(self, kind: int, points: list[MissionItem]) -> None:
+        self._vehicle.points[kind] = points
+        self._firmware.missions.points_changed(self._vehicle, kind)
 
     def _request_item(self) -> None:
         upload = self._upload
@@ -271,12 +308,12 @@ class MissionService:
             return
         if self._kernel.now() - upload.latest >= UPLOAD_TIMEOUT:
             self._vehicle.send_text(4, "Mission upload timeout")
-            self._acknowledge(upload.peer, CANCELLED)
+            self._acknowledge(upload.peer, CANCELLED, upload.kind)
             self._upload = None
             return
-        index = len(upload.items)
+        index = upload.first + len(upload.items)
         request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.request(index)
-        upload.peer.answer(request, seq=index, mission_type=MISSION)
+        upload.peer.answer(request, seq=index, mission_type=upload.kind)
         upload.reminder = self._kernel.call_at(self._kernel.now() + REQUEST_PERIOD, self._request_item)
 
     def _drop_upload(self) -> None:
@@ -314,16 +351,20 @@ class MissionService:
             )
         elif self._upload is None:
             self._acknowledge(peer, MISSION_ERROR)
-        elif fields["seq"] != len(self._upload.items):
+        elif fields["seq"] != self._upload.first + len(self._upload.items):
             self._acknowledge(peer, INVALID_SEQUENCE)
         else:
             self._store(self._upload, item)
 
     def _store(self, upload: _Upload, item: MissionItem) -> None:
-        stored = self._firmware.missions.stored_item(item)
+        convert = self._firmware.missions.stored_point
+        if upload.kind == MISSION or convert is None:
+            stored = self._firmware.missions.stored_item(item)
+        else:
+            stored = convert(upload.kind, item)
         if isinstance(stored, int):
             self._drop_upload()
-            self._acknowledge(upload.peer, stored)
+            self._acknowledge(upload.peer, stored, upload.kind)
             return
         upload.items.append(stored)
         upload.latest = self._kernel.now()
@@ -332,55 +373,76 @@ class MissionService:
         if len(upload.items) < upload.count:
             self._request_item()
         else:
-            self._upload = None
+            self._finish(upload)
+        if upload.kind == MISSION and not upload.part:
+            self._firmware.missions.grew(self._vehicle, len(upload.items))
+
+    def _finish(self, upload: _Upload) -> None:
+        """Put a complete upload in force and acknowledge it."""
+        self._upload = None
+        if upload.kind != MISSION:
+            self._store_points(upload.kind, upload.items)
+        elif upload.part:
+            self._vehicle.mission.items[upload.first : upload.first + upload.count] = upload.items
+        else:
             self._vehicle.mission.replace(upload.items)
-            self._acknowledge(upload.peer, MISSION_ACCEPTED)
-            if self._firmware.missions.upload.received:
-                self._vehicle.send_text(6, self._firmware.missions.upload.received)
-        self._firmware.missions.grew(self._vehicle, len(upload.items))
+        self._acknowledge(upload.peer, MISSION_ACCEPTED, upload.kind)
+        if upload.kind == MISSION and self._firmware.missions.upload.received:
+            self._vehicle.send_text(6, self._firmware.missions.upload.received)
 
     # -- download
 
     def on_request_list(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_REQUEST_LIST."""
         kind = fields["mission_type"]
-        count = len(self._vehicle.mission) if kind == MISSION else 0
+        if self._firmware.missions.stored_point is not None and kind not in (MISSION, FENCE, RALLY):
+            self._acknowledge(peer, MISSION_UNSUPPORTED, kind)
+            return
+        count = len(self._vehicle.mission) if kind == MISSION else len(self._points(kind))
         peer.answer("MISSION_COUNT", count=count, mission_type=kind)
 
     def on_request_int(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_REQUEST_INT."""
         item = self._requested(peer, fields)
         if item is not None:
-            self._send_item(peer, "MISSION_ITEM_INT", fields["seq"], item, (item.x, item.y))
+            self._send_item(peer, "MISSION_ITEM_INT", fields, item, (item.x, item.y))
 
     def on_request(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_REQUEST; the answer is in degrees."""
         item = self._requested(peer, fields)
         if item is not None:
-            self._send_item(peer, "MISSION_ITEM", fields["seq"], item, (item.x / 1e7, item.y / 1e7))
+            self._send_item(peer, "MISSION_ITEM", fields, item, (item.x / 1e7, item.y / 1e7))
+
+    def _points(self, kind: int) -> list[MissionItem]:
+        """Return the points of the fence, or the rally points."""
+        return self._vehicle.points.get(kind, [])
 
     def _requested(self, peer: Peer, fields: dict[str, Any]) -> MissionItem | None:
-        sequence, plan = fields["seq"], self._vehicle.mission
+        sequence: int = fields["seq"]
+        plan = self._vehicle.mission
         if fields["mission_type"] == MISSION:
             home = self._firmware.missions.home_item(self._vehicle)
             if sequence == 0 and home is not None:
                 return home
             if sequence < len(plan):
                 return plan[sequence]
+        points = self._points(fields["mission_type"])
+        if sequence < len(points):
+            return points[sequence]
         self.on_request_list(peer, fields)
         self._acknowledge(peer, INVALID_SEQUENCE, fields["mission_type"])
         return None
 
     def _send_item(
-        self, peer: Peer, name: str, sequence: int, item: MissionItem, place: tuple[float, float]
+        self, peer: Peer, name: str, asked: dict[str, Any], item: MissionItem, place: tuple[float, float]
     ) -> None:
-        x, y = place
+        sequence, kind, (x, y) = asked["seq"], asked["mission_type"], place
         peer.answer(
             name,
             seq=sequence,
             frame=item.frame,
             command=item.command,
-            current=int(sequence == self._vehicle.mission.current and sequence > 0),
+            current=int(kind == MISSION and sequence == self._vehicle.mission.current and sequence > 0),
             autocontinue=item.autocontinue,
             param1=item.param1,
             param2=item.param2,
@@ -389,7 +451,7 @@ class MissionService:
             x=x,
             y=y,
             z=item.z,
-            mission_type=MISSION,
+            mission_type=kind,
         )
 
     # -- the rest
@@ -402,8 +464,12 @@ class MissionService:
         if fields["mission_type"] in (MISSION, 255):
             self._drop_upload()
             self._vehicle.mission.clear()
+        for kind in (FENCE, RALLY):
+            if fields["mission_type"] in (kind, 255) and self._stores(kind):
+                self._clear(kind)
         self._acknowledge(peer, MISSION_ACCEPTED, fields["mission_type"])
-        self._firmware.missions.grew(self._vehicle, 0)
+        if fields["mission_type"] in (MISSION, 255):
+            self._firmware.missions.grew(self._vehicle, 0)
 
     def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_SET_CURRENT."""
