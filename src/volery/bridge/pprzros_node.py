@@ -63,7 +63,7 @@ class PprzrosNode:
         publisher = node.advertise(TO_ROS, TYPE)
         group = node.group()
         node.subscribe(FROM_ROS, TYPE, self._send, group=group)
-        helper = replace(context, deadline=None, on_release=None)
+        helper = replace(context, deadline=None, period=None, on_release=None)
         self._kernel.spawn(group.spin, f"{context.component} (datalink)", helper, scope)
         rate = node.rate(PERIOD)
         while not node.closed:

@@ -105,7 +105,7 @@ class VehicleNode:
     def _run(self, context: ExecutionContext, scope: Scope) -> None:
         options = self.options
         node = self._graph.node(options.names.node, self.namespace, context=context)
-        helper = replace(context, deadline=None, on_release=None)
+        helper = replace(context, deadline=None, period=None, on_release=None)
         interface = options.names.make_interface(
             InterfaceContext(
                 node,

@@ -38,6 +38,7 @@ class Allocation:
         frequency_mhz: Frequency of the processor, MHz.
         priority: Priority of an active component; None for a passive one, which has its caller's.
         deadline: Deadline of an activation, relative to its release, ns.
+        period: Time between its releases, ns.
         starts_at: Time at which ``run`` of an active component starts, ns.
     """
 
@@ -46,6 +47,7 @@ class Allocation:
     priority: int | None = None
     deadline: Ns | None = None
     starts_at: Ns = 0
+    period: Ns | None = None
 
     @property
     def is_active(self) -> bool:
@@ -100,6 +102,7 @@ class Instance:
             allocation.processor,
             allocation.priority,
             allocation.deadline,
+            allocation.period,
             meter=self._read_meter if read_steps else None,
             on_release=self._on_release if allocation.is_active and pricing is not FREE else None,
             instance=self,

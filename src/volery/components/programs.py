@@ -270,7 +270,9 @@ def start(
         if not made:
             instance.set_unavailable("its constructor has failed")
         elif active:
-            sleep(instance.kernel, instance.allocation.starts_at - instance.kernel.now())
+            with instance.kernel as kernel:
+                if instance.allocation.starts_at > kernel.now():
+                    sleep(kernel, instance.allocation.starts_at - kernel.now())
             instance.run_guarded(lambda: program.run(instance.object), RUN)
 
     return instance.kernel.spawn(body, instance.name, instance.context, scope)

@@ -42,6 +42,7 @@ class ExecutionContext:
         processor: Processor that executes it; None where computing takes no simulated time.
         priority: Scheduling priority, higher is more urgent; None inherits the caller's (passive component).
         deadline: Relative to the release of an activation, ns; None for none.
+        period: Time between releases that the model states, ns; None for none.
         meter: Returns the execution time on the target since its last call, ns; read at interaction points.
         on_release: Called with the task at each release of an activation; it may charge the activation.
     """
@@ -50,6 +51,7 @@ class ExecutionContext:
     processor: ComputeResource | None = None
     priority: int | None = 0
     deadline: Ns | None = None
+    period: Ns | None = None
     meter: Callable[[], Ns] | None = None
     on_release: Callable[[Task], None] | None = None
 
@@ -67,6 +69,8 @@ class Task:
         self.scope = scope
         self.pending_ns: Ns = 0
         self.released: Ns | None = None  # release time of the activation in progress
+        self.counted_from: Ns = 0  # the next release is due a period after this
+        self.readings: dict[object, Ns] = {}  # last reading of the clock in this activation, by its place
         self.done = False
         self.adopted = False  # the flow of a script: the kernel did not start it and cannot end it
         self.flow: Any = None
@@ -91,9 +95,16 @@ class Task:
         if error is not None:
             raise error
 
-    def release(self, due: Ns) -> None:
-        """Begin an activation that was due at `due`, ns; in the past for a task that is late."""
+    def release(self, due: Ns, counted_from: Ns | None = None) -> None:
+        """Begin an activation that was due at `due`, ns; in the past for a task that is late.
+
+        Args:
+            due: Its release, ns.
+            counted_from: Time from which the next release counts, ns; by default `due`.
+        """
         self.released = due
+        self.counted_from = due if counted_from is None else counted_from
+        self.readings.clear()
         hook = self.contexts[0].on_release
         if hook is not None:
             hook(self)

@@ -2,10 +2,14 @@
 
 Waits of component code end an activation when they block: ``sleep``, ``Rate.sleep``, ``Event.wait``,
 ``Queue.get`` and ``Signal.wait_for`` on request. Waits inside the framework, such as a ``Lock``'s, do not.
+
+A periodic loop that is late does not wait, and still ends an activation each time round: at a sleep of no
+length, or where it reads the clock and finds that there is nothing to sleep (``read_clock``).
 """
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,7 +25,9 @@ T = TypeVar("T")
 Predicate = Callable[[], object]
 
 MAX_PERIODS_LATE = 2
-"""A ``Rate`` that is later than this does not catch up but counts anew, as rospy's does."""
+"""A loop that is later than this does not catch up but counts anew, as rospy's ``Rate`` does."""
+
+_FRAMEWORK = __name__.partition(".")[0] + "."
 
 
 def current_task(kernel: Kernel) -> Task:
@@ -39,6 +45,60 @@ def end_activation(kernel: Kernel, task: Task | None = None) -> None:
         kernel.record(activation)
 
 
+def next_release(counted_from: Ns, period: Ns, now: Ns) -> tuple[Ns, Ns]:
+    """Return when the next release is or was due, and the time from which the one after it counts, ns."""
+    due = counted_from + period
+    return due, now if now - due > MAX_PERIODS_LATE * period else due
+
+
+def read_clock(kernel: Kernel) -> Ns:
+    """Return the time for component code, ns. An interaction point.
+
+    A loop that times itself reads the clock once a cycle to find out how long to sleep, and does not sleep when
+    it is late. So when a task with a period or a deadline reads the clock twice at one place without having
+    waited, and was late at the first reading, then its activation ended at the first reading and the next one
+    began, which was due a period after its predecessor.
+    """
+    with kernel:
+        now, task = kernel.now(), kernel.current()
+        if task is not None and task.released is not None and _period_of(task) is not None:
+            place = _place_of_caller()
+            earlier = task.readings.get(place)
+            if earlier is not None:
+                _end_if_late(kernel, task, earlier)
+            task.readings[place] = now
+        return now
+
+
+def _period_of(task: Task) -> Ns | None:
+    """Return the time after which a task is late, ns; None for one without, and within a call of a port."""
+    own = task.contexts[0]
+    return (own.period or own.deadline) if len(task.contexts) == 1 else None
+
+
+def _end_if_late(kernel: Kernel, task: Task, ended: Ns) -> None:
+    """End the activation in progress at `ended`, ns, and begin the next one, if that was due by then."""
+    period = _period_of(task)
+    if task.released is None or period is None or ended < task.counted_from + period:
+        return
+    due, counted_from = next_release(task.counted_from, period, ended)
+    if task.contexts[0].period is None:  # no release was due: the loop has just come round
+        due = counted_from = ended
+    activation = task.finish(ended)
+    if activation is not None:
+        kernel.record(activation)
+    task.release(due, counted_from)
+
+
+def _place_of_caller() -> object:
+    """Return where component code has called the framework: its innermost frame; in C++ the kind of call."""
+    caller = frame = sys._getframe(2)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(_FRAMEWORK):
+        frame = frame.f_back
+    found = caller if frame.f_back is None else frame
+    return id(found.f_code), found.f_lasti
+
+
 def sleep(kernel: Kernel, duration: Ns) -> None:
     """Block the current task for `duration` ns, counted from when its computing so far has been served."""
     with kernel:
@@ -53,13 +113,18 @@ def sleep_within(kernel: Kernel, duration: Ns) -> None:
         end_activation(kernel, task)
         kernel.sleep_until(due)
         task.release(due)
+        return
+    late = kernel.current()
+    if late is not None:
+        _end_if_late(kernel, late, kernel.now())
 
 
 class Rate:
     """Sleeps until the next multiple of `period` ns, counted from its creation.
 
     A late loop catches up: ``sleep`` returns at once, and the next activation was released when it was due.
-    One that is more than two periods late counts anew from now, as rospy's Rate does.
+    One that is more than two periods late counts anew from now, as rospy's Rate does: the next activation was
+    still released a period after its predecessor, the one after it a period from now.
     """
 
     def __init__(self, kernel: Kernel, period: Ns) -> None:
@@ -67,20 +132,21 @@ class Rate:
             raise UsageError(f"a period of {period} ns; it must be above 0")
         self._kernel, self.period = kernel, period
         with kernel:
-            self._last = kernel.now()
+            self._counted_from = kernel.now()
+
+    @property
+    def due(self) -> Ns:
+        """Time of the next release, ns."""
+        return self._counted_from + self.period
 
     def sleep(self) -> None:
         """End the activation; block the current task until the next one is due."""
         with self._kernel as kernel:
             task = current_task(kernel)
             end_activation(kernel, task)
-            now = kernel.now()
-            due = self._last + self.period
-            if now - due > MAX_PERIODS_LATE * self.period:
-                due = now
-            self._last = due
+            due, self._counted_from = next_release(self._counted_from, self.period, kernel.now())
             kernel.sleep_until(due)
-            task.release(due)
+            task.release(due, self._counted_from)
 
 
 class Signal:

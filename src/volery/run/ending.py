@@ -105,7 +105,7 @@ class Ending:
                 self._kernel.cancel(scope, self.reason)
 
         self._kernel.spawn(
-            body, f"{who} (at the end)", replace(context, deadline=None, on_release=None), scope
+            body, f"{who} (at the end)", replace(context, deadline=None, period=None, on_release=None), scope
         )
         self._kernel.call_at(self._kernel.now() + FAREWELL_WITHIN, cancel)
 

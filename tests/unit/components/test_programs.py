@@ -402,3 +402,33 @@ def test_failed_imports_state_the_reason(desk, line, words):
     path = desk.write("user.py", f"{line}\nclass User: pass\n")
     with pytest.raises(ComponentError, match=words):
         desk.start(path, "User")
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["on time", "late for ever"])
+def test_a_component_that_sleeps_only_when_there_is_time_left_misses_each_cycle(desk, late):
+    path = desk.write(
+        "hold.py",
+        """
+        import volery
+
+        class Hold:
+            def __init__(self, work):
+                self.work = work
+
+            def run(self):
+                due = volery.now()
+                for _ in range(10):
+                    volery.add_time(self.work)
+                    due += 0.05
+                    rest = due - volery.now()
+                    if rest > 0:
+                        volery.sleep(rest)
+        """,
+    )
+    seat = Allocation(desk.processor, 600.0, 1, deadline=50 * MS, period=50 * MS)
+    desk.start(path, "Hold", seat=seat, work=0.146 if late else 0.020)
+    desk.kernel.run(5 * S)
+    found = desk.of(Activation)
+    assert len([one for one in found if one.finished > one.deadline]) == (10 if late else 0)
+    responses = sorted((one.finished - one.released) / MS for one in found)
+    assert responses[-10:] == ([146.0, *[242.0] * 5, *[338.0] * 4] if late else [20.0] * 10)

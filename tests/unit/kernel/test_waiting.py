@@ -14,7 +14,7 @@ from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.waiting import Event, Lock, Queue, Rate, Signal, executing_in, sleep
+from volery.kernel.waiting import Event, Lock, Queue, Rate, Signal, executing_in, read_clock, sleep
 from volery.trace.events import NONE, Activation
 from volery.trace.events import Event as Recorded
 
@@ -319,9 +319,95 @@ def test_a_rate_that_is_more_than_two_periods_late_starts_anew(
     assert [(released, finished) for released, finished, *_ in activations()] == [
         (0, 300),  # due at 100, late by exactly two periods: catches up
         (100, 650),  # due at 200, late by 450: starts anew from 650
-        (650, 660),
+        (200, 660),
         (750, 750),
     ]
+
+
+# -- loops of component code that time themselves
+
+
+def self_timed(
+    virtual: VirtualKernel, costs: list[int], rest: Callable[[int], None], period: int = 50 * MS
+) -> Callable[[], None]:
+    """Return a loop that computes `costs`, ms, and calls `rest` with the time that is left, ns, maybe < 0."""
+
+    def body() -> None:
+        due = read_clock(virtual)
+        for cost in costs:
+            read_clock(virtual)  # a second place, as for a stamp
+            virtual.consume(cost * MS)
+            due += period
+            rest(due - read_clock(virtual))
+
+    return body
+
+
+@pytest.mark.parametrize("style", ["if", "max"])
+@pytest.mark.parametrize(
+    ("costs", "spans"),
+    [
+        ([10, 20, 30], [(0, 10), (50, 70), (100, 130), (150, 150)]),
+        ([10, 80, 10, 10], [(0, 10), (50, 130), (100, 140), (150, 160), (200, 200)]),
+        ([10, *[146] * 4], [(0, 10), (50, 196), (100, 342), (150, 488), (392, 634)]),
+        ([146] * 4, [(0, 146), (50, 292), (100, 438), (342, 584)]),
+    ],
+    ids=["on time", "late once", "late for ever", "late from the start"],
+)
+def test_a_loop_that_is_too_late_to_sleep_ends_an_activation_each_time_round(
+    virtual: VirtualKernel,
+    core: Processor,
+    activations: Activations,
+    style: str,
+    costs: list[int],
+    spans: list[tuple[int, int]],
+) -> None:
+    def rest(left: int) -> None:
+        if style == "max":
+            sleep(virtual, max(0, left))
+        elif left > 0:
+            sleep(virtual, left)
+
+    place = ExecutionContext("loop", core, deadline=50 * MS, period=50 * MS)
+    virtual.spawn(self_timed(virtual, costs, rest), "loop", place)
+    virtual.run(10 * S)
+    found = [(released, finished) for released, finished, *_ in activations()]
+    assert found[: len(spans)] == spans
+    assert len(found) - len(spans) <= (style == "max")  # what follows the last sleep of no length
+
+
+def test_a_long_wait_within_an_activation_is_one_activation(
+    virtual: VirtualKernel, activations: Activations
+) -> None:
+    def body() -> None:
+        for _ in range(2):
+            read_clock(virtual)
+            for _ in range(100):
+                virtual.sleep_until(virtual.now() + 10 * MS)  # as an operation of a vehicle waits
+            sleep(virtual, 50 * MS)
+
+    virtual.spawn(body, "mission", ExecutionContext("mission", period=50 * MS, deadline=50 * MS))
+    virtual.run(10 * S)
+    spans = [(released, finished) for released, finished, *_ in activations()]
+    assert spans == [(0, 1000), (1050, 2050), (2100, 2100)]
+
+
+def test_a_loop_with_a_deadline_only_is_late_by_its_deadline(
+    virtual: VirtualKernel, core: Processor, activations: Activations
+) -> None:
+    body = self_timed(virtual, [80, 80, 80], lambda left: sleep(virtual, left) if left > 0 else None)
+    virtual.spawn(body, "loop", ExecutionContext("loop", core, deadline=50 * MS))
+    virtual.run(10 * S)
+    spans = [(released, finished) for released, finished, *_ in activations()]
+    assert spans == [(0, 80), (80, 160), (160, 240)]
+
+
+def test_reading_the_clock_without_a_period_or_a_deadline_ends_nothing(
+    virtual: VirtualKernel, core: Processor, activations: Activations
+) -> None:
+    virtual.spawn(self_timed(virtual, [80, 80], lambda left: None), "loop", ExecutionContext("loop", core))
+    virtual.run(10 * S)
+    assert [(released, finished) for released, finished, *_ in activations()] == [(0, 160)]
 
 
 def test_a_rate_always_ends_the_activation(virtual: VirtualKernel, activations: Activations) -> None:

@@ -52,12 +52,10 @@ def _service_handlers(kernel: Kernel) -> dict[str, RequestHandler]:
         return Writer().real(component_api.now()).done()
 
     def monotonic(fiber: CppFiber, arguments: Reader) -> bytes:
-        with kernel:
-            return Writer().integer(kernel.now()).done()
+        return Writer().integer(waiting.read_clock(kernel)).done()
 
     def time_of_day(fiber: CppFiber, arguments: Reader) -> bytes:
-        with kernel:
-            return Writer().integer(EPOCH + kernel.now()).done()
+        return Writer().integer(EPOCH + waiting.read_clock(kernel)).done()
 
     def sleep(fiber: CppFiber, arguments: Reader) -> bytes:
         component_api.sleep(arguments.real())

@@ -137,20 +137,17 @@ class NodeRate:
     def __init__(self, node: NodeContext, period: Ns) -> None:
         self._node = node
         self._rate = Rate(node.kernel, period)
-        self._last = node.kernel.now()
 
     def remaining(self) -> Ns:
         """Return the time until the next release, ns; 0 for a loop that is late."""
         with self._node.kernel as kernel:
-            return max(0, self._last + self._rate.period - kernel.now())
+            return max(0, self._rate.due - kernel.now())
 
     def sleep(self) -> None:
         """Block until the next release."""
-        with self._node.kernel as kernel:
+        with self._node.kernel:
             self._node.consume("sleep", self.remaining() / US)
             self._rate.sleep()
-            released = current_task(kernel).released
-            self._last = kernel.now() if released is None else released
 
 
 class NodeTimer:

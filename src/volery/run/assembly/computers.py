@@ -169,15 +169,16 @@ class Platform:
     # -- for components
 
     def allocation(self, instance: Instance) -> Allocation:
-        """Return the processor, priority, deadline and start of an instance."""
+        """Return the processor, priority, deadline, start and period of an instance."""
         activity = instance.activity
         priority = activity.priority if activity else None
         deadline = activity.deadline_ns if activity else None
         start = activity.start_ns if activity else 0
+        period = activity.period_ns if activity else None
         if instance.processor is None:
-            return Allocation(priority=priority, deadline=deadline, starts_at=start)
+            return Allocation(priority=priority, deadline=deadline, starts_at=start, period=period)
         frequency = self._models[instance.processor].frequency_mhz
-        return Allocation(self.processors[instance.processor], frequency, priority, deadline, start)
+        return Allocation(self.processors[instance.processor], frequency, priority, deadline, start, period)
 
     def pricing(self, instance: Instance) -> Pricing:
         """Return the pricing of an instance's own computing at the fidelity of the run."""

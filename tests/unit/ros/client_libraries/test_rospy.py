@@ -1,9 +1,12 @@
+import textwrap
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
+from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.ros.client_libraries.rospy import Launch
 from volery.trace.events import Activation, Call, Failure, Text
@@ -412,3 +415,53 @@ def main():
     deadlines = {(event.released, event.deadline) for event in stage.of(Activation)}
     assert (0, 100 * MS) in deadlines
     assert (100 * MS, -1) in deadlines
+
+
+LATE_LOOPS = {
+    "rospy.Rate": """
+        import rospy
+        rospy.init_node("n")
+        rate = rospy.Rate(20)
+        for _ in range(4):
+            out(146)
+            rate.sleep()
+        """,
+    "rospy clock": """
+        import rospy
+        rospy.init_node("n")
+        due = rospy.get_time()
+        for _ in range(4):
+            out(146)
+            due += 0.05
+            if due > rospy.get_time():
+                rospy.sleep(due - rospy.get_time())
+        """,
+    "rclpy.Rate": """
+        import rclpy
+        rclpy.init()
+        rate = rclpy.create_node("n").create_rate(20)
+        for _ in range(4):
+            out(146)
+            rate.sleep()
+        """,
+    "rclpy timer": """
+        import rclpy
+        rclpy.init()
+        node = rclpy.create_node("n")
+        node.create_timer(0.05, lambda: out(146))
+        rclpy.spin(node)
+        """,
+}
+
+
+@pytest.mark.parametrize("loop", LATE_LOOPS)
+def test_each_release_of_a_loop_that_is_always_late_counts_and_is_missed(stage, loop):
+    stage.out = SimpleNamespace(append=lambda ms: stage.kernel.consume(ms * MS))
+    core = Processor(stage.kernel, "core")
+    context = ExecutionContext("n", core, deadline=50 * MS, period=50 * MS)
+    stage.kernel.spawn(lambda: stage.load(textwrap.dedent(LATE_LOOPS[loop])), "n", context)
+    stage.kernel.run(650 * MS)
+    late = [one for one in stage.events if isinstance(one, Activation) and one.finished > one.deadline]
+    first = 50 if "timer" in loop else 0  # a timer fires for the first time after a period
+    assert [one.finished // MS - first for one in late[:4]] == [146, 292, 438, 584]
+    assert [(one.finished - one.released) // MS for one in late[:2]] == [146, 242]

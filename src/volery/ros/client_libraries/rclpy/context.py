@@ -9,7 +9,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.kernel.waiting import Signal, current_task
+from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, ignore_end
 from volery.ros.client_libraries.rclpy.exceptions import NameValidationException, NotInitializedException
 from volery.ros.graph import Node, RosGraph
@@ -119,7 +119,7 @@ class Context:
 
     def spawn(self, body: Callable[[], None], label: str) -> None:
         """Run *body* in a helper task of this component."""
-        context = replace(self.task.context, deadline=None, on_release=None)
+        context = replace(self.task.context, deadline=None, period=None, on_release=None)
         self.kernel.spawn(body, f"{self._component} ({label})", context, self.task.scope)
 
     def log(self, severity: int, text: str) -> None:
@@ -148,5 +148,4 @@ class Contexts(LaunchedComponents):
 
     def now(self) -> Ns:
         """Return ROS time. An interaction point."""
-        with self.kernel as kernel:
-            return self.graph.epoch + kernel.now()
+        return self.graph.epoch + read_clock(self.kernel)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.task import Task
-from volery.kernel.waiting import Signal, current_task
+from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.abi_codec import CppFiber
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph, ServiceError
@@ -85,8 +85,7 @@ class Session:
 
     def now(self) -> Ns:
         """Return ROS time, also before ``ros::init``. An interaction point."""
-        with self.kernel as kernel:
-            return self.graph.epoch + kernel.now()
+        return self.graph.epoch + read_clock(self.kernel)
 
     # -- entities that the code refers to
 

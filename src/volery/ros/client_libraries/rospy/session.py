@@ -11,7 +11,7 @@ from volery.base.errors import VoleryError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
-from volery.kernel.waiting import Signal, current_task
+from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.trace.events import Failure, Text
@@ -132,7 +132,7 @@ class Session:
         return self.node.group(start)
 
     def _spawn(self, body: Callable[[], None], label: str) -> None:
-        context = replace(self.node.context, deadline=None, on_release=None)
+        context = replace(self.node.context, deadline=None, period=None, on_release=None)
         self.kernel.spawn(body, f"{context.component} ({label})", context, self.scope)
 
     def _guarded(self, run: Callable[[], object], what: str) -> None:
@@ -209,4 +209,6 @@ class Sessions(LaunchedComponents):
 
     def now(self) -> Ns:
         """Return ROS time. An interaction point."""
-        return self.initialised().node.now()
+        node = self.initialised().node
+        read_clock(self.kernel)
+        return node.now()
