@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from volery.base.errors import NotArrived as NotArrived
     from volery.base.errors import OutOfBounds as OutOfBounds
     from volery.base.errors import Overridden as Overridden
+    from volery.base.errors import PositionLost as PositionLost
     from volery.base.errors import Refused as Refused
     from volery.base.errors import UsageError as UsageError
     from volery.base.errors import VehicleError as VehicleError

@@ -117,6 +117,10 @@ class OutOfBounds(VehicleError):
     """
 
 
+class PositionLost(VehicleError):
+    """The vehicle has lost its position in the air: no satellites, or no estimate is reported any more."""
+
+
 class LowBattery(VehicleError):
     """The battery is below its reserve: only landing and returning home may be started."""
 

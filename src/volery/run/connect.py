@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TypeVar
 
 from volery.base.errors import UsageError, VoleryError
@@ -50,11 +50,8 @@ def connect(
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
         vehicle.wait_connected()
-        try:
+        with _ending(vehicle.come_to_rest):
             yield vehicle
-        finally:
-            with suppress(VoleryError):
-                vehicle.come_to_rest()
 
 
 @contextmanager
@@ -94,11 +91,25 @@ def connect_fleet(
     with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
-        try:
+        with _ending(lambda: fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest")):
             yield fleet
-        finally:
-            with suppress(VoleryError):
-                fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest")
+
+
+@contextmanager
+def _ending(come_to_rest: Callable[[], object]) -> Iterator[None]:
+    """Bring vehicles to rest at the end of the context.
+
+    If that fails they may still fly, so the error is raised, or added as a note to the one under way.
+    """
+    try:
+        yield
+    except BaseException as failure:
+        try:
+            come_to_rest()
+        except VoleryError as error:
+            failure.add_note(f"at the end of the program: {error}")
+        raise
+    come_to_rest()
 
 
 @contextmanager

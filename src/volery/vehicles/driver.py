@@ -71,6 +71,7 @@ class Step:
         leads_to: modes that the autopilot may enter by itself meanwhile.
         armed: whether it must stay armed.
         lost: returns how another station has changed the target, where the mode does not show it; else empty.
+        fails: returns why the step can no longer be done, which ends it at once; else empty.
         keep: repeated until the step ends.
         advice: remedy if the step is refused or late.
     """
@@ -87,6 +88,7 @@ class Step:
     leads_to: tuple[str, ...] = ()
     armed: bool = False
     lost: Callable[[], str] = _never
+    fails: Callable[[], str] = _never
     keep: Repeat | None = None
     advice: str = ""
 
@@ -214,6 +216,7 @@ class DriverFactory:
         on_graph: opener on a node of a graph; ``None`` if not supported.
         namespace: default namespace of its topics; ``{name}`` is replaced by the vehicle's name.
         graph_names: whose topic names it uses.
+        home_option: option that states the altitude of home, m AMSL, for an autopilot that does not know it.
     """
 
     on_link: Opener | None = None
@@ -221,6 +224,13 @@ class DriverFactory:
     on_graph: Opener | None = None
     namespace: str = "/{name}"
     graph_names: str = "mavros"
+    home_option: str = ""
+
+    def home_options(self, home: Position | None) -> dict[str, str]:
+        """Return the options that state *home* (AMSL) to this driver; none where it needs none."""
+        if home is None or not self.home_option:
+            return {}
+        return {self.home_option: f"{home.altitude.metres:g}"}
 
 
 def link_error(link: Link, wrong: str) -> LinkError:

@@ -6,8 +6,8 @@ from math import isfinite, nan
 
 from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
-from volery.base.position import AMSL, AboveHome, Position
-from volery.base.time import Ns, from_seconds
+from volery.base.position import AboveHome, Position
+from volery.base.time import Ns, S, from_seconds
 from volery.vehicles.driver import Capability, ManualControl
 from volery.vehicles.executor import RESTARTS
 from volery.vehicles.limits import height_violation
@@ -16,6 +16,8 @@ from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
 
 VELOCITY_LASTS_S = 3.0
+SAFE_ACTION_WITHIN: Ns = 10 * S
+"""Time for which an autopilot in a failsafe may hold before it lands or returns: 5 s by default in PX4."""
 RETURN_CLIMB = 30.0
 """Climb before a return, m, that a time-out allows for; ArduPilot's RTL_ALT is 15 m."""
 
@@ -106,8 +108,7 @@ class Drone(Vehicle):
         if speed is not None:
             self._check_speed(asked, speed)
         self._check_flying(asked)
-        if not isinstance(goal.altitude, AMSL | AboveHome):
-            self._check_altitude(goal)
+        self._check_altitude(goal)
         path = self._check_path(asked, self.position, goal)
         within = path_timeout(path, speed)
         self._operate(
@@ -172,7 +173,13 @@ class Drone(Vehicle):
         if not (isfinite(lasting) and lasting > 0):
             raise UsageError(f"{self.name}: {asked}, lasting {lasting:g} s; give seconds above 0")
         self._check_flying(asked)
-        self._check_path(asked, self.position, self._position_after(velocity, lasting))
+        try:
+            self._check_path(asked, self.position, self._position_after(velocity, lasting))
+        except OutOfBounds as error:
+            if self._monitor is None:
+                raise
+            # the velocity set before would go on over the bound
+            raise OutOfBounds(self.name, asked, f"{error.what}; {self._hold_back()}") from None
         self._operate(
             "set_velocity",
             asked,
@@ -212,11 +219,15 @@ class Drone(Vehicle):
             at: intended touch-down point, against which the record measures the landing; the descent is
                 vertical in any case.
         """
+        self._land("land", at)
+
+    def _land(self, operation: str, at: Position | None = None) -> None:
+        """Land as *operation*: what a program asked for and its end are recorded under different names."""
         self._require(Capability.LAND)
         here = at or self._driver.telemetry.position
         within = self._landing_timeout(0.0)
         self._operate(
-            "land",
+            operation,
             "land",
             lambda: self._driver.land(within),
             policy=TO_SAFETY,
@@ -276,8 +287,15 @@ class Drone(Vehicle):
         if telemetry.last_message_ns < 0:
             return "never sent a message"
         self._wait_for_link()
-        if telemetry.flying and self._executor.is_ours():
-            self.land()  # manual control is repeated until the autopilot lands; otherwise it would fall
+        if self._acts_by_itself():
+            with self.kernel:
+                self._driver.stop()
+            return self._watch_landing()
+        if telemetry.flying and (
+            self._executor.is_ours() or telemetry.stream_lost or telemetry.failsafe_lasts
+        ):
+            # manual control is repeated until the autopilot lands; otherwise it would fall
+            self._land("come_to_rest")
             return "landed"
         with self.kernel:
             self._driver.stop()
@@ -287,6 +305,24 @@ class Drone(Vehicle):
             self.disarm()
             return "was disarmed on the ground"
         return "is disarmed"
+
+    def _acts_by_itself(self) -> bool:
+        """Return whether a failsafe of the autopilot lands or returns the drone; it may hold first.
+
+        A landing by this program would overrule it: it would come down where it is instead of at home.
+        """
+        telemetry = self._driver.telemetry
+        if (
+            not telemetry.flying
+            or not telemetry.failsafe
+            or telemetry.stream_lost
+            or telemetry.failsafe_lasts
+        ):
+            return False
+        landing_modes = self._driver.landing_modes
+        return telemetry.mode in landing_modes or self._executor.wait(
+            lambda: telemetry.mode in landing_modes, SAFE_ACTION_WITHIN
+        )
 
     def _watch_landing(self) -> str:
         telemetry, mode = self._driver.telemetry, self._driver.telemetry.mode

@@ -7,7 +7,7 @@ therefore taken as the choice of a pilot, another station or a failsafe, and is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from volery.base.errors import (
     Failsafe,
@@ -25,6 +25,8 @@ from volery.vehicles.telemetry import Telemetry
 
 RESTARTS = 3
 """How often a sequence that is undone before lift-off is started again."""
+RECENT_CAUSE: Ns = 5 * S
+"""Age up to which a text of the autopilot tells why it has changed its mode."""
 REASON_WAIT: Ns = 500 * MS
 """Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0
@@ -57,6 +59,7 @@ class StepExecutor:
         self._previous = ""  # mode commanded before, until the one commanded last is seen
         self._claim = 0  # counts aborts; steps begun under an earlier claim end
         self._successor = ""  # what aborted the steps in progress
+        self._taking_back = False  # from a failsafe that a stream of this program has caused
 
     def execute(
         self,
@@ -139,15 +142,57 @@ class StepExecutor:
     def check_ours(self, asked: str) -> None:
         """Raise ``Overridden`` or ``Failsafe`` if it flies in a mode not commanded by this program."""
         telemetry = self._driver.telemetry
-        if not telemetry.flying or self.is_ours():
+        if not telemetry.flying:
+            telemetry.stream_lost = ""
+            return
+        if telemetry.stream_lost:
+            self.release_control()
+            raise Failsafe(
+                self._driver.name,
+                asked,
+                f"{telemetry.stream_lost}: the autopilot is in {telemetry.mode} (status {telemetry.status})"
+                f"{self.last_text()}; resume() takes the vehicle back, land() lands it",
+            )
+        if self.is_ours():
             return
         self.release_control()
-        kind = Failsafe if telemetry.failsafe else Overridden
-        raise kind(
+        cause = failsafe_cause(telemetry, self._kernel.now())
+        raise (Failsafe if cause else Overridden)(
             self._driver.name,
             asked,
             f"is in {telemetry.mode} (status {telemetry.status}), which this program did not command"
-            f"{self.last_text()}; to hand it over, switch the vehicle to {self._driver.offboard_mode}",
+            f"{_because(cause)}{self.last_text()}; "
+            f"to hand it over, switch the vehicle to {self._driver.offboard_mode}",
+        )
+
+    def take_back(self) -> bool:
+        """Take the vehicle back from a failsafe that an order of safety may end; False if there is none.
+
+        A stream of this program has caused it, or it does not end on the ground by itself.
+        """
+        telemetry = self._driver.telemetry
+        if not (telemetry.stream_lost or telemetry.failsafe_lasts) or not telemetry.flying:
+            return False
+        telemetry.stream_lost = ""
+        self.set_commanded(telemetry.mode)
+        self._taking_back = True
+        return True
+
+    def check_link(self, asked: str) -> None:
+        """Raise ``LinkLost`` if the link has timed out: what is sent then may be obeyed much later."""
+        telemetry = self._driver.telemetry
+        if telemetry.detects_silence and telemetry.last_message_ns >= 0 and self.link_lost():
+            raise self.link_lost_error(asked)
+
+    def link_lost_error(self, asked: str) -> LinkLost:
+        """Return the error for a lost link."""
+        telemetry = self._driver.telemetry
+        ago = telemetry.silence(self._kernel.now())
+        problem = self._driver.problem()
+        why = f"; {problem}" if problem is not None else ""
+        return LinkLost(
+            f"{telemetry.name}: {asked}: no message was received for {ago:.1f} s{why}; "
+            f"last: {describe_state(telemetry)}, at {to_seconds(telemetry.last_message_ns):.1f} s"
         )
 
     # -- telemetry and link
@@ -205,7 +250,8 @@ class _StepRun:
         if step.enters:
             in_failsafe = telemetry.flying and telemetry.failsafe and mode != step.enters
             # the offboard mode is never commanded over a failsafe, not even over one that interrupted us
-            if in_failsafe and step.enters == self._driver.offboard_mode:
+            taking_back, self._executor._taking_back = self._executor._taking_back, False
+            if in_failsafe and step.enters == self._driver.offboard_mode and not taking_back:
                 raise self._control_lost(f"is in a failsafe, in {mode}")
             self._executor.set_commanded(step.enters)
         telemetry.answers.pop(step.answer, None)
@@ -268,8 +314,15 @@ class _StepRun:
             return True
         self._detect_takeover()
         if not self._taken:
-            self._stopped = self._stopped or self._check(self._asked, self._kernel.now())
+            self._stopped = self._stopped or self._check(self._asked, self._kernel.now()) or self._failed()
         return bool(self._taken) or self._stopped is not None
+
+    def _failed(self) -> NotArrived | None:
+        """Return the error of a step that can no longer be done."""
+        why = self._step.fails()
+        if not why:
+            return None
+        return NotArrived(self._driver.name, self._asked, f"{why}; {describe_state(self._telemetry)}")
 
     def _is_refused(self) -> bool:
         answer = self._telemetry.answers.get(self._step.answer)
@@ -292,7 +345,7 @@ class _StepRun:
         now = self._kernel.now()
         patience = self._telemetry.last_message_ns + self._executor._link_timeout - now
         if patience <= 0:
-            raise self._link_lost()
+            raise self._executor.link_lost_error(self._asked)
         left = self._began + self._step.within - now
         if left <= 0:
             raise self._refused() if self._is_refused() else self._not_arrived()
@@ -333,10 +386,11 @@ class _StepRun:
 
     def _control_lost(self, what: str) -> Overridden:
         telemetry = self._telemetry
-        kind = Failsafe if telemetry.failsafe else Overridden
-        text = self._executor.last_text()
+        cause = failsafe_cause(telemetry, self._kernel.now())
+        kind = Failsafe if cause else Overridden
+        why = f"{_because(cause)}{self._executor.last_text()}"
         back = f"; to hand it back, switch the vehicle to {self._driver.offboard_mode}"
-        return kind(self._driver.name, self._asked, f"{what} (status {telemetry.status}){text}{back}")
+        return kind(self._driver.name, self._asked, f"{what} (status {telemetry.status}){why}{back}")
 
     def _not_arrived(self) -> NotArrived:
         telemetry, step = self._telemetry, self._step
@@ -344,19 +398,9 @@ class _StepRun:
         said = f"; the autopilot said {'; '.join(dict.fromkeys(texts[-3:]))!r}" if texts else ""
         unanswered = step.answer and step.answer not in telemetry.answers
         within = to_seconds(step.within)
-        what = f"to {step.ask} was not seen within {within:g} s; {_state(telemetry)}"
+        what = f"to {step.ask} was not seen within {within:g} s; {describe_state(telemetry)}"
         what += "; the autopilot never answered" if unanswered else ""
         return NotArrived(self._driver.name, self._asked, f"{what}{said}{self._advice()}")
-
-    def _link_lost(self) -> LinkLost:
-        telemetry = self._telemetry
-        ago = telemetry.silence(self._kernel.now())
-        problem = self._driver.problem()
-        why = f"; {problem}" if problem is not None else ""
-        return LinkLost(
-            f"{telemetry.name}: {self._asked}: no message was received for {ago:.1f} s{why}; "
-            f"last: {_state(telemetry)}, at {to_seconds(telemetry.last_message_ns):.1f} s"
-        )
 
     def _advice(self) -> str:
         return f"; {self._step.advice}" if self._step.advice else ""
@@ -376,7 +420,52 @@ def _repeat(kernel: Kernel, period: Ns, action: Action) -> Handle:
     return kernel.every(period, tick)
 
 
-def _state(telemetry: Telemetry) -> str:
+_CAUSES: Mapping[str, tuple[str, ...]] = {
+    "battery": ("battery",),
+    "fence": ("fence",),
+    "position: GPS or estimator": ("gps", "ekf", "position", "navigation", "estimator", "vibration"),
+    "link to the ground station": ("gcs", "data link", "datalink", "ground control"),
+    "manual control": ("radio", "rc failsafe", "manual control", "rc signal"),
+    "thrust": ("thrust", "motor", "crash", "attitude"),
+    "terrain": ("terrain",),
+}
+"""Words in an autopilot's texts that tell the cause of a failsafe."""
+_LOW_SHARE = 0.15
+
+
+def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
+    """Return why a failsafe of the autopilot acts, in words; empty if none does.
+
+    An autopilot may act by itself without reporting the status of a failsafe: ArduPilot at its fence. Then
+    its text tells.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+        now: the present time, ns.
+    """
+    said = [text.text.lower() for text in telemetry.texts if now - text.at <= RECENT_CAUSE]
+    acts = [text for text in said if "failsafe" in text or "breach" in text]
+    if not telemetry.failsafe and not acts:
+        return ""
+    for text in (*reversed(acts), *reversed(said)):
+        for cause, words in _CAUSES.items():
+            if any(word in text for word in words):
+                return cause
+    if telemetry.stream_lost:
+        return "set-points of this program"
+    if telemetry.position_lost_for(now):
+        return "position: GPS or estimator"
+    if telemetry.battery.remaining <= _LOW_SHARE:
+        return "battery"
+    return "not stated by the autopilot"
+
+
+def _because(cause: str) -> str:
+    return f"; failsafe ({cause})" if cause else ""
+
+
+def describe_state(telemetry: Telemetry) -> str:
+    """Return position, mode and whether it is armed, as last reported."""
     armed = "armed" if telemetry.armed else "disarmed"
     where = f"at {telemetry.position}" if telemetry.position is not None else "position unknown"
     return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}"

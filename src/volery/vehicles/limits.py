@@ -16,11 +16,11 @@ from typing import NamedTuple
 from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
 
-from volery.base.errors import LowBattery, OutOfBounds, UsageError, VehicleError
+from volery.base.errors import LowBattery, OutOfBounds, PositionLost, UsageError, VehicleError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
-from volery.base.time import Ns, S
-from volery.vehicles.telemetry import Telemetry
+from volery.base.time import Ns, S, to_seconds
+from volery.vehicles.telemetry import UNFIXED, Telemetry
 
 Corner = tuple[float, float]
 """Latitude and longitude in degrees."""
@@ -33,6 +33,10 @@ multirotor when it stops.
 """
 LOW_BATTERY_FOR: Ns = 3 * S
 """The battery must be below the reserve for this time: the voltage sags while the motors draw current."""
+DEFAULT_RESERVE = 0.15
+"""Battery reserve where none is stated and the battery is measured: PX4's threshold for a low battery."""
+POSITION_LOST_FOR: Ns = 10 * S
+"""Autopilots with a failsafe for it act sooner: PX4 1.14 after 6.5 s, ArduCopter 4.5 after 8 s."""
 FLOOR = "floor"
 """Key of the floor's violation. Operations that end on the ground ignore it."""
 
@@ -48,21 +52,26 @@ class Limits:
         lowest: least height above home, m. The default leaves 2 m for the error of the estimate; state a
             lower value if a goal lies below home.
         battery_reserve: share of the battery, 0 to below 1, below which only landing, returning and holding
-            are allowed. 0 means no reserve.
+            are allowed. 0 means no reserve; ``None`` means 15 %, if the autopilot reports the battery at all.
     """
 
     farthest: float = 10_000.0
     highest: float = 120.0
     lowest: float = -2.0
-    battery_reserve: float = 0.0
+    battery_reserve: float | None = None
 
     def __post_init__(self) -> None:
         if not (self.farthest > 0 and self.highest > self.lowest):
             raise UsageError(f"{self} leaves no room to fly: farthest > 0 and highest > lowest")
-        if not 0.0 <= self.battery_reserve < 1.0:
+        if self.battery_reserve is not None and not 0.0 <= self.battery_reserve < 1.0:
             raise UsageError(
                 f"battery_reserve={self.battery_reserve:g}: give a share from 0 to below 1, as 0.2"
             )
+
+    @property
+    def reserve(self) -> float:
+        """The battery reserve, stated or by default."""
+        return DEFAULT_RESERVE if self.battery_reserve is None else self.battery_reserve
 
 
 @dataclass(frozen=True)
@@ -106,6 +115,12 @@ class Fence:
         if self.polygon:
             _check_corners("the fence", self.polygon)
         _check_heights("the fence", self.floor, self.ceiling)
+
+
+def states_amsl(fence: Fence) -> bool:
+    """Return whether a boundary of the fence or of a zone is an altitude AMSL."""
+    areas = (fence, *fence.no_fly)
+    return any(isinstance(height, AMSL) for area in areas for height in (area.floor, area.ceiling))
 
 
 def _check_corners(what: str, corners: Sequence[Corner]) -> None:
@@ -370,6 +385,7 @@ class BoundsMonitor:
         bounds: bounds about home, or ``None`` without a home.
         reserve: battery reserve, 0..1.
         ignored: names of bounds that are never checked.
+        needs_position: whether a lost position ends the operation.
     """
 
     def __init__(
@@ -378,8 +394,11 @@ class BoundsMonitor:
         bounds: Bounds | None,
         reserve: float,
         ignored: frozenset[str] = frozenset(),
+        *,
+        needs_position: bool = False,
     ) -> None:
         self._telemetry = telemetry
+        self._needs_position = needs_position
         self._bounds = bounds
         self._reserve = reserve
         self._ignored = ignored
@@ -397,7 +416,22 @@ class BoundsMonitor:
             operation: what the vehicle is doing, for the error message.
             now: the present time, ns.
         """
-        return self._check_bounds(operation) or self._check_battery(operation, now)
+        return (
+            self._check_bounds(operation)
+            or self._check_battery(operation, now)
+            or self._check_position(operation, now)
+        )
+
+    def _check_position(self, operation: str, now: Ns) -> PositionLost | None:
+        seen = self._telemetry
+        if not self._needs_position or not seen.flying or seen.stale:
+            return None
+        lost = seen.position_lost_for(now)
+        if lost < POSITION_LOST_FOR:
+            return None
+        why = f"its GPS reports {seen.fix}" if seen.fix in UNFIXED else "none is reported"
+        what = f"it has had no position for {to_seconds(lost):.0f} s ({why}); land() needs none"
+        return PositionLost(seen.name, operation, what)
 
     def _check_bounds(self, operation: str) -> OutOfBounds | None:
         here = self._telemetry.position

@@ -53,6 +53,19 @@ class Answer(NamedTuple):
 
 
 KEPT_TEXTS = 50
+STALE_AFTER: Ns = 2 * S
+"""Silence after which the state counts as old."""
+REFRESHED_AFTER: Ns = 2 * S
+"""Time after a silence in which messages that the link has held back may still arrive."""
+POSITION_STALE_AFTER: Ns = 3 * S
+PERIODS_MISSED = 3
+"""A position that is reported rarely counts as old after this many of its periods."""
+LONGEST_POSITION_AGE: Ns = 30 * S
+FIXED = frozenset(
+    {"3d_fix", "dgps", "rtk_float", "rtk_fixed", "static", "ppp", "3d", "rtk", "gps health 4", "gps health 5"}
+)
+UNFIXED = frozenset({"no_gps", "no_fix", "2d_fix", "2d", "na", "gps health 0", "gps health 1"})
+"""Terms of the drivers' protocols with a position by satellites, and without one."""
 
 
 class Telemetry:
@@ -60,24 +73,37 @@ class Telemetry:
 
     Attributes:
         changed: notified after each message.
-        last_message_ns: time of the last message of the autopilot itself; -1 before the first.
         kind: "drone", "rover", or the autopilot's own term for another kind.
         system: system id, where the protocol has one.
         failsafe: the autopilot is in a failsafe.
+        failsafe_lasts: this failsafe need not end on the ground: an order of safety may end it.
         flying: off the ground, as judged by the autopilot.
         armable: it could arm in the present mode.
         ready: it could arm now and go to a position.
-        position: position estimate with an AMSL altitude.
         target: where the autopilot reports that it goes; AMSL altitude.
         above_home: height above home, m.
+        amsl_known: altitudes AMSL are what they say; if not, only their differences to home's count.
+        amsl_remedy: what the user can do if they are not.
         mission_item: the mission item in progress.
         mission_reached: the mission item reached last.
         answers: last acknowledgement by key.
+        detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
+        stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
     """
 
     def __init__(self, kernel: Kernel, name: str) -> None:
         self.name = name
-        self.last_message_ns: Ns = -1
+        self._kernel = kernel
+        self._last_message_ns: Ns = -1
+        self._refreshed_ns: Ns = 0  # from then on the state is not older than it seems
+        self._position: Position | None = None
+        self._position_ns: Ns = -1
+        self._position_period: Ns = 0
+        self._fix = ""
+        self._had_fix = False
+        self._fix_lost_ns: Ns | None = None
+        self.detects_silence = True
+        self.stream_lost = ""
         self.kind = ""
         self.autopilot = ""
         self.system = 0
@@ -85,17 +111,18 @@ class Telemetry:
         self.status = ""
         self.armed = False
         self.failsafe = False
+        self.failsafe_lasts = False
         self.flying = False
         self.armable = False
         self.ready = False
-        self.position: Position | None = None
         self.target: Position | None = None
         self.above_home = nan
+        self.amsl_known = True
+        self.amsl_remedy = ""
         self.home: Position | None = None
         self.velocity = Velocity(nan, nan, nan)
         self.attitude = Attitude(nan, nan, nan)
         self.battery = Battery(nan, nan, nan)
-        self.fix = ""
         self.satellites = 0
         self.mission_item = -1
         self.mission_reached = -1
@@ -103,6 +130,74 @@ class Telemetry:
         self.texts: deque[StatusText] = deque(maxlen=KEPT_TEXTS)
         self.answers: dict[str, Answer] = {}
         self.changed = Signal(kernel, f"telemetry of {name}")
+
+    # -- age
+
+    @property
+    def last_message_ns(self) -> Ns:
+        """Time of the last message of the autopilot itself; -1 before the first."""
+        return self._last_message_ns
+
+    @last_message_ns.setter
+    def last_message_ns(self, now: Ns) -> None:
+        if self.detects_silence and 0 <= self._last_message_ns < now - STALE_AFTER:
+            self._refreshed_ns = now + REFRESHED_AFTER
+        self._last_message_ns = now
+
+    @property
+    def stale(self) -> bool:
+        """Whether the state may be old: the autopilot is silent, or was until a moment ago.
+
+        A link that stalls delivers late what it has held back, so the first messages after a silence may be
+        as old as the silence.
+        """
+        now = self._kernel.now()
+        silent = self.detects_silence and now - self._last_message_ns > STALE_AFTER
+        return self._last_message_ns < 0 or silent or now < self._refreshed_ns
+
+    @property
+    def position(self) -> Position | None:
+        """Position estimate with an AMSL altitude; ``None`` before the first."""
+        return self._position
+
+    @position.setter
+    def position(self, position: Position | None) -> None:
+        now = self._kernel.now()
+        if self._position is not None:
+            self._position_period = now - self._position_ns
+        self._position, self._position_ns = position, now
+
+    @property
+    def located(self) -> bool:
+        """Whether the position is known, not old, and not an estimate that goes on without satellites."""
+        return (
+            self._position is not None and not self.stale and self.position_lost_for(self._kernel.now()) == 0
+        )
+
+    def position_lost_for(self, now: Ns) -> Ns:
+        """Return for how long the position has not been reported, or estimated without satellites, ns.
+
+        It is 0 before the first position, and for a vehicle that never had satellites.
+        """
+        if self._position is None:
+            return 0
+        allowed = max(POSITION_STALE_AFTER, PERIODS_MISSED * self._position_period)
+        age = now - self._position_ns
+        lost = age if age > min(allowed, LONGEST_POSITION_AGE) else 0
+        return max(lost, now - self._fix_lost_ns if self._fix_lost_ns is not None else 0)
+
+    @property
+    def fix(self) -> str:
+        """Kind of satellite fix in the protocol's own term; empty before the first report."""
+        return self._fix
+
+    @fix.setter
+    def fix(self, fix: str) -> None:
+        self._fix = fix
+        if fix in FIXED:
+            self._had_fix, self._fix_lost_ns = True, None
+        elif fix in UNFIXED and self._had_fix and self._fix_lost_ns is None:
+            self._fix_lost_ns = self._kernel.now()
 
     def texts_since(self, when: Ns, severity: int = 6) -> list[str]:
         """Return texts received at or after *when*, at least as severe as *severity*, oldest first."""

@@ -8,6 +8,7 @@ operation runs at a time, only while no other station has control, within the bo
 |---|---|---|
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
+| the position is lost for 10 s in the air | ``PositionLost`` | is commanded to hold |
 | a pilot or another station changes mode or target | ``Overridden``, ``Failsafe`` | gets no more messages |
 | another task of this program holds, returns, lands or kills | ``Overridden`` | does that |
 | the link times out | ``LinkLost`` | does what its parameters state: ``on_link_loss`` |
@@ -29,6 +30,7 @@ from volery.base.errors import (
     LinkSilent,
     LowBattery,
     OutOfBounds,
+    PositionLost,
     Refused,
     UsageError,
     VehicleError,
@@ -40,8 +42,8 @@ from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext, Task
 from volery.trace.events import Operation, Text
 from volery.vehicles.driver import Capability, Driver, ManualControl, Step
-from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor
-from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery
+from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor, describe_state
+from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery, states_amsl
 from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint, item_problem
 from volery.vehicles.operation import (
     FLY_MISSION,
@@ -139,11 +141,13 @@ class Vehicle(ABC):
         self.limits = limits or Limits()
         self.fence = fence
         self._driver = driver
+        driver.telemetry.detects_silence = driver.cycle is None
         self._executor = StepExecutor(kernel, driver, link_timeout)
         self._truth = truth
         self._bounds: Bounds | None = None
         self._in_progress: tuple[Task | None, str] | None = None
         self._monitor: Handle | None = None  # monitors what goes on after a call has returned
+        self._straying: VehicleError | None = None  # the same, while the vehicle is being held for it
         self._bounds_error: VehicleError | None = None  # found by the monitor; raised by the next call
         self._link_loss_query: Handle | None = None
         self._manual_control_at: Ns | None = None
@@ -202,6 +206,15 @@ class Vehicle(ABC):
     def ready(self) -> bool:
         """Whether the vehicle could arm now and go to a position."""
         return self._poll().ready
+
+    @property
+    def stale(self) -> bool:
+        """Whether the state below may be old: position, mode and all else are those before a silence.
+
+        It is True from 2 s after the last message until 2 s after messages have returned, because a link that
+        stalls delivers late what it has held back.
+        """
+        return self._poll().stale
 
     @property
     def texts(self) -> list[StatusText]:
@@ -305,12 +318,22 @@ class Vehicle(ABC):
             raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
 
     def _wait_for_link(self) -> None:
-        """If the link is lost, give it time to return and telemetry time to become complete."""
-        if not self._executor.link_lost():
+        """If the link is or was lost, give it time to return and telemetry time to become fresh."""
+        telemetry = self._driver.telemetry
+        if not telemetry.stale and not self._executor.link_lost():
             return
-        if not self._executor.wait(lambda: not self._executor.link_lost(), from_seconds(LINK_RETURN_S)):
-            raise LinkLost(f"{self.name}: the link did not return; it is unknown whether it has come to rest")
-        self._executor.wait(lambda: False, from_seconds(REFRESHED_WITHIN_S))
+        if not self._executor.wait(
+            lambda: not (telemetry.stale or self._executor.link_lost()), from_seconds(LINK_RETURN_S)
+        ):
+            raise LinkLost(
+                f"{self.name}: the link did not return; it is unknown whether it has come to rest; last: "
+                f"{describe_state(telemetry)}{', FLYING' if telemetry.flying else ''}, {self._reaction()}"
+            )
+        if not telemetry.detects_silence:
+            self._executor.wait(lambda: False, from_seconds(REFRESHED_WITHIN_S))
+
+    def _reaction(self) -> str:
+        return self._driver.on_link_loss() or "its reaction to a lost link is not known"
 
     # -- operations common to all vehicles
 
@@ -354,6 +377,15 @@ class Vehicle(ABC):
         """
         self._require(Capability.HOLD)
         self._operate("hold", "hold", self._driver.hold, policy=TO_SAFETY)
+
+    def resume(self) -> None:
+        """Take the vehicle back after a failsafe that an interrupted stream of this program has caused.
+
+        The vehicle then holds its position. Raises ``Failsafe`` or ``Overridden`` for any other failsafe, or
+        if another station has control.
+        """
+        self._require(Capability.HOLD)
+        self._operate("resume", "take the vehicle back", self._driver.hold, policy=TO_SAFETY)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
         """Replace the mission on board. Each leg is checked against limits and fence as a straight path."""
@@ -416,6 +448,9 @@ class Vehicle(ABC):
             or bounds.home != home
         ):
             bounds = self._bounds = Bounds(home, self.limits, self.fence)
+        seen = self._driver.telemetry
+        if not seen.amsl_known and self.fence is not None and states_amsl(self.fence):
+            raise UsageError(f"{self.name}: the fence states altitudes AMSL: {seen.amsl_remedy}")
         if bounds.home_violation:
             raise UsageError(f"{self.name}: the fence excludes home: {bounds.home_violation}")
         return bounds
@@ -446,6 +481,9 @@ class Vehicle(ABC):
             )
         if isinstance(goal.altitude, AboveGround):
             self._require(Capability.TERRAIN)
+        seen = self._driver.telemetry
+        if isinstance(goal.altitude, AMSL) and not seen.amsl_known:
+            raise Refused(self.name, f"go to {goal}", seen.amsl_remedy)
 
     def _check_speed(self, asked: str, speed: float) -> None:
         self._require(Capability.SPEED)
@@ -478,8 +516,10 @@ class Vehicle(ABC):
         return here is not None and bounds is not None and bool(bounds.violations(here))
 
     def _check_reserve(self, asked: str) -> None:
-        reserve, telemetry = self.limits.battery_reserve, self._driver.telemetry
+        reserve, telemetry = self.limits.reserve, self._driver.telemetry
         if reserve == 0.0:
+            return
+        if self.limits.battery_reserve is None and not isfinite(telemetry.battery.remaining):
             return
         if not isfinite(telemetry.battery.remaining) and not self._executor.wait(
             lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
@@ -535,7 +575,10 @@ class Vehicle(ABC):
                 self._bounds_error = None
             if self._bounds_error is not None:
                 self._raise_bounds_error()
-            if policy.needs_control:
+            if not policy.to_safety:
+                self._executor.check_link(asked)
+            self._wait_until_refreshed()
+            if policy.needs_control and not (policy.to_safety and self._executor.take_back()):
                 self._executor.check_ours(asked)
             if policy.travels:
                 self._check_reserve(asked)
@@ -550,10 +593,20 @@ class Vehicle(ABC):
                 if policy.recorded or outcome != "ok":
                     self._record(start, operation, asked, (outcome, said), goal())
 
+    def _wait_until_refreshed(self) -> None:
+        """After a silence wait until the state is fresh: a mode from before it must decide nothing."""
+        telemetry = self._driver.telemetry
+        if telemetry.stale and telemetry.last_message_ns >= 0 and not self._executor.link_lost():
+            self._executor.wait(
+                lambda: not telemetry.stale or self._executor.link_lost(), from_seconds(REFRESHED_WITHIN_S)
+            )
+
     def _abort_other(self, task: Task | None, operation: str, policy: OperationPolicy) -> None:
         """Abort the operation of another task, or raise ``UsageError`` unless this one brings to safety."""
         if self._in_progress is None:
             return
+        if self._straying is not None and not policy.to_safety:
+            raise type(self._straying)(self.name, operation, self._straying.what)
         holder, running = self._in_progress
         if holder is not None and (holder.done or holder.scope.cancelled):
             return
@@ -574,11 +627,17 @@ class Vehicle(ABC):
         if not policy.bounded:
             self._executor.execute(asked, plan, restarts=restarts)
             return
-        reserve = self.limits.battery_reserve if policy.travels else 0.0
-        monitor = BoundsMonitor(self._driver.telemetry, self._home_bounds(), reserve, policy.ignored)
+        reserve = self.limits.reserve if policy.travels else 0.0
+        monitor = BoundsMonitor(
+            self._driver.telemetry,
+            self._home_bounds(),
+            reserve,
+            policy.ignored,
+            needs_position=policy.travels,
+        )
         try:
             self._executor.execute(asked, plan, restarts=restarts, check=monitor.check)
-        except (OutOfBounds, LowBattery) as error:
+        except (OutOfBounds, LowBattery, PositionLost) as error:
             raise type(error)(self.name, asked, f"{error.what}; {self._hold_back()}") from None
         if policy.goes_on and self._driver.cycle is None:
             self._keep_monitoring(asked, monitor)
@@ -621,10 +680,13 @@ class Vehicle(ABC):
             self._monitor = handle = self.kernel.every(BOUNDS_PERIOD, check)
 
     def _hold_out_of_bounds(self) -> None:
-        error = self._bounds_error
-        with suppress(VoleryError):  # recorded, and the next call raises *error*
-            self._operate("hold", "hold: it has strayed", self._driver.hold, policy=TO_SAFETY)
-        self._bounds_error = error
+        error = self._straying = self._bounds_error
+        try:
+            with suppress(VoleryError):  # recorded, and the next call raises *error*
+                self._operate("hold", "hold: it has strayed", self._driver.hold, policy=TO_SAFETY)
+        finally:
+            self._straying = None
+            self._bounds_error = error
 
     def _raise_bounds_error(self) -> None:
         error, self._bounds_error = self._bounds_error, None

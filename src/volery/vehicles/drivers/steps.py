@@ -106,7 +106,7 @@ def climbed_to(height: float) -> Callable[[Telemetry], bool]:
 
     def climbed(seen: Telemetry) -> bool:
         near = abs(seen.above_home - height) <= NEAR_UP_M
-        return seen.flying and near and abs(seen.velocity.up) <= AT_REST_M_S
+        return seen.flying and not seen.stale and near and abs(seen.velocity.up) <= AT_REST_M_S
 
     return climbed
 
@@ -124,7 +124,7 @@ def arrived_at(goal: Position, rover: bool) -> Callable[[Telemetry], bool]:
 
     def arrived(seen: Telemetry) -> bool:
         here = seen.position
-        if here is None or not at_rest(seen):
+        if here is None or not seen.located or not at_rest(seen):
             return False
         east, north, _ = frame.to_enu(here.latitude, here.longitude, 0.0)
         return hypot(east, north) <= near and (rover or _vertical_distance(seen, here, goal) <= NEAR_UP_M)
@@ -215,7 +215,7 @@ class TargetMonitor:
         """Return a step that goes to *goal* in *mode*; *send* is repeated until the target is reported."""
 
         def send_unless_confirmed() -> None:
-            if self._goal is None or not self._is_confirmed():
+            if self._goal is None or not self.confirmed:
                 self.set(goal)
                 send()
 
@@ -233,7 +233,7 @@ class TargetMonitor:
     def lost(self) -> str:
         """Return how another station, which then has control, has changed the target; empty otherwise."""
         target = self._telemetry.target
-        if target is None or not self._is_confirmed() or self._goal is None or self._reports(self._goal):
+        if target is None or not self.confirmed or self._goal is None or self._reports(self._goal):
             self._other_since = None
             return ""
         if self._other_since is None:
@@ -243,8 +243,9 @@ class TargetMonitor:
         self._takeover.begin()
         return f"was sent elsewhere by another, to {target}"
 
-    def _is_confirmed(self) -> bool:
-        """Return whether the autopilot has reported our target."""
+    @property
+    def confirmed(self) -> bool:
+        """Whether the autopilot has reported our target."""
         if not self._confirmed:
             self._confirmed = self._goal is not None and self._reports(self._goal)
         return self._confirmed

@@ -25,7 +25,7 @@ from volery.vehicles.drivers.mavlink.backend import (
     Backend,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
-from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
+from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -75,6 +75,19 @@ class ArduPilotDecoder(TelemetryDecoder):
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
         super().__init__(kernel, telemetry, record=record)
         self._handlers["EKF_STATUS_REPORT"] = self._estimator
+
+    def _global_position(self, fields: Fields) -> None:
+        """Decode the position if the estimator has one.
+
+        Without one it sends where it was last, and as altitude 0 or a height above home that is not one: in a
+        recording of ArduRover both jump by 584 m when the estimator takes over.
+        """
+        if self._estimates_position:
+            super()._global_position(fields)
+            return
+        if self._telemetry.kind == DRONE_KIND:
+            self._telemetry.above_home = fields["relative_alt"] / 1000.0
+        self._heading(fields["hdg"])
 
     def _mode_name(self, number: int) -> str:
         return mode_name(self._telemetry.kind, number)

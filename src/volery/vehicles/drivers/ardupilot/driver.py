@@ -13,7 +13,7 @@ from dataclasses import replace
 from math import isfinite, isnan
 
 from volery.base.position import AboveHome, Position
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.vehicles.driver import ManualControl, Step
 from volery.vehicles.drivers.ardupilot.backend import ArduPilotBackend
@@ -39,6 +39,10 @@ from volery.vehicles.drivers.steps import (
 )
 from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Velocity
+
+CONFIRMED_WITHIN: Ns = 600 * MS
+TIMES_UNCONFIRMED = 3
+"""How often a target is sent that an autopilot does not report."""
 
 
 class ArduPilot(MavlinkDriver):
@@ -100,13 +104,32 @@ class ArduPilot(MavlinkDriver):
         if self.telemetry.kind != DRONE_KIND:
             stand = Step(ask="stand", send=send_nothing, done=at_rest, within=STOPPED_WITHIN, mode=RESTING)
             return (self._change_mode(RESTING), stand)
-        return (*self._guided(), self._setpoints.braking_step(), immediate_step("stay", self._stay))
+        return (*self._guided(), self._setpoints.braking_step(), self._stay_step())
 
-    def _stay(self) -> None:
-        here = self.telemetry.position
-        if here is not None and isfinite(self.telemetry.above_home):
-            above = AboveHome(self.telemetry.above_home)
-            self._backend.send_target(Position(here.latitude, here.longitude, above))
+    def _stay_step(self) -> Step:
+        """Return a step that sends the present position as the target until it is reported, or thrice."""
+        seen = self.telemetry
+        monitor = TargetMonitor(seen, self._takeover)
+        sent = 0
+
+        def send() -> None:
+            nonlocal sent
+            here = seen.position
+            if here is not None and seen.located and isfinite(seen.above_home) and not monitor.confirmed:
+                goal = Position(here.latitude, here.longitude, AboveHome(seen.above_home))
+                monitor.set(goal)
+                self._backend.send_target(goal)
+            sent += 1
+
+        return Step(
+            ask="stay",
+            send=send,
+            done=lambda _: monitor.confirmed or sent >= TIMES_UNCONFIRMED or not seen.located,
+            within=STOPPED_WITHIN,
+            again=CONFIRMED_WITHIN,
+            mode=GUIDED,
+            armed=True,
+        )
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Enter GUIDED and repeat a velocity for *lasting*, then stop."""

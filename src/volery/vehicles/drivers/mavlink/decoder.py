@@ -41,7 +41,6 @@ NO_POSITION = constant("ESTIMATOR_CONST_POS_MODE")
 """The same bits are used in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
 COMPLETE = constant("MISSION_STATE_COMPLETE")
 _UNKNOWN_16 = 65535
-_UNKNOWN = -1
 
 
 class TelemetryDecoder(ABC):
@@ -107,8 +106,10 @@ class TelemetryDecoder(ABC):
         """Return the firmware's name of a ``custom_mode``."""
 
     def _update_ready(self) -> None:
-        """Update ``ready``: it could arm now, and the estimator has a position."""
-        self._telemetry.ready = self._telemetry.armable and self._estimates_position
+        """Update ``ready``: it could arm now; estimator, position and home are known."""
+        telemetry = self._telemetry
+        located = telemetry.position is not None and telemetry.home is not None
+        telemetry.ready = telemetry.armable and self._estimates_position and located
 
     def _heartbeat(self, fields: Fields) -> None:
         telemetry = self._telemetry
@@ -141,19 +142,22 @@ class TelemetryDecoder(ABC):
         telemetry.position = Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0))
         telemetry.above_home = fields["relative_alt"] / 1000.0
         telemetry.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
-        heading: int = fields["hdg"]
-        if heading != _UNKNOWN_16:
-            roll, pitch, _ = telemetry.attitude
-            telemetry.attitude = Attitude(roll, pitch, heading / 100.0)
+        self._heading(fields["hdg"])
+
+    def _heading(self, centidegrees: int) -> None:
+        if centidegrees != _UNKNOWN_16:
+            roll, pitch, _ = self._telemetry.attitude
+            self._telemetry.attitude = Attitude(roll, pitch, centidegrees / 100.0)
 
     def _sys_status(self, fields: Fields) -> None:
         self._telemetry.armable = bool(fields["onboard_control_sensors_health"] & PREARM_CHECK)
         volts, amperes = fields["voltage_battery"], fields["current_battery"]
         remaining: int = fields["battery_remaining"]
+        # not measured: -1 in the definition; a current of -100 (-1 A) from PX4, 0 V from ArduPilot
         self._telemetry.battery = Battery(
-            nan if remaining == _UNKNOWN else remaining / 100.0,
-            nan if volts == _UNKNOWN_16 else volts / 1000.0,
-            nan if amperes == _UNKNOWN else amperes / 100.0,
+            remaining / 100.0 if 0 <= remaining <= 100 else nan,
+            volts / 1000.0 if 0 < volts < _UNKNOWN_16 else nan,
+            amperes / 100.0 if amperes >= 0 else nan,
         )
         self._update_ready()
 
@@ -165,6 +169,7 @@ class TelemetryDecoder(ABC):
     def _home_position(self, fields: Fields) -> None:
         altitude = AMSL(fields["altitude"] / 1000.0)
         self._telemetry.home = Position(fields["latitude"] / 1e7, fields["longitude"] / 1e7, altitude)
+        self._update_ready()
 
     def _target(self, fields: Fields) -> None:
         altitude = AMSL(fields["alt"])

@@ -258,6 +258,7 @@ class MavlinkDriver:
         def home(seen: Telemetry) -> bool:
             return (
                 seen.home is not None
+                and seen.located
                 and horizontal_distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
                 and at_rest(seen)
             )

@@ -194,11 +194,10 @@ class PX4Decoder(TelemetryDecoder):
         return mode_name(number)
 
     def _update_ready(self) -> None:
-        """Update ``ready``; PX4 converts altitudes above home by its own home, so it needs one."""
-        telemetry = self._telemetry
-        located = telemetry.position is not None and telemetry.home is not None
-        estimates = self._estimates_position or not self._estimator_reports
-        telemetry.ready = telemetry.armable and located and estimates
+        """Update ``ready``; a PX4 that does not report its estimator tells by reporting a position."""
+        if not self._estimator_reports:
+            self._estimates_position = True
+        super()._update_ready()
 
     def _estimator_status(self, fields: Fields) -> None:
         self._estimator_reports = True

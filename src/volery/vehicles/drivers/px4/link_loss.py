@@ -46,9 +46,7 @@ def on_link_loss(parameters: Mapping[str, float]) -> str:
         after = parameters.get("COM_DL_LOSS_T", 10.0)
         parts.append(f"{after:g} s after the last heartbeat {_LINK_LOST[action]}")
     elif action >= 0:
-        parts.append(
-            "it does not react (NAV_DLL_ACT=0): it flies to its last target and stays there"
-        )
+        parts.append("it does not react (NAV_DLL_ACT=0): it flies to its last target and stays there")
     if "COM_OBL_RC_ACT" in parameters:
         mode = _OFFBOARD_LOST.get(round(parameters["COM_OBL_RC_ACT"]), "its failsafe")
         parts.append(f"a velocity ends after {parameters.get('COM_OF_LOSS_T', 1.0):g} s in {mode}")
