@@ -2,8 +2,9 @@
 
 Messages carry numbers that differ from aircraft to aircraft. Their meaning is in the files that the build of
 an aircraft leaves in ``var/aircrafts/NAME``: ``settings.xml``, ``flight_plan.xml``, ``conf_aircraft.xml``.
-The reader is hardened: no entities, no network, no document type definitions. ``stock_aircraft`` describes an
-aircraft whose files are not given.
+The reader is hardened: no entities, no network, no document type definitions. Nothing is assumed of an
+aircraft whose files are not given. ``stock_aircraft`` describes the simulated aircraft, which proves in ALIVE
+that it is the one described.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from hashlib import md5
 from importlib.resources import files
 from pathlib import Path
+from re import split
 from typing import Any, TypeVar
 
 from lxml import etree
@@ -22,13 +25,19 @@ from volery.base.errors import Location, ModelError, UsageError, choices, did_yo
 MAX_FILE_SIZE = 8_000_000
 """Bytes of a file; the settings file of a large aircraft has about 100 kB."""
 
+CONFIGURATION = Path("conf", "conf_aircraft.xml")
+"""File of an aircraft's folder that lies deeper than the others."""
+
+PREFERRED_MODULE = "autopilot"
+"""Module whose setting is meant if several modules have one of the same name."""
+
 FIRST_WAYPOINT = 1
 """Number of the first waypoint of a plan; in the aircraft an unnamed waypoint precedes it."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A variable that can be set in flight. ``name`` is the ``shortname`` that a ground station shows."""
+    """A variable that can be set in flight. ``name`` is the short name, else the variable."""
 
     number: int
     name: str
@@ -68,6 +77,7 @@ class PaparazziAircraft:
         blocks: Flight-plan blocks by number.
         waypoints: Waypoints by number.
         farthest: Distance from home in metres at which the aircraft turns back; None if not given.
+        fingerprint: Checksum that the aircraft sends in ALIVE; empty if the files do not contain it.
     """
 
     source: str
@@ -77,12 +87,31 @@ class PaparazziAircraft:
     blocks: tuple[Block, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()
     farthest: float | None = None
+    fingerprint: tuple[int, ...] = ()
 
     def setting(self, name: str) -> Setting:
-        """Return the setting with this name or variable; raise ``UsageError`` if there is none."""
-        for one in self.settings:
-            if name in (one.name, one.variable):
-                return one
+        """Return the setting that a ground station finds under *name*.
+
+        The first of these that fits decides: the short name, the variable, the variable without its
+        structure (``autopilot.mode``), and without the prefix of its module (``autopilot_mode``).
+
+        Raises:
+            UsageError: There is none, or several fit equally well.
+        """
+        ranks = (
+            [one for one in self.settings if one.name == name],
+            [one for one in self.settings if one.variable == name],
+            [one for one in self.settings if _member(one.variable) == name],
+            [one for one in self.settings if one.variable == f"{PREFERRED_MODULE}_{name}"],
+        )
+        found = next((rank for rank in ranks if rank), [])
+        if len(found) > 1:
+            found = [one for one in found if one.variable.startswith(PREFERRED_MODULE)] or found
+        if len(found) == 1:
+            return found[0]
+        if found:
+            listed = choices([f"{one.number} ({one.variable})" for one in found])
+            raise UsageError(f"{self.source}: {name!r} may be setting {listed}")
         raise self._lacks("setting", name, [one.name for one in self.settings])
 
     def block(self, name: str) -> Block:
@@ -104,28 +133,35 @@ class PaparazziAircraft:
         return UsageError(f"{self.source}: no {what} {name!r}{did_you_mean(name, names)}; {listed}")
 
 
+def _member(variable: str) -> str:
+    """Return the last member of a C expression: ``mode`` of ``autopilot.mode`` and of ``pilot->mode``."""
+    return split(r"\.|->", variable)[-1]
+
+
 @cache
 def stock_aircraft() -> PaparazziAircraft:
-    """Return the stock rotorcraft, which is assumed of an aircraft whose files are not given."""
-    aircraft = PaparazziAircraft("the stock rotorcraft")
+    """Return the simulated rotorcraft; its fingerprint is the checksum of the two files that describe it."""
+    aircraft = PaparazziAircraft("the simulated rotorcraft")
     folder = files("volery.links").joinpath("stock_rotorcraft")
+    checksum = md5(usedforsecurity=False)
     for name in ("settings.xml", "flight_plan.xml"):
         document = folder.joinpath(name).read_bytes()
+        checksum.update(document)
         aircraft = _with(aircraft, _root(document, name), name)
-    return aircraft
+    return replace(aircraft, fingerprint=tuple(checksum.digest()))
 
 
 def read_aircraft(path: Path) -> PaparazziAircraft:
     """Return the aircraft described by the XML at *path*.
 
-    Lists that no file contains (settings, blocks, waypoints) are taken from the stock rotorcraft.
-
     Args:
-        path: The folder of the aircraft, or one file of it. In a folder every ``.xml`` file is read in the
-            order of names; its root element determines its kind.
+        path: The folder of the aircraft, or one file that contains all of it. In a folder every ``.xml`` file
+            is read in the order of names, then ``conf/conf_aircraft.xml``; the root element determines the
+            kind.
 
     Raises:
-        UsageError: There is nothing to read.
+        UsageError: There is nothing to read, or no settings, or no flight plan: these differ from aircraft to
+            aircraft and are never assumed.
         ModelError: A file is wrong; the error names file and line.
     """
     aircraft = PaparazziAircraft(str(path))
@@ -133,20 +169,21 @@ def read_aircraft(path: Path) -> PaparazziAircraft:
         if file.stat().st_size > MAX_FILE_SIZE:
             raise UsageError(f"{file}: larger than {MAX_FILE_SIZE} bytes: not a file of an aircraft")
         aircraft = _with(aircraft, _root(file.read_bytes(), str(file)), str(file))
-    if not (aircraft.settings or aircraft.blocks):
-        raise UsageError(f"{path}: neither settings nor a flight plan; give a folder var/aircrafts/NAME")
-    stock = stock_aircraft()
-    return replace(
-        aircraft,
-        settings=aircraft.settings or stock.settings,
-        blocks=aircraft.blocks or stock.blocks,
-        waypoints=aircraft.waypoints or stock.waypoints,
+    lacks = " and ".join(
+        what
+        for what, found in (("settings", aircraft.settings), ("flight plan", aircraft.blocks))
+        if not found
     )
+    if lacks:
+        raise UsageError(f"{path}: no {lacks} there; give a folder var/aircrafts/NAME")
+    return aircraft
 
 
 def _documents(path: Path) -> list[Path]:
     try:
         found = sorted(path.glob("*.xml")) if path.is_dir() else [path]
+        if found and (deeper := path / CONFIGURATION).is_file():
+            found.append(deeper)
         if found and all(file.is_file() for file in found):
             return found
     except OSError as error:

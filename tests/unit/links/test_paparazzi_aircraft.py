@@ -36,12 +36,14 @@ def folder(at: Path, **documents: str) -> Path:
 
 def test_the_stock_rotorcraft() -> None:
     stock = stock_aircraft()
+    assert len(stock.fingerprint) == 16
     names = [block.name for block in stock.blocks]
     assert names[3:5] == ["Start Engine", "Takeoff"]
-    assert names[13:] == ["land here", "land", "flare", "landed"]
-    assert [block.number for block in stock.blocks] == list(range(17))
+    assert names[13:17] == ["land here", "land", "flare", "landed"]
+    assert [block.number for block in stock.blocks] == list(range(len(names)))
     assert stock.setting("auto2").words[19] == "Guided"
-    assert stock.setting("mode").variable == "autopilot_mode"
+    assert stock.setting("mode").variable == "autopilot.mode"
+    assert stock.setting("kill_throttle").variable == "autopilot.kill_throttle"
     assert stock.setting("kill_throttle").words == ("Resurrect", "Kill")
     assert stock.waypoint("HOME").number == 1
 
@@ -63,12 +65,49 @@ def test_the_folder_of_an_aircraft(tmp_path: Path) -> None:
     assert aircraft.waypoint("_TD").number == 2
 
 
-def test_what_a_single_file_does_not_say_is_as_in_the_stock_rotorcraft(tmp_path: Path) -> None:
+def test_what_the_files_do_not_say_is_never_assumed(tmp_path: Path) -> None:
     folder(tmp_path, settings=SETTINGS)
-    aircraft = read_aircraft(tmp_path / "settings.xml")
-    assert aircraft.setting("auto2").number == 2
-    assert aircraft.blocks == stock_aircraft().blocks
-    assert aircraft.system is None
+    with pytest.raises(UsageError, match="no flight plan there; give a folder"):
+        read_aircraft(tmp_path / "settings.xml")
+    (tmp_path / "settings.xml").unlink()
+    folder(tmp_path, flight_plan=PLAN)
+    with pytest.raises(UsageError, match="no settings there; give a folder"):
+        read_aircraft(tmp_path)
+
+
+def test_the_configuration_lies_one_folder_deeper(tmp_path: Path) -> None:
+    folder(tmp_path, settings=SETTINGS, flight_plan=PLAN)
+    (tmp_path / "conf").mkdir()
+    (tmp_path / "conf" / "conf_aircraft.xml").write_text(CONF)
+    (tmp_path / "conf" / "other.xml").write_text("not read")
+    assert read_aircraft(tmp_path).system == 202
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        'var="x" shortname="kill_throttle"',
+        'var="kill_throttle"',
+        'var="autopilot.kill_throttle"',
+        'var="pilot->kill_throttle"',
+        'var="autopilot_kill_throttle"',
+    ],
+)
+def test_a_setting_is_found_as_a_ground_station_finds_it(tmp_path: Path, attributes: str) -> None:
+    text = f'<settings><dl_setting var="gps.mode"/><dl_setting {attributes}/></settings>'
+    aircraft = read_aircraft(folder(tmp_path, settings=text, flight_plan=PLAN))
+    assert aircraft.setting("kill_throttle").number == 1
+
+
+def test_a_name_in_several_modules_is_that_of_the_autopilot_or_an_error(tmp_path: Path) -> None:
+    def read(*variables: str) -> int:
+        text = "".join(f'<dl_setting var="{variable}"/>' for variable in variables)
+        plain = folder(tmp_path, settings=f"<settings>{text}</settings>", flight_plan=PLAN)
+        return read_aircraft(plain).setting("mode").number
+
+    assert read("gps.mode", "autopilot.mode") == 1
+    with pytest.raises(UsageError, match=r"'mode' may be setting 0 \(gps.mode\) or 1 \(imu.mode\)"):
+        read("gps.mode", "imu.mode")
 
 
 def test_an_unknown_name_is_reported_with_the_known_ones(tmp_path: Path) -> None:
@@ -123,5 +162,5 @@ def test_nothing_to_read(tmp_path: Path) -> None:
         read_aircraft(tmp_path)
     with pytest.raises(UsageError, match="no XML of an aircraft there"):
         read_aircraft(tmp_path / "missing")
-    with pytest.raises(UsageError, match="neither settings nor a flight plan"):
+    with pytest.raises(UsageError, match="no settings and flight plan there"):
         read_aircraft(folder(tmp_path, conf=CONF))

@@ -53,6 +53,10 @@ class SetpointRepeater(ABC):
     def send_control(self, control: ManualControl) -> None:
         """Send manual control once."""
 
+    def has_stopped(self) -> bool:
+        """Return whether the end of a velocity need not be sent again: at once, where nothing is lost."""
+        return True
+
     @abstractmethod
     def is_commanded(self, mode: str) -> bool:
         """Return whether this program commanded *mode*."""
@@ -60,7 +64,7 @@ class SetpointRepeater(ABC):
     # -- velocity
 
     def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        """Repeat a velocity for *lasting*, then stop."""
+        """Repeat a velocity for *lasting*, then a velocity of zero until the vehicle ``has_stopped``."""
         self.end_velocity()
         until = self._kernel.now() + lasting
 
@@ -70,8 +74,9 @@ class SetpointRepeater(ABC):
             elif self._kernel.now() < until:
                 self.send_velocity(velocity, yaw_rate)
             else:
-                self.end_velocity()
                 self.send_stop()
+                if self.has_stopped():
+                    self.end_velocity()
 
         self.following = True
         self._velocity_handle = self._kernel.every(self._velocity_period, repeat)

@@ -1,7 +1,7 @@
 """Paparazzi rotorcraft: one driver, over pprzlink or over pprzros topics.
 
-It follows the public definitions of the protocol and has not been flown; ``modes.ASSUMED`` lists the
-assumptions.
+It follows the public definitions of the protocol and what version 6.2 did in its own simulator;
+``modes.ASSUMED`` lists the assumptions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from volery.vehicles.drivers.paparazzi.sequences import Blocks
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 
 OPTIONS = ("aircraft", "land", "start", "system", "takeoff", "texts")
-LINK_OPTIONS = ("baud", "from", "uplink")
+LINK_OPTIONS = ("baud", "bind", "from", "uplink")
 """Options of an address that belong to the link."""
 
 
@@ -36,10 +36,10 @@ def open_driver(kernel: Kernel, link: Link, name: str, options: Mapping[str, str
         kernel: clock and tasks.
         link: link to the aircraft.
         name: name of the vehicle.
-        options: ``aircraft``, the folder with its XML (default: the stock rotorcraft); ``system``, its id
-            (default: the id in the XML, or the first that is received); ``start``, ``takeoff`` and ``land``,
-            the names of these blocks of its flight plan; ``texts=unrecorded`` if the aircraft records its
-            texts itself, as a simulated one does.
+        options: ``aircraft``, the folder with its XML (default: the simulated rotorcraft only);
+            ``system``, its id (default: the id in the XML, or the first that is received); ``start``,
+            ``takeoff`` and ``land``, the names of these blocks of its flight plan; ``texts=unrecorded`` if
+            the aircraft records its texts itself, as a simulated one does.
     """
     check_options("paparazzi", options, *OPTIONS, *LINK_OPTIONS)
     backend = PaparazziBackend(kernel, link, name, _aircraft(options), options)

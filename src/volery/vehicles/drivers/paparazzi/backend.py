@@ -7,7 +7,7 @@ the telemetry or not at all.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import radians
+from math import hypot, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import CapabilityError, LinkError, LinkSilent
@@ -21,9 +21,18 @@ from volery.trace.events import LinkState
 from volery.vehicles.address import records_texts, system_option
 from volery.vehicles.driver import ManualControl, link_error
 from volery.vehicles.drivers.paparazzi.decoder import PaparazziDecoder
-from volery.vehicles.drivers.paparazzi.modes import AUTO2, GUIDED, KILL_THROTTLE, MODE, NUMBERS, STATUS
+from volery.vehicles.drivers.paparazzi.modes import (
+    AUTO2,
+    CHANGE,
+    GUIDED,
+    KILL_THROTTLE,
+    MODE,
+    NUMBERS,
+    STATUS,
+)
 from volery.vehicles.drivers.setpoint_repeater import SetpointRepeater
-from volery.vehicles.telemetry import Telemetry, Velocity
+from volery.vehicles.drivers.steps import at_rest
+from volery.vehicles.telemetry import Answer, Telemetry, Velocity
 
 PING_PERIOD: Ns = S
 """A flight plan may make the aircraft return when the ground station falls silent."""
@@ -38,9 +47,16 @@ VELOCITY, VELOCITY_Z, YAW_RATE = 0x20, 0x40, 0x80
 """Flags of GUIDED_SETPOINT_NED; without flags a position and a heading."""
 BY_VELOCITY = VELOCITY | VELOCITY_Z | YAW_RATE
 
-STICK, THROTTLE = 127, 127
-"""Full deflection in RC_4CH."""
-AUTO2_SWITCH = entry_value("RC_4CH", "mode", "AUTO2")
+FULL = 127
+"""Full deflection in RC_UP."""
+SWITCHES = (FULL, FULL, 0, 0, 0, 0, 0)
+"""Channels of RC_UP behind the sticks: mode switch in its third position, kill switch off, others centred."""
+REFUSALS = 2
+"""Answers with another mode that are a refusal: one may have been sent before the command arrived."""
+STOPS = 4
+"""Least number of velocities of zero at the end of a velocity: 1 s."""
+SLOWED, NOISE_M_S, TURNED_DEG = 0.5, 0.1, 2.0
+"""Share of a slow velocity, error of the estimate, and turn within 1 s, at which it has stopped."""
 STOP = entry_value("EMERGENCY_CMD", "cmd", "KILL")
 COME_DOWN = entry_value("EMERGENCY_CMD", "cmd", "LAND")
 
@@ -92,13 +108,15 @@ class PaparazziBackend:
         self._silent = False
         self._wrong_setting = ""
         self._wrong_answers = 0
-        self._checked = {one.name: one for one in (self._find(MODE), self._find(KILL_THROTTLE)) if one}
-        self._unchecked = set(self._checked)
+        self._settings: Mapping[str, Setting] = {
+            name: aircraft.setting(name) for name in (AUTO2, KILL_THROTTLE, MODE)
+        }
+        self._unchecked = {KILL_THROTTLE, MODE}
+        self._identified = not aircraft.fingerprint
+        self._commanded_mode = ""  # until it is confirmed or refused
+        self._refusals = 0
         link.receive(self._receive)
         self._ping = kernel.every(PING_PERIOD, self._tick)
-
-    def _find(self, name: str) -> Setting | None:
-        return next((one for one in self.aircraft.settings if one.name == name), None)
 
     # -- receiving
 
@@ -110,7 +128,11 @@ class PaparazziBackend:
             self._silent = False
             self._kernel.record(LinkState(now, self.telemetry.name, "back", "the aircraft is received again"))
         used = self.decoder.handle_message(frame.name, frame.fields)
-        if frame.name in ("DL_VALUE", STATUS):
+        if frame.name == "ALIVE":
+            self._identify(tuple(frame.fields["md5sum"]))
+        if frame.name == "DL_VALUE":
+            self._answer_change(frame.fields["index"], frame.fields["value"])
+        if frame.name in ("DL_VALUE", "ALIVE", STATUS):
             self._check_settings()
         if used:
             self.telemetry.changed.notify()
@@ -131,7 +153,7 @@ class PaparazziBackend:
         if last < 0:
             return
         for name in sorted(self._unchecked):
-            self._send("GET_SETTING", index=self._checked[name].number, ac_id=self._system)
+            self._send("GET_SETTING", index=self._settings[name].number, ac_id=self._system)
         if now - last > SILENT_AFTER and not self._silent:
             self._silent = True
             detail = self._link.problem() or "the aircraft is not received"
@@ -139,12 +161,24 @@ class PaparazziBackend:
 
     # -- check of the setting numbers
 
+    def _identify(self, fingerprint: tuple[int, ...]) -> None:
+        """Compare the checksum in ALIVE with that of the description, where this has one."""
+        if not self.aircraft.fingerprint:
+            return
+        self._identified = fingerprint == self.aircraft.fingerprint
+        if not self._identified:
+            self.decoder.settings_checked = False
+            self._wrong_setting = (
+                f"this aircraft is not {self.aircraft.source}: the numbers of its settings and blocks are "
+                f"not known; give its own XML: aircraft=var/aircrafts/NAME"
+            )
+
     def _check_settings(self) -> None:
         """Compare settings with the telemetry: writing under a wrong number could change anything."""
         telemetry = self.telemetry
         shown = {MODE: NUMBERS.get(telemetry.mode), KILL_THROTTLE: int(not telemetry.armed)}
         for name in sorted(self._unchecked):
-            number = self._checked[name].number
+            number = self._settings[name].number
             answer = self.decoder.values.pop(number, None)
             if answer is None or not telemetry.mode:
                 continue
@@ -158,7 +192,7 @@ class PaparazziBackend:
                     f"setting {number} of this aircraft is not {name!r} as in {self.aircraft.source}: it is "
                     f"{answer[1]:g} while it is {state}; give its own XML: aircraft=var/aircrafts/NAME"
                 )
-        if not self._unchecked and not self.decoder.settings_checked:
+        if not self._unchecked and self._identified and not self.decoder.settings_checked:
             self.decoder.settings_checked, self._wrong_setting = True, ""
             self.decoder.update_ready()
 
@@ -167,17 +201,40 @@ class PaparazziBackend:
     def _send(self, name: str, **fields: Any) -> None:
         self._link.send(Frame(name, fields, TO_GROUND, 0))
 
+    def wrong_setting(self) -> str:
+        """Return why nothing may be written to this aircraft; empty if nothing is known against it."""
+        return self._wrong_setting
+
     def set_setting(self, name: str, value: float) -> None:
-        """Write a setting, if the aircraft has it and its number has been checked."""
-        found = self._find(name)
-        if found is not None and self.decoder.settings_checked:
-            self._send("SETTING", index=found.number, ac_id=self._system, value=value)
+        """Write a setting, if its number has been checked."""
+        if self.decoder.settings_checked:
+            self._send("SETTING", index=self._settings[name].number, ac_id=self._system, value=value)
 
     def set_mode(self, mode: str) -> None:
         """Change the mode: directly, and as the meaning of the third position of a mode switch."""
         self.decoder.note_commanded(mode)
+        self._commanded_mode, self._refusals = mode, 0
         self.set_setting(AUTO2, NUMBERS[mode])
         self.set_setting(MODE, NUMBERS[mode])
+
+    def _answer_change(self, index: int, value: float) -> None:
+        """Take the value of 'mode' as the answer to a change; a transmitter's switch may still follow."""
+        if not self._commanded_mode or index != self._settings[MODE].number:
+            return
+        now = self._kernel.now()
+        if value == NUMBERS[self._commanded_mode]:
+            self.telemetry.answers[CHANGE] = Answer(now, True, self._commanded_mode)
+            self._commanded_mode = ""
+            return
+        if self.decoder.transmitter:
+            return
+        self._refusals += 1
+        if self._refusals < REFUSALS:
+            self.set_setting(MODE, NUMBERS[self._commanded_mode])
+            return
+        kept = next((name for name, number in NUMBERS.items() if number == value), f"{value:g}")
+        self.telemetry.answers[CHANGE] = Answer(now, False, f"it stays in {kept}")
+        self._commanded_mode = ""
 
     def set_motors(self, on: bool) -> None:
         """Start or stop the motors."""
@@ -189,8 +246,9 @@ class PaparazziBackend:
         self._send("EMERGENCY_CMD", ac_id=self._system, cmd=command)
 
     def enter_block(self, name: str) -> None:
-        """Continue in another block of the flight plan."""
-        self._send("BLOCK", block_id=self.aircraft.block(name).number, ac_id=self._system)
+        """Continue in another block of the flight plan, if its number is known to be right."""
+        if self.decoder.settings_checked:
+            self._send("BLOCK", block_id=self.aircraft.block(name).number, ac_id=self._system)
 
     def send_setpoint(self, setpoint: Setpoint) -> None:
         """Send a set-point, which is obeyed in GUIDED only."""
@@ -205,16 +263,10 @@ class PaparazziBackend:
         )
 
     def send_manual_control(self, control: ManualControl) -> None:
-        """Send RC_4CH, like a transmitter with its mode switch in the third position; pitch is nose up."""
-        self._send(
-            "RC_4CH",
-            ac_id=self._system,
-            mode=AUTO2_SWITCH,
-            throttle=round(THROTTLE * control.throttle),
-            roll=round(STICK * control.roll),
-            pitch=round(-STICK * control.pitch),
-            yaw=round(STICK * control.yaw),
-        )
+        """Send RC_UP, like a transmitter with its mode switch in the third position; pitch is nose up."""
+        sticks = (control.roll, -control.pitch, control.yaw, control.throttle)
+        channels = (*(round(FULL * stick) for stick in sticks), *SWITCHES)
+        self._send("RC_UP", ac_id=self._system, channels=channels)
 
     # -- link
 
@@ -249,13 +301,37 @@ class PaparazziSetpoints(SetpointRepeater):
             control_period=CONTROL_PERIOD,
         )
         self._backend = backend
+        self._speed = 0.0  # commanded last, m/s
+        self._headings: list[float] = []  # degrees, at each velocity of zero at the end of a velocity
+
+    def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
+        """Repeat a velocity for *lasting*, then a velocity of zero until the vehicle is seen to stand."""
+        self._speed = hypot(*velocity)
+        self._headings = []
+        super().follow(velocity, yaw_rate, lasting)
+
+    def has_stopped(self) -> bool:
+        """Return whether a fresh position shows that it has stopped, and turns no more.
+
+        The last velocity has no end: a command that is lost must be sent again.
+        """
+        seen = self._backend.telemetry
+        self._headings.append(seen.attitude.heading)
+        if len(self._headings) <= STOPS or self._backend.decoder.lacks_position() or not at_rest(seen):
+            return False
+        turned = (self._headings[-1] - self._headings[-1 - STOPS] + 180.0) % 360.0 - 180.0
+        slow = self._speed == 0.0 or hypot(*seen.velocity) <= max(NOISE_M_S, SLOWED * self._speed)
+        return slow and abs(turned) <= TURNED_DEG
 
     def send_stop(self) -> None:
         """Send a velocity of zero once."""
         self._backend.send_setpoint(STILL)
 
     def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
-        """Send a velocity and a turn rate once."""
+        """Send a velocity and a turn rate once; zero once its position does not count any more."""
+        if self._backend.decoder.lacks_position():
+            self.send_stop()
+            return
         north, east, up = velocity
         self._backend.send_setpoint(Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, Position
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Kernel
 from volery.links.paparazzi_aircraft import PaparazziAircraft
 from volery.links.pprzlink_messages import entry_name
@@ -19,6 +19,7 @@ from volery.vehicles.drivers.paparazzi.modes import (
     GUIDED,
     HOME,
     HOME_WAYPOINT,
+    LASTING_FAILSAFES,
     NEEDS_CARE,
     PREPARING_BLOCKS,
     PREVENTS_ARMING,
@@ -38,6 +39,11 @@ KINDS = {STATUS: DRONE_KIND, "PPRZ_MODE": "plane", "ROVER_STATUS": "Paparazzi ro
 
 EFFECT: Ns = 300 * MS
 """Time after the command to start the motors from which a status that prevents arming is its answer."""
+
+MISSED_AFTER: Ns = 3 * S
+"""Time without a position, while other messages arrive, after which it counts for nothing."""
+PAUSE: Ns = S
+"""Silence of the link after which the position has all of ``MISSED_AFTER`` again."""
 
 NOTICE, WARNING = 5, 4
 
@@ -72,6 +78,9 @@ class PaparazziDecoder:
         values: time and value of received settings, by number.
         block: time and number of the last reported block of the flight plan.
         good_fix: the GPS receiver has a 3D fix.
+        status_at: time of the last status; -1 before the first.
+        transmitter: a transmitter is received, or sticks by datalink.
+        thrust: thrust as last reported, in its own counts.
 
     Args:
         kernel: clock and record.
@@ -90,6 +99,12 @@ class PaparazziDecoder:
         self.values: dict[int, tuple[Ns, float]] = {}
         self.block: tuple[Ns, int] = (-1, -1)
         self.good_fix = False
+        self.status_at: Ns = -1
+        self.transmitter = False
+        self.thrust = 0
+        self._flight_at: Ns = -1
+        self._resumed_at: Ns = -1  # when messages began to arrive again
+        self._lack = ""
         self._kernel = kernel
         self._telemetry = telemetry
         self._records = record
@@ -115,13 +130,42 @@ class PaparazziDecoder:
         telemetry = self._telemetry
         if name in KINDS and not telemetry.kind:
             telemetry.kind, telemetry.autopilot = KINDS[name], "Paparazzi"
+        now = self._kernel.now()
+        if telemetry.last_message_ns < now - PAUSE:
+            self._resumed_at = now
         if telemetry.kind:
-            telemetry.last_message_ns = self._kernel.now()
+            telemetry.last_message_ns = now
         handler = self._handlers.get(name)
-        if handler is None:
-            return False
-        handler(fields)
-        return True
+        if handler is not None:
+            handler(fields)
+        self._tell_lack()
+        return handler is not None
+
+    def lacks_position(self) -> str:
+        """Return why there is no position that counts, in words; empty if there is one."""
+        last = self._telemetry.last_message_ns
+        if not self.good_fix:
+            fix = self._telemetry.fix or "none reported"
+            return f"it has no 3D fix ({fix}), its position counts for nothing"
+        if self.origin is None:
+            return "it has not reported the origin of its local frame (INS_REF)"
+        if self._flight_at < 0:
+            return "it has not reported its position (ROTORCRAFT_FP)"
+        if last - max(self._flight_at, self._resumed_at) > MISSED_AFTER:
+            ago = to_seconds(last - self._flight_at)
+            return (
+                f"its position (ROTORCRAFT_FP) is not sent any more, the last {ago:.1f} s ago, while other "
+                f"messages arrive; look at its telemetry mode"
+            )
+        return ""
+
+    def _tell_lack(self) -> None:
+        """Report once in flight that the position does not count any more."""
+        lack = self.lacks_position() if self._telemetry.flying else ""
+        if lack and not self._lack:
+            self._telemetry.velocity = Velocity(nan, nan, self._telemetry.velocity.up)
+            self.add_text(WARNING, lack)
+        self._lack = lack
 
     def note_commanded(self, mode: str) -> None:
         """Note that *mode* is being commanded."""
@@ -142,6 +186,7 @@ class PaparazziDecoder:
         telemetry.armable = bool(self._arming) and self._arming not in PREVENTS_ARMING
         located = self._origin_is_set and telemetry.position is not None
         telemetry.ready = telemetry.armable and self.settings_checked and self.good_fix and located
+        telemetry.ready = telemetry.ready and not self.lacks_position()
 
     def _status(self, fields: Fields) -> None:
         telemetry = self._telemetry
@@ -150,6 +195,9 @@ class PaparazziDecoder:
         telemetry.flying = bool(fields["ap_in_flight"]) and telemetry.armed
         commanded = telemetry.mode == self._commanded_mode
         telemetry.failsafe = telemetry.mode in {FAILSAFE, HOME} and not commanded
+        telemetry.failsafe_lasts = telemetry.failsafe and telemetry.mode in LASTING_FAILSAFES
+        self.status_at = self._kernel.now()
+        self.transmitter = entry_name(STATUS, "rc_status", fields["rc_status"]) == "OK"
         if commanded:
             self.ours = frozenset({telemetry.mode})
         telemetry.fix = entry_name(STATUS, "gps_status", fields["gps_status"]).lower()
@@ -201,15 +249,16 @@ class PaparazziDecoder:
         telemetry.attitude = Attitude(
             degrees(fields["phi"] * ANGLE), degrees(fields["theta"] * ANGLE), heading
         )
+        self.thrust = fields["thrust"]
         if self.origin is None:
             return
+        self._flight_at = self._kernel.now()
         telemetry.position = self.origin.position(_enu(fields, ""))
         telemetry.above_home = telemetry.position.altitude.metres - self.origin.amsl
         if telemetry.mode == GUIDED:
             telemetry.target = self.origin.position(_enu(fields, "carrot_"))
-        telemetry.velocity = Velocity(
-            fields["vnorth"] * SPEED, fields["veast"] * SPEED, fields["vup"] * SPEED
-        )
+        north, east, up = (fields[name] * SPEED for name in ("vnorth", "veast", "vup"))
+        telemetry.velocity = Velocity(north, east, up) if self.good_fix else Velocity(nan, nan, up)
         self.update_ready()
 
     def _satellites(self, fields: Fields) -> None:

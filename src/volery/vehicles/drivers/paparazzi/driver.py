@@ -2,8 +2,9 @@
 
 Facts from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors start and
 stop by a setting or by a block of the flight plan. Blocks take off and land; in between the aircraft follows
-set-points in GUIDED, which last until the next one. Telemetry is 0.25 s (position) to 2 s (block) late, but a
-change of mode is reported at once.
+set-points in GUIDED, which last until the next one. Telemetry is late: a position by 0.25 s, a change of mode
+by up to 1.2 s, a block by up to 1.6 s. A position without a fix counts for nothing: in GUIDED the aircraft
+would follow it for hundreds of metres.
 
 On a lost link nothing happens in GUIDED: neither the ground station nor a transmitter nor, by the sources, a
 fence is monitored. In NAV the plan's own rules hold. Manual modes become FAILSAFE when manual control ends.
@@ -116,18 +117,19 @@ class Paparazzi:
             "it needs a 3D fix, an origin (blocks 'Wait GPS' and 'Geo init' done, INS_REF sent), an aligned "
             "attitude, and to answer GET_SETTING"
         )
-        return (ready_step(within, advice),)
+        return (replace(ready_step(within, advice), fails=self._backend.wrong_setting),)
 
     def arm(self) -> Sequence[Step]:
-        """Arm in the present mode; from KILL, where motors do not start, by way of GUIDED."""
-        return (self._steps.check_settings(), self._steps.start_motors())
+        """Arm in the present mode; from KILL, where motors do not start, and from GUIDED by way of NAV."""
+        return self._takeoff_and_landing.arm(by_hand=self._setpoints.held is not None)
 
     def disarm(self, force: bool) -> Sequence[Step]:
         """Disarm. Paparazzi would stop the motors in the air: that is refused here without *force*."""
         if self.telemetry.flying and not force:
             said = "it flies, and would fall: a Paparazzi stops its motors in the air, too; land() first"
             raise Refused(self.name, "disarm", said)
-        return (self._steps.stop_motors(force=force),)
+        stop = self._steps.stop_motors(force=force)
+        return (replace(self._steps.check_settings(), send=stop.send), stop)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Wait until ready, lift off by blocks or without, and climb in GUIDED."""
@@ -138,25 +140,31 @@ class Paparazzi:
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
         """Enter GUIDED and send a set-point, with the heading unchanged."""
         del speed  # there is no such capability
+        self._steps.check_position(f"go to {goal}")
         return (*self._steps.guided(), self._reach(goal, within))
 
     def _reach(self, goal: Position, within: Ns) -> Step:
         monitor = TargetMonitor(self.telemetry, self._takeover)
-        return monitor.step(goal, lambda: self._backend.send_setpoint(self._steps.at(goal)), GUIDED, within)
+        step = monitor.step(goal, lambda: self._backend.send_setpoint(self._steps.at(goal)), GUIDED, within)
+        return replace(step, fails=self._steps.decoder.lacks_position)
 
     def hold(self) -> Sequence[Step]:
         """Stop in GUIDED by a velocity of zero, then hold that position."""
+        self._steps.check_position("hold")
+        brake = replace(self._setpoints.braking_step(), fails=self._steps.decoder.lacks_position)
         stay = immediate_step("stay", self._steps.stay)
-        return (*self._steps.guided(), self._setpoints.braking_step(), stay)
+        return (*self._steps.guided(), brake, stay)
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Enter GUIDED and repeat a velocity for *lasting*, then stop."""
+        self._steps.check_position("follow a velocity")
         self._steps.yaw = None
         follow = immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting))
         return (*self._steps.guided(), follow)
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place in GUIDED."""
+        self._steps.check_position(f"turn to {degrees:g} degrees")
 
         def send() -> None:
             self._steps.yaw = radians(degrees)
@@ -170,6 +178,7 @@ class Paparazzi:
             again=4 * S,
             mode=GUIDED,
             armed=True,
+            fails=self._steps.decoder.lacks_position,
         )
         return (*self._steps.guided(), turn)
 
@@ -177,6 +186,9 @@ class Paparazzi:
         """Fly over home in GUIDED at the present height, then land; mode HOME does not land."""
         if not self.telemetry.armed:
             return ()
+        if not self.telemetry.flying:
+            return self._takeoff_and_landing.stop_on_ground()
+        self._steps.check_position("return home")
         home = self.telemetry.home
         if home is None:
             raise Refused(self.name, "return home", "it has not reported its home")
@@ -195,12 +207,12 @@ class Paparazzi:
         """Enter ATTITUDE_DIRECT with manual control repeated; in the air not with an idle throttle."""
         self._setpoints.hold_any()
         check_throttle(self.telemetry, self._setpoints.held)
-        return (self._steps.change_mode(ATTITUDE_MODE),)
+        return (self._steps.check_settings(), self._steps.heard(), self._steps.change_mode(ATTITUDE_MODE))
 
     def altitude_hold(self) -> Sequence[Step]:
         """Enter ATTITUDE_RC_CLIMB with manual control repeated."""
         self._setpoints.hold_any()
-        return (self._steps.change_mode(HEIGHT_MODE),)
+        return (self._steps.check_settings(), self._steps.heard(), self._steps.change_mode(HEIGHT_MODE))
 
     def manual(self) -> Sequence[Step]:
         """Raise ``CapabilityError``: this is for rovers."""

@@ -7,15 +7,15 @@ well inside that distance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import radians
+from math import isnan, radians
 
 from volery.base.errors import CapabilityError, Refused
 from volery.base.position import AMSL, AboveHome, Position
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Step
+from volery.vehicles.driver import Repeat, Step
 from volery.vehicles.drivers.paparazzi.backend import (
     COME_DOWN,
     STOP,
@@ -25,8 +25,10 @@ from volery.vehicles.drivers.paparazzi.backend import (
     Setpoint,
 )
 from volery.vehicles.drivers.paparazzi.modes import (
+    CHANGE,
     FAILSAFE,
     GUIDED,
+    HOME,
     KILL,
     LAND_BLOCK,
     NAV,
@@ -35,7 +37,9 @@ from volery.vehicles.drivers.paparazzi.modes import (
     TAKEOFF_BLOCK,
 )
 from volery.vehicles.drivers.steps import (
-    climbed_to,
+    AT_REST_M_S,
+    NEAR_UP_M,
+    at_rest,
     disarmed_step,
     horizontal_distance,
     immediate_step,
@@ -47,6 +51,11 @@ CHANGED_WITHIN: Ns = 8 * S
 """Time-out of mode changes and motors. ROTORCRAFT_STATUS arrives each 1.2 s where nothing changes."""
 SETTINGS_WITHIN: Ns = 10 * S
 BLOCK_WITHIN: Ns = 15 * S
+POSITION_WITHIN: Ns = 5 * S
+HEARD_WITHIN: Ns = 4 * S
+"""Time-out until sticks by datalink count as a transmitter, which the status shows each 1.2 s."""
+BLOCK_REPORTED_WITHIN: Ns = 5 * S
+"""Time without ROTORCRAFT_NAV_STATUS, which is sent each 1.6 s, after which it is not waited for."""
 
 LIFTED_M = 1.0
 """Height above the ground at which the take-off block is done."""
@@ -54,6 +63,19 @@ SINKING_M_S = 0.8
 """Rate of descent in GUIDED; the blocks of the stock plan use the same."""
 WELL_INSIDE = 0.9
 """Share of the distance at which NAV turns back, inside which blocks are flown."""
+
+OVERSHOT_M, CREEPING_M_S = 1.0, 0.1
+"""Error of height and rate with which a climb is over: it overshoots by 0.65 m and comes back at 0.01 m/s."""
+SUNK_M = 0.5
+NOT_SINKING_FOR: Ns = 10 * S
+"""Time in which FAILSAFE must lower the height by ``SUNK_M``; it should descend at 1.5 m/s."""
+
+WATCH_PERIOD: Ns = 250 * MS
+STANDING_M_S = 0.1
+STANDING_FOR: Ns = S
+STANDING_UNWEIGHED_FOR: Ns = 3 * S
+CARRIED = 0.85
+"""Share of the thrust of a steady descent below which a vehicle that does not move stands on the ground."""
 
 TRANSMITTER = (
     "if a transmitter is on, put its mode switch into the third position (AUTO2) or switch it off: "
@@ -84,14 +106,43 @@ class PaparazziSteps:
             done=lambda seen: seen.mode == mode,
             within=CHANGED_WITHIN,
             skippable=True,
+            answer=CHANGE,
             again=S,
             enters=mode,
-            advice=TRANSMITTER,
+            advice=TRANSMITTER if self.decoder.transmitter else "",
         )
 
-    def guided(self) -> tuple[Step, Step]:
+    def guided(self) -> tuple[Step, ...]:
         """Return steps that enter GUIDED and only then release manual control."""
-        return self.change_mode(GUIDED), self.release()
+        return self.check_settings(), self.change_mode(GUIDED), self.release()
+
+    def heard(self) -> Step:
+        """Return a step that waits until sticks by datalink count; without them no mode obeys them."""
+        return Step(
+            ask="take its sticks from the datalink",
+            send=send_nothing,
+            done=lambda seen: self.decoder.transmitter,
+            within=HEARD_WITHIN,
+            skippable=True,
+            advice="it must be built to take radio control from the datalink (RC_UP)",
+        )
+
+    def check_position(self, asked: str) -> None:
+        """Raise ``Refused`` if it has no position that counts."""
+        lack = self.decoder.lacks_position()
+        if lack:
+            raise Refused(self.telemetry.name, asked, f"{lack}; land() needs no position")
+
+    def locate(self) -> Step:
+        """Return a step that waits for a position that counts."""
+        return Step(
+            ask="tell its position",
+            send=send_nothing,
+            done=lambda seen: not self.decoder.lacks_position(),
+            within=POSITION_WITHIN,
+            skippable=True,
+            advice="a position without a 3D fix counts for nothing",
+        )
 
     def release(self) -> Step:
         """Return a step that releases manual control."""
@@ -105,21 +156,16 @@ class PaparazziSteps:
             done=lambda seen: self.decoder.settings_checked,
             within=SETTINGS_WITHIN,
             skippable=True,
+            fails=self.backend.wrong_setting,
             advice="it must answer GET_SETTING, and number its settings as in its XML: aircraft=PATH",
         )
 
     def start_motors(self) -> Step:
-        """Return a step that arms in the present mode; from KILL, where motors do not start, in GUIDED."""
-
-        def send() -> None:
-            if self.telemetry.mode == KILL:
-                self.backend.set_mode(GUIDED)
-            self.backend.set_motors(True)
-
+        """Return a step that arms in the present mode. Arming that ends in FAILSAFE is none."""
         return Step(
             ask="arm",
-            send=send,
-            done=lambda seen: seen.armed,
+            send=lambda: self.backend.set_motors(True),
+            done=lambda seen: seen.armed and not seen.failsafe,
             within=CHANGED_WITHIN,
             skippable=True,
             answer=START,
@@ -151,17 +197,19 @@ class PaparazziSteps:
         return self.yaw if self.yaw is not None else radians(self.telemetry.attitude.heading)
 
     def spot(self) -> tuple[float, float]:
-        """Return north, east of the present position; the origin before the first position."""
+        """Return north, east of the present position. Raises ``Refused`` without one that counts."""
+        self.check_position("stay over its place")
         here = self.telemetry.position
-        return self._ned(here)[:2] if here is not None else (0.0, 0.0)
+        assert here is not None, "a position that counts was received"
+        return self._ned(here)[:2]
 
     def at(self, goal: Position) -> Setpoint:
         """Return the set-point of *goal* with the commanded heading."""
         return Setpoint(*self._ned(goal), self.heading())
 
     def stay(self) -> None:
-        """Send the present position as set-point."""
-        if self.telemetry.position is not None:
+        """Send the present position as set-point, if it counts."""
+        if self.telemetry.position is not None and not self.decoder.lacks_position():
             self.backend.send_setpoint(self.at(self.telemetry.position))
 
     def _ned(self, place: Position) -> tuple[float, float, float]:
@@ -208,6 +256,68 @@ class TakeoffAndLanding:
             return True
         return horizontal_distance(telemetry.position, telemetry.home) <= WELL_INSIDE * farthest
 
+    # -- motors on the ground
+
+    def arm(self, *, by_hand: bool) -> Sequence[Step]:
+        """Return steps that start the motors on the ground, and nothing else.
+
+        In GUIDED the aircraft lifts off as soon as its motors run, and in NAV it flies the present block: it
+        is armed in NAV, in the block that starts the motors or in an earlier one.
+
+        Args:
+            by_hand: it is or will be in a mode of sticks.
+
+        Raises:
+            Refused: without a fix NAV becomes FAILSAFE and KILL; too far from home it would fly there.
+        """
+        steps, telemetry = self._steps, self._telemetry
+        in_place = (steps.check_settings(), steps.start_motors())
+        in_nav = telemetry.mode in {NAV, GUIDED, KILL, FAILSAFE, HOME}
+        if by_hand or telemetry.armed or not in_nav:
+            return in_place
+        if not steps.decoder.good_fix:
+            said = f"it has no 3D fix ({telemetry.fix or 'none reported'}): it would stop its motors again"
+            raise Refused(telemetry.name, "arm", said)
+        waits = 0 <= steps.decoder.block[1] <= self._backend.aircraft.block(self._blocks.start).number
+        if telemetry.mode == NAV and waits:
+            return (in_place[0], replace(in_place[1], mode=NAV))
+        if not self._by_plan():
+            said = f"in {telemetry.mode} it would lift off, in NAV fly home; takeoff(height) instead"
+            raise Refused(telemetry.name, "arm", said)
+        return (in_place[0], steps.change_mode(NAV), self._start_block())
+
+    def stop_on_ground(self) -> Sequence[Step]:
+        """Return steps that stop the motors of an aircraft that a newer status still shows on the ground."""
+        steps, telemetry = self._steps, self._telemetry
+        asked_at: list[Ns] = []
+
+        def send() -> None:
+            if not asked_at:
+                asked_at.append(steps.kernel.now())
+            if steps.decoder.status_at > asked_at[0] and not telemetry.flying:
+                self._backend.set_motors(False)
+
+        stop = replace(
+            steps.stop_motors(),
+            ask="disarm on the ground",
+            send=send,
+            again=WATCH_PERIOD,
+            fails=lambda: "it has lifted off meanwhile; land() again" if telemetry.flying else "",
+        )
+        return (steps.check_settings(), stop, steps.release())
+
+    def _stop_when_down(self) -> Repeat:
+        """Return a repetition that stops motors which go on running after a status without flight."""
+        began = self._steps.kernel.now()
+
+        def stop() -> None:
+            telemetry = self._telemetry
+            landed = self._steps.decoder.status_at > began and telemetry.armed and not telemetry.flying
+            if landed and at_rest(telemetry):
+                self._backend.set_motors(False)
+
+        return Repeat(2 * WATCH_PERIOD, stop)
+
     # -- take-off
 
     def climb(self, height: float, within: Ns) -> Sequence[Step]:
@@ -224,22 +334,24 @@ class TakeoffAndLanding:
         straight_up = Step(
             ask=f"climb to {height:g} m",
             send=send,
-            done=climbed_to(height),
+            done=_climbed_to(height),
             within=within,
             again=S,
             mode=GUIDED,
             armed=True,
+            fails=steps.decoder.lacks_position,
         )
         if self._by_plan():
-            enter = steps.change_mode(NAV)
-            return (enter, self._start_block(), self._takeoff_block(within), *steps.guided(), straight_up)
-        return (*steps.guided(), replace(steps.start_motors(), mode=GUIDED), straight_up)
+            enter = (steps.locate(), steps.check_settings(), steps.change_mode(NAV))
+            return (*enter, self._start_block(), self._takeoff_block(within), *steps.guided(), straight_up)
+        start = replace(steps.start_motors(), mode=GUIDED)
+        return (steps.locate(), *steps.guided(), start, straight_up)
 
     def _start_block(self) -> Step:
         return Step(
             ask="start the motors",
             send=lambda: self._backend.enter_block(self._blocks.start),
-            done=lambda seen: seen.armed,
+            done=lambda seen: seen.armed and not seen.failsafe,
             within=BLOCK_WITHIN,
             skippable=True,
             again=2 * S,
@@ -271,6 +383,8 @@ class TakeoffAndLanding:
         """Return steps that land in place; without a fix in FAILSAFE, which needs no position."""
         steps = self._steps
         steps.yaw = None
+        if not self._telemetry.flying:
+            return self.stop_on_ground()
         if steps.decoder.good_fix:
             return self.land_by_plan(within) if self._by_plan() else self._descend(within)
 
@@ -279,17 +393,45 @@ class TakeoffAndLanding:
             self._backend.send_emergency(COME_DOWN)
 
         enter = steps.change_mode(FAILSAFE, fail_safely)
-        return (enter, steps.release(), disarmed_step("land", FAILSAFE, within, (KILL,)))
+        sink = replace(
+            disarmed_step("land", FAILSAFE, within, (KILL,)),
+            done=lambda seen: not seen.armed or steps.decoder.good_fix,
+            fails=self._sinking(),
+        )
+        # FAILSAFE may keep its height: once there is a fix again, the plan lands it
+        by_plan = (replace(step, skippable=True) for step in self.land_by_plan(within))
+        return (steps.check_settings(), enter, steps.release(), sink, *by_plan)
+
+    def _sinking(self) -> Callable[[], str]:
+        """Return a function that tells in words that FAILSAFE does not sink."""
+        lowest: list[tuple[Ns, float]] = []
+
+        def tell() -> str:
+            seen, now = self._telemetry, self._steps.kernel.now()
+            if seen.mode != FAILSAFE or isnan(seen.above_home):
+                lowest.clear()
+            elif not lowest or seen.above_home < lowest[0][1] - SUNK_M:
+                lowest[:] = [(now, seen.above_home)]
+            elif now - lowest[0][0] > NOT_SINKING_FOR:
+                seconds = to_seconds(now - lowest[0][0])
+                return (
+                    f"in FAILSAFE it does not sink: {seen.above_home:.1f} m above home after {seconds:.0f} s"
+                    f"; land() again once it has a fix, or fly it by hand"
+                )
+            return ""
+
+        return tell
 
     def land_by_plan(self, within: Ns) -> Sequence[Step]:
         """Return steps that land by the landing block."""
         steps = self._steps
         enter = self._landing_block()
         return (
+            steps.check_settings(),
             enter,
-            steps.change_mode(NAV),
+            replace(steps.change_mode(NAV), done=lambda seen: seen.mode == NAV or not seen.armed),
             steps.release(),
-            disarmed_step("land", NAV, within, (KILL,)),
+            replace(disarmed_step("land", NAV, within, (KILL,)), keep=self._stop_when_down()),
         )
 
     def _landing_block(self) -> Step:
@@ -304,7 +446,10 @@ class TakeoffAndLanding:
 
         def landing(seen: Telemetry) -> bool:
             reported_at, block = steps.decoder.block
-            return not seen.armed or (reported_at > sent_at[0] and block >= number)
+            if not seen.armed or not sent_at:
+                return not seen.armed
+            waited = steps.kernel.now() - max(sent_at[0], reported_at) > BLOCK_REPORTED_WITHIN
+            return (reported_at > sent_at[0] and block >= number) or (waited and reported_at < sent_at[0])
 
         return Step(
             ask=f"go to block {self._blocks.land!r}",
@@ -316,7 +461,10 @@ class TakeoffAndLanding:
         )
 
     def _descend(self, within: Ns) -> Sequence[Step]:
-        """Return steps that descend vertically in GUIDED until landed, then stop the motors."""
+        """Return steps that descend vertically in GUIDED until landed, then stop the motors.
+
+        The aircraft itself sees only after 12 s that it stands on the ground, and may jump meanwhile.
+        """
         steps = self._steps
         spot: list[tuple[float, float]] = []
 
@@ -333,5 +481,43 @@ class TakeoffAndLanding:
             again=S,
             mode=GUIDED,
             leads_to=(KILL,),
+            keep=Repeat(WATCH_PERIOD, _TouchDown(steps).watch),
         )
         return (*steps.guided(), descend, steps.stop_motors())
+
+
+class _TouchDown:
+    """Stops the motors of an aircraft that was sinking and now stands, carried by less thrust than before."""
+
+    def __init__(self, steps: PaparazziSteps) -> None:
+        self._steps = steps
+        self._sinking_thrust = -1  # before it sinks
+        self._standing_since: Ns | None = None
+
+    def watch(self) -> None:
+        """Judge the last position; at the touch-down stop the motors."""
+        decoder, now = self._steps.decoder, self._steps.kernel.now()
+        up = self._steps.telemetry.velocity.up
+        if up <= -SINKING_M_S / 2:
+            self._sinking_thrust = decoder.thrust
+        standing = self._sinking_thrust >= 0 and abs(up) <= STANDING_M_S and not decoder.lacks_position()
+        if not standing:
+            self._standing_since = None
+            return
+        if self._standing_since is None:
+            self._standing_since = now
+        needed = STANDING_FOR if self._sinking_thrust > 0 else STANDING_UNWEIGHED_FOR
+        carried = decoder.thrust <= CARRIED * self._sinking_thrust
+        if carried and now - self._standing_since >= needed:
+            self._steps.backend.set_motors(False)
+
+
+def _climbed_to(height: float) -> Callable[[Telemetry], bool]:
+    """Return a condition: in the air about *height* metres above home, and no longer climbing."""
+
+    def climbed(seen: Telemetry) -> bool:
+        error, rate = abs(seen.above_home - height), abs(seen.velocity.up)
+        near = error <= NEAR_UP_M and rate <= AT_REST_M_S
+        return seen.flying and (near or (error <= OVERSHOT_M and rate <= CREEPING_M_S))
+
+    return climbed

@@ -17,6 +17,7 @@ from volery.base.frames import geodetic_to_ecef
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.link import Frame, Link
+from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import entry_value
 from volery.vehicles.drivers.paparazzi import open_driver
@@ -29,6 +30,9 @@ NAMES = {number: name for name, number in NUMBERS.items()}
 FIRST_STEADY_BLOCK, START, TAKEOFF, STANDBY, LAND_HERE, FLARE, LANDED = 2, 3, 4, 5, 13, 15, 16
 OTHER_SETTING = 1.0
 FARTHEST_M = 150.0
+HOVER_THRUST = 6040.0
+THRUST_LOST = 50.0
+"""Thrust that it loses in 0.1 s on the ground while it is to sink: it sees after 12 s that it has landed."""
 
 
 @dataclass
@@ -49,6 +53,7 @@ class Craft:
     auto2: int = 13
     placed: bool = True
     volts: float = 12.25
+    thrust: float = 0.0
 
 
 @dataclass
@@ -62,7 +67,14 @@ class FakePaparazzi:
     kind: int = 2
     craft: Craft = field(default_factory=Craft)
     numbers: dict[int, str] = field(
-        default_factory=lambda: {0: "auto2", 1: "kill_throttle", 2: "power", 3: "mode"}
+        default_factory=lambda: {
+            0: "telemetry",
+            1: "video",
+            2: "gps",
+            3: "auto2",
+            4: "kill_throttle",
+            5: "mode",
+        }
     )
     locked: set[str] = field(default_factory=set)
     deaf: bool = False
@@ -70,6 +82,11 @@ class FakePaparazzi:
     received: list[Frame] = field(default_factory=list)
     sticks_at: int = -(10**12)
     transmitter: bool = False
+    fingerprint: tuple[int, ...] = stock_aircraft().fingerprint
+    sticks_by_datalink: bool = True
+    lands_late: bool = False
+    on_ground: Callable[[], object] = bool
+    silenced: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.link.receive(self._receive)
@@ -88,11 +105,11 @@ class FakePaparazzi:
     # -- speaking
 
     def say(self, name: str, **fields: Any) -> None:
-        if not self.mute:
+        if not self.mute and name not in self.silenced:
             self.link.send(Frame(name, fields, AIRCRAFT, 0))
 
     def _alive(self) -> None:
-        self.say("ALIVE", md5sum=tuple(range(16)))
+        self.say("ALIVE", md5sum=self.fingerprint)
 
     def _fp(self) -> None:
         craft = self.craft
@@ -106,6 +123,7 @@ class FakePaparazzi:
             vnorth=round(north * 2**19),
             vup=round(up * 2**19),
             psi=round(craft.psi * 4096),
+            thrust=round(craft.thrust),
         )
 
     def status(self) -> None:
@@ -172,11 +190,11 @@ class FakePaparazzi:
             self.craft.auto2 = int(value)
             if self._hears_sticks():
                 self.enter(NAMES[int(value)])
-        elif name == "mode" and (not self._hears_sticks() or value <= 2):
-            self.enter(NAMES[int(value)])
+        elif name == "mode" and not self._refuses(value):
+            self.craft.mode = NAMES[int(value)]
         elif name == "kill_throttle":
             self._motors(value == 0.0)
-        self.say("DL_VALUE", index=fields["index"], value=value)
+        self._get_setting(fields)
 
     def _block(self, fields: dict[str, Any]) -> None:
         craft = self.craft
@@ -197,17 +215,27 @@ class FakePaparazzi:
         elif fields["flags"] == 0xE0:
             craft.velocity = fields["x"], fields["y"], -fields["z"]
         elif fields["flags"] == 0x40:
-            craft.north, craft.east, craft.velocity = fields["x"], fields["y"], (0.0, 0.0, -fields["z"])
+            craft.north, craft.east = fields["x"], fields["y"]
+            craft.velocity = (0.0, 0.0, -fields["z"] if craft.up > 0.0 else 0.0)
 
-    def _rc_4ch(self, fields: dict[str, Any]) -> None:
-        self.sticks_at = self.kernel.now()
-        if fields["mode"] == 2 and self.craft.mode != NAMES[self.craft.auto2]:
+    def _rc_up(self, fields: dict[str, Any]) -> None:
+        if self.sticks_by_datalink:
+            self.sticks_at = self.kernel.now()
+        if (
+            self._hears_sticks()
+            and fields["channels"][4] == 127
+            and self.craft.mode != NAMES[self.craft.auto2]
+        ):
             self.enter(NAMES[self.craft.auto2])
 
     def _emergency_cmd(self, fields: dict[str, Any]) -> None:
         if fields["cmd"] == 0:
             self._motors(False)
             self.enter("KILL")
+
+    def _refuses(self, mode: float) -> bool:
+        """Refuse modes of sticks without a transmitter, and modes of the computer with one."""
+        return mode > 2 and (self._hears_sticks() or mode not in (13, 19))
 
     # -- flying
 
@@ -217,6 +245,8 @@ class FakePaparazzi:
     def _motors(self, on: bool) -> None:
         craft = self.craft
         craft.armed = on and craft.mode != "KILL" and craft.arming == "WAITING"
+        if craft.armed and craft.mode == "GUIDED" and not craft.flying:
+            craft.flying, craft.up = True, 0.5
         craft.flying = craft.flying and craft.armed
 
     def enter(self, mode: str) -> None:
@@ -233,7 +263,10 @@ class FakePaparazzi:
             craft.up + up / 10,
         )
         if craft.mode == "GUIDED" and craft.up < 0.0:
-            craft.up, craft.velocity, craft.flying = 0.0, (0.0, 0.0, 0.0), False
+            craft.up, craft.velocity, craft.flying = 0.0, (0.0, 0.0, 0.0), self.lands_late
+            self.on_ground()
+        carried = HOVER_THRUST if craft.up > 0.0 else max(0.0, craft.thrust - THRUST_LOST)
+        craft.thrust = carried if craft.armed else 0.0
         if craft.mode == "NAV" and craft.flying and craft.north**2 + craft.east**2 > FARTHEST_M**2:
             self.enter("HOME")
         if craft.mode == "NAV" and craft.armed:

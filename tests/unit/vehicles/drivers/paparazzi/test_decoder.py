@@ -43,6 +43,7 @@ def listener() -> Listener:
 
 
 def test_a_position_is_scaled_and_placed(listener: Listener) -> None:
+    listener.hear("ROTORCRAFT_STATUS", **STATUS)
     listener.hear("INS_REF", **ORIGIN)
     listener.hear(
         "ROTORCRAFT_FP",

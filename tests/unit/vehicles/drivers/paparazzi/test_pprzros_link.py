@@ -93,9 +93,9 @@ def test_sticks_go_on_although_the_component_does_something_else(peer: Any) -> N
         drone.takeoff(10)
         drone.manual_control(0.0, 0.0, 0.5, 0.0)
         drone.altitude_hold()
-        before = len(at.aircraft.sent("RC_4CH"))
+        before = len(at.aircraft.sent("RC_UP"))
         sleep(at.kernel, 5 * S)
-        assert len(at.aircraft.sent("RC_4CH")) >= before + 40
+        assert len(at.aircraft.sent("RC_UP")) >= before + 40
 
     at.fly(mission)
 
