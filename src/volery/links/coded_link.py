@@ -11,7 +11,6 @@ import select
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Protocol
 
 from volery.base.time import MS, Ns, S
@@ -24,7 +23,14 @@ FIRST_RETRY: Ns = 500 * MS
 LONGEST_RETRY: Ns = 5 * S
 MAX_UNSENT = 65_536
 """Bytes that wait for a slow connection. Data beyond this is dropped, as a radio drops it."""
+MAX_UNHANDLED = 262_144
+"""Received bytes of one connection that wait for the kernel. What exceeds this stays in the socket, so that a
+TCP sender is slowed down and datagrams are dropped."""
+_OVERHEAD = 256
+"""Bytes that a waiting callback itself takes, about."""
 _JOIN_S = 5.0
+CONNECTION_FAULTS = (OSError, ValueError, OverflowError)
+"""What opening a connection raises; the last two for a name or a number that the system refuses."""
 
 
 class CodedLink(ABC):
@@ -89,7 +95,7 @@ class CodedLink(ABC):
 
 
 class ReaderThread:
-    """A thread that runs *body* from ``start`` to ``stop``. *body* may block only in ``readable``.
+    """A thread that runs *body* from ``start`` to ``stop``. *body* may block only in this class's methods.
 
     *body* may post to the kernel before ``start`` has returned, so start the thread when its owner is
     complete.
@@ -98,6 +104,8 @@ class ReaderThread:
     def __init__(self, name: str, body: Callable[[ReaderThread], None]) -> None:
         self._wake_read, self._wake_write = os.pipe()
         self._stopped = threading.Event()
+        self._handled = threading.Condition()
+        self._unhandled = 0
         self._thread = threading.Thread(target=body, args=(self,), name=name, daemon=True)
 
     def start(self) -> None:
@@ -106,14 +114,34 @@ class ReaderThread:
 
     def readable(self, file: int) -> bool:
         """Wait until descriptor *file* can be read or has ended; return False if the thread must stop."""
-        ready, _, _ = select.select([file, self._wake_read], [], [])
+        poll = select.poll()  # select() refuses descriptors above 1023
+        poll.register(file, select.POLLIN)
+        poll.register(self._wake_read, select.POLLIN)
+        ready = [descriptor for descriptor, _ in poll.poll()]
         return not self._stopped.is_set() and file in ready
+
+    def post(self, kernel: Kernel, handle: Callable[[bytes], None], data: bytes) -> None:
+        """Let *kernel* call *handle* with *data*; wait first while ``MAX_UNHANDLED`` bytes wait."""
+        size = len(data) + _OVERHEAD
+        with self._handled:
+            self._handled.wait_for(lambda: self._unhandled < MAX_UNHANDLED or self._stopped.is_set())
+            self._unhandled += size
+
+        def handle_and_count() -> None:
+            with self._handled:
+                self._unhandled -= size
+                self._handled.notify()
+            handle(data)
+
+        kernel.post(handle_and_count)
 
     def stop(self) -> None:
         """Stop the thread and wait for its end. Must not be called from the thread itself."""
         if self._stopped.is_set():
             return
         self._stopped.set()
+        with self._handled:
+            self._handled.notify()
         os.write(self._wake_write, b"!")
         self._thread.join(_JOIN_S)
         if not self._thread.is_alive():
@@ -156,10 +184,10 @@ class StreamLink(CodedLink):
 
     @abstractmethod
     def _open(self) -> ByteStream:
-        """Open the stream. Runs in the reader thread and raises ``OSError``."""
+        """Open the stream. Runs in the reader thread and raises one of ``CONNECTION_FAULTS``."""
 
     @abstractmethod
-    def _explain(self, error: OSError) -> str:
+    def _explain(self, error: Exception) -> str:
         """Return why the stream could not be opened or broke, and the remedy."""
 
     def _connection_problem(self) -> str:
@@ -170,7 +198,7 @@ class StreamLink(CodedLink):
     def _open_and_read(self, reader: ReaderThread) -> None:
         try:
             stream = self._open()
-        except OSError as error:
+        except CONNECTION_FAULTS as error:
             problem = self._explain(error)
             self._kernel.post(lambda: self._on_down(reader, None, problem))
             return
@@ -184,7 +212,7 @@ class StreamLink(CodedLink):
                 data = stream.read()
                 if not data:
                     return "the other side closed the connection"
-                self._kernel.post(partial(self.arrived, data))
+                reader.post(self._kernel, self.arrived, data)
         except OSError as error:
             return self._explain(error)
         return "closed"

@@ -43,7 +43,9 @@ class SerialLink(StreamLink):
     def _open(self) -> ByteStream:
         return _SerialStream(serial.Serial(self._device, self._baud, timeout=0, write_timeout=0))
 
-    def _explain(self, error: OSError) -> str:
+    def _explain(self, error: Exception) -> str:
+        if not isinstance(error, OSError):
+            return f"{self._device}: {error}"
         if isinstance(error, serial.SerialException) and error.errno is None:
             return f"{self._device}: {error}"
         if error.errno == 2:

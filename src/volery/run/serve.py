@@ -14,6 +14,7 @@ from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
 from volery.simulation.autopilots.firmware import firmwares
+from volery.trace.events import Event, LinkState
 from volery.vehicles.address import Address, listen, parse_listen
 
 
@@ -32,15 +33,23 @@ class VehicleServer:
         address: Where to serve it; None for the addresses at which ground stations expect its firmware.
         speed: Simulated seconds per second.
         seed: Seed of the simulation.
+        notice: Receives a line for the user when a link has no room for a client.
 
     Raises:
         UsageError: The address cannot be opened, or the firmware has no links.
     """
 
     def __init__(
-        self, wanted: SimulatedVehicle, address: Address | None, *, speed: float = 1.0, seed: int = 1
+        self,
+        wanted: SimulatedVehicle,
+        address: Address | None,
+        *,
+        speed: float = 1.0,
+        seed: int = 1,
+        notice: Callable[[str], None] = lambda line: None,
     ) -> None:
-        self.kernel = VirtualKernel(pace=speed)
+        self._notice = notice
+        self.kernel = VirtualKernel(self._record, pace=speed)
         self.fleet: SimulatedFleet = fleet_of(self.kernel, [wanted], seed)
         name = wanted.vehicle.name
         self._autopilot = self.fleet.autopilots[name]
@@ -54,6 +63,10 @@ class VehicleServer:
             link = listen(self.kernel, one, on_connect=partial(self._greet, place), codec=codec)
             self.links.append(link)
             self._autopilot.connect(link, use=use)
+
+    def _record(self, event: Event) -> None:
+        if isinstance(event, LinkState) and event.state == "full":
+            self._notice(f"{event.link}: {event.detail}")
 
     def _greet(self, place: int) -> None:
         self.links[place].send_bytes(self._autopilot.banner)

@@ -4,6 +4,7 @@
 sim:ardupilot?home=46.0828,-103.899,900     simulated in this program
 ardupilot+tcp://127.0.0.1:5760              connects to a server
 ardupilot+udp://:14550                      binds the port and answers the first sender
+ardupilot+udp://:14550?bind=127.0.0.1       the same, for senders on this computer only
 ardupilot+udp://10.0.0.7:14551              sends to a host
 ardupilot+serial:///dev/ttyUSB0?baud=57600  a radio or a cable
 mavros+graph:///drone_1                     topics and services of a graph, below that namespace
@@ -16,6 +17,7 @@ simulated vehicles and graphs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -40,14 +42,15 @@ EXAMPLES = (
 DEFAULT_BAUD = 57_600
 USUAL_BAUD = {"pprzlink": 115_200}
 """Default baud rate by protocol, where it differs."""
-ANY_HOST = "0.0.0.0"
+LOCAL_ADDRESS = "bind"
+"""Option of a UDP address without a host: the local address to listen at, else all addresses."""
 LOCAL_PORT = "from"
 """Option of a UDP address with a host: the local port to send from and listen at."""
 REPLY_PORT = "uplink"
 """Option of a UDP address without a host: port for replies, if it differs from the sender's."""
 LAST_PORT = 65_535
 
-MAVLINK_OPTIONS = ("attitude", "baud", "rate", "system", "texts")
+MAVLINK_OPTIONS = ("attitude", "baud", LOCAL_ADDRESS, "rate", "system", "texts")
 """Options of MAVLink drivers: ``rate`` of the position and ``attitude`` in Hz, ``system`` id, and
 ``texts=unrecorded`` if the autopilot records its texts itself, as a simulated one does.
 """
@@ -88,9 +91,12 @@ class Address:
         if given is None:
             return default
         try:
-            return float(given)
+            number = float(given)
         except ValueError:
-            raise UsageError(f"{self.text}: {option}={given!r} is not a number") from None
+            number = math.nan
+        if not math.isfinite(number):
+            raise UsageError(f"{self.text}: {option}={given!r} is not a number")
+        return number
 
     def numbers(self, option: str, count: int) -> tuple[float, ...] | None:
         """Return an option as *count* comma-separated numbers, or ``None`` if it is not given."""
@@ -101,7 +107,7 @@ class Address:
             numbers = tuple(float(part) for part in given.split(","))
         except ValueError:
             numbers = ()
-        if len(numbers) != count:
+        if len(numbers) != count or not all(map(math.isfinite, numbers)):
             raise UsageError(f"{self.text}: {option}={given!r} should be {count} numbers between commas")
         return numbers
 
@@ -191,6 +197,10 @@ def _check_socket(address: Address) -> None:
         raise UsageError(f"{address.text!r} lacks the port, as in {address.transport}://127.0.0.1:5760")
     if address.transport == "tcp" and not address.host:
         raise UsageError(f"{address.text!r} lacks the host, as in tcp://127.0.0.1:{address.port}")
+    try:
+        _ = address.host.encode("idna")
+    except UnicodeError as error:
+        raise UsageError(f"{address.text!r}: {address.host!r} is no name of a host ({error})") from None
     if address.path.strip("/"):
         raise UsageError(f"{address.text!r}: {address.path!r} means nothing after HOST:PORT")
 
@@ -216,7 +226,8 @@ def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, share
         if shared and not address.host:
             if REPLY_PORT in address.options:
                 raise UsageError(f"{address}: {REPLY_PORT} is for one vehicle behind a port, not for several")
-            return UdpServer(kernel, ANY_HOST, _port(address), address.text, codec=codec)
+            local = address.options.get(LOCAL_ADDRESS, "")
+            return UdpServer(kernel, local, _port(address), address.text, codec=codec)
         return _udp(kernel, address, codec)
     if address.transport == "serial":
         baud = address.number("baud", USUAL_BAUD.get(codec.name, DEFAULT_BAUD))
@@ -245,16 +256,19 @@ def listen(
         address.only()
         host, port = address.host, _port(address)
         return TcpServer(kernel, host, port, address.text, on_connect=on_connect, codec=codec)
-    address.only(LOCAL_PORT)
+    address.only(*(() if address.host else (LOCAL_ADDRESS,)), LOCAL_PORT)
     return _udp(kernel, address, codec)
 
 
 def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
     if address.host:
         local = _port_option(address, LOCAL_PORT)
-        return UdpLink(kernel, ANY_HOST, local, (address.host, _port(address)), address.text, codec=codec)
+        if LOCAL_ADDRESS in address.options:
+            raise UsageError(f"{address}: {LOCAL_ADDRESS} is for udp://:PORT, which listens; this one sends")
+        return UdpLink(kernel, "", local, (address.host, _port(address)), address.text, codec=codec)
     reply = _port_option(address, REPLY_PORT) or None
-    return UdpLink(kernel, ANY_HOST, _port(address), None, address.text, codec=codec, answers_to=reply)
+    bound = address.options.get(LOCAL_ADDRESS, "")
+    return UdpLink(kernel, bound, _port(address), None, address.text, codec=codec, answers_to=reply)
 
 
 def _port_option(address: Address, name: str) -> int:
@@ -309,6 +323,6 @@ def system_option(options: Mapping[str, str]) -> int | None:
     given = options.get("system")
     if given is None:
         return None
-    if not given.isdigit() or not 1 <= int(given) <= 255:
+    if not (given.isdecimal() and len(given) <= 3 and 1 <= int(given) <= 255):
         raise UsageError(f"system={given!r} is no system id from 1 to 255")
     return int(given)

@@ -21,7 +21,7 @@ from volery.links.link import Frame
 from volery.links.mavlink_codec import encode
 from volery.links.serial_link import SerialLink
 from volery.links.tcp_link import TcpClient, TcpServer
-from volery.links.udp_link import UdpLink
+from volery.links.udp_link import UdpLink, UdpServer
 from volery.trace.events import LinkState
 from volery.vehicles.address import listen, open_link, parse, parse_listen
 
@@ -188,6 +188,48 @@ def test_a_bound_udp_link_answers_the_first_sender_only(bench: Bench) -> None:
     bench.until(lambda: len(bench.received[bound]) == 2)  # the other's was not one of them
     assert bench.received[other] == []
     assert bound.problem() == first.problem() == ""
+
+
+def test_a_link_to_a_udp_peer_on_loopback_is_bound_there_and_receives_the_peer_only(
+    bench: Bench,
+) -> None:
+    with (
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as peer,
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as spoofer,
+    ):
+        peer.bind((HERE, 0))
+        ours = UdpLink(bench.kernel, "", 0, ("localhost", peer.getsockname()[1]))
+        bench.add(ours)
+        assert ours._socket.getsockname()[0] == HERE
+        for sender, frame in ((spoofer, ASK), (peer, BEAT)):
+            sender.sendto(encode(frame, 0), (HERE, ours.port))
+        bench.until(lambda: bench.received[ours])
+        assert [frame.system for frame in bench.received[ours]] == [BEAT.system]
+
+
+def test_a_udp_port_is_bound_where_the_address_says(bench: Bench) -> None:
+    bound = open_link(bench.kernel, parse(f"ardupilot+udp://:{free_port()}?bind={HERE}"))
+    bench.add(bound)
+    assert isinstance(bound, UdpLink)
+    assert bound._socket.getsockname()[0] == HERE
+    with pytest.raises(UsageError, match="bind is for udp://:PORT"):
+        open_link(bench.kernel, parse(f"ardupilot+udp://{HERE}:14550?bind={HERE}"))
+
+
+def test_a_udp_server_takes_the_frames_of_a_system_from_one_address(bench: Bench) -> None:
+    server = UdpServer(bench.kernel, HERE, 0)
+    bench.add(server)
+    with (
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as vehicle,
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as spoofer,
+    ):
+        forged = BEAT._replace(fields={**BEAT.fields, "type": 99})
+        vehicle.sendto(encode(BEAT, 0), (HERE, server.port))
+        bench.until(lambda: bench.received[server])
+        spoofer.sendto(encode(forged, 0), (HERE, server.port))
+        spoofer.sendto(encode(ASK, 1), (HERE, server.port))
+        bench.until(lambda: len(bench.received[server]) == 2)
+        assert [frame.system for frame in bench.received[server]] == [BEAT.system, ASK.system]
 
 
 def test_a_udp_port_that_is_taken(bench: Bench) -> None:

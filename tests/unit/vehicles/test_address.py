@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import UsageError
-from volery.vehicles.address import Address, parse, parse_listen
+from volery.vehicles.address import Address, open_link, parse, parse_listen, system_option
 
 
 @pytest.mark.parametrize(
@@ -65,3 +65,21 @@ def test_addresses_to_listen_at() -> None:
     assert parse_listen("udp://:14550") == Address("", "udp", "", 14550)
     with pytest.raises(UsageError, match="not 'serial'"):
         parse_listen("serial:///dev/ttyUSB0")
+
+
+@pytest.mark.parametrize("host", ["a" * 300, "..", ".", "x..y"])
+def test_a_host_that_no_name_server_takes_is_refused(host: str) -> None:
+    with pytest.raises(UsageError, match="no name of a host"):
+        parse(f"ardupilot+tcp://{host}:5760")
+
+
+@pytest.mark.parametrize("baud", ["inf", "1e400", "nan", "-inf", "9" * 100_000])
+def test_a_baud_rate_that_is_not_finite_is_refused(baud: str) -> None:
+    with pytest.raises(UsageError, match="baud="):
+        open_link(None, parse(f"ardupilot+serial:///dev/null?baud={baud}"))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("system", ["²", "9" * 5000, "0", "256"])
+def test_a_system_id_that_is_none_is_refused(system: str) -> None:
+    with pytest.raises(UsageError, match="no system id"):
+        system_option({"system": system})

@@ -59,7 +59,7 @@ def serve(
     server: VehicleServer | VehicleNodeServer
     if not graph and has_links(autopilot):
         address = None if listen is None else parse_listen(listen)
-        server = VehicleServer(vehicle, address, speed=speed, seed=seed)
+        server = VehicleServer(vehicle, address, speed=speed, seed=seed, notice=output.note)
         lines = [
             f"serving {autopilot} ({kind}) at {speed:g}× real time; Ctrl-C stops it",
             *how_to_connect(server.protocol, server.addresses, autopilot),
